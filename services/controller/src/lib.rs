@@ -1,0 +1,1 @@
+//! The velocity synchroniser: guidance to wheel speeds, equations (14)-(17).

@@ -1,0 +1,1 @@
+//! The on-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).

@@ -1,0 +1,1 @@
+//! The harmonic planner: hazard cells to a guidance field, equation (11).
