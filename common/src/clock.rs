@@ -1,0 +1,142 @@
+//! Mission time, the pace it runs at, and the machine's own monotonic clock.
+//!
+//! Samples carry mission time. Deadlines that guard against dead processes use [`monotonic_ns`].
+
+use std::{fmt, str::FromStr, time::Duration};
+
+use rustix::time::{ClockId, clock_gettime};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Nanoseconds since the mission began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct MissionTime(pub u64);
+
+impl MissionTime {
+    /// Seconds since the mission began.
+    #[must_use]
+    pub fn seconds(self) -> f64 {
+        self.0 as f64 * 1e-9
+    }
+
+    /// The time `seconds` after the beginning; negative and NaN give the beginning.
+    #[must_use]
+    pub fn from_seconds(seconds: f64) -> Self {
+        Self((seconds.max(0.0) * 1e9) as u64)
+    }
+
+    /// How long ago `earlier` was; zero if it lies ahead.
+    #[must_use]
+    pub fn since(self, earlier: Self) -> Duration {
+        Duration::from_nanos(self.0.saturating_sub(earlier.0))
+    }
+}
+
+/// How mission time passes in a simulated run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pace {
+    /// As fast as the machine can: each tick waits for the one before, and the run is repeatable.
+    Max,
+    /// So many times wall-clock.
+    Rate(f64),
+}
+
+/// `--pace` was neither `max` nor a rate.
+#[derive(Debug, Error)]
+#[error(
+    "pace {0:?} is neither `max` nor a rate between 0.05 and 100; give `max`, or 1 for wall-clock"
+)]
+pub struct PaceError(String);
+
+impl FromStr for Pace {
+    type Err = PaceError;
+
+    fn from_str(text: &str) -> Result<Self, PaceError> {
+        if text == "max" {
+            return Ok(Self::Max);
+        }
+        match text.parse() {
+            Ok(rate) if (0.05..=100.0).contains(&rate) => Ok(Self::Rate(rate)),
+            _ => Err(PaceError(text.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for Pace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Max => f.write_str("max"),
+            Self::Rate(rate) => write!(f, "{rate}"),
+        }
+    }
+}
+
+/// The clock the link stamps samples with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MissionClock {
+    /// Tick k happens at k periods: a simulated robot at `--pace max`.
+    Ticks {
+        /// Nanoseconds from tick to tick.
+        period_ns: u64,
+    },
+    /// Wall-clock since the epoch, times a rate: a real robot, or a simulated one at `--pace R`.
+    Wall {
+        /// [`monotonic_ns`] when the mission began.
+        epoch_ns: u64,
+        /// Mission seconds a wall-clock second.
+        rate: f64,
+    },
+}
+
+impl MissionClock {
+    /// Mission time at `tick`, when the machine's clock reads `monotonic_ns`.
+    #[must_use]
+    pub fn at(&self, tick: u64, monotonic_ns: u64) -> MissionTime {
+        match *self {
+            Self::Ticks { period_ns } => MissionTime(tick.saturating_mul(period_ns)),
+            Self::Wall { epoch_ns, rate } => {
+                MissionTime((monotonic_ns.saturating_sub(epoch_ns) as f64 * rate) as u64)
+            }
+        }
+    }
+}
+
+/// CLOCK_MONOTONIC, nanoseconds: the same for every process of the machine.
+#[must_use]
+pub fn monotonic_ns() -> u64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tick_time_does_not_look_at_the_machine() {
+        let clock = MissionClock::Ticks { period_ns: 1_000 };
+        assert_eq!(clock.at(3, 77), MissionTime(3_000));
+        assert_eq!(clock.at(3, 99_999), MissionTime(3_000));
+    }
+
+    #[test]
+    fn wall_time_runs_from_the_epoch_at_its_rate() {
+        let clock = MissionClock::Wall {
+            epoch_ns: 1_000,
+            rate: 2.0,
+        };
+        assert_eq!(clock.at(9, 1_500), MissionTime(1_000));
+        assert_eq!(clock.at(9, 500), MissionTime(0), "before the epoch");
+    }
+
+    #[test]
+    fn a_pace_is_max_or_a_sane_rate() {
+        assert_eq!("max".parse::<Pace>().unwrap(), Pace::Max);
+        assert_eq!("4".parse::<Pace>().unwrap(), Pace::Rate(4.0));
+        for bad in ["0", "-1", "nan", "inf", "fast", "1e9"] {
+            assert!(bad.parse::<Pace>().is_err(), "{bad} was accepted");
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The mission file: everything a run is told, validated before anything starts.
+//!
+//! Metres, seconds, radians inside; degrees where a person writes them (`_deg`). All positions are in
+//! the mission frame: its origin is where the robot starts and, unless `start.heading_deg` says
+//! otherwise, its x-axis is the robot's own.
+
+mod check;
+mod robot;
+mod simulation;
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+pub use check::MissionError;
+pub use robot::{Body, Channel, Model, RobotConfig, SonarConfig};
+pub use simulation::Simulation;
+
+use crate::{geometry::Shapes, grid::GridFrame, kinematics::Pose2};
+
+/// A mission as it is written. Every key but `target` has a default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mission {
+    /// What it is called; the file's own name if it says nothing.
+    #[serde(default)]
+    pub name: String,
+    /// One line for `firsthand missions`.
+    #[serde(default)]
+    pub description: String,
+    /// X_T: where to go, metres.
+    pub target: DVec2,
+    /// How near the target counts as reached, metres.
+    #[serde(default = "defaults::arrival_tolerance_m")]
+    pub arrival_tolerance_m: f64,
+    /// Mission time after which the mission is given up, seconds.
+    #[serde(default = "defaults::timeout_s")]
+    pub timeout_s: f64,
+    /// Seed of everything random in the simulation.
+    #[serde(default = "defaults::seed")]
+    pub seed: u64,
+    /// How the robot stands at the start.
+    #[serde(default)]
+    pub start: Start,
+    /// Pi: where the robot may operate, and the grid laid over it.
+    #[serde(default)]
+    pub perimeter: Perimeter,
+    /// The robot's body and where it answers.
+    #[serde(default)]
+    pub robot: RobotConfig,
+    /// The front ultrasonic sensor.
+    #[serde(default)]
+    pub sonar: SonarConfig,
+    /// From wheels to pose.
+    #[serde(default)]
+    pub dead_reckoning: DeadReckoning,
+    /// From ranges to hazard cells.
+    #[serde(default)]
+    pub mapper: Mapper,
+    /// From hazard cells to guidance.
+    #[serde(default)]
+    pub planner: Planner,
+    /// From guidance to wheel speeds.
+    #[serde(default)]
+    pub controller: Controller,
+    /// What is known of the place beforehand.
+    #[serde(default, skip_serializing_if = "Shapes::is_empty")]
+    pub known: Shapes,
+    /// What really stands there; only the simulator reads it.
+    #[serde(default, skip_serializing_if = "Shapes::is_empty")]
+    pub world: Shapes,
+    /// How the simulated robot behaves.
+    #[serde(default)]
+    pub simulation: Simulation,
+}
+
+/// How the robot stands at the start.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Start {
+    /// Heading in the mission frame, degrees counter-clockwise from x.
+    pub heading_deg: f64,
+}
+
+/// The square the robot may operate in, (18).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Perimeter {
+    /// D: side of the square, metres.
+    pub width_m: f64,
+    /// N: cells along each side.
+    pub cells: u32,
+    /// Centre of the square, metres.
+    pub centre: DVec2,
+}
+
+/// How wheel counts become a pose.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DeadReckoning {
+    /// The integration rule.
+    pub integration: Integration,
+}
+
+/// The rule that integrates (20) into (21).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integration {
+    /// Exact along the arc of constant curvature.
+    #[default]
+    Arc,
+    /// The paper's forward Euler, as (21) prints it.
+    Euler,
+}
+
+/// How range samples become hazard cells.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mapper {
+    /// Im of (19): cells around a hit that are marked with it.
+    pub margin_cells: u32,
+    /// Hits farther than this are no safety event yet, metres.
+    pub map_within_m: f64,
+}
+
+/// How the field is posed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Planner {
+    /// k: u = mean of the neighbours / (1 + k). 0 is exactly (11).
+    pub absorption: f64,
+}
+
+/// How guidance becomes wheel speeds, (14)-(17).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Controller {
+    /// vd: the most tangential speed asked for, m/s.
+    pub speed_m_s: f64,
+    /// wd: the most turn rate asked for, rad/s.
+    pub turn_rad_s: f64,
+    /// Rc: where slowing down before the target begins, metres.
+    pub slow_radius_m: f64,
+    /// |eta_c| below which an antipodal robot keeps its turning side.
+    pub dead_zone: f64,
+    /// Whether (16) modulates the speed by alignment; without it the speed is constant up to Rc.
+    pub modulated: bool,
+}
+
+mod defaults {
+    pub(super) const fn arrival_tolerance_m() -> f64 {
+        0.15
+    }
+    pub(super) const fn timeout_s() -> f64 {
+        180.0
+    }
+    pub(super) const fn seed() -> u64 {
+        1
+    }
+}
+
+impl Default for Perimeter {
+    fn default() -> Self {
+        Self {
+            width_m: 12.0,
+            cells: 120,
+            centre: DVec2::ZERO,
+        }
+    }
+}
+
+impl Default for Mapper {
+    fn default() -> Self {
+        Self {
+            margin_cells: 3,
+            map_within_m: 1.0,
+        }
+    }
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self {
+            speed_m_s: 0.25,
+            turn_rad_s: 0.8,
+            slow_radius_m: 0.4,
+            dead_zone: 0.05,
+            modulated: true,
+        }
+    }
+}
+
+impl Mission {
+    /// Parse and validate `text`; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// A [`MissionError`] that says line, key, what is wrong and the remedy.
+    pub fn parse(text: &str, origin: &Path) -> Result<Self, MissionError> {
+        check::parse(text, origin)
+    }
+
+    /// [`Mission::parse`] on a file.
+    ///
+    /// # Errors
+    /// Also when the file cannot be read.
+    pub fn load(path: &Path) -> Result<Self, MissionError> {
+        let text = std::fs::read_to_string(path).map_err(|source| MissionError::Unreadable {
+            file: PathBuf::from(path),
+            source,
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Delta = D / N and where the cells lie.
+    #[must_use]
+    pub fn grid_frame(&self) -> GridFrame {
+        GridFrame {
+            cells: self.perimeter.cells,
+            resolution_m: self.perimeter.width_m / f64::from(self.perimeter.cells),
+            centre: self.perimeter.centre,
+        }
+    }
+
+    /// The pose at mission time 0.
+    #[must_use]
+    pub fn start_pose(&self) -> Pose2 {
+        Pose2 {
+            position: DVec2::ZERO,
+            heading: self.start.heading_deg.to_radians(),
+        }
+    }
+
+    /// The body of the robot: its model with what the mission overrides.
+    #[must_use]
+    pub fn body(&self) -> Body {
+        self.robot.body()
+    }
+}

@@ -1,0 +1,498 @@
+//! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec2;
+use thiserror::Error;
+use toml::de::{DeTable, DeValue};
+
+use super::Mission;
+
+/// Why a mission was refused.
+#[derive(Debug, Error)]
+pub enum MissionError {
+    /// The file cannot be read.
+    #[error(
+        "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
+    )]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// The system's word.
+        source: std::io::Error,
+    },
+    /// It is not the TOML a mission is written in: syntax, an unknown key, a wrong type.
+    #[error("{file}:{line}: {problem}")]
+    Syntax {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: usize,
+        /// The parser's word.
+        problem: String,
+    },
+    /// A value cannot be.
+    #[error("{file}:{line}: {key}: {problem}; {remedy}")]
+    Value {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line of the key, or of the table that should hold it.
+        line: usize,
+        /// The key, dotted.
+        key: String,
+        /// What is wrong with it.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+}
+
+/// The most cells along a side: 4096 x 4096 is the largest field that is solved.
+const MAX_CELLS: u32 = 4096;
+/// Fewer cells than this leave no room between the perimeter's two sides.
+const MIN_CELLS: u32 = 10;
+/// The longest mission, seconds: a day.
+const MAX_TIMEOUT_S: f64 = 86_400.0;
+/// More shapes than this in a file are a mistake.
+const MAX_POINTS: usize = 100_000;
+
+pub(super) fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
+    let syntax = |error: &toml::de::Error| MissionError::Syntax {
+        file: origin.to_path_buf(),
+        line: error.span().map_or(1, |span| line_of(text, span.start)),
+        problem: error.message().trim().replace('\n', " "),
+    };
+    let tree = DeTable::parse(text).map_err(|error| syntax(&error))?;
+    let mut mission: Mission = toml::from_str(text).map_err(|error| syntax(&error))?;
+    if mission.name.is_empty() {
+        mission.name = origin
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    }
+    match Checker::default().run(&mission) {
+        Ok(()) => Ok(mission),
+        Err(Objection {
+            key,
+            problem,
+            remedy,
+        }) => Err(MissionError::Value {
+            file: origin.to_path_buf(),
+            line: line_of(text, span_of(tree.get_ref(), key)),
+            key: key.to_owned(),
+            problem,
+            remedy,
+        }),
+    }
+}
+
+/// 1-based line of byte `offset`.
+fn line_of(text: &str, offset: usize) -> usize {
+    let upto = &text.as_bytes()[..offset.min(text.len())];
+    1 + upto.iter().filter(|&&byte| byte == b'\n').count()
+}
+
+/// Byte offset of the deepest part of dotted `key` that the file has; a default has no line of its own.
+fn span_of(tree: &DeTable<'_>, key: &str) -> usize {
+    let mut table = tree;
+    let mut start = 0;
+    for part in key.split('.') {
+        let Some((name, value)) = table.get_key_value(part) else {
+            break;
+        };
+        start = name.span().start;
+        match value.get_ref() {
+            DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    start
+}
+
+/// A value that cannot be, before it is given a line.
+struct Objection {
+    key: &'static str,
+    problem: String,
+    remedy: String,
+}
+
+fn objection(
+    key: &'static str,
+    problem: impl Into<String>,
+    remedy: impl Into<String>,
+) -> Objection {
+    Objection {
+        key,
+        problem: problem.into(),
+        remedy: remedy.into(),
+    }
+}
+
+/// `value` must lie in `range`; NaN lies in none.
+fn within(
+    key: &'static str,
+    value: f64,
+    range: std::ops::RangeInclusive<f64>,
+    unit: &str,
+) -> Result<(), Objection> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(objection(
+        key,
+        format!("{value} {unit} is out of range"),
+        format!("give {} to {} {unit}", range.start(), range.end()),
+    ))
+}
+
+#[derive(Default)]
+struct Checker {
+    points: usize,
+}
+
+impl Checker {
+    fn run(&mut self, mission: &Mission) -> Result<(), Objection> {
+        self.perimeter(mission)?;
+        self.target(mission)?;
+        within("timeout_s", mission.timeout_s, 1.0..=MAX_TIMEOUT_S, "s")?;
+        within(
+            "start.heading_deg",
+            mission.start.heading_deg,
+            -360.0..=360.0,
+            "degrees",
+        )?;
+        robot(mission)?;
+        stages(mission)?;
+        simulation(mission)?;
+        self.shapes("known", &mission.known)?;
+        self.shapes("world", &mission.world)?;
+        start_is_free(mission)
+    }
+
+    fn perimeter(&mut self, mission: &Mission) -> Result<(), Objection> {
+        let perimeter = &mission.perimeter;
+        within("perimeter.width_m", perimeter.width_m, 0.5..=1000.0, "m")?;
+        if !(MIN_CELLS..=MAX_CELLS).contains(&perimeter.cells) {
+            return Err(objection(
+                "perimeter.cells",
+                format!("a grid of {0} x {0} cells cannot be", perimeter.cells),
+                format!("give {MIN_CELLS} to {MAX_CELLS}"),
+            ));
+        }
+        self.point("perimeter.centre", perimeter.centre)?;
+        let frame = mission.grid_frame();
+        if frame
+            .cell_at(DVec2::ZERO)
+            .is_none_or(|cell| frame.is_rim(cell))
+        {
+            return Err(objection(
+                "perimeter.centre",
+                "the robot's start (0, 0) is not inside the perimeter",
+                "move the centre or widen perimeter.width_m",
+            ));
+        }
+        Ok(())
+    }
+
+    fn target(&mut self, mission: &Mission) -> Result<(), Objection> {
+        self.point("target", mission.target)?;
+        let frame = mission.grid_frame();
+        if frame
+            .cell_at(mission.target)
+            .is_none_or(|cell| frame.is_rim(cell))
+        {
+            return Err(objection(
+                "target",
+                format!(
+                    "{} is not inside the perimeter of {} m around {}",
+                    mission.target, mission.perimeter.width_m, mission.perimeter.centre
+                ),
+                "move the target in, or widen perimeter.width_m",
+            ));
+        }
+        let half = mission.perimeter.width_m / 2.0;
+        within(
+            "arrival_tolerance_m",
+            mission.arrival_tolerance_m,
+            0.01..=half,
+            "m",
+        )
+    }
+
+    fn point(&mut self, key: &'static str, point: DVec2) -> Result<(), Objection> {
+        if point.is_finite() {
+            return Ok(());
+        }
+        Err(objection(
+            key,
+            format!("{point} is not a place"),
+            "give two finite numbers, metres",
+        ))
+    }
+
+    fn shapes(
+        &mut self,
+        key: &'static str,
+        shapes: &crate::geometry::Shapes,
+    ) -> Result<(), Objection> {
+        for drum in &shapes.drums {
+            self.point(key, drum.at)?;
+            within(key, drum.radius_m, 0.001..=1000.0, "m of drum radius")?;
+        }
+        for wall in &shapes.walls {
+            if wall.points.len() < 2 {
+                return Err(objection(
+                    key,
+                    "a wall has fewer than two points",
+                    "give two or more",
+                ));
+            }
+            for point in &wall.points {
+                self.point(key, *point)?;
+            }
+            self.points += wall.points.len();
+        }
+        for block in &shapes.boxes {
+            self.point(key, block.at)?;
+            within(key, block.size_m.x, 0.001..=1000.0, "m of box")?;
+            within(key, block.size_m.y, 0.001..=1000.0, "m of box")?;
+            within(key, block.angle_deg, -360.0..=360.0, "degrees")?;
+        }
+        self.points += shapes.drums.len() + shapes.boxes.len();
+        if self.points > MAX_POINTS {
+            return Err(objection(
+                key,
+                format!("more than {MAX_POINTS} shapes and corners"),
+                "simplify the outline",
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn robot(mission: &Mission) -> Result<(), Objection> {
+    let body = mission.body();
+    let robot = &mission.robot;
+    within("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz")?;
+    within(
+        "robot.wheel_radius_m",
+        body.wheel_radius_m,
+        0.005..=2.0,
+        "m",
+    )?;
+    within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
+    within(
+        "robot.counts_per_turn",
+        body.counts_per_turn,
+        1.0..=100_000.0,
+        "counts",
+    )?;
+    within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
+    within(
+        "robot.top_speed_m_s",
+        body.top_speed_m_s,
+        0.01..=10.0,
+        "m/s",
+    )?;
+    within(
+        "robot.command_limit_s",
+        robot.command_limit_s,
+        0.02..=5.0,
+        "s",
+    )?;
+    let (left, right) = (robot.left.channel, robot.right.channel);
+    if left > 1 || right > 1 || left == right {
+        return Err(objection(
+            "robot.left",
+            format!("wheels on channels {left} and {right}"),
+            "put one on channel 0 and one on channel 1",
+        ));
+    }
+    // A third of the counter's cycle a tick keeps wrap-around unambiguous with a tick to spare.
+    let counts = body.top_speed_m_s / body.metres_per_count() / robot.rate_hz;
+    if counts > 32_768.0 / 6.0 {
+        return Err(objection(
+            "robot.rate_hz",
+            format!(
+                "at top speed a wheel makes {counts:.0} counts a tick, and the counter wraps at 32768"
+            ),
+            "raise robot.rate_hz or lower robot.top_speed_m_s",
+        ));
+    }
+    if mission.sonar.index > 5 {
+        return Err(objection(
+            "sonar.index",
+            format!(
+                "the standard frame has sonars 0 to 5, not {}",
+                mission.sonar.index
+            ),
+            "give 1 for the front one of an X80",
+        ));
+    }
+    within("sonar.forward_m", mission.sonar.forward_m, -5.0..=5.0, "m")?;
+    within(
+        "sonar.bearing_deg",
+        mission.sonar.bearing_deg,
+        -180.0..=180.0,
+        "degrees",
+    )
+}
+
+fn stages(mission: &Mission) -> Result<(), Objection> {
+    let controller = &mission.controller;
+    let top = mission.body().top_speed_m_s;
+    within(
+        "controller.speed_m_s",
+        controller.speed_m_s,
+        0.001..=top,
+        "m/s",
+    )?;
+    within(
+        "controller.turn_rad_s",
+        controller.turn_rad_s,
+        0.01..=20.0,
+        "rad/s",
+    )?;
+    within(
+        "controller.slow_radius_m",
+        controller.slow_radius_m,
+        0.001..=1000.0,
+        "m",
+    )?;
+    within("controller.dead_zone", controller.dead_zone, 0.0..=0.9, "")?;
+    within(
+        "mapper.map_within_m",
+        mission.mapper.map_within_m,
+        0.04..=2.54,
+        "m",
+    )?;
+    within(
+        "planner.absorption",
+        mission.planner.absorption,
+        0.0..=10.0,
+        "",
+    )?;
+    let margin = mission.mapper.margin_cells;
+    if margin > mission.perimeter.cells / 4 {
+        return Err(objection(
+            "mapper.margin_cells",
+            format!(
+                "a margin of {margin} cells fills a map of {}",
+                mission.perimeter.cells
+            ),
+            format!("give 0 to {}", mission.perimeter.cells / 4),
+        ));
+    }
+    Ok(())
+}
+
+fn simulation(mission: &Mission) -> Result<(), Objection> {
+    let sonar = &mission.simulation.sonar;
+    within(
+        "simulation.sonar.cone_deg",
+        sonar.cone_deg,
+        0.0..=60.0,
+        "degrees",
+    )?;
+    within("simulation.sonar.noise_m", sonar.noise_m, 0.0..=1.0, "m")?;
+    within(
+        "simulation.sonar.noise_per_m",
+        sonar.noise_per_m,
+        0.0..=1.0,
+        "",
+    )
+}
+
+/// A robot that starts inside a hazard has already collided.
+fn start_is_free(mission: &Mission) -> Result<(), Objection> {
+    let radius = mission.body().radius_m;
+    for (key, shapes) in [("world", &mission.world), ("known", &mission.known)] {
+        let clearance = shapes.clearance(DVec2::ZERO);
+        if clearance <= radius {
+            return Err(objection(
+                key,
+                format!(
+                    "something stands {clearance:.2} m from the start, and the robot's radius is {radius} m"
+                ),
+                "move it away from (0, 0)",
+            ));
+        }
+        if shapes.clearance(mission.target) <= 0.0 {
+            return Err(objection(
+                key,
+                "the target lies inside a shape",
+                "move one of them",
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        match parse(text, Path::new("m.toml")) {
+            Ok(_) => panic!("accepted: {text}"),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn a_target_is_all_a_mission_needs() {
+        let mission = parse("target = [3, 0.5]", Path::new("dir/short.toml")).unwrap();
+        assert_eq!(mission.name, "short");
+        assert_eq!(mission.grid_frame().resolution_m, 0.1);
+        assert_eq!(mission.body().counts_per_turn, 1200.0);
+    }
+
+    #[test]
+    fn a_mission_written_out_reads_back_the_same() {
+        let text = "target = [3, 0.5]\n[[world.drum]]\nat = [1.5, 1]\nradius_m = 0.3\n[robot]\nmodel = 'x80sv'";
+        let mission = parse(text, Path::new("m.toml")).unwrap();
+        let written = toml::to_string(&mission).unwrap();
+        assert_eq!(parse(&written, Path::new("x")).unwrap(), mission);
+    }
+
+    #[test]
+    fn every_refusal_names_line_and_key() {
+        let cases = [
+            ("target = [30, 0]", "m.toml:1: target: "),
+            ("target = [nan, 0]", "m.toml:1: target: "),
+            (
+                "target = [3, 0]\n[perimeter]\ncells = 4",
+                "m.toml:3: perimeter.cells: ",
+            ),
+            (
+                "target = [3, 0]\n[perimeter]\ncells = 100000",
+                "m.toml:3: perimeter.cells: ",
+            ),
+            (
+                "target = [3, 0]\nspeeed = 3",
+                "m.toml:2: unknown field `speeed`",
+            ),
+            (
+                "target = [3, 0]\n\n[controller]\nspeed_m_s = nan",
+                "m.toml:4: controller.speed_m_s: ",
+            ),
+            ("target = 3", "m.toml:1: invalid type"),
+            ("target = [3, 0", "m.toml:1: "),
+            (
+                "target = [3, 0]\n[[world.drum]]\nat = [0.3, 0]\nradius_m = 0.2",
+                "m.toml:2: world: something stands 0.10 m from the start",
+            ),
+            (
+                "target = [3, 0]\n[robot]\nleft = { channel = 1, reversed = true }",
+                "m.toml:3: robot.left: ",
+            ),
+            (
+                "description = 'no target'",
+                "m.toml:1: missing field `target`",
+            ),
+        ];
+        for (text, start) in cases {
+            let refusal = refusal(text);
+            assert!(refusal.starts_with(start), "{text:?} gave {refusal:?}");
+        }
+    }
+}

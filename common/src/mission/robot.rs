@@ -1,0 +1,165 @@
+//! The robot's body: presets of the X80 family and what a mission overrides.
+
+use serde::{Deserialize, Serialize};
+
+/// A member of the X80 family.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Model {
+    /// The X80: 1200 counts a wheel turn.
+    #[default]
+    X80,
+    /// The X80SV and X80Pro: 756 counts a wheel turn.
+    X80sv,
+}
+
+/// One wheel's channel on the motor board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Channel {
+    /// 0 or 1: which of the two encoder channels.
+    pub channel: u8,
+    /// Whether forward is the negative direction of this channel.
+    pub reversed: bool,
+}
+
+/// The robot as a mission writes it: a model, and only what differs from it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RobotConfig {
+    /// Preset that gives what is not said.
+    pub model: Model,
+    /// `host:port` of a real robot; without it a simulated one is started.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub address: Option<String>,
+    /// Ticks a second the robot's sensors come at.
+    pub rate_hz: f64,
+    /// r of (2), metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wheel_radius_m: Option<f64>,
+    /// W of (2): the track, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub track_m: Option<f64>,
+    /// Encoder counts of one wheel turn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counts_per_turn: Option<f64>,
+    /// Radius of the disc that contains the body, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
+    /// The most either wheel's rim can do, m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub top_speed_m_s: Option<f64>,
+    /// The left wheel's channel.
+    pub left: Channel,
+    /// The right wheel's channel.
+    pub right: Channel,
+    /// Age at which a command no longer moves the robot, seconds.
+    pub command_limit_s: f64,
+}
+
+impl Default for RobotConfig {
+    fn default() -> Self {
+        Self {
+            model: Model::X80,
+            address: None,
+            rate_hz: 7.0,
+            wheel_radius_m: None,
+            track_m: None,
+            counts_per_turn: None,
+            radius_m: None,
+            top_speed_m_s: None,
+            left: Channel {
+                channel: 0,
+                reversed: true,
+            },
+            right: Channel {
+                channel: 1,
+                reversed: false,
+            },
+            command_limit_s: 0.25,
+        }
+    }
+}
+
+/// The body, every value known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Body {
+    /// r, metres.
+    pub wheel_radius_m: f64,
+    /// W, metres.
+    pub track_m: f64,
+    /// Encoder counts of one wheel turn.
+    pub counts_per_turn: f64,
+    /// Radius of the disc that contains it, metres.
+    pub radius_m: f64,
+    /// The most either wheel's rim can do, m/s.
+    pub top_speed_m_s: f64,
+}
+
+impl Body {
+    /// Metres the rim moves per encoder count.
+    #[must_use]
+    pub fn metres_per_count(&self) -> f64 {
+        std::f64::consts::TAU * self.wheel_radius_m / self.counts_per_turn
+    }
+}
+
+impl Model {
+    /// The family's published and measured dimensions.
+    #[must_use]
+    pub const fn body(self) -> Body {
+        match self {
+            Self::X80 => Body {
+                wheel_radius_m: 0.085,
+                track_m: 0.26,
+                counts_per_turn: 1200.0,
+                radius_m: 0.19,
+                top_speed_m_s: 1.0,
+            },
+            Self::X80sv => Body {
+                wheel_radius_m: 0.085,
+                track_m: 0.283,
+                counts_per_turn: 756.0,
+                radius_m: 0.19,
+                top_speed_m_s: 0.76,
+            },
+        }
+    }
+}
+
+impl RobotConfig {
+    /// The model's body with the overrides in place.
+    #[must_use]
+    pub fn body(&self) -> Body {
+        let preset = self.model.body();
+        Body {
+            wheel_radius_m: self.wheel_radius_m.unwrap_or(preset.wheel_radius_m),
+            track_m: self.track_m.unwrap_or(preset.track_m),
+            counts_per_turn: self.counts_per_turn.unwrap_or(preset.counts_per_turn),
+            radius_m: self.radius_m.unwrap_or(preset.radius_m),
+            top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
+        }
+    }
+}
+
+/// The front ultrasonic sensor: which one it is and how it is mounted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SonarConfig {
+    /// Its index among the six of the standard frame.
+    pub index: u8,
+    /// Its distance ahead of the robot's centre, metres (the paper writes W/2).
+    pub forward_m: f64,
+    /// delta of (19): its bearing from the robot's axis, degrees.
+    pub bearing_deg: f64,
+}
+
+impl Default for SonarConfig {
+    fn default() -> Self {
+        Self {
+            index: 1,
+            forward_m: 0.1915,
+            bearing_deg: 0.0,
+        }
+    }
+}
