@@ -1,16 +1,32 @@
 //! The ground every firsthand process stands on: only what two processes must agree on.
 //!
-//! Layout, from the idea to the wire:
+//! Layout, from the idea to the machine:
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`mission`] | the mission file, validated |
-//! | [`clock`] | mission time, pace, the monotonic clock |
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
 //! | [`kinematics`] | (1)-(3) and their inverses |
+//! | [`clock`] | mission time, pace, the monotonic clock |
+//! | [`topics`] | THE table of topics |
+//! | [`samples`] | their payloads |
+//! | [`domain`] | where a robot lives on this machine |
+//! | [`bus`] | writers and readers: the one file that names the middleware |
+//! | [`waiter`] | one wait for topics, sockets, signals, processes |
+//! | [`checkpoint`] | state that outlives a SIGKILL |
+//! | [`run`] | what the supervisor tells the stages of a run |
+//! | [`shell`] | the process shell every stage runs in |
 
+pub mod bus;
+pub mod checkpoint;
 pub mod clock;
+pub mod domain;
 pub mod geometry;
 pub mod grid;
 pub mod kinematics;
 pub mod mission;
+pub mod run;
+pub mod samples;
+pub mod shell;
+pub mod topics;
+pub mod waiter;

@@ -1,0 +1,716 @@
+//! The one file that names the middleware (iceoryx2): services, writers, readers, and waiting for them.
+//!
+//! Rules it keeps, each paid for by experiment:
+//! - the domain's configuration is made the process-wide one before anything else is called;
+//! - services are created by the supervisor alone ([`Bus::create_all`]) and opened by everyone else, so
+//!   that no stage killed while starting leaves one half made;
+//! - limits have slack, so authorship is checked here: readers drop samples of a writer's older lives;
+//! - events only wake; data come from receiving until there is none.
+//!
+//! Why `unsafe` is allowed here: the listener's file descriptor can only be had through an `unsafe`
+//! call, and polling it needs a borrow of it. It is sound because the borrow never outlives the
+//! listener, which the same struct owns, and nobody closes the descriptor.
+#![allow(unsafe_code)]
+
+use std::{
+    any::Any,
+    collections::HashSet,
+    fmt::Debug,
+    marker::PhantomData,
+    ops::Deref,
+    os::fd::{AsFd, BorrowedFd},
+    path::PathBuf,
+};
+
+pub use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2::{
+    config::Config,
+    node::{Node, NodeBuilder},
+    port::{
+        listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber,
+        update_connections::UpdateConnections,
+    },
+    prelude::{
+        AllocationStrategy, CallbackProgression, FileDescriptorBased, LogLevel, NodeName,
+        SemanticString, ServiceName, SignalHandlingMode, ipc, set_log_level_from_env_or,
+    },
+    sample::Sample,
+    service::{
+        builder::publish_subscribe::PublishSubscribeOpenError,
+        port_factory::{PortFactory as _, event, publish_subscribe},
+    },
+};
+use thiserror::Error;
+
+use crate::{
+    clock::MissionTime,
+    domain::Domain,
+    samples::Stamped,
+    topics::{EVERY_STAGE, Spec},
+};
+
+/// How much a topic holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Samples a reader that falls behind still gets; then the oldest give way.
+    pub buffer: usize,
+    /// Samples a reader may hold at once.
+    pub borrowed: usize,
+    /// Readers at once, dashboards and loggers among them.
+    pub readers: usize,
+}
+
+impl Limits {
+    /// For topics of one small struct.
+    pub const SMALL: Self = Self {
+        buffer: 128,
+        borrowed: 2,
+        readers: 16,
+    };
+    /// For slices of a whole map.
+    pub const MAP: Self = Self {
+        buffer: 4,
+        borrowed: 2,
+        readers: 12,
+    };
+    /// Writers at once. One is meant; a kill while starting can leak a place for good.
+    const WRITERS: usize = 16;
+    /// Processes at once on one topic.
+    const NODES: usize = 64;
+}
+
+/// What can go wrong between a process and shared memory.
+#[derive(Debug, Error)]
+pub enum BusError {
+    /// The robot has no bus.
+    #[error(
+        "robot {robot:?} is not running here ({detail}); start it with `firsthand run`, or name another with --robot"
+    )]
+    NotRunning {
+        /// The robot.
+        robot: String,
+        /// What was missing.
+        detail: String,
+    },
+    /// Two builds that do not agree on a payload.
+    #[error(
+        "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
+    )]
+    Incompatible {
+        /// The topic.
+        topic: &'static str,
+    },
+    /// The middleware refused.
+    #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, or the topic's last place taken?", shm = crate::domain::SHARED_MEMORY)]
+    Refused {
+        /// What was tried.
+        action: &'static str,
+        /// The topic.
+        topic: &'static str,
+        /// The middleware's word.
+        detail: String,
+    },
+    /// The process could not join the domain.
+    #[error("cannot join the bus of robot {robot:?}: {detail}; if it runs, is it this user's, and is {shm} writable and not full?", shm = crate::domain::SHARED_MEMORY)]
+    Join {
+        /// The robot.
+        robot: String,
+        /// The middleware's word.
+        detail: String,
+    },
+    /// Waiting failed.
+    #[error("cannot wait for samples: {0}")]
+    Wait(#[source] std::io::Error),
+}
+
+fn refused<E: Debug>(action: &'static str, topic: &'static str) -> impl FnOnce(E) -> BusError {
+    move |detail| BusError::Refused {
+        action,
+        topic,
+        detail: format!("{detail:?}"),
+    }
+}
+
+fn opening(topic: &'static str) -> impl FnOnce(PublishSubscribeOpenError) -> BusError {
+    use PublishSubscribeOpenError as E;
+    move |error| match error {
+        E::IncompatibleTypes | E::VersionMismatch | E::ServiceInCorruptedState => {
+            BusError::Incompatible { topic }
+        }
+        other => refused("open", topic)(other),
+    }
+}
+
+/// A topic whose samples are one struct.
+#[derive(Debug)]
+pub struct Topic<P> {
+    spec: &'static Spec,
+    payload: PhantomData<fn() -> P>,
+}
+
+/// A topic whose samples are a header and a slice.
+#[derive(Debug)]
+pub struct SliceTopic<H, T> {
+    spec: &'static Spec,
+    payload: PhantomData<fn() -> (H, T)>,
+}
+
+/// What a payload must be to lie in shared memory.
+pub trait Payload: ZeroCopySend + Copy + Debug + Default + 'static {}
+impl<P: ZeroCopySend + Copy + Debug + Default + 'static> Payload for P {}
+
+impl<P> Topic<P> {
+    /// A row of the table.
+    #[must_use]
+    pub const fn new(spec: &'static Spec) -> Self {
+        Self {
+            spec,
+            payload: PhantomData,
+        }
+    }
+}
+
+impl<H, T> SliceTopic<H, T> {
+    /// A row of the table.
+    #[must_use]
+    pub const fn new(spec: &'static Spec) -> Self {
+        Self {
+            spec,
+            payload: PhantomData,
+        }
+    }
+}
+
+/// A row of the table, whatever it carries.
+pub trait AnyTopic: Sync {
+    /// What the table says.
+    fn spec(&self) -> &'static Spec;
+    /// Create its services on `bus`; they exist as long as the result is held.
+    ///
+    /// # Errors
+    /// When the middleware refuses.
+    fn create(&self, bus: &Bus) -> Result<Box<dyn Any>, BusError>;
+}
+
+macro_rules! pub_sub {
+    ($bus:expr, $spec:expr, $payload:ty, $header:ty) => {
+        $bus.node
+            .service_builder(&service_name($spec)?)
+            .publish_subscribe::<$payload>()
+            .user_header::<$header>()
+            .subscriber_max_buffer_size($spec.limits.buffer)
+            .subscriber_max_borrowed_samples($spec.limits.borrowed)
+            .max_subscribers($spec.limits.readers)
+            .max_publishers(Limits::WRITERS)
+            .max_nodes(Limits::NODES)
+            .history_size(1)
+            .enable_safe_overflow(true)
+    };
+}
+
+impl<P: Payload> AnyTopic for Topic<P> {
+    fn spec(&self) -> &'static Spec {
+        self.spec
+    }
+
+    fn create(&self, bus: &Bus) -> Result<Box<dyn Any>, BusError> {
+        let samples = pub_sub!(bus, self.spec, P, ())
+            .create()
+            .map_err(refused("create", self.spec.name))?;
+        Ok(Box::new((samples, bus.create_event(self.spec)?)))
+    }
+}
+
+impl<H: Payload, T: Payload> AnyTopic for SliceTopic<H, T> {
+    fn spec(&self) -> &'static Spec {
+        self.spec
+    }
+
+    fn create(&self, bus: &Bus) -> Result<Box<dyn Any>, BusError> {
+        let samples = pub_sub!(bus, self.spec, [T], H)
+            .create()
+            .map_err(refused("create", self.spec.name))?;
+        Ok(Box::new((samples, bus.create_event(self.spec)?)))
+    }
+}
+
+fn service_name(spec: &Spec) -> Result<ServiceName, BusError> {
+    spec.name.try_into().map_err(refused("name", spec.name))
+}
+
+/// A process's place on a robot's bus.
+#[derive(Debug)]
+pub struct Bus {
+    node: Node<ipc::Service>,
+}
+
+/// The services of every topic, existing as long as this is held.
+pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
+
+impl Bus {
+    /// Write the configuration that [`Bus::join`], and consumers in other languages, load.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_config(domain: &Domain) -> Result<(), BusError> {
+        let failed = |detail: String| BusError::Join {
+            robot: domain.robot.to_string(),
+            detail,
+        };
+        let mut config = Config::default();
+        let root = domain.middleware_root();
+        let prefix = domain.shared_memory_prefix();
+        let path = SemanticString::new(root.as_os_str().as_encoded_bytes())
+            .map_err(|error| failed(format!("{error:?} in {root:?}")))?;
+        config.global.set_root_path(&path);
+        config.global.prefix = SemanticString::new(prefix.as_bytes())
+            .map_err(|error| failed(format!("{error:?} in {prefix:?}")))?;
+        let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
+        let file = domain.middleware_config();
+        std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
+    }
+
+    /// Join the bus of a robot under a name that `iox2 node list` shows.
+    ///
+    /// The first call settles the process's domain: a process speaks to one robot.
+    ///
+    /// # Errors
+    /// When the robot does not run here, is another user's, or shared memory is full.
+    pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
+        // The middleware reports what we report anyway; IOX2_LOG_LEVEL brings its own words back.
+        set_log_level_from_env_or(LogLevel::Fatal);
+        let join = |detail: String| BusError::Join {
+            robot: domain.robot.to_string(),
+            detail,
+        };
+        let file: PathBuf = domain.middleware_config();
+        if !file.exists() {
+            return Err(BusError::NotRunning {
+                robot: domain.robot.to_string(),
+                detail: format!("no {}", file.display()),
+            });
+        }
+        let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
+            .map_err(|error| join(format!("{error:?} in {file:?}")))?;
+        Config::setup_global_config_from_file(&path).map_err(|error| join(format!("{error:?}")))?;
+        let name = NodeName::new(name).map_err(|error| join(format!("{error:?}")))?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|error| join(format!("{error:?}")))?;
+        Ok(Self { node })
+    }
+
+    /// Create the services of every topic of the table. The supervisor's business alone.
+    ///
+    /// # Errors
+    /// When one exists already or shared memory is full.
+    pub fn create_all(&self) -> Result<Services, BusError> {
+        crate::topics::TABLE
+            .iter()
+            .map(|topic| topic.create(self))
+            .collect::<Result<_, _>>()
+            .map(Services)
+    }
+
+    /// Free what dead processes of the domain held.
+    pub fn clean_up_after_the_dead(&self) {
+        self.node.try_cleanup_dead_nodes();
+    }
+
+    fn create_event(&self, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {
+        self.node
+            .service_builder(&service_name(spec)?)
+            .event()
+            .max_notifiers(Limits::WRITERS)
+            .max_listeners(spec.limits.readers)
+            .max_nodes(Limits::NODES)
+            .create()
+            .map_err(refused("create", spec.name))
+    }
+
+    fn open_event(&self, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {
+        self.node
+            .service_builder(&service_name(spec)?)
+            .event()
+            .open()
+            .map_err(refused("open", spec.name))
+    }
+
+    fn notifier(&self, spec: &Spec) -> Result<Notifier<ipc::Service>, BusError> {
+        self.open_event(spec)?
+            .notifier_builder()
+            .create()
+            .map_err(refused("write", spec.name))
+    }
+
+    /// Write `topic` in the `generation`-th life of this process's stage.
+    ///
+    /// # Errors
+    /// When the topic is missing, carries another payload, or has no place left.
+    pub fn writer<P: Payload + Stamped>(
+        &self,
+        topic: &Topic<P>,
+        generation: u32,
+    ) -> Result<Writer<P>, BusError> {
+        let spec = topic.spec;
+        let service = pub_sub!(self, spec, P, ())
+            .open()
+            .map_err(opening(spec.name))?;
+        let publisher = service
+            .publisher_builder()
+            .create()
+            .map_err(refused("write", spec.name))?;
+        Ok(Writer {
+            publisher,
+            notifier: self.notifier(spec)?,
+            generation,
+            sequence: 0,
+            topic: spec.name,
+        })
+    }
+
+    /// Write slices of at most `longest` elements on `topic`.
+    ///
+    /// # Errors
+    /// As [`Bus::writer`].
+    pub fn slice_writer<H: Payload + Stamped, T: Payload>(
+        &self,
+        topic: &SliceTopic<H, T>,
+        generation: u32,
+        longest: usize,
+    ) -> Result<SliceWriter<H, T>, BusError> {
+        let spec = topic.spec;
+        let service = pub_sub!(self, spec, [T], H)
+            .open()
+            .map_err(opening(spec.name))?;
+        let publisher = service
+            .publisher_builder()
+            .initial_max_slice_len(longest)
+            .allocation_strategy(AllocationStrategy::Static)
+            .create()
+            .map_err(refused("write", spec.name))?;
+        Ok(SliceWriter {
+            publisher,
+            readers: Readers {
+                service,
+                known: HashSet::new(),
+            },
+            notifier: self.notifier(spec)?,
+            generation,
+            sequence: 0,
+            topic: spec.name,
+        })
+    }
+
+    /// Read `topic`.
+    ///
+    /// # Errors
+    /// As [`Bus::writer`].
+    pub fn reader<P: Payload + Stamped>(&self, topic: &Topic<P>) -> Result<Reader<P>, BusError> {
+        let spec = topic.spec;
+        let subscriber = pub_sub!(self, spec, P, ())
+            .open()
+            .map_err(opening(spec.name))?
+            .subscriber_builder()
+            .create()
+            .map_err(refused("read", spec.name))?;
+        Ok(Reader {
+            subscriber,
+            authorship: Authorship::of(spec),
+        })
+    }
+
+    /// Read the slices of `topic`.
+    ///
+    /// # Errors
+    /// As [`Bus::writer`].
+    pub fn slice_reader<H: Payload + Stamped, T: Payload>(
+        &self,
+        topic: &SliceTopic<H, T>,
+    ) -> Result<SliceReader<H, T>, BusError> {
+        let spec = topic.spec;
+        let subscriber = pub_sub!(self, spec, [T], H)
+            .open()
+            .map_err(opening(spec.name))?
+            .subscriber_builder()
+            .create()
+            .map_err(refused("read", spec.name))?;
+        Ok(SliceReader {
+            subscriber,
+            authorship: Authorship::of(spec),
+        })
+    }
+
+    /// Be woken when `topic` speaks.
+    ///
+    /// # Errors
+    /// When the topic is missing or has no place left.
+    pub fn alarm(&self, topic: &dyn AnyTopic) -> Result<Alarm, BusError> {
+        let spec = topic.spec();
+        self.open_event(spec)?
+            .listener_builder()
+            .create()
+            .map(|listener| Alarm { listener })
+            .map_err(refused("listen to", spec.name))
+    }
+}
+
+/// Publishes one struct a sample.
+#[derive(Debug)]
+pub struct Writer<P: Payload> {
+    publisher: Publisher<ipc::Service, P, ()>,
+    notifier: Notifier<ipc::Service>,
+    generation: u32,
+    sequence: u32,
+    topic: &'static str,
+}
+
+impl<P: Payload + Stamped> Writer<P> {
+    /// Publish `payload` for `tick` at mission `time`, stamped, and wake the readers.
+    ///
+    /// # Errors
+    /// When no memory is left to loan, which slack in the limits rules out unless a reader misbehaves.
+    pub fn publish(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        mut payload: P,
+    ) -> Result<(), BusError> {
+        *payload.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
+        self.publisher
+            .send_copy(payload)
+            .map_err(refused("publish on", self.topic))?;
+        wake(&self.notifier, self.topic)
+    }
+
+    /// Give the last sample to readers that came since.
+    pub fn greet(&self) {
+        // What fails here fails again, and loudly, at the next publish.
+        let _ = self.publisher.update_connections();
+    }
+}
+
+fn next_stamp(
+    tick: u64,
+    time: MissionTime,
+    generation: u32,
+    sequence: &mut u32,
+) -> crate::samples::Stamp {
+    let stamp = crate::samples::Stamp {
+        tick,
+        stamp_ns: time.0,
+        generation,
+        sequence: *sequence,
+    };
+    *sequence = sequence.wrapping_add(1);
+    stamp
+}
+
+fn wake(notifier: &Notifier<ipc::Service>, topic: &'static str) -> Result<(), BusError> {
+    notifier
+        .notify()
+        .map(drop)
+        .map_err(refused("wake the readers of", topic))
+}
+
+/// Who reads a topic of slices.
+#[derive(Debug)]
+struct Readers<H: Payload, T: Payload> {
+    service: publish_subscribe::PortFactory<ipc::Service, [T], H>,
+    known: HashSet<u128>,
+}
+
+/// Publishes a header and a slice a sample.
+#[derive(Debug)]
+pub struct SliceWriter<H: Payload, T: Payload> {
+    publisher: Publisher<ipc::Service, [T], H>,
+    readers: Readers<H, T>,
+    notifier: Notifier<ipc::Service>,
+    generation: u32,
+    sequence: u32,
+    topic: &'static str,
+}
+
+impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
+    /// Publish `header` with `cells`, in order; as [`Writer::publish`].
+    ///
+    /// # Errors
+    /// As [`Writer::publish`], and when there are more cells than the writer was made for.
+    pub fn publish(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        mut header: H,
+        cells: impl ExactSizeIterator<Item = T>,
+    ) -> Result<(), BusError> {
+        *header.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
+        let mut sample = self
+            .publisher
+            .loan_slice_uninit(cells.len())
+            .map_err(refused("publish on", self.topic))?;
+        *sample.user_header_mut() = header;
+        let mut cells = cells;
+        sample
+            .write_from_fn(|_| cells.next().unwrap_or_default())
+            .send()
+            .map_err(refused("publish on", self.topic))?;
+        wake(&self.notifier, self.topic)
+    }
+
+    /// Whether a reader came since this was last asked: it needs a keyframe.
+    pub fn has_new_reader(&mut self) -> bool {
+        let mut now = HashSet::new();
+        self.readers
+            .service
+            .dynamic_config()
+            .list_subscribers(|reader| {
+                now.insert(reader.subscriber_id.value());
+                CallbackProgression::Continue
+            });
+        let new = !now.is_subset(&self.readers.known);
+        self.readers.known = now;
+        new
+    }
+}
+
+/// Which life of the writer a reader listens to.
+#[derive(Debug)]
+struct Authorship {
+    /// None where many write.
+    newest: Option<u32>,
+}
+
+impl Authorship {
+    fn of(spec: &Spec) -> Self {
+        Self {
+            newest: (spec.writer != EVERY_STAGE).then_some(0),
+        }
+    }
+
+    /// Whether a sample of `generation` is still of the living.
+    fn admits(&mut self, generation: u32) -> bool {
+        match &mut self.newest {
+            Some(newest) if generation < *newest => false,
+            Some(newest) => {
+                *newest = generation;
+                true
+            }
+            None => true,
+        }
+    }
+}
+
+/// Receives structs.
+#[derive(Debug)]
+pub struct Reader<P: Payload> {
+    subscriber: Subscriber<ipc::Service, P, ()>,
+    authorship: Authorship,
+}
+
+impl<P: Payload + Stamped> Reader<P> {
+    /// The next sample in order of publication; none when all were taken.
+    ///
+    /// # Errors
+    /// When a connection to the writer broke.
+    pub fn take(&mut self) -> Result<Option<P>, BusError> {
+        while let Some(sample) = self
+            .subscriber
+            .receive()
+            .map_err(refused("read", "a topic"))?
+        {
+            if self.authorship.admits(sample.stamp().generation) {
+                return Ok(Some(*sample));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The newest sample; those before it are dropped.
+    ///
+    /// # Errors
+    /// As [`Reader::take`].
+    pub fn newest(&mut self) -> Result<Option<P>, BusError> {
+        let mut newest = None;
+        while let Some(sample) = self.take()? {
+            newest = Some(sample);
+        }
+        Ok(newest)
+    }
+}
+
+/// Receives headers with slices.
+#[derive(Debug)]
+pub struct SliceReader<H: Payload, T: Payload> {
+    subscriber: Subscriber<ipc::Service, [T], H>,
+    authorship: Authorship,
+}
+
+/// A header with its slice, still in shared memory; the writer cannot reuse it while this is held.
+#[derive(Debug)]
+pub struct Slice<H: Payload, T: Payload> {
+    sample: Sample<ipc::Service, [T], H>,
+}
+
+impl<H: Payload, T: Payload> Slice<H, T> {
+    /// The header.
+    #[must_use]
+    pub fn header(&self) -> &H {
+        self.sample.user_header()
+    }
+}
+
+impl<H: Payload, T: Payload> Deref for Slice<H, T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        self.sample.payload()
+    }
+}
+
+impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
+    /// The next sample; as [`Reader::take`].
+    ///
+    /// # Errors
+    /// As [`Reader::take`].
+    pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
+        while let Some(sample) = self
+            .subscriber
+            .receive()
+            .map_err(refused("read", "a topic"))?
+        {
+            if self
+                .authorship
+                .admits(sample.user_header().stamp().generation)
+            {
+                return Ok(Some(Slice { sample }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Rings when a topic speaks.
+#[derive(Debug)]
+pub struct Alarm {
+    listener: Listener<ipc::Service>,
+}
+
+impl Alarm {
+    /// Level-triggered: silence it before looking at the data, or waiting never waits again.
+    pub(crate) fn silence(&self) -> Result<(), BusError> {
+        self.listener
+            .try_wait(|_| {})
+            .map(drop)
+            .map_err(refused("listen to", "a topic"))
+    }
+}
+
+impl AsFd for Alarm {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        // SAFETY: the descriptor belongs to the listener that `self` owns and stays open until it is
+        // dropped; the borrow ends before that, and nobody closes it.
+        unsafe { BorrowedFd::borrow_raw(self.listener.file_descriptor().native_handle()) }
+    }
+}

@@ -1,0 +1,135 @@
+//! Where a robot lives on this machine: its name, its runtime directory, its corner of shared memory.
+//!
+//! Two robots share nothing: each has its own directory, lock, prefix in `/dev/shm` and services.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
+///
+/// Short, because Unix socket paths are; no `_`, because that ends the name in a shared memory prefix.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct RobotName(String);
+
+/// A robot cannot be called that.
+#[derive(Debug, Error)]
+#[error("{0:?} cannot name a robot; use 1 to 16 of a-z, 0-9 and '-'")]
+pub struct RobotNameError(String);
+
+impl FromStr for RobotName {
+    type Err = RobotNameError;
+
+    fn from_str(text: &str) -> Result<Self, RobotNameError> {
+        let allowed = |byte: u8| matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'-');
+        if (1..=16).contains(&text.len()) && text.bytes().all(allowed) {
+            Ok(Self(text.to_owned()))
+        } else {
+            Err(RobotNameError(text.to_owned()))
+        }
+    }
+}
+
+impl TryFrom<String> for RobotName {
+    type Error = RobotNameError;
+
+    fn try_from(text: String) -> Result<Self, RobotNameError> {
+        text.parse()
+    }
+}
+
+impl From<RobotName> for String {
+    fn from(name: RobotName) -> Self {
+        name.0
+    }
+}
+
+impl fmt::Display for RobotName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// The directory of shared memory on Linux.
+pub const SHARED_MEMORY: &str = "/dev/shm";
+
+/// A robot's corner of this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Domain {
+    /// Whose it is.
+    pub robot: RobotName,
+    user: u32,
+    directory: PathBuf,
+}
+
+impl Domain {
+    /// The corner of `robot` for the user this process runs as.
+    #[must_use]
+    pub fn of(robot: RobotName) -> Self {
+        let user = rustix::process::geteuid().as_raw();
+        // Not $XDG_RUNTIME_DIR: it differs between a login, a service and a container of one user, and
+        // a consumer must find the robot from any of them.
+        let directory = PathBuf::from(format!("/tmp/firsthand-{user}/{robot}"));
+        Self {
+            robot,
+            user,
+            directory,
+        }
+    }
+
+    /// Holds everything below; only its owner may enter.
+    #[must_use]
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// Held exclusively by the supervisor as long as it lives.
+    #[must_use]
+    pub fn lock_file(&self) -> PathBuf {
+        self.directory.join("lock")
+    }
+
+    /// Under it lie the node and service files of the middleware.
+    #[must_use]
+    pub fn middleware_root(&self) -> PathBuf {
+        self.directory.join("bus")
+    }
+
+    /// The middleware's configuration: what a consumer in any language loads first.
+    #[must_use]
+    pub fn middleware_config(&self) -> PathBuf {
+        self.directory.join("iceoryx2.toml")
+    }
+
+    /// Starts the name of every file of this domain in [`SHARED_MEMORY`]. No other domain's prefix
+    /// starts with it: names hold no `_`.
+    #[must_use]
+    pub fn shared_memory_prefix(&self) -> String {
+        format!("fh{}_{}_", self.user, self.robot)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_name_cannot_reach_out_of_its_directory() {
+        for bad in ["", "..", "a/b", "A", "a_b", "a b", "12345678901234567"] {
+            assert!(bad.parse::<RobotName>().is_err(), "{bad:?} was accepted");
+        }
+        assert!("x80-2".parse::<RobotName>().is_ok());
+    }
+
+    #[test]
+    fn no_prefix_starts_another() {
+        let of = |name: &str| Domain::of(name.parse().unwrap()).shared_memory_prefix();
+        assert!(!of("x80-2").starts_with(&of("x80")));
+    }
+}

@@ -1,0 +1,218 @@
+//! The process shell every stage runs in: open the topics, wait, turn, beat, stop on a signal.
+//!
+//! A stage's own shell file implements [`Process`]: it wires topics to its pure step, and nothing else.
+
+use std::{io::Read, os::unix::net::UnixStream, path::PathBuf, time::Duration};
+
+use signal_hook::consts::SIGTERM;
+use thiserror::Error;
+
+use crate::{
+    bus::{Bus, BusError, Writer},
+    checkpoint::CheckpointError,
+    clock::{MissionTime, monotonic_ns},
+    domain::Domain,
+    run::{Run, RunError},
+    samples::{HealthSample, HealthState, name},
+    topics,
+    waiter::Waiter,
+};
+
+/// How often a stage beats, and the longest it waits: a tenth of the tightest deadline set on beats,
+/// and a hundredth of a percent of a core.
+pub const BEAT: Duration = Duration::from_millis(20);
+
+/// Which life of which stage this process is.
+#[derive(Clone, Debug)]
+pub struct Life {
+    /// The stage's name in the table.
+    pub stage: &'static str,
+    /// Where `run.toml` and the checkpoints lie.
+    pub directory: PathBuf,
+    /// 1 for the first life.
+    pub generation: u32,
+    /// Ticks before this one are another life's.
+    pub first_tick: u64,
+    /// The process that must live for this one to live.
+    pub supervisor: u32,
+}
+
+/// Why a stage's process ended.
+#[derive(Debug, Error)]
+pub enum StageError {
+    /// Shared memory.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The run file.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The stage's checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The stage's own affairs.
+    #[error("{0}")]
+    Other(String),
+    /// Signals or process attributes.
+    #[error("cannot {action}: {source}; this needs Linux 5.4 or newer")]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// The system's word.
+        source: std::io::Error,
+    },
+}
+
+/// What a stage's process is opened with.
+#[derive(Debug)]
+pub struct Context {
+    /// Which life.
+    pub life: Life,
+    /// The run.
+    pub run: Run,
+    /// The robot's bus.
+    pub bus: Bus,
+    /// What wakes the process; the stage adds its inputs.
+    pub waiter: Waiter,
+}
+
+impl Context {
+    /// Where this stage's checkpoint lies.
+    #[must_use]
+    pub fn checkpoint_file(&self) -> PathBuf {
+        self.life
+            .directory
+            .join(format!("{}.checkpoint", self.life.stage))
+    }
+}
+
+/// How far a stage has come: what its heartbeats are stamped with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// The tick last worked on.
+    pub tick: u64,
+    /// Its mission time.
+    pub time: MissionTime,
+}
+
+/// A stage wired to its topics.
+pub trait Process: Sized {
+    /// Open the topics, restore the checkpoint.
+    ///
+    /// # Errors
+    /// When one of them cannot be had.
+    fn open(context: &mut Context) -> Result<Self, StageError>;
+
+    /// Take what came, step, publish. Called whenever something may have come, and each [`BEAT`].
+    ///
+    /// # Errors
+    /// When the stage cannot go on; it will be restarted.
+    fn turn(&mut self) -> Result<Progress, StageError>;
+
+    /// Say goodbye.
+    ///
+    /// # Errors
+    /// When that fails.
+    fn stop(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+}
+
+/// Live the life of a stage until told to stop.
+///
+/// # Errors
+/// What [`Process`] says, or what keeps it from being opened.
+pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
+    let mut terminated = become_stage(life)?;
+    let run = Run::load(&life.directory)?;
+    let bus = Bus::join(&Domain::of(run.robot.clone()), life.stage)?;
+    let mut waiter = Waiter::default();
+    waiter.on_readable(&terminated)?;
+    let mut heart = Heart::new(&bus, life)?;
+    heart.beat(HealthState::Starting, Progress::default())?;
+    let mut context = Context {
+        life: life.clone(),
+        run,
+        bus,
+        waiter,
+    };
+    let mut process = P::open(&mut context)?;
+    let waiter = &context.waiter;
+    tracing::info!(generation = life.generation, "ready");
+    let mut progress = process.turn()?;
+    heart.beat(HealthState::Ready, progress)?;
+    while !is_readable(&mut terminated) {
+        waiter.wait(BEAT)?;
+        progress = process.turn()?;
+        heart.beat_if_due(progress)?;
+    }
+    heart.beat(HealthState::Stopping, progress)?;
+    tracing::info!("stopping");
+    process.stop()
+}
+
+/// Take the stage's name, die with the supervisor, and turn SIGTERM into something to wait for.
+fn become_stage(life: &Life) -> Result<UnixStream, StageError> {
+    let system = |action| move |source: std::io::Error| StageError::System { action, source };
+    let (terminated, signal) = UnixStream::pair().map_err(system("make a signal pipe"))?;
+    terminated
+        .set_nonblocking(true)
+        .map_err(system("make a signal pipe"))?;
+    signal_hook::low_level::pipe::register(SIGTERM, signal).map_err(system("handle SIGTERM"))?;
+    // `ps` and `pkill` tell stages apart by this. A name with a zero byte cannot come from the table.
+    if let Ok(name) = std::ffi::CString::new(life.stage) {
+        rustix::thread::set_name(&name)
+            .map_err(|errno| system("name the process")(errno.into()))?;
+    }
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
+        .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
+    // It may have died before that took hold.
+    let parent = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get() as u32);
+    if parent != life.supervisor {
+        return Err(StageError::Other(format!(
+            "supervisor {} is gone; start stages through `firsthand run`",
+            life.supervisor
+        )));
+    }
+    Ok(terminated)
+}
+
+fn is_readable(stream: &mut UnixStream) -> bool {
+    matches!(stream.read(&mut [0; 16]), Ok(read) if read > 0)
+}
+
+/// Beats from inside the work loop: a stage that hangs or spins stops beating.
+struct Heart {
+    writer: Writer<HealthSample>,
+    sample: HealthSample,
+    last_beat_ns: u64,
+}
+
+impl Heart {
+    fn new(bus: &Bus, life: &Life) -> Result<Self, StageError> {
+        Ok(Self {
+            writer: bus.writer(&topics::HEALTH, life.generation)?,
+            sample: HealthSample {
+                stage: name(life.stage),
+                pid: std::process::id(),
+                ..HealthSample::default()
+            },
+            last_beat_ns: 0,
+        })
+    }
+
+    fn beat(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
+        self.sample.state = state.into();
+        self.last_beat_ns = monotonic_ns();
+        self.writer
+            .publish(progress.tick, progress.time, self.sample)?;
+        Ok(())
+    }
+
+    fn beat_if_due(&mut self, progress: Progress) -> Result<(), StageError> {
+        self.sample.turns += 1;
+        if monotonic_ns() - self.last_beat_ns >= BEAT.as_nanos() as u64 {
+            self.beat(HealthState::Ready, progress)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,131 @@
+//! THE table of topics: what the processes say to each other.
+//!
+//! Services are created from it, the README's table is printed from it (`firsthand topics`), and the
+//! stages' table is checked against it. A topic is declared once, below, and named nowhere else.
+
+use std::time::Duration;
+
+use crate::{
+    bus::{self, Limits},
+    samples::{
+        CommandSample, DirectiveSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
+        HealthSample, LinkSample, PoseSample, RangeSample, RosterEntry, RosterHeader, WheelSample,
+    },
+};
+
+pub use crate::bus::{SliceTopic, Topic};
+
+/// How often a topic speaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rate {
+    /// Once a tick.
+    EachTick,
+    /// At every change, and at least this often.
+    OnChange(Duration),
+}
+
+/// What the table says of a topic.
+#[derive(Debug)]
+pub struct Spec {
+    /// Its name, and the name of its two services.
+    pub name: &'static str,
+    /// Who writes it: a stage, `supervisor`, or `every stage`.
+    pub writer: &'static str,
+    /// How often.
+    pub rate: Rate,
+    /// Mission time after which a reader must not act on it any more; none where age does not matter.
+    pub max_age: Option<Duration>,
+    /// Depth of history and buffers, number of readers.
+    pub limits: Limits,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// A tick is late after this: one and three quarters of a period at 7 Hz.
+const TICK_AGE: Option<Duration> = Some(Duration::from_millis(250));
+/// How often state that changes seldom is said again for late joiners.
+pub const RESTATE: Duration = Duration::from_millis(200);
+
+/// The writer named by topics that all stages write.
+pub const EVERY_STAGE: &str = "every stage";
+/// The writer that is no stage.
+pub const SUPERVISOR: &str = "supervisor";
+
+macro_rules! topics {
+    ($($(#[doc = $meaning:literal])+ $id:ident: $kind:ident<$($payload:ty),+> {
+        name: $name:literal, writer: $writer:expr, rate: $rate:expr, max_age: $age:expr, limits: $limits:expr $(,)?
+    })*) => {
+        $(
+            $(#[doc = $meaning])+
+            pub static $id: $kind<$($payload),+> = $kind::new(&Spec {
+                name: $name,
+                writer: $writer,
+                rate: $rate,
+                max_age: $age,
+                limits: $limits,
+                meaning: concat!($($meaning),+),
+            });
+        )*
+        /// Every topic, in the order of the pipeline.
+        pub static TABLE: &[&dyn bus::AnyTopic] = &[$(&$id),*];
+    };
+}
+
+topics! {
+    /// Front sonar: distance to the nearest thing ahead.
+    RANGE: Topic<RangeSample> {
+        name: "range", writer: "x80-link", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+    }
+    /// Encoder counts and wheel speeds.
+    WHEELS: Topic<WheelSample> {
+        name: "wheels", writer: "x80-link", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+    }
+    /// Where the robot believes it is.
+    POSE: Topic<PoseSample> {
+        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+    }
+    /// The safety map: keyframes and changed windows.
+    GRID: SliceTopic<GridHeader, u8> {
+        name: "grid", writer: "mapper", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::MAP,
+    }
+    /// The reference direction at the robot's pose.
+    GUIDANCE: Topic<GuidanceSample> {
+        name: "guidance", writer: "planner", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+    }
+    /// The whole-domain policy, for consumers.
+    FIELD: SliceTopic<FieldHeader, FieldCell> {
+        name: "field", writer: "planner", rate: Rate::OnChange(Duration::from_secs(1)), max_age: None, limits: Limits::MAP,
+    }
+    /// Wheel speeds for the robot.
+    COMMAND: Topic<CommandSample> {
+        name: "command", writer: "controller", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+    }
+    /// Heartbeats.
+    HEALTH: Topic<HealthSample> {
+        name: "health", writer: EVERY_STAGE, rate: Rate::OnChange(Duration::from_millis(50)), max_age: None, limits: Limits::SMALL,
+    }
+    /// The wire to the robot: connection, counts, tick latency.
+    LINK: Topic<LinkSample> {
+        name: "link", writer: "x80-link", rate: Rate::EachTick, max_age: None, limits: Limits::SMALL,
+    }
+    /// The supervisor's order to all stages.
+    DIRECTIVE: Topic<DirectiveSample> {
+        name: "directive", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), max_age: None, limits: Limits::SMALL,
+    }
+    /// What runs, as the supervisor sees it.
+    ROSTER: SliceTopic<RosterHeader, RosterEntry> {
+        name: "roster", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), max_age: None, limits: Limits::MAP,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_topics_share_a_name() {
+        let names: HashSet<_> = TABLE.iter().map(|topic| topic.spec().name).collect();
+        assert_eq!(names.len(), TABLE.len());
+    }
+}

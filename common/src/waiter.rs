@@ -1,0 +1,80 @@
+//! One wait for everything a process waits for: alarms of topics, sockets, signals, other processes.
+
+use std::{
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    time::Duration,
+};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+use crate::bus::{Alarm, BusError};
+
+/// Waits for alarms and foreign descriptors (sockets, signals, processes) at once.
+#[derive(Debug, Default)]
+pub struct Waiter {
+    alarms: Vec<Alarm>,
+    descriptors: Vec<OwnedFd>,
+}
+
+impl Waiter {
+    /// Wake for `alarm`.
+    pub fn on(&mut self, alarm: Alarm) {
+        self.alarms.push(alarm);
+    }
+
+    /// Wake when `descriptor` is readable; what is read from it is the caller's.
+    ///
+    /// # Errors
+    /// When the process has no descriptor left.
+    pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result<(), BusError> {
+        let own = descriptor
+            .as_fd()
+            .try_clone_to_owned()
+            .map_err(BusError::Wait)?;
+        self.descriptors.push(own);
+        Ok(())
+    }
+
+    /// Wait until something rings, is readable, or `timeout` has passed; silences the alarms.
+    ///
+    /// # Errors
+    /// When the system refuses to wait.
+    pub fn wait(&self, timeout: Duration) -> Result<(), BusError> {
+        self.wait_also_for(&[], timeout)
+    }
+
+    /// [`Waiter::wait`], for `others` too, this once.
+    ///
+    /// # Errors
+    /// As [`Waiter::wait`].
+    pub fn wait_also_for(
+        &self,
+        others: &[BorrowedFd<'_>],
+        timeout: Duration,
+    ) -> Result<(), BusError> {
+        let alarms = self.alarms.iter().map(AsFd::as_fd);
+        let own = self.descriptors.iter().map(AsFd::as_fd);
+        let mut polled: Vec<PollFd<'_>> = alarms
+            .chain(own)
+            .chain(others.iter().copied())
+            .map(|descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
+            .collect();
+        let timeout = Timespec::try_from(timeout).ok();
+        match poll(&mut polled, timeout.as_ref()) {
+            // A signal that interrupts has also written to the signal pipe.
+            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            Err(error) => return Err(BusError::Wait(error.into())),
+        }
+        let rang: Vec<bool> = polled
+            .iter()
+            .take(self.alarms.len())
+            .map(|entry| !entry.revents().is_empty())
+            .collect();
+        for (alarm, rang) in self.alarms.iter().zip(rang) {
+            if rang {
+                alarm.silence()?;
+            }
+        }
+        Ok(())
+    }
+}
