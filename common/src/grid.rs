@@ -163,6 +163,21 @@ impl GridFrame {
         }
     }
 
+    /// The cells of `window` out of a row-major slice of the whole map, in order.
+    pub fn cells_of<'map, T: Copy>(
+        &self,
+        window: Window,
+        map: &'map [T],
+    ) -> impl ExactSizeIterator<Item = T> + use<'map, T> {
+        let (frame, width) = (*self, window.width.max(1));
+        (0..window.area() as u32).map(move |offset| {
+            map[frame.index(Cell {
+                col: window.col + offset % width,
+                row: window.row + offset / width,
+            })]
+        })
+    }
+
     /// Whether `window` lies inside the map.
     #[must_use]
     pub fn contains(&self, window: Window) -> bool {
@@ -190,9 +205,9 @@ pub struct Revision {
 /// What became of a revision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
-    /// The whole map was replaced.
+    /// The whole map came, and nothing was held before to compare it with.
     Whole,
-    /// The window was; nothing, if it is empty.
+    /// The window changed; nothing, if it is empty.
     Window(Window),
     /// A version is missing, or the cells do not fit: the map is as it was, wait for a keyframe.
     Missed,
@@ -205,7 +220,7 @@ pub struct Replica<T> {
     state: Option<(GridFrame, u64)>,
 }
 
-impl<T: Copy> Replica<T> {
+impl<T: Copy + PartialEq> Replica<T> {
     /// The frame, once a keyframe has come.
     #[must_use]
     pub fn frame(&self) -> Option<GridFrame> {
@@ -224,6 +239,29 @@ impl<T: Copy> Replica<T> {
         &self.cells
     }
 
+    /// The smallest window outside of which `cells` are those held.
+    fn difference(&self, frame: GridFrame, cells: &[T]) -> Window {
+        let rows = frame.cells as usize;
+        let mut window = Window::default();
+        for (row, (held, new)) in self
+            .cells
+            .chunks_exact(rows)
+            .zip(cells.chunks_exact(rows))
+            .enumerate()
+        {
+            let differs = |(held, new): (&T, &T)| held != new;
+            let first = held.iter().zip(new).position(differs);
+            let last = held.iter().zip(new).rposition(differs);
+            for col in [first, last].into_iter().flatten() {
+                window = window.including(Cell {
+                    col: col as u32,
+                    row: row as u32,
+                });
+            }
+        }
+        window
+    }
+
     /// Follow one revision.
     pub fn apply(&mut self, revision: &Revision, cells: &[T]) -> Applied {
         let Revision {
@@ -239,14 +277,14 @@ impl<T: Copy> Replica<T> {
             if window != frame.whole() {
                 return Applied::Missed;
             }
-            // The same version again is the keyframe for late joiners: nothing new.
-            if self.state == Some((frame, version)) {
-                return Applied::Window(Window::default());
-            }
+            // A keyframe for late joiners must not look like more than what changed, or a consumer that
+            // attaches would change what the others compute.
+            let known = self.state.is_some_and(|(held, _)| held == frame);
+            let changed = known.then(|| self.difference(frame, cells));
             self.cells.clear();
             self.cells.extend_from_slice(cells);
             self.state = Some((frame, version));
-            return Applied::Whole;
+            return changed.map_or(Applied::Whole, Applied::Window);
         }
         let Some((held_frame, held)) = self.state else {
             return Applied::Missed;
@@ -330,6 +368,30 @@ mod tests {
         assert_eq!(replica.cells()[8..12], [0, 1, 2, 0]);
         assert_eq!(replica.apply(&change(4), &[1, 1]), Applied::Missed);
         assert_eq!(replica.frame(), None, "a gap makes the copy worthless");
+    }
+
+    #[test]
+    fn a_keyframe_that_changes_one_cell_is_told_as_that_window() {
+        let frame = frame(4);
+        let mut replica = Replica::default();
+        let keyframe = |version| Revision {
+            frame,
+            window: frame.whole(),
+            version,
+            keyframe: true,
+        };
+        let mut cells = [0_u8; 16];
+        assert_eq!(replica.apply(&keyframe(1), &cells), Applied::Whole);
+        let nothing = Applied::Window(Window::default());
+        assert_eq!(replica.apply(&keyframe(1), &cells), nothing);
+        cells[9] = 1;
+        let one = Window {
+            col: 1,
+            row: 2,
+            width: 1,
+            height: 1,
+        };
+        assert_eq!(replica.apply(&keyframe(2), &cells), Applied::Window(one));
     }
 
     #[test]

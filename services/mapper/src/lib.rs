@@ -1,1 +1,6 @@
 //! The on-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).
+//!
+//! [`step`] is the whole of it, pure; [`shell`] wires it to the topics `pose`, `range` and `grid`.
+
+pub mod shell;
+pub mod step;

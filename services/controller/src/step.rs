@@ -1,0 +1,307 @@
+//! Align the robot with the guidance, and let alignment set the speed.
+
+use common::{
+    kinematics::{DifferentialDrive, Pose2, Twist},
+    mission::Mission,
+    samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
+};
+use glam::DVec2;
+
+/// How the robot stands to the guidance: (14), with the heading in place of the measured velocity, which
+/// is undefined at rest, where every mission starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alignment {
+    /// eta_d: cosine of the angle to the guidance.
+    pub cosine: f64,
+    /// eta_c: its sine, positive when the guidance lies to the left. The printed sign turns away.
+    pub sine: f64,
+}
+
+impl Alignment {
+    /// (14): of a robot facing `axis` under the unit vector `guidance`.
+    #[must_use]
+    pub fn of(axis: DVec2, guidance: DVec2) -> Self {
+        Self {
+            cosine: axis.dot(guidance),
+            sine: axis.perp_dot(guidance),
+        }
+    }
+}
+
+/// Which way an antipodal robot turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Left,
+    Right,
+}
+
+impl Side {
+    const fn sign(self) -> f64 {
+        match self {
+            Self::Left => 1.0,
+            Self::Right => -1.0,
+        }
+    }
+}
+
+/// The controller of (15)-(17).
+#[derive(Clone, Debug)]
+pub struct Controller {
+    drive: DifferentialDrive,
+    target: DVec2,
+    tolerance: f64,
+    speed: f64,
+    turn: f64,
+    slow_radius: f64,
+    dead_zone: f64,
+    modulated: bool,
+    side: Side,
+    arrived: bool,
+}
+
+impl Controller {
+    /// For a mission's robot.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        let settings = &mission.controller;
+        let top = body.top_speed_m_s / body.wheel_radius_m;
+        Self {
+            drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, top),
+            target: mission.target,
+            tolerance: mission.arrival_tolerance_m,
+            speed: settings.speed_m_s,
+            turn: settings.turn_rad_s,
+            slow_radius: settings.slow_radius_m,
+            dead_zone: settings.dead_zone,
+            modulated: settings.modulated,
+            side: Side::Left,
+            arrived: false,
+        }
+    }
+
+    /// The command for a robot at `pose` under `guidance`.
+    pub fn step(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample {
+        let distance = pose.position.distance(self.target);
+        // Latched: a robot at rest on the edge of the circle must not start again over a count.
+        self.arrived |= distance <= self.tolerance;
+        if self.arrived {
+            return stand(CommandState::Arrived, distance);
+        }
+        let direction = DVec2::new(guidance.ex, guidance.ey);
+        let goes = matches!(
+            GuidanceStatus::from_byte(guidance.status),
+            GuidanceStatus::Along | GuidanceStatus::WayOut
+        );
+        // Shared memory is outside too: only a direction is followed.
+        if !goes || !((direction.length() - 1.0).abs() < 1e-3 && distance.is_finite()) {
+            return stand(CommandState::Halt, distance);
+        }
+        let alignment = Alignment::of(pose.axis(), direction);
+        let omega = self.angular(alignment);
+        let v = self.tangential(alignment, omega, distance);
+        let wheels = self.drive.wheels(Twist { v, omega });
+        CommandSample {
+            left_rad_s: wheels.left,
+            right_rad_s: wheels.right,
+            v_m_s: v,
+            omega_rad_s: omega,
+            distance_m: distance,
+            state: CommandState::Driving.into(),
+            ..CommandSample::default()
+        }
+    }
+
+    /// (15): wc. Within the dead zone of the exact antipode the side is kept: noise there would make the
+    /// sign chatter.
+    fn angular(&mut self, alignment: Alignment) -> f64 {
+        let Alignment { cosine, sine } = alignment;
+        if cosine > 0.0 {
+            return self.turn * sine;
+        }
+        if sine.abs() >= self.dead_zone {
+            self.side = if sine > 0.0 { Side::Left } else { Side::Right };
+        }
+        self.turn * self.side.sign()
+    }
+
+    /// (16): vc. Slowing down for the target multiplies what alignment allows; printed as a case of its
+    /// own it would override it.
+    fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
+        let aligned = if !self.modulated {
+            1.0
+        } else if alignment.cosine < 0.0 {
+            f64::midpoint(alignment.cosine, 1.0)
+        } else {
+            1.0 - (omega / self.turn).abs() / 2.0
+        };
+        self.speed * aligned * (distance / self.slow_radius).min(1.0)
+    }
+}
+
+fn stand(state: CommandState, distance: f64) -> CommandSample {
+    CommandSample {
+        distance_m: distance,
+        state: state.into(),
+        ..CommandSample::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{
+        f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI},
+        path::Path,
+    };
+
+    /// vd = 0.4, wd = 0.8, Rc = 0.5, target (3, 0), r = 0.1, W = 0.4.
+    fn controller(extra: &str) -> Controller {
+        let text = format!(
+            "target = [3, 0]\narrival_tolerance_m = 0.1\n\
+             robot = {{ wheel_radius_m = 0.1, track_m = 0.4 }}\n\
+             [controller]\nspeed_m_s = 0.4\nturn_rad_s = 0.8\nslow_radius_m = 0.5\ndead_zone = 0.05\n{extra}"
+        );
+        Controller::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    }
+
+    fn facing(heading: f64) -> Pose2 {
+        Pose2 {
+            position: DVec2::ZERO,
+            heading,
+        }
+    }
+
+    /// Guidance along x.
+    fn ahead() -> GuidanceSample {
+        GuidanceSample {
+            ex: 1.0,
+            status: GuidanceStatus::Along.into(),
+            ..GuidanceSample::default()
+        }
+    }
+
+    fn close(got: f64, want: f64) {
+        assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
+    }
+
+    #[test]
+    fn equation_14_by_hand() {
+        // Facing 45 degrees, guidance along x lies 45 degrees to the right.
+        let alignment = Alignment::of(facing(FRAC_PI_4).axis(), DVec2::X);
+        close(alignment.cosine, FRAC_1_SQRT_2);
+        close(alignment.sine, -FRAC_1_SQRT_2);
+    }
+
+    #[test]
+    fn equation_15_ahead_is_proportional_to_the_sine() {
+        let command = controller("").step(facing(-FRAC_PI_3), &ahead());
+        close(command.omega_rad_s, 0.8 * 3_f64.sqrt() / 2.0);
+    }
+
+    #[test]
+    fn equation_15_behind_turns_full_towards_the_guidance() {
+        let left = controller("").step(facing(-2.0), &ahead());
+        close(left.omega_rad_s, 0.8);
+        let right = controller("").step(facing(2.0), &ahead());
+        close(right.omega_rad_s, -0.8);
+    }
+
+    #[test]
+    fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
+        let mut controller = controller("");
+        close(
+            controller.step(facing(PI - 0.01), &ahead()).omega_rad_s,
+            0.8,
+        );
+        controller.step(facing(2.0), &ahead());
+        close(
+            controller.step(facing(-PI + 0.01), &ahead()).omega_rad_s,
+            -0.8,
+        );
+    }
+
+    #[test]
+    fn equation_16_by_hand() {
+        // Aligned: all of vd. 60 degrees off: 1 - sin 60 / 2. Antipodal: nothing.
+        close(controller("").step(facing(0.0), &ahead()).v_m_s, 0.4);
+        let off = controller("").step(facing(FRAC_PI_3), &ahead());
+        close(off.v_m_s, 0.4 * (1.0 - 3_f64.sqrt() / 4.0));
+        close(controller("").step(facing(PI), &ahead()).v_m_s, 0.0);
+    }
+
+    #[test]
+    fn equation_16_is_continuous_where_its_cases_meet() {
+        let just_ahead = controller("")
+            .step(facing(FRAC_PI_2 - 1e-9), &ahead())
+            .v_m_s;
+        let just_behind = controller("")
+            .step(facing(FRAC_PI_2 + 1e-9), &ahead())
+            .v_m_s;
+        assert!((just_ahead - just_behind).abs() < 1e-8);
+        assert!((just_ahead - 0.2).abs() < 1e-8);
+    }
+
+    #[test]
+    fn near_the_target_slowing_down_multiplies_alignment() {
+        // 0.25 m away, Rc = 0.5: half of what alignment allows.
+        let pose = Pose2 {
+            position: DVec2::new(2.75, 0.0),
+            heading: FRAC_PI_3,
+        };
+        let command = controller("").step(pose, &ahead());
+        close(command.v_m_s, 0.2 * (1.0 - 3_f64.sqrt() / 4.0));
+    }
+
+    #[test]
+    fn without_modulation_the_speed_is_constant_up_to_rc() {
+        let mut controller = controller("modulated = false");
+        close(controller.step(facing(PI), &ahead()).v_m_s, 0.4);
+    }
+
+    #[test]
+    fn equation_17_by_hand() {
+        // vc = 0.4, wc = 0: both wheels at 4 rad/s.
+        let command = controller("").step(facing(0.0), &ahead());
+        close(command.left_rad_s, 4.0);
+        close(command.right_rad_s, 4.0);
+    }
+
+    #[test]
+    fn arrival_is_final() {
+        let mut controller = controller("");
+        let there = Pose2 {
+            position: DVec2::new(2.95, 0.0),
+            heading: 0.0,
+        };
+        let command = controller.step(there, &ahead());
+        assert_eq!(
+            CommandState::from_byte(command.state),
+            CommandState::Arrived
+        );
+        let back_off = controller.step(facing(0.0), &ahead());
+        assert_eq!(
+            CommandState::from_byte(back_off.state),
+            CommandState::Arrived
+        );
+        close(back_off.v_m_s, 0.0);
+    }
+
+    #[test]
+    fn without_guidance_the_robot_stands() {
+        let nan = GuidanceSample {
+            ex: f64::NAN,
+            ..ahead()
+        };
+        let unreachable = GuidanceSample {
+            status: GuidanceStatus::Unreachable.into(),
+            ..ahead()
+        };
+        for guidance in [GuidanceSample::default(), unreachable, nan] {
+            let command = controller("").step(facing(0.0), &guidance);
+            assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
+            close(command.v_m_s, 0.0);
+            close(command.left_rad_s, 0.0);
+        }
+    }
+}

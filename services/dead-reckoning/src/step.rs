@@ -1,0 +1,287 @@
+//! Counts to pose. Nothing can recompute an integral, so its state is what the checkpoint keeps.
+
+use common::{
+    clock::MissionTime,
+    kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
+    mission::{Body, Integration, Mission},
+    samples::{PoseSample, WheelSample},
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// The encoders count modulo this.
+pub const COUNT_CYCLE: i32 = 32_768;
+
+/// How much faster than its top speed a wheel may seem to turn before the counts are disbelieved: a
+/// robot that slides or is pushed does not reach it, a counter that restarted nearly always does.
+const PLAUSIBLE: f64 = 2.0;
+/// Counts always believed, whatever the time between: timestamps jitter by about a tick.
+const SLACK_S: f64 = 0.3;
+
+/// What must survive the process: the pose, and the counts it was computed at.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    position: DVec2,
+    heading: f64,
+    travelled: f64,
+    last: Option<Last>,
+}
+
+/// The wheel sample the pose was computed from, and the speeds it gave.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Last {
+    tick: u64,
+    time: MissionTime,
+    left: u16,
+    right: u16,
+    v: f64,
+    omega: f64,
+}
+
+/// The integrator of (20) and (21).
+#[derive(Clone, Debug)]
+pub struct DeadReckoning {
+    drive: DifferentialDrive,
+    body: Body,
+    integration: Integration,
+    state: State,
+    disbelieved: u64,
+}
+
+impl DeadReckoning {
+    /// At the mission's start.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        let start = mission.start_pose();
+        Self {
+            drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY),
+            body,
+            integration: mission.dead_reckoning.integration,
+            state: State {
+                position: start.position,
+                heading: start.heading,
+                travelled: 0.0,
+                last: None,
+            },
+            disbelieved: 0,
+        }
+    }
+
+    /// Go on from a state that was kept.
+    pub const fn restore(&mut self, state: State) {
+        self.state = state;
+    }
+
+    /// What to keep.
+    #[must_use]
+    pub const fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Times the counts jumped farther than wheels can turn: the robot restarted its counters.
+    #[must_use]
+    pub const fn disbelieved(&self) -> u64 {
+        self.disbelieved
+    }
+
+    /// Integrate up to one wheel sample. A tick given twice gives the same pose twice.
+    pub fn step(&mut self, wheels: &WheelSample) -> PoseSample {
+        let time = wheels.stamp.time();
+        let (left, right) = (wheels.left_counts, wheels.right_counts);
+        let (mut v, mut omega) = (0.0, 0.0);
+        if let Some(last) = self.state.last {
+            if last.tick == wheels.stamp.tick {
+                return self.sample();
+            }
+            let elapsed = time.since(last.time).as_secs_f64();
+            let turned = self.turned(last, left, right, elapsed);
+            // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.
+            let motion = self.drive.twist(turned);
+            let pose = Pose2 {
+                position: self.state.position,
+                heading: self.state.heading,
+            };
+            let moved = match self.integration {
+                Integration::Arc => pose.along_arc(motion.v, motion.omega),
+                Integration::Euler => pose.along_euler(motion.v, motion.omega),
+            };
+            self.state.position = moved.position;
+            self.state.heading = moved.heading;
+            self.state.travelled += motion.v.abs();
+            if elapsed > 0.0 {
+                (v, omega) = (motion.v / elapsed, motion.omega / elapsed);
+            }
+        }
+        self.state.last = Some(Last {
+            tick: wheels.stamp.tick,
+            time,
+            left,
+            right,
+            v,
+            omega,
+        });
+        self.sample()
+    }
+
+    /// Wheel angles since `last`, radians; none if the counts cannot have come from turning wheels.
+    fn turned(&mut self, last: Last, left: u16, right: u16, elapsed: f64) -> WheelSpeeds {
+        let (left, right) = (difference(last.left, left), difference(last.right, right));
+        let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
+        let top = self.body.top_speed_m_s / self.body.metres_per_count();
+        let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
+        if f64::from(left.abs().max(right.abs())) > limit {
+            self.disbelieved += 1;
+            return WheelSpeeds::default();
+        }
+        WheelSpeeds {
+            left: f64::from(left) * per_count,
+            right: f64::from(right) * per_count,
+        }
+    }
+
+    fn sample(&self) -> PoseSample {
+        let State {
+            position,
+            heading,
+            travelled,
+            last,
+        } = self.state;
+        let (left_counts, right_counts, v, omega) = last.map_or((0, 0, 0.0, 0.0), |last| {
+            (last.left, last.right, last.v, last.omega)
+        });
+        PoseSample {
+            x_m: position.x,
+            y_m: position.y,
+            heading_rad: heading,
+            v_m_s: v,
+            omega_rad_s: omega,
+            travelled_m: travelled,
+            left_counts,
+            right_counts,
+            ..PoseSample::default()
+        }
+    }
+}
+
+/// Counts from `old` to `new` the short way round the cycle.
+fn difference(old: u16, new: u16) -> i32 {
+    let ahead = (i32::from(new) - i32::from(old)).rem_euclid(COUNT_CYCLE);
+    if ahead >= COUNT_CYCLE / 2 {
+        ahead - COUNT_CYCLE
+    } else {
+        ahead
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::samples::Stamp;
+    use std::{f64::consts::PI, path::Path};
+
+    fn reckoning(extra: &str) -> DeadReckoning {
+        // r = 0.1 m, W = 0.4 m, 1000 counts a turn: a count is 0.2 pi mm of rim.
+        let text = format!(
+            "target = [3, 0]\n[robot]\nwheel_radius_m = 0.1\ntrack_m = 0.4\ncounts_per_turn = 1000\n{extra}"
+        );
+        DeadReckoning::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    }
+
+    fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {
+        WheelSample {
+            stamp: Stamp {
+                tick,
+                stamp_ns: tick * 500_000_000,
+                ..Stamp::default()
+            },
+            left_counts: left,
+            right_counts: right,
+            ..WheelSample::default()
+        }
+    }
+
+    fn close(got: f64, want: f64) {
+        assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
+    }
+
+    #[test]
+    fn equation_20_straight_by_hand() {
+        let mut reckoning = reckoning("");
+        reckoning.step(&wheels(0, 100, 200));
+        // 500 counts are half a turn: pi * 0.1 m in 0.5 s.
+        let pose = reckoning.step(&wheels(1, 600, 700));
+        close(pose.x_m, 0.1 * PI);
+        close(pose.y_m, 0.0);
+        close(pose.v_m_s, 0.2 * PI);
+        close(pose.omega_rad_s, 0.0);
+        close(pose.travelled_m, 0.1 * PI);
+    }
+
+    #[test]
+    fn equation_20_turns_left_when_the_right_wheel_leads() {
+        let mut reckoning = reckoning("");
+        reckoning.step(&wheels(0, 0, 0));
+        // +-1000 counts: 2 pi 0.1 m a side over a track of 0.4 m: pi radians, on the spot.
+        let pose = reckoning.step(&wheels(1, (COUNT_CYCLE - 1000) as u16, 1000));
+        close(pose.heading_rad, PI);
+        close(pose.x_m, 0.0);
+    }
+
+    #[test]
+    fn the_arc_and_the_papers_euler_differ_as_they_should() {
+        // Right wheel alone, 1000 counts: arc 0.1 pi, turn pi/2, radius 0.2.
+        let mut arc = reckoning("");
+        arc.step(&wheels(0, 0, 0));
+        let pose = arc.step(&wheels(1, 0, 1000));
+        close(pose.x_m, 0.2);
+        close(pose.y_m, 0.2);
+        let mut euler = reckoning("[dead_reckoning]\nintegration = 'euler'");
+        euler.step(&wheels(0, 0, 0));
+        let pose = euler.step(&wheels(1, 0, 1000));
+        close(pose.x_m, 0.1 * PI);
+        close(pose.y_m, 0.0);
+        close(pose.heading_rad, PI / 2.0);
+    }
+
+    #[test]
+    fn counts_wrap_around_both_ways() {
+        assert_eq!(difference(32_760, 10), 18);
+        assert_eq!(difference(10, 32_760), -18);
+        assert_eq!(difference(5, 5), 0);
+    }
+
+    #[test]
+    fn a_tick_given_twice_moves_once() {
+        let mut reckoning = reckoning("");
+        reckoning.step(&wheels(0, 0, 0));
+        let first = reckoning.step(&wheels(1, 100, 100));
+        assert_eq!(reckoning.step(&wheels(1, 100, 100)), first);
+    }
+
+    #[test]
+    fn a_restored_state_goes_on_as_if_nothing_had_happened() {
+        let mut whole = reckoning("");
+        let mut killed = reckoning("");
+        for tick in 0..4 {
+            let sample = wheels(tick, tick as u16 * 50, tick as u16 * 90);
+            whole.step(&sample);
+            killed.step(&sample);
+        }
+        let mut successor = reckoning("");
+        successor.restore(*killed.state());
+        let sample = wheels(4, 250, 400);
+        assert_eq!(successor.step(&sample), whole.step(&sample));
+    }
+
+    #[test]
+    fn counters_that_restart_do_not_move_the_robot() {
+        let mut reckoning = reckoning("");
+        reckoning.step(&wheels(0, 16_000, 16_000));
+        let pose = reckoning.step(&wheels(1, 0, 0));
+        close(pose.x_m, 0.0);
+        assert_eq!(reckoning.disbelieved(), 1);
+        let pose = reckoning.step(&wheels(2, 500, 500));
+        close(pose.x_m, 0.1 * PI);
+    }
+}

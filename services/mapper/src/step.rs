@@ -1,0 +1,391 @@
+//! The belief: which cells are hazard.
+//!
+//! The paper's map only grows, (10); what it must never swallow is the target's cell, the cells under
+//! the robot, and nothing ever changes the perimeter, (18).
+
+use common::{
+    grid::{Cell, CellState, GridFrame, Window},
+    mission::Mission,
+    samples::{PoseSample, RangeSample, RangeStatus},
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// "4 cm or nearer" is mapped at 4 cm.
+const CONTACT_M: f64 = 0.04;
+
+/// What must survive the process.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Belief {
+    /// One [`CellState`] byte a cell, row-major.
+    #[serde(with = "serde_bytes")]
+    cells: Vec<u8>,
+    /// Grows by one with every change.
+    version: u64,
+    /// Range samples that put a hazard on the map.
+    safety_events: u64,
+    /// Resets of the sensed belief.
+    epoch: u64,
+    /// The last tick mapped.
+    tick: Option<u64>,
+}
+
+impl Belief {
+    /// The cells, row-major.
+    #[must_use]
+    pub fn cells(&self) -> &[u8] {
+        &self.cells
+    }
+
+    /// Grows by one with every change; 1 for the map a mission starts with.
+    #[must_use]
+    pub const fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Range samples that put a hazard on the map.
+    #[must_use]
+    pub const fn safety_events(&self) -> u64 {
+        self.safety_events
+    }
+
+    /// Resets of the sensed belief.
+    #[must_use]
+    pub const fn epoch(&self) -> u64 {
+        self.epoch
+    }
+}
+
+/// The mapper of (19).
+#[derive(Clone, Debug)]
+pub struct Mapper {
+    frame: GridFrame,
+    target: Option<Cell>,
+    margin: i64,
+    map_within: f64,
+    sensor_forward: f64,
+    sensor_bearing: f64,
+    footprint: f64,
+    belief: Belief,
+}
+
+impl Mapper {
+    /// (18) and what the mission knows beforehand.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let frame = mission.grid_frame();
+        let mut mapper = Self {
+            frame,
+            target: frame.cell_at(mission.target),
+            margin: i64::from(mission.mapper.margin_cells),
+            map_within: mission.mapper.map_within_m,
+            sensor_forward: mission.sonar.forward_m,
+            sensor_bearing: mission.sonar.bearing_deg.to_radians(),
+            footprint: mission.body().radius_m,
+            belief: Belief {
+                cells: vec![CellState::Free as u8; frame.area()],
+                version: 1,
+                safety_events: 0,
+                epoch: 0,
+                tick: None,
+            },
+        };
+        mapper.lay_foundation(mission);
+        mapper
+    }
+
+    fn lay_foundation(&mut self, mission: &Mission) {
+        // A known surface blocks what a hit on it would: its cell and the margin around.
+        let reach = (self.margin as f64 + 0.5) * self.frame.resolution_m;
+        for row in 0..self.frame.cells {
+            for col in 0..self.frame.cells {
+                let cell = Cell { col, row };
+                let state = if self.frame.is_rim(cell) {
+                    CellState::Perimeter
+                } else if Some(cell) != self.target
+                    && mission.known.clearance(self.frame.centre_of(cell)) <= reach
+                {
+                    CellState::Known
+                } else {
+                    CellState::Free
+                };
+                self.belief.cells[self.frame.index(cell)] = state as u8;
+            }
+        }
+    }
+
+    /// How the map lies.
+    #[must_use]
+    pub const fn frame(&self) -> GridFrame {
+        self.frame
+    }
+
+    /// What is believed, and what to keep.
+    #[must_use]
+    pub const fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// Go on from a belief that was kept; one of another map is refused.
+    pub fn restore(&mut self, belief: Belief) -> bool {
+        let fits = belief.cells.len() == self.frame.area();
+        if fits {
+            self.belief = belief;
+        }
+        fits
+    }
+
+    /// Map one reading taken at `pose`. Returns the window that changed, empty for none. A tick given
+    /// twice is mapped once.
+    pub fn step(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
+        if self.belief.tick == Some(pose.stamp.tick) {
+            return Window::default();
+        }
+        self.belief.tick = Some(pose.stamp.tick);
+        let Some(distance) = range.and_then(safety_distance) else {
+            return Window::default();
+        };
+        if distance > self.map_within {
+            return Window::default();
+        }
+        let robot = pose.pose();
+        let beam = DVec2::from_angle(robot.heading + self.sensor_bearing);
+        let hit = robot.position + robot.axis() * self.sensor_forward + beam * distance;
+        let changed = self.mark(hit, robot.position);
+        if changed.area() > 0 {
+            self.belief.safety_events += 1;
+            self.belief.version += 1;
+        }
+        changed
+    }
+
+    /// (19): the hit's cell and the margin around it.
+    fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
+        let mut changed = Window::default();
+        let Some(middle) = self.frame.cell_at(hit) else {
+            return changed;
+        };
+        for row in i64::from(middle.row) - self.margin..=i64::from(middle.row) + self.margin {
+            for col in i64::from(middle.col) - self.margin..=i64::from(middle.col) + self.margin {
+                let (Ok(col), Ok(row)) = (u32::try_from(col), u32::try_from(row)) else {
+                    continue;
+                };
+                let cell = Cell { col, row };
+                let inside = col < self.frame.cells && row < self.frame.cells;
+                if !inside || self.frame.is_rim(cell) || Some(cell) == self.target {
+                    continue;
+                }
+                if self.frame.centre_of(cell).distance(robot) <= self.footprint {
+                    continue;
+                }
+                let state = &mut self.belief.cells[self.frame.index(cell)];
+                if *state == CellState::Free as u8 {
+                    *state = CellState::Sensed as u8;
+                    changed = changed.including(cell);
+                }
+            }
+        }
+        changed
+    }
+
+    /// Forget what was sensed, if `epoch` is newer than the belief's: back to the perimeter and what
+    /// was known beforehand. Says whether it did.
+    pub fn forget(&mut self, epoch: u64) -> bool {
+        if epoch <= self.belief.epoch {
+            return false;
+        }
+        for cell in &mut self.belief.cells {
+            if *cell == CellState::Sensed as u8 {
+                *cell = CellState::Free as u8;
+            }
+        }
+        self.belief.epoch = epoch;
+        self.belief.version += 1;
+        true
+    }
+}
+
+/// S of (19), if the reading says where something is.
+fn safety_distance(range: &RangeSample) -> Option<f64> {
+    match RangeStatus::from_byte(range.status) {
+        RangeStatus::Measured if range.range_m >= 0.0 => Some(range.range_m),
+        RangeStatus::AtContact => Some(CONTACT_M),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::samples::Stamp;
+    use std::{f64::consts::FRAC_PI_2, path::Path};
+
+    /// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). Sensor 0.2 m ahead.
+    fn mapper(extra: &str) -> Mapper {
+        let text = format!(
+            "target = [1.5, 0.0]\nperimeter = {{ width_m = 5, cells = 50 }}\n\
+             sonar = {{ forward_m = 0.2 }}\nmapper = {{ margin_cells = 1, map_within_m = 2.0 }}\n{extra}"
+        );
+        Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    }
+
+    fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
+        PoseSample {
+            stamp: Stamp {
+                tick,
+                ..Stamp::default()
+            },
+            x_m: x,
+            y_m: y,
+            heading_rad: heading,
+            ..PoseSample::default()
+        }
+    }
+
+    fn reading(status: RangeStatus, range_m: f64) -> RangeSample {
+        RangeSample {
+            range_m,
+            status: status.into(),
+            ..RangeSample::default()
+        }
+    }
+
+    fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
+        let cells = mapper.frame().cells;
+        let marked = |(index, _): (usize, _)| (index as u32 % cells, index as u32 / cells);
+        let is_sensed = |(_, cell): &(usize, &u8)| **cell == CellState::Sensed as u8;
+        let all = mapper.belief().cells().iter().enumerate();
+        all.filter(is_sensed).map(marked).collect()
+    }
+
+    #[test]
+    fn equation_18_blocks_the_border_and_nothing_else() {
+        let mapper = mapper("");
+        let blocked = mapper.belief().cells().iter().filter(|&&cell| cell != 0);
+        assert_eq!(blocked.count(), 4 * 49);
+    }
+
+    #[test]
+    fn equation_19_by_hand() {
+        // From (0.3, -0.2) facing y: S + offset = 0.5 + 0.2: the hit is at (0.3, 0.5), cell (28, 30).
+        let mut mapper = mapper("");
+        let window = mapper.step(
+            &at(0, 0.3, -0.2, FRAC_PI_2),
+            Some(&reading(RangeStatus::Measured, 0.5)),
+        );
+        let want: Vec<_> = (29..=31)
+            .flat_map(|row| (27..=29).map(move |col| (col, row)))
+            .collect();
+        assert_eq!(sensed(&mapper), want);
+        assert_eq!(
+            (window.col, window.row, window.width, window.height),
+            (27, 29, 3, 3)
+        );
+        assert_eq!(mapper.belief().safety_events(), 1);
+        assert_eq!(mapper.belief().version(), 2);
+    }
+
+    #[test]
+    fn a_reading_that_shows_nothing_leaves_the_map_alone() {
+        let mut mapper = mapper("");
+        for (tick, status) in [
+            RangeStatus::Nothing,
+            RangeStatus::Invalid,
+            RangeStatus::Absent,
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            mapper.step(&at(tick as u64, 0.0, 0.0, 0.0), Some(&reading(status, 0.5)));
+        }
+        mapper.step(&at(8, 0.0, 0.0, 0.0), None);
+        mapper.step(
+            &at(9, 0.0, 0.0, 0.0),
+            Some(&reading(RangeStatus::Measured, 2.1)),
+        );
+        assert_eq!(sensed(&mapper), []);
+        assert_eq!(mapper.belief().version(), 1);
+    }
+
+    #[test]
+    fn four_centimetres_or_nearer_is_mapped_just_ahead() {
+        let mut mapper = mapper("");
+        mapper.step(
+            &at(0, 0.0, 0.0, 0.0),
+            Some(&reading(RangeStatus::AtContact, 0.0)),
+        );
+        assert!(sensed(&mapper).contains(&(27, 25)), "{:?}", sensed(&mapper));
+    }
+
+    #[test]
+    fn the_targets_cell_is_never_marked() {
+        let mut mapper = mapper("");
+        mapper.step(
+            &at(0, 0.8, 0.0, 0.0),
+            Some(&reading(RangeStatus::Measured, 0.5)),
+        );
+        let marked = sensed(&mapper);
+        assert!(
+            marked.contains(&(39, 25)) && !marked.contains(&(40, 25)),
+            "{marked:?}"
+        );
+    }
+
+    #[test]
+    fn the_robots_own_cells_are_never_marked() {
+        let mut mapper = mapper("");
+        mapper.step(
+            &at(0, 0.0, 0.0, 0.0),
+            Some(&reading(RangeStatus::AtContact, 0.0)),
+        );
+        let radius = 0.19;
+        for (col, row) in sensed(&mapper) {
+            let centre = mapper.frame().centre_of(Cell { col, row });
+            assert!(
+                centre.length() > radius,
+                "({col}, {row}) lies under the robot"
+            );
+        }
+    }
+
+    #[test]
+    fn the_border_stays_border_when_a_margin_falls_on_it() {
+        let mut mapper = mapper("");
+        mapper.step(
+            &at(0, 1.9, 0.0, 0.0),
+            Some(&reading(RangeStatus::Measured, 0.2)),
+        );
+        let cells = mapper.belief().cells();
+        assert_eq!(cells[25 * 50 + 49], CellState::Perimeter as u8);
+    }
+
+    #[test]
+    fn a_priori_shapes_are_hazard_from_the_start_and_outlive_a_reset() {
+        let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
+        let known = |mapper: &Mapper| {
+            let cells = mapper.belief().cells();
+            cells
+                .iter()
+                .filter(|&&cell| cell == CellState::Known as u8)
+                .count()
+        };
+        let before = known(&mapper);
+        // A disc of 0.2 + 0.15 m has about pi 3.5^2 = 38 cells.
+        assert!((34..=42).contains(&before), "{before} cells");
+        mapper.step(
+            &at(0, 0.0, 0.0, 0.0),
+            Some(&reading(RangeStatus::Measured, 0.5)),
+        );
+        assert!(mapper.forget(1) && !mapper.forget(1));
+        assert_eq!((known(&mapper), sensed(&mapper).len()), (before, 0));
+    }
+
+    #[test]
+    fn a_tick_given_twice_is_one_safety_event() {
+        let mut mapper = mapper("");
+        let (pose, range) = (at(3, 0.0, 0.0, 0.0), reading(RangeStatus::Measured, 0.5));
+        mapper.step(&pose, Some(&range));
+        assert_eq!(mapper.step(&pose, Some(&range)).area(), 0);
+        assert_eq!(mapper.belief().safety_events(), 1);
+    }
+}
