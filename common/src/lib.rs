@@ -16,6 +16,8 @@
 //! | [`checkpoint`] | state that outlives a SIGKILL |
 //! | [`run`] | what the supervisor tells the stages of a run |
 //! | [`shell`] | the process shell every stage runs in |
+//! | [`wire`] | the X80's protocol: frames and messages |
+//! | [`truth`] | what a simulated robot tells of itself |
 
 pub mod bus;
 pub mod checkpoint;
@@ -29,4 +31,6 @@ pub mod run;
 pub mod samples;
 pub mod shell;
 pub mod topics;
+pub mod truth;
 pub mod waiter;
+pub mod wire;

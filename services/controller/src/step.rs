@@ -94,7 +94,8 @@ impl Controller {
             GuidanceStatus::Along | GuidanceStatus::WayOut
         );
         // Shared memory is outside too: only a direction is followed.
-        if !goes || !((direction.length() - 1.0).abs() < 1e-3 && distance.is_finite()) {
+        let unit = (direction.length() - 1.0).abs() < 1e-3;
+        if !(goes && unit && distance.is_finite()) {
             return stand(CommandState::Halt, distance);
         }
         let alignment = Alignment::of(pose.axis(), direction);

@@ -1,0 +1,47 @@
+//! What a simulated robot tells of itself: one JSON object a line, for the summary and the pictures.
+//!
+//! The first line is a [`TruthHeader`], every further one a [`TruthTick`]. No stage reads it.
+
+use serde::{Deserialize, Serialize};
+
+/// The first line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TruthHeader {
+    /// Where the robot answers, `address:port`.
+    pub listening: String,
+}
+
+/// One line a tick, written when the tick's frames are made; tick 0 comes before anything has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TruthTick {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Mission time, seconds.
+    pub time_s: f64,
+    /// Position of the robot's centre in the mission frame, metres.
+    pub x: f64,
+    /// See `x`.
+    pub y: f64,
+    /// Heading, radians counter-clockwise from x, not wrapped.
+    pub heading: f64,
+    /// Speed along the heading, m/s.
+    pub v: f64,
+    /// Turn rate, rad/s.
+    pub omega: f64,
+    /// Least distance since the tick before from the body's surface to the nearest thing, metres;
+    /// [`TruthTick::NOTHING_NEAR`] where nothing stands.
+    pub clearance_m: f64,
+    /// How often the body has touched something so far.
+    pub contacts: u64,
+    /// Left wheel counts as this tick's frame shows them, growing forward, modulo 32768.
+    pub left_counts: u16,
+    /// Right wheel counts, likewise.
+    pub right_counts: u16,
+    /// The front ultrasonic byte of this tick's frame, centimetres; 255 is nothing.
+    pub sonar_cm: u8,
+}
+
+impl TruthTick {
+    /// Clearance where nothing stands, metres: JSON has no infinity.
+    pub const NOTHING_NEAR: f64 = 1e9;
+}

@@ -1,0 +1,58 @@
+//! The X80's protocol: bytes to frames, frames to messages, and back. No sockets in here.
+//!
+//! ```text
+//! 5E 02 | RID | SN | DID | LEN | DATA[LEN] | CRC | 5E 0D
+//! ```
+//!
+//! Little-endian, nothing is escaped. CRC is CRC-8/MAXIM-DOW over RID to the last data byte. RID says
+//! who is spoken to, DID what the data mean:
+//!
+//! | DID | host to robot ([`Command`]) | robot to host ([`Report`]) |
+//! |---|---|---|
+//! | 3 / 5 / 26 | position / PWM / velocity of one channel | |
+//! | 4 / 6 / 27 | the same, six channels at once | |
+//! | 7 | a parameter | |
+//! | 30 | enable motors | |
+//! | 123 | start or stop the motor stream | wheel counts and speeds |
+//! | 124 | start or stop the custom stream | eight AD channels |
+//! | 125 | start or stop the standard stream | ultrasonic and the rest |
+//! | 127 | start or stop all three | |
+//! | 255 | ping, acknowledge | ping, acknowledge |
+//!
+//! There is no official document. What is written here comes from the vendor's manual and from
+//! drivers that are in use, so everything is sent in the commonest form and taken in any of them.
+//!
+//! ```
+//! use common::wire::{Addressing, Command, Decoder, Report, SystemSignal};
+//!
+//! let mut bytes = Vec::new();
+//! Command::velocity([Some(400), Some(-400)], Some(1000)).encode(Addressing::Numbered, &mut bytes);
+//!
+//! let mut decoder = Decoder::default();
+//! decoder.push(&[0x5e, 0x02, 0x00, 0x00, 0xff, 0x01, 0x01, 0x48, 0x5e, 0x0d]);
+//! while let Some(frame) = decoder.next_frame() {
+//!     assert_eq!(Report::parse(&frame), Ok(Report::System(SystemSignal::Ack)));
+//! }
+//! ```
+
+mod command;
+mod crc;
+mod decoder;
+pub mod did;
+mod frame;
+mod report;
+mod sensors;
+mod units;
+
+pub use command::{
+    CHANNELS, Command, Feedback, Gains, Mode, Motion, Parameter, Quantity, Request, Stream, Targets,
+};
+pub use crc::crc8;
+pub use decoder::{Decoder, DecoderTally};
+pub use frame::{Addressing, Frame, MAX_FRAME_BYTES, MessageError, SystemSignal};
+pub use report::Report;
+pub use sensors::{COUNT_CYCLE, CustomSensors, Encoder, MotorSensors, StandardSensors};
+pub use units::{Echo, infrared_ad, infrared_m, volts};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,203 @@
+//! Bytes in any pieces to frames: several at once, halves, noise between, bad CRCs.
+//!
+//! A frame is found by its header, LEN and CRC; its end bytes are looked at only where CRC-8 alone is
+//! too weak a witness. One noisy header in 256 passes the CRC and would swallow the good frames behind
+//! it, so a frame with wrong end bytes is believed only if no frame with right ones begins inside it.
+
+use super::{
+    crc::crc8,
+    frame::{BEFORE_DATA, Frame, HEADER},
+};
+
+/// Bytes held at most: the largest datagram, and a frame begun in the one before.
+const CAPACITY: usize = 65_536 + super::MAX_FRAME_BYTES;
+/// No message that is known is longer. A header that claims more is likely noise, so it does not hold
+/// back the complete frames behind it while the rest of its own is missing.
+const LONGEST_PLAUSIBLE: usize = 64;
+
+/// What became of the bytes so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DecoderTally {
+    /// Frames given out.
+    pub frames: u64,
+    /// Headers whose CRC was wrong.
+    pub bad_crc: u64,
+    /// Bytes that belonged to no frame.
+    pub noise_bytes: u64,
+    /// Bytes dropped unread because more came than is held.
+    pub dropped_bytes: u64,
+}
+
+/// A streaming decoder: [`Decoder::push`] what came, then take every [`Decoder::next_frame`].
+///
+/// It holds at most 64 KiB and a frame; of a push that exceeds that, the oldest bytes are dropped and
+/// counted. A half frame waits for its rest; a header that was noise waits until its claimed length
+/// has come, and then what follows it is found.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    buffer: Vec<u8>,
+    start: usize,
+    tally: DecoderTally,
+}
+
+/// What stands at a header.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Candidate {
+    /// LEN data bytes and a right CRC; `end` is the offset behind the CRC.
+    Sound { end: usize, ending: Ending },
+    /// The rest of it has not come; it claims `len` data bytes, if that much has.
+    Half { len: usize },
+    /// The CRC is wrong.
+    Broken,
+}
+
+/// What follows a CRC.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    /// `5E 0D`, or the `5E 13` that one client sends.
+    Right,
+    /// Something else, or so far only the beginning of a right one.
+    Wrong,
+    Missing,
+}
+
+impl Decoder {
+    /// Take the bytes that came.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.buffer.drain(..self.start);
+        self.start = 0;
+        let excess = (self.buffer.len() + bytes.len()).saturating_sub(CAPACITY);
+        let from_held = excess.min(self.buffer.len());
+        self.buffer.drain(..from_held);
+        self.buffer.extend_from_slice(&bytes[excess - from_held..]);
+        self.tally.dropped_bytes += excess as u64;
+    }
+
+    /// The next complete frame, in the order they came.
+    pub fn next_frame(&mut self) -> Option<Frame<'_>> {
+        let end = loop {
+            let bytes = &self.buffer[self.start..];
+            let Some(noise) = header_in(bytes) else {
+                self.skip(bytes.len());
+                return None;
+            };
+            let bytes = &bytes[noise..];
+            match candidate(bytes) {
+                Candidate::Sound {
+                    end,
+                    ending: Ending::Right,
+                } => {
+                    self.skip(noise);
+                    break end;
+                }
+                Candidate::Sound { end, ending } => match right_frame_within(bytes, end) {
+                    None => {
+                        self.skip(noise);
+                        break end;
+                    }
+                    Some(_) if ending == Ending::Missing => {
+                        self.skip(noise);
+                        return None;
+                    }
+                    Some(inner) => {
+                        self.tally.bad_crc += 1;
+                        self.skip(noise + inner);
+                    }
+                },
+                Candidate::Half { len } => {
+                    let hidden = (len > LONGEST_PLAUSIBLE)
+                        .then(|| right_frame_within(bytes, bytes.len()))
+                        .flatten();
+                    self.skip(noise + hidden.unwrap_or(0));
+                    hidden?;
+                }
+                // Only the header is given up: the frame behind a bad one may begin inside it.
+                Candidate::Broken => {
+                    self.tally.bad_crc += 1;
+                    self.skip(noise + 1);
+                }
+            }
+        };
+        self.tally.frames += 1;
+        let from = self.start;
+        self.start += end;
+        if is_end(&self.buffer[self.start..]) == Ending::Right {
+            self.start += 2;
+        }
+        let frame = &self.buffer[from..from + end];
+        Some(Frame {
+            rid: frame[2],
+            sn: frame[3],
+            did: frame[4],
+            data: &frame[BEFORE_DATA..end - 1],
+        })
+    }
+
+    /// What became of the bytes so far.
+    #[must_use]
+    pub fn tally(&self) -> DecoderTally {
+        self.tally
+    }
+
+    fn skip(&mut self, bytes: usize) {
+        self.start += bytes;
+        self.tally.noise_bytes += bytes as u64;
+    }
+}
+
+/// Offset of the first header, or of a last byte that may begin one.
+fn header_in(bytes: &[u8]) -> Option<usize> {
+    let whole = bytes.windows(2).position(|pair| pair == HEADER);
+    whole.or_else(|| {
+        bytes
+            .last()
+            .is_some_and(|&last| last == HEADER[0])
+            .then(|| bytes.len() - 1)
+    })
+}
+
+/// Judge what stands at the start of `bytes`, which is a header or the beginning of one.
+fn candidate(bytes: &[u8]) -> Candidate {
+    let Some(&len) = bytes.get(BEFORE_DATA - 1) else {
+        return Candidate::Half { len: 0 };
+    };
+    let crc_at = BEFORE_DATA + usize::from(len);
+    match bytes.get(crc_at) {
+        None => Candidate::Half {
+            len: usize::from(len),
+        },
+        Some(&crc) if crc == crc8(&bytes[HEADER.len()..crc_at]) => Candidate::Sound {
+            end: crc_at + 1,
+            ending: is_end(&bytes[crc_at + 1..]),
+        },
+        Some(_) => Candidate::Broken,
+    }
+}
+
+fn is_end(bytes: &[u8]) -> Ending {
+    match bytes {
+        [0x5e, 0x0d | 0x13, ..] => Ending::Right,
+        [] | [0x5e] => Ending::Missing,
+        _ => Ending::Wrong,
+    }
+}
+
+/// Offset of a sound frame with right end bytes that begins behind the start of `bytes` and before `end`.
+fn right_frame_within(bytes: &[u8], end: usize) -> Option<usize> {
+    let headers = bytes[1..]
+        .windows(2)
+        .enumerate()
+        .filter_map(|(at, pair)| (pair == HEADER).then_some(at + 1));
+    headers.take_while(|&at| at < end).find(|&at| {
+        matches!(
+            candidate(&bytes[at..]),
+            Candidate::Sound {
+                ending: Ending::Right,
+                ..
+            }
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests;

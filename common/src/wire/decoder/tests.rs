@@ -1,0 +1,258 @@
+//! Promises of the decoder, by example and by property.
+
+use super::*;
+use crate::wire::MAX_FRAME_BYTES;
+use proptest::prelude::*;
+
+type Owned = (u8, u8, u8, Vec<u8>);
+
+fn drain(decoder: &mut Decoder) -> Vec<Owned> {
+    let mut frames = Vec::new();
+    while let Some(frame) = decoder.next_frame() {
+        frames.push((frame.rid, frame.sn, frame.did, frame.data.to_vec()));
+    }
+    frames
+}
+
+fn decode(pieces: &[&[u8]]) -> Vec<Owned> {
+    let mut decoder = Decoder::default();
+    let mut frames = Vec::new();
+    for piece in pieces {
+        decoder.push(piece);
+        frames.extend(drain(&mut decoder));
+    }
+    frames
+}
+
+fn encoded(did: u8, data: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let frame = Frame {
+        rid: 1,
+        sn: 0,
+        did,
+        data,
+    };
+    frame.encode(&mut bytes);
+    bytes
+}
+
+const PING: [u8; 10] = [0x5e, 0x02, 0x01, 0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d];
+fn ping() -> Owned {
+    (1, 0, 255, vec![0])
+}
+
+#[test]
+fn several_frames_and_halves_come_out_of_any_pieces() {
+    let bytes = [PING, PING, PING].concat();
+    for size in 1..bytes.len() {
+        let pieces: Vec<&[u8]> = bytes.chunks(size).collect();
+        assert_eq!(decode(&pieces), vec![ping(); 3], "pieces of {size}");
+    }
+}
+
+#[test]
+fn a_client_that_begins_with_zeros_and_ends_wrong_is_heard() {
+    let mut bytes = vec![0; 65];
+    bytes.extend(PING);
+    let last = bytes.len() - 1;
+    bytes[last] = 0x13;
+    assert_eq!(decode(&[&bytes, &bytes]), vec![ping(); 2]);
+}
+
+#[test]
+fn end_bytes_that_are_none_at_all_do_not_spoil_a_frame() {
+    let bare = &PING[..8];
+    assert_eq!(decode(&[bare]), vec![ping()], "missing");
+    assert_eq!(
+        decode(&[bare, &PING]),
+        vec![ping(); 2],
+        "header follows at once"
+    );
+    assert_eq!(
+        decode(&[bare, &[0xff, 0x5e], &PING]),
+        vec![ping(); 2],
+        "wrong"
+    );
+}
+
+#[test]
+fn end_bytes_inside_data_end_nothing() {
+    let data = [0x5e, 0x0d, 0x5e, 0x02, 0x5e, 0x0d];
+    assert_eq!(
+        decode(&[&encoded(9, &data)]),
+        vec![(1, 0, 9, data.to_vec())]
+    );
+}
+
+#[test]
+fn a_whole_frame_inside_data_is_data() {
+    let outer = encoded(9, &PING);
+    for cut in 0..outer.len() {
+        let (first, second) = outer.split_at(cut);
+        assert_eq!(
+            decode(&[first, second]),
+            vec![(1, 0, 9, PING.to_vec())],
+            "cut at {cut}"
+        );
+    }
+}
+
+#[test]
+fn a_bad_crc_loses_only_its_own_frame() {
+    let mut bad = encoded(9, &[1, 2, 3]);
+    bad[6] ^= 0x10;
+    let bytes = [&bad[..], &PING].concat();
+    assert_eq!(decode(&[&bytes]), vec![ping()]);
+}
+
+#[test]
+fn a_frame_that_begins_inside_a_broken_one_is_found() {
+    let torn = encoded(9, &[1, 2, 3, 4, 5, 6, 7, 8]);
+    let bytes = [&torn[..9], &PING, &PING].concat();
+    assert_eq!(decode(&[&bytes]), vec![ping(); 2]);
+}
+
+#[test]
+fn a_noisy_header_that_claims_much_holds_no_frame_back() {
+    let bytes = [&[0x5e, 0x02, 0x00, 0x00, 0x7b, 0xff][..], &PING].concat();
+    assert_eq!(decode(&[&bytes]), vec![ping()]);
+}
+
+#[test]
+fn a_noisy_header_whose_crc_happens_to_fit_swallows_no_frame() {
+    // LEN 4 reaches into the ping behind it; SN is chosen so that a byte of the ping is its CRC.
+    let forged = (0..=255)
+        .map(|sn| [&[0x5e, 0x02, 0x01, sn, 0x09, 0x04][..], &PING].concat())
+        .find(|bytes| crc8(&bytes[2..10]) == bytes[10])
+        .expect("the CRC takes every value over SN");
+    assert_eq!(decode(&[&forged]), vec![ping()]);
+}
+
+#[test]
+fn more_than_is_held_drops_the_oldest_and_keeps_the_newest() {
+    let mut decoder = Decoder::default();
+    decoder.push(&vec![0x5e; 3 * CAPACITY]);
+    decoder.push(&PING);
+    assert_eq!(drain(&mut decoder), vec![ping()]);
+    assert!(decoder.tally().dropped_bytes > 2 * CAPACITY as u64);
+    assert!(decoder.buffer.capacity() <= 2 * CAPACITY);
+}
+
+#[test]
+fn every_byte_is_accounted_for() {
+    let mut decoder = Decoder::default();
+    let mut bad = PING;
+    bad[6] ^= 1;
+    decoder.push(&[&[9, 9, 9][..], &bad, &PING].concat());
+    drain(&mut decoder);
+    let tally = decoder.tally();
+    assert_eq!((tally.frames, tally.bad_crc, tally.noise_bytes), (1, 1, 13));
+}
+
+/// One piece of a stream under test.
+#[derive(Clone, Debug)]
+enum Piece {
+    Untouched {
+        did: u8,
+        data: Vec<u8>,
+    },
+    Flipped {
+        data: Vec<u8>,
+        at: prop::sample::Index,
+        mask: u8,
+    },
+    Truncated {
+        data: Vec<u8>,
+        at: prop::sample::Index,
+    },
+    Noise(Vec<u8>),
+}
+
+/// Bytes in which headers and ends are far commoner than chance.
+fn tricky_bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
+    let byte = prop_oneof![
+        3 => any::<u8>(),
+        1 => Just(0x5e_u8),
+        1 => Just(0x02_u8),
+        1 => Just(0x0d_u8),
+    ];
+    prop::collection::vec(byte, 0..=most)
+}
+
+fn piece() -> impl Strategy<Value = Piece> {
+    prop_oneof![
+        4 => (any::<u8>(), tricky_bytes(255)).prop_map(|(did, data)| Piece::Untouched { did, data }),
+        1 => (tricky_bytes(60), any::<prop::sample::Index>(), 1..=255_u8)
+            .prop_map(|(data, at, mask)| Piece::Flipped { data, at, mask }),
+        1 => (tricky_bytes(60), any::<prop::sample::Index>())
+            .prop_map(|(data, at)| Piece::Truncated { data, at }),
+        1 => tricky_bytes(80).prop_map(Piece::Noise),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn every_untouched_frame_comes_out_however_the_stream_is_cut_and_corrupted(
+        pieces in prop::collection::vec(piece(), 1..12),
+        cuts in prop::collection::vec(any::<prop::sample::Index>(), 0..12),
+    ) {
+        let mut stream = Vec::new();
+        let mut untouched = Vec::new();
+        let mut touched = Vec::new();
+        for piece in &pieces {
+            match piece {
+                Piece::Untouched { did, data } => {
+                    stream.extend(encoded(*did, data));
+                    untouched.push((1, 0, *did, data.clone()));
+                }
+                Piece::Flipped { data, at, mask } => {
+                    let mut bytes = encoded(77, data);
+                    let at = at.index(bytes.len());
+                    bytes[at] ^= mask;
+                    stream.extend(bytes);
+                    touched.push((1, 0, 77, data.clone()));
+                }
+                Piece::Truncated { data, at } => {
+                    let bytes = encoded(78, data);
+                    stream.extend(&bytes[..at.index(bytes.len())]);
+                    touched.push((1, 0, 78, data.clone()));
+                }
+                Piece::Noise(bytes) => stream.extend(bytes),
+            }
+        }
+        // What a header that was noise claims has to come before it is known for noise.
+        stream.extend([0; MAX_FRAME_BYTES]);
+
+        let mut cuts: Vec<usize> = cuts.iter().map(|cut| cut.index(stream.len())).collect();
+        cuts.push(stream.len());
+        cuts.sort_unstable();
+        let mut decoder = Decoder::default();
+        let mut came = Vec::new();
+        let mut from = 0;
+        for to in cuts {
+            decoder.push(&stream[from..to]);
+            came.extend(drain(&mut decoder));
+            from = to;
+        }
+
+        // Corruption can by chance make a frame that CRC-8 cannot tell from a sent one.
+        prop_assume!(came.iter().all(|frame| untouched.contains(frame) || touched.contains(frame)));
+        came.retain(|frame| untouched.contains(frame));
+        prop_assert_eq!(came, untouched);
+    }
+
+    #[test]
+    fn any_bytes_leave_the_decoder_bounded_and_deaf_to_nothing_that_follows(
+        bytes in tricky_bytes(4000),
+    ) {
+        let mut decoder = Decoder::default();
+        decoder.push(&bytes);
+        drain(&mut decoder);
+        decoder.push(&[0; MAX_FRAME_BYTES]);
+        drain(&mut decoder);
+        decoder.push(&PING);
+        prop_assert!(drain(&mut decoder).ends_with(&[ping()]));
+    }
+}

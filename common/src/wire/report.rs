@@ -1,0 +1,56 @@
+//! Robot to host.
+
+use super::{
+    did,
+    frame::{Addressing, Frame, MessageError, SystemSignal},
+    sensors::{CustomSensors, MotorSensors, StandardSensors},
+};
+
+/// Robot to host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Report {
+    /// 123: wheels.
+    Motor(MotorSensors),
+    /// 124: AD channels.
+    Custom(CustomSensors),
+    /// 125: ultrasonic and the rest.
+    Standard(StandardSensors),
+    /// Ping or acknowledge.
+    System(SystemSignal),
+}
+
+impl Report {
+    /// Append the frame of this report to `out`.
+    pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
+        let write = |did, data: &[u8], out: &mut Vec<u8>| {
+            let rid = addressing.host();
+            let frame = Frame {
+                rid,
+                sn: 0,
+                did,
+                data,
+            };
+            frame.encode(out);
+        };
+        match self {
+            Self::Motor(sensors) => write(did::MOTOR, &sensors.to_bytes(), out),
+            Self::Custom(sensors) => write(did::CUSTOM, &sensors.to_bytes(), out),
+            Self::Standard(sensors) => write(did::STANDARD, &sensors.to_bytes(), out),
+            Self::System(signal) => write(did::SYSTEM, &[signal.byte()], out),
+        }
+    }
+
+    /// What a frame tells the host.
+    ///
+    /// # Errors
+    /// When the frame is sound but no report: unknown DID, too short, a byte that means nothing.
+    pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
+        match frame.did {
+            did::MOTOR => MotorSensors::from_bytes(frame.data).map(Self::Motor),
+            did::CUSTOM => CustomSensors::from_bytes(frame.data).map(Self::Custom),
+            did::STANDARD => StandardSensors::from_bytes(frame.data).map(Self::Standard),
+            did::SYSTEM => SystemSignal::parse(frame.data).map(Self::System),
+            did => Err(MessageError::UnknownDid { did }),
+        }
+    }
+}

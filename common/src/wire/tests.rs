@@ -1,0 +1,293 @@
+//! Every worked frame, and every message there and back.
+
+use proptest::prelude::*;
+
+use super::*;
+
+fn bytes(hex: &str) -> Vec<u8> {
+    hex.split_whitespace()
+        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
+        .collect()
+}
+
+fn command(hex: &str) -> Result<Command, MessageError> {
+    let mut decoder = Decoder::default();
+    decoder.push(&bytes(hex));
+    Command::parse(&decoder.next_frame().expect("one sound frame"))
+}
+
+fn wheels(first: i16, second: i16, limit_ms: Option<u16>) -> Command {
+    Command::velocity([Some(first), Some(second)], limit_ms)
+}
+
+#[test]
+fn every_worked_frame_is_written_and_read() {
+    let standard = |request| Command::Stream {
+        stream: Stream::Standard,
+        request,
+    };
+    let pid = Command::Parameter {
+        channel: 0,
+        parameter: Parameter::VelocityPid(Gains {
+            kp: Some(15),
+            kd: Some(0),
+            ki_x100: Some(0),
+        }),
+    };
+    let worked = [
+        (
+            Command::System(SystemSignal::Ack),
+            "5e 02 01 00 ff 01 01 85 5e 0d",
+        ),
+        (
+            Command::System(SystemSignal::Ping),
+            "5e 02 01 00 ff 01 00 db 5e 0d",
+        ),
+        (standard(Request::Start), "5e 02 01 00 7d 00 b0 5e 0d"),
+        (standard(Request::Stop), "5e 02 01 00 7d 01 00 f6 5e 0d"),
+        (
+            wheels(400, -400, None),
+            "5e 02 01 00 1b 0c 90 01 70 fe 00 80 00 80 00 80 00 80 3c 5e 0d",
+        ),
+        (
+            wheels(400, -400, Some(1000)),
+            "5e 02 01 00 1b 0e 90 01 70 fe 00 80 00 80 00 80 00 80 e8 03 98 5e 0d",
+        ),
+        (
+            pid,
+            "5e 02 01 00 07 0b 08 00 01 0f 00 02 00 00 03 00 00 27 5e 0d",
+        ),
+    ];
+    for (meant, hex) in worked {
+        let mut out = Vec::new();
+        meant.encode(Addressing::Numbered, &mut out);
+        assert_eq!(out, bytes(hex), "{meant:?}");
+        assert_eq!(command(hex), Ok(meant), "{hex}");
+    }
+}
+
+#[test]
+fn the_worked_acknowledgement_of_the_robot_is_written_and_read() {
+    let ack = Report::System(SystemSignal::Ack);
+    let hex = bytes("5e 02 00 00 ff 01 01 48 5e 0d");
+    let mut out = Vec::new();
+    ack.encode(Addressing::Numbered, &mut out);
+    assert_eq!(out, hex);
+    let mut decoder = Decoder::default();
+    decoder.push(&hex);
+    assert_eq!(Report::parse(&decoder.next_frame().unwrap()), Ok(ack));
+}
+
+/// A command's data in a frame of `did`.
+fn parsed(did: u8, data: &[u8]) -> Result<Command, MessageError> {
+    Command::parse(&Frame {
+        rid: 1,
+        sn: 0,
+        did,
+        data,
+    })
+}
+
+#[test]
+fn timed_commands_are_taken_with_14_and_with_15_bytes() {
+    let six = bytes("90 01 70 fe 00 80 00 80 00 80 00 80");
+    let timed = Ok(wheels(400, -400, Some(1000)));
+    assert_eq!(parsed(27, &[&six[..], &[0xe8, 0x03]].concat()), timed);
+    assert_eq!(parsed(27, &[&six[..], &[28, 0xe8, 0x03]].concat()), timed);
+    assert_eq!(parsed(27, &[&six[..], &[0xe8, 0x03, 0]].concat()), timed);
+}
+
+#[test]
+fn both_ways_to_leave_a_channel_alone_are_taken() {
+    let other = bytes("90 01 70 fe 01 80 01 80 00 80 01 80");
+    assert_eq!(parsed(27, &other), Ok(wheels(400, -400, None)));
+    let nobody = Ok(Command::Motion(Motion {
+        quantity: Quantity::Velocity,
+        targets: Targets::All([None; 6]),
+        limit_ms: None,
+    }));
+    assert_eq!(parsed(26, &[1, 0x01, 0x80]), nobody);
+}
+
+#[test]
+fn a_single_channel_is_set_with_and_without_time() {
+    let meant = |limit_ms| {
+        Ok(Command::Motion(Motion {
+            quantity: Quantity::Position,
+            targets: Targets::One {
+                channel: 1,
+                value: -2,
+            },
+            limit_ms,
+        }))
+    };
+    assert_eq!(parsed(3, &[1, 0xfe, 0xff]), meant(None));
+    assert_eq!(parsed(3, &[1, 0xfe, 0xff, 28, 10, 1]), meant(Some(266)));
+}
+
+#[test]
+fn a_stream_asked_for_255_times_is_continuous() {
+    let start = Ok(Command::Stream {
+        stream: Stream::All,
+        request: Request::Start,
+    });
+    assert_eq!(parsed(127, &[255]), start);
+    assert_eq!(parsed(127, &[]), start);
+}
+
+#[test]
+fn what_is_no_message_is_refused_with_its_did() {
+    let refusals = [
+        (parsed(27, &[0; 13]), 27),
+        (parsed(27, &[0; 11]), 27),
+        (parsed(26, &[6, 0, 0]), 26),
+        (parsed(30, &[]), 30),
+        (parsed(30, &[1, 9]), 30),
+        (parsed(7, &[14, 0, 3]), 7),
+        (parsed(7, &[8, 0, 1, 5]), 7),
+        (parsed(255, &[2]), 255),
+        (parsed(200, &[]), 200),
+    ];
+    for (refusal, did) in refusals {
+        let text = refusal.expect_err("was taken").to_string();
+        assert!(text.contains(&format!("DID {did}")), "{text}");
+    }
+}
+
+#[test]
+fn the_motor_frame_lies_as_the_notes_say() {
+    let sensors = MotorSensors {
+        pots: [0x0102, 0, 0, 0, 0, 0],
+        currents: [0, 0, 0, 0, 0, 0x0304],
+        encoders: [
+            Encoder {
+                position: 0x7ffe,
+                speed: 0x0506,
+                positive: true,
+            },
+            Encoder {
+                position: 0x0708,
+                speed: 0x090a,
+                positive: false,
+            },
+        ],
+    };
+    let mut out = Vec::new();
+    Report::Motor(sensors).encode(Addressing::Lettered, &mut out);
+    assert_eq!(out[2..6], [0xb8, 0, 123, 33]);
+    let data = &out[6..39];
+    assert_eq!(data[..2], [0x02, 0x01]);
+    assert_eq!(data[22..24], [0x04, 0x03]);
+    assert_eq!(data[24..], bytes("fe 7f 06 05 08 07 0a 09 01"));
+}
+
+#[test]
+fn the_standard_frame_lies_as_the_notes_say_and_may_be_a_byte_longer() {
+    let data: Vec<u8> = (1..=41).collect();
+    let frame = Frame {
+        rid: 0,
+        sn: 0,
+        did: 125,
+        data: &data,
+    };
+    let Ok(Report::Standard(sensors)) = Report::parse(&frame) else {
+        panic!("41 bytes were refused");
+    };
+    assert_eq!(sensors.ultrasonic, [1, 2, 3, 4, 5, 6]);
+    assert_eq!(sensors.human[0], 0x0807);
+    assert_eq!(sensors.tilt[0], 0x100f);
+    assert_eq!(sensors.overheat[1], 0x1615);
+    assert_eq!((sensors.temperature, sensors.infrared), (0x1817, 0x1a19));
+    assert_eq!(sensors.infrared_code, [27, 28, 29, 30]);
+    assert_eq!(sensors.board_battery, 0x201f);
+    assert_eq!(sensors.motor_battery, 0x2221);
+    assert_eq!(sensors.servo_battery, 0x2423);
+    assert_eq!(sensors.reference, 0x2625);
+}
+
+#[test]
+fn wheel_counts_go_the_shorter_way_round_the_cycle() {
+    let at = |position| Encoder {
+        position,
+        ..Encoder::default()
+    };
+    assert_eq!(at(3).counts_since(&at(32_766)), 5);
+    assert_eq!(at(32_766).counts_since(&at(3)), -5);
+    assert_eq!(at(700).counts_since(&at(100)), 600);
+}
+
+fn any_command() -> impl Strategy<Value = Command> {
+    let value = (-32_766..=i16::MAX).prop_map(Some);
+    let targets = prop_oneof![
+        (0..6_u8, -32_766..=i16::MAX).prop_map(|(channel, value)| Targets::One { channel, value }),
+        prop::array::uniform6(prop_oneof![value, Just(None)]).prop_map(Targets::All),
+    ];
+    let quantity =
+        prop::sample::select(vec![Quantity::Position, Quantity::Pwm, Quantity::Velocity]);
+    let gain = prop::option::of(any::<u16>());
+    let gains =
+        (gain.clone(), gain.clone(), gain).prop_map(|(kp, kd, ki_x100)| Gains { kp, kd, ki_x100 });
+    let parameter = prop_oneof![
+        gains.clone().prop_map(Parameter::PositionPid),
+        gains.prop_map(Parameter::VelocityPid),
+        Just(Parameter::Feedback(Feedback::Encoder)),
+        Just(Parameter::Mode(Mode::Position)),
+        Just(Parameter::Other { sub: 6 }),
+    ];
+    prop_oneof![
+        (quantity, targets, prop::option::of(any::<u16>())).prop_map(
+            |(quantity, targets, limit_ms)| Command::Motion(Motion {
+                quantity,
+                targets,
+                limit_ms,
+            })
+        ),
+        (0..6_u8, parameter)
+            .prop_map(|(channel, parameter)| Command::Parameter { channel, parameter }),
+        (any::<bool>(), prop::option::of(0..6_u8))
+            .prop_map(|(on, channel)| Command::Enable { on, channel }),
+        (1..=254_u8).prop_map(|count| Command::Stream {
+            stream: Stream::Custom,
+            request: Request::Count(count),
+        }),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn a_command_comes_back_as_it_was_sent(
+        meant in any_command(),
+        addressing in prop::sample::select(vec![Addressing::Numbered, Addressing::Lettered]),
+    ) {
+        let mut out = Vec::new();
+        meant.encode(addressing, &mut out);
+        let mut decoder = Decoder::default();
+        decoder.push(&out);
+        let frame = decoder.next_frame().expect("it was encoded whole");
+        prop_assert_eq!(Addressing::of_robot(frame.rid), Some(addressing));
+        prop_assert_eq!(Command::parse(&frame), Ok(meant));
+    }
+
+    #[test]
+    fn any_data_under_any_did_are_a_message_or_an_error(
+        did in any::<u8>(),
+        data in prop::collection::vec(any::<u8>(), 0..60),
+    ) {
+        let frame = Frame { rid: 0, sn: 0, did, data: &data };
+        // A report says everything its data did, up to what the frame keeps free.
+        if let Ok(report) = Report::parse(&frame) {
+            let mut out = Vec::new();
+            report.encode(Addressing::Numbered, &mut out);
+            let mut decoder = Decoder::default();
+            decoder.push(&out);
+            prop_assert_eq!(Report::parse(&decoder.next_frame().expect("whole")), Ok(report));
+        }
+        if let Ok(command) = Command::parse(&frame) {
+            let mut out = Vec::new();
+            command.encode(Addressing::Numbered, &mut out);
+            let mut decoder = Decoder::default();
+            decoder.push(&out);
+            prop_assert_eq!(Command::parse(&decoder.next_frame().expect("whole")), Ok(command));
+        }
+    }
+}

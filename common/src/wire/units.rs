@@ -1,0 +1,100 @@
+//! Bytes and AD counts in metres and volts.
+
+/// What an ultrasonic byte says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Echo {
+    /// 1..4: something 4 cm away or nearer.
+    Touching,
+    /// 5..254: something at so many centimetres.
+    At(u8),
+    /// 255: nothing within 2.55 m.
+    Nothing,
+}
+
+impl Echo {
+    /// What `byte` says; 0 is no reading.
+    #[must_use]
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        match byte {
+            0 => None,
+            1..=4 => Some(Self::Touching),
+            5..=254 => Some(Self::At(byte)),
+            255 => Some(Self::Nothing),
+        }
+    }
+
+    /// The byte that says that something is `range` metres away: whole centimetres, 4 to 255.
+    #[must_use]
+    pub fn byte_at(range: f64) -> u8 {
+        (range * 100.0).round().clamp(4.0, 255.0) as u8
+    }
+
+    /// The range in metres, 0.04 when touching; none for nothing.
+    #[must_use]
+    pub fn metres(self) -> Option<f64> {
+        match self {
+            Self::Touching => Some(0.04),
+            Self::At(cm) => Some(f64::from(cm) / 100.0),
+            Self::Nothing => None,
+        }
+    }
+}
+
+/// Nearest and farthest an infrared ranger tells, metres.
+const INFRARED_M: (f64, f64) = (0.09, 0.81);
+
+/// The range an infrared ranger means by `ad`, metres, clamped to 0.09..0.81; 0.81 is also nothing.
+#[must_use]
+pub fn infrared_m(ad: u16) -> f64 {
+    let volts_over = f64::from(ad) * 3.0 / 4028.0 - 0.17;
+    if volts_over <= 0.0 {
+        return INFRARED_M.1;
+    }
+    (0.216 / volts_over).clamp(INFRARED_M.0, INFRARED_M.1)
+}
+
+/// The AD counts an infrared ranger gives `range` metres from something.
+#[must_use]
+pub fn infrared_ad(range: f64) -> u16 {
+    let range = range.clamp(INFRARED_M.0, INFRARED_M.1);
+    ((0.216 / range + 0.17) * 4028.0 / 3.0).round() as u16
+}
+
+/// Volts of a battery whose `ad` counts reach 4095 at `full_scale` volts (9 for board and servo, 24 for
+/// the motors).
+#[must_use]
+pub fn volts(ad: u16, full_scale: f64) -> f64 {
+    f64::from(ad) / 4095.0 * full_scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_is_no_reading_and_the_ends_of_the_scale_mean_what_the_manual_says() {
+        assert_eq!(Echo::from_byte(0), None);
+        assert_eq!(Echo::from_byte(4), Some(Echo::Touching));
+        assert_eq!(Echo::from_byte(254), Some(Echo::At(254)));
+        assert_eq!(Echo::from_byte(255), Some(Echo::Nothing));
+        assert_eq!([0.01, 1.234, 9.0].map(Echo::byte_at), [4, 123, 255]);
+        assert_eq!(Echo::byte_at(f64::INFINITY), 255);
+    }
+
+    #[test]
+    fn the_infrared_formula_by_hand_and_clamped() {
+        // 21.6 / (1000 * 3 / 4028 - 0.17) = 21.6 / 0.574786 = 37.579 cm.
+        assert!((infrared_m(1000) - 0.375_79).abs() < 1e-5);
+        assert_eq!(infrared_m(0), 0.81);
+        assert_eq!(infrared_m(4095), 0.09);
+        for range in [0.1, 0.3, 0.7] {
+            assert!((infrared_m(infrared_ad(range)) - range).abs() < 0.002);
+        }
+    }
+
+    #[test]
+    fn battery_volts_by_hand() {
+        assert_eq!(volts(4095, 24.0), 24.0);
+        assert_eq!(volts(0, 9.0), 0.0);
+    }
+}
