@@ -8,6 +8,7 @@
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
 //! | [`kinematics`] | (1)-(3) and their inverses |
 //! | [`clock`] | mission time, pace, the monotonic clock |
+//! | [`latency`] | a histogram that fits in a sample |
 //! | [`topics`] | THE table of topics |
 //! | [`samples`] | their payloads |
 //! | [`domain`] | where a robot lives on this machine |
@@ -26,6 +27,7 @@ pub mod domain;
 pub mod geometry;
 pub mod grid;
 pub mod kinematics;
+pub mod latency;
 pub mod mission;
 pub mod run;
 pub mod samples;

@@ -16,6 +16,7 @@ use crate::{
     clock::MissionTime,
     grid::{GridFrame, Revision, Window},
     kinematics::{Pose2, Twist},
+    latency,
 };
 
 /// Which sample this is, who wrote it and when: the first field of every payload and header.
@@ -111,7 +112,7 @@ wire_enum! {
         Nothing = 2,
         /// 4: at 4 cm or nearer.
         AtContact = 3,
-        /// 0 to 3: no valid reading.
+        /// 0: no valid reading.
         Invalid = 4,
     }
 }
@@ -437,9 +438,6 @@ pub struct HealthSample {
     pub turns: u64,
 }
 
-/// Buckets of [`LinkSample::latency_histogram`]: eight an octave, from 1 microsecond.
-pub const LATENCY_BUCKETS: usize = 192;
-
 /// Topic `link`: the state of the wire.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Link")]
@@ -463,8 +461,10 @@ pub struct LinkSample {
     pub repeated_ticks: u64,
     /// From the datagram in to the datagram out, last tick, nanoseconds.
     pub latency_ns: u64,
-    /// All such latencies of this life of the link: bucket k counts those from 2^(k/8) microseconds.
-    pub latency_histogram: [u32; LATENCY_BUCKETS],
+    /// The longest of this life of the link, nanoseconds.
+    pub latency_max_ns: u64,
+    /// All of this life, a [`crate::latency::Histogram`]: bucket k counts those from 2^(k/8) microseconds.
+    pub latency_histogram: [u32; latency::BUCKETS],
 }
 
 impl Default for LinkSample {
@@ -479,7 +479,8 @@ impl Default for LinkSample {
             commands_out: 0,
             repeated_ticks: 0,
             latency_ns: 0,
-            latency_histogram: [0; LATENCY_BUCKETS],
+            latency_max_ns: 0,
+            latency_histogram: [0; latency::BUCKETS],
         }
     }
 }

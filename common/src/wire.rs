@@ -51,7 +51,9 @@ pub use crc::crc8;
 pub use decoder::{Decoder, DecoderTally};
 pub use frame::{Addressing, Frame, MAX_FRAME_BYTES, MessageError, SystemSignal};
 pub use report::Report;
-pub use sensors::{COUNT_CYCLE, CustomSensors, Encoder, MotorSensors, StandardSensors};
+pub use sensors::{
+    COUNT_CYCLE, CustomSensors, Encoder, MotorSensors, StandardSensors, counts_between,
+};
 pub use units::{Echo, infrared_ad, infrared_m, volts};
 
 #[cfg(test)]

@@ -299,6 +299,16 @@ fn robot(mission: &Mission) -> Result<(), Objection> {
         0.02..=5.0,
         "s",
     )?;
+    if robot.command_limit_s * robot.rate_hz <= 1.0 {
+        return Err(objection(
+            "robot.command_limit_s",
+            format!(
+                "a command would go stale before the next tick: {} s at {} Hz",
+                robot.command_limit_s, robot.rate_hz
+            ),
+            "raise robot.command_limit_s or robot.rate_hz",
+        ));
+    }
     let (left, right) = (robot.left.channel, robot.right.channel);
     if left > 1 || right > 1 || left == right {
         return Err(objection(

@@ -31,13 +31,19 @@ impl Encoder {
     /// round the cycle.
     #[must_use]
     pub fn counts_since(&self, earlier: &Self) -> i32 {
-        let cycle = i32::from(COUNT_CYCLE);
-        let turned = (i32::from(self.position) - i32::from(earlier.position)).rem_euclid(cycle);
-        if turned >= cycle / 2 {
-            turned - cycle
-        } else {
-            turned
-        }
+        counts_between(earlier.position, self.position)
+    }
+}
+
+/// Counts from `old` to `new`, both below [`COUNT_CYCLE`]: the shorter way round the cycle.
+#[must_use]
+pub fn counts_between(old: u16, new: u16) -> i32 {
+    let cycle = i32::from(COUNT_CYCLE);
+    let ahead = (i32::from(new) - i32::from(old)).rem_euclid(cycle);
+    if ahead >= cycle / 2 {
+        ahead - cycle
+    } else {
+        ahead
     }
 }
 

@@ -5,12 +5,10 @@ use common::{
     kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
     mission::{Body, Integration, Mission},
     samples::{PoseSample, WheelSample},
+    wire::counts_between,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
-
-/// The encoders count modulo this.
-pub const COUNT_CYCLE: i32 = 32_768;
 
 /// How much faster than its top speed a wheel may seem to turn before the counts are disbelieved: a
 /// robot that slides or is pushed does not reach it, a counter that restarted nearly always does.
@@ -126,7 +124,10 @@ impl DeadReckoning {
 
     /// Wheel angles since `last`, radians; none if the counts cannot have come from turning wheels.
     fn turned(&mut self, last: Last, left: u16, right: u16, elapsed: f64) -> WheelSpeeds {
-        let (left, right) = (difference(last.left, left), difference(last.right, right));
+        let (left, right) = (
+            counts_between(last.left, left),
+            counts_between(last.right, right),
+        );
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
@@ -164,20 +165,10 @@ impl DeadReckoning {
     }
 }
 
-/// Counts from `old` to `new` the short way round the cycle.
-fn difference(old: u16, new: u16) -> i32 {
-    let ahead = (i32::from(new) - i32::from(old)).rem_euclid(COUNT_CYCLE);
-    if ahead >= COUNT_CYCLE / 2 {
-        ahead - COUNT_CYCLE
-    } else {
-        ahead
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::samples::Stamp;
+    use common::{samples::Stamp, wire::COUNT_CYCLE};
     use std::{f64::consts::PI, path::Path};
 
     fn reckoning(extra: &str) -> DeadReckoning {
@@ -223,7 +214,7 @@ mod tests {
         let mut reckoning = reckoning("");
         reckoning.step(&wheels(0, 0, 0));
         // +-1000 counts: 2 pi 0.1 m a side over a track of 0.4 m: pi radians, on the spot.
-        let pose = reckoning.step(&wheels(1, (COUNT_CYCLE - 1000) as u16, 1000));
+        let pose = reckoning.step(&wheels(1, COUNT_CYCLE - 1000, 1000));
         close(pose.heading_rad, PI);
         close(pose.x_m, 0.0);
     }
@@ -246,9 +237,12 @@ mod tests {
 
     #[test]
     fn counts_wrap_around_both_ways() {
-        assert_eq!(difference(32_760, 10), 18);
-        assert_eq!(difference(10, 32_760), -18);
-        assert_eq!(difference(5, 5), 0);
+        let mut reckoning = reckoning("");
+        reckoning.step(&wheels(0, COUNT_CYCLE - 200, COUNT_CYCLE - 200));
+        let pose = reckoning.step(&wheels(1, 300, 300));
+        close(pose.x_m, 0.1 * PI);
+        let pose = reckoning.step(&wheels(2, COUNT_CYCLE - 200, COUNT_CYCLE - 200));
+        close(pose.x_m, 0.0);
     }
 
     #[test]

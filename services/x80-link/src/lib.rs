@@ -1,1 +1,13 @@
 //! The X80 link: frames in, samples out, commands to the robot, and the one place that stops it.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`step`] | the link itself, pure: bytes and commands in, samples and bytes out |
+//! | [`failsafe`] | whether a command may move the robot, and why not |
+//! | [`transport`] | the socket |
+//! | [`shell`] | wires them to the topics |
+
+pub mod failsafe;
+pub mod shell;
+pub mod step;
+pub mod transport;

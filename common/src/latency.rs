@@ -1,0 +1,99 @@
+//! A histogram of latencies that fits in a sample: eight buckets an octave from 1 microsecond, so a
+//! quantile read from it is right within 9 percent.
+
+/// Number of buckets: 24 octaves, up to 16 s.
+pub const BUCKETS: usize = 192;
+const PER_OCTAVE: f64 = 8.0;
+
+/// Counts by bucket: bucket k holds latencies from 2^(k/8) microseconds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Histogram {
+    counts: [u32; BUCKETS],
+    max_ns: u64,
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self {
+            counts: [0; BUCKETS],
+            max_ns: 0,
+        }
+    }
+}
+
+impl Histogram {
+    /// Count one latency.
+    pub fn record(&mut self, latency_ns: u64) {
+        let microseconds = (latency_ns as f64 / 1e3).max(1.0);
+        let bucket = (microseconds.log2() * PER_OCTAVE) as usize;
+        let count = &mut self.counts[bucket.min(BUCKETS - 1)];
+        *count = count.saturating_add(1);
+        self.max_ns = self.max_ns.max(latency_ns);
+    }
+
+    /// The counts, as samples carry them.
+    #[must_use]
+    pub const fn counts(&self) -> &[u32; BUCKETS] {
+        &self.counts
+    }
+
+    /// The longest counted, nanoseconds.
+    #[must_use]
+    pub const fn max_ns(&self) -> u64 {
+        self.max_ns
+    }
+
+    /// Add the counts of another histogram, say of another life of its writer.
+    pub fn add(&mut self, counts: &[u32; BUCKETS], max_ns: u64) {
+        for (own, other) in self.counts.iter_mut().zip(counts) {
+            *own = own.saturating_add(*other);
+        }
+        self.max_ns = self.max_ns.max(max_ns);
+    }
+
+    /// The upper end of the bucket that holds the `share` quantile, microseconds, never above the
+    /// longest; none of nothing.
+    #[must_use]
+    pub fn quantile_us(&self, share: f64) -> Option<f64> {
+        let total: u64 = self.counts.iter().map(|&count| u64::from(count)).sum();
+        if total == 0 {
+            return None;
+        }
+        let rank = ((total as f64 * share).ceil() as u64).clamp(1, total);
+        let mut seen = 0;
+        for (bucket, &count) in self.counts.iter().enumerate() {
+            seen += u64::from(count);
+            if seen >= rank {
+                let end = ((bucket + 1) as f64 / PER_OCTAVE).exp2();
+                return Some(end.min(self.max_ns as f64 / 1e3));
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_right_within_a_bucket() {
+        let mut histogram = Histogram::default();
+        for microseconds in 1..=1000_u64 {
+            histogram.record(microseconds * 1000);
+        }
+        for (share, want) in [(0.5, 500.0), (0.99, 990.0)] {
+            let got = histogram.quantile_us(share).unwrap();
+            assert!((want..want * 1.1).contains(&got), "{share}: {got}");
+        }
+        assert_eq!(histogram.quantile_us(1.0), Some(1000.0));
+    }
+
+    #[test]
+    fn nothing_has_no_quantile_and_an_age_falls_in_the_last_bucket() {
+        let mut histogram = Histogram::default();
+        assert_eq!(histogram.quantile_us(0.5), None);
+        histogram.record(u64::MAX);
+        assert_eq!(histogram.counts()[BUCKETS - 1], 1);
+    }
+}

@@ -1,0 +1,155 @@
+//! The socket, `command` and `directive` in; `range`, `wheels`, `link` and the socket out.
+
+use std::time::Duration;
+
+use common::{
+    bus::{Reader, Writer},
+    clock::monotonic_ns,
+    latency::Histogram,
+    samples::{CommandSample, DirectiveSample, LinkSample, Order, RangeSample, WheelSample},
+    shell::{Context, Process, Progress, StageError},
+    topics,
+};
+
+use crate::{
+    step::{Effect, Event, Link},
+    transport::Transport,
+};
+
+/// The `link` topic is restated this often while no ticks come.
+const RESTATE: Duration = Duration::from_millis(100);
+
+/// The link process.
+#[derive(Debug)]
+pub struct Shell {
+    transport: Transport,
+    command: Reader<CommandSample>,
+    directive: Reader<DirectiveSample>,
+    range: Writer<RangeSample>,
+    wheels: Writer<WheelSample>,
+    state: Writer<LinkSample>,
+    link: Link,
+    latency: Histogram,
+    latency_ns: u64,
+    stated_ns: u64,
+    progress: Progress,
+}
+
+impl Process for Shell {
+    fn open(context: &mut Context) -> Result<Self, StageError> {
+        let address = context.run.address;
+        let transport = Transport::open(address).map_err(|error| {
+            StageError::Other(format!(
+                "cannot open a UDP socket towards {address}: {error}"
+            ))
+        })?;
+        context.waiter.on_readable(&transport)?;
+        context.waiter.on(context.bus.alarm(&topics::COMMAND)?);
+        context.waiter.on(context.bus.alarm(&topics::DIRECTIVE)?);
+        let generation = context.life.generation;
+        let run = &context.run;
+        Ok(Self {
+            transport,
+            command: context.bus.reader(&topics::COMMAND)?,
+            directive: context.bus.reader(&topics::DIRECTIVE)?,
+            range: context.bus.writer(&topics::RANGE, generation)?,
+            wheels: context.bus.writer(&topics::WHEELS, generation)?,
+            state: context.bus.writer(&topics::LINK, generation)?,
+            link: Link::new(&run.mission, run.clock, context.life.first_tick),
+            latency: Histogram::default(),
+            latency_ns: 0,
+            stated_ns: 0,
+            progress: Progress::default(),
+        })
+    }
+
+    fn turn(&mut self) -> Result<Progress, StageError> {
+        if let Some(directive) = self.directive.newest()? {
+            let order = Order::from_byte(directive.order);
+            let effects = self.link.step(Event::Order(order), monotonic_ns());
+            self.carry_out(effects)?;
+        }
+        while let Some(command) = self.command.take()? {
+            let effects = self.link.step(Event::Command(&command), monotonic_ns());
+            self.carry_out(effects)?;
+        }
+        while let Some(bytes) = self.transport.receive().map_err(wire_broke)? {
+            let effects = self.link.step(Event::Datagram(bytes), monotonic_ns());
+            self.carry_out(effects)?;
+        }
+        let effects = self.link.step(Event::Quiet, monotonic_ns());
+        self.carry_out(effects)?;
+        if monotonic_ns() - self.stated_ns >= RESTATE.as_nanos() as u64 {
+            self.state()?;
+        }
+        Ok(self.progress)
+    }
+
+    fn stop(&mut self) -> Result<(), StageError> {
+        for bytes in self.link.farewell() {
+            self.transport.send(&bytes).map_err(wire_broke)?;
+        }
+        tracing::info!("robot told to stand");
+        Ok(())
+    }
+}
+
+#[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
+fn wire_broke(error: std::io::Error) -> StageError {
+    StageError::Other(format!("the wire to the robot broke: {error}"))
+}
+
+impl Shell {
+    fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
+        for effect in effects {
+            match effect {
+                Effect::Send(bytes) => self.transport.send(&bytes).map_err(wire_broke)?,
+                Effect::Tick {
+                    tick,
+                    time,
+                    range,
+                    wheels,
+                } => {
+                    self.progress = Progress { tick, time };
+                    self.range.publish(tick, time, range)?;
+                    self.wheels.publish(tick, time, wheels)?;
+                }
+                Effect::Answered { began_ns } => {
+                    self.latency_ns = monotonic_ns().saturating_sub(began_ns);
+                    self.latency.record(self.latency_ns);
+                    self.state()?;
+                }
+                Effect::Stopped(cause) => {
+                    tracing::warn!(cause = cause.as_str(), "robot stopped");
+                    self.state()?;
+                }
+                Effect::Connected(true) => tracing::info!("robot answers"),
+                Effect::Connected(false) => tracing::warn!("robot lost"),
+            }
+        }
+        Ok(())
+    }
+
+    /// Say how the wire is.
+    fn state(&mut self) -> Result<(), StageError> {
+        self.stated_ns = monotonic_ns();
+        let wire = self.link.wire_tally();
+        let tally = self.link.tally();
+        let sample = LinkSample {
+            connected: self.link.connected().into(),
+            stopped: self.link.stopped().is_some().into(),
+            frames_in: wire.frames,
+            bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
+            strangers: self.transport.strangers(),
+            commands_out: tally.commands,
+            repeated_ticks: tally.repeated_ticks,
+            latency_ns: self.latency_ns,
+            latency_max_ns: self.latency.max_ns(),
+            latency_histogram: *self.latency.counts(),
+            ..LinkSample::default()
+        };
+        let Progress { tick, time } = self.progress;
+        self.state.publish(tick, time, sample)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,286 @@
+use super::*;
+use common::{samples::Stamp, wire::StandardSensors};
+use std::path::Path;
+
+const MS: u64 = 1_000_000;
+const PERIOD_NS: u64 = 142_857_142;
+
+fn mission() -> Mission {
+    // 1200 counts a turn; left on channel 0 reversed, right on channel 1: the X80's own.
+    Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap()
+}
+
+fn in_ticks() -> Link {
+    Link::new(
+        &mission(),
+        MissionClock::Ticks {
+            period_ns: PERIOD_NS,
+        },
+        0,
+    )
+}
+
+fn on_the_wall() -> Link {
+    let clock = MissionClock::Wall {
+        epoch_ns: 0,
+        rate: 1.0,
+    };
+    Link::new(&mission(), clock, 0)
+}
+
+/// A datagram of the robot: sonar byte and wheel positions as its channels count.
+fn datagram(sonar: u8, channel_0: u16, channel_1: u16) -> Vec<u8> {
+    let mut standard = StandardSensors::default();
+    standard.ultrasonic[1] = sonar;
+    let mut motor = MotorSensors::default();
+    motor.encoders[0].position = channel_0;
+    motor.encoders[1].position = channel_1;
+    let mut bytes = Vec::new();
+    Report::Standard(standard).encode(Addressing::default(), &mut bytes);
+    Report::Motor(motor).encode(Addressing::default(), &mut bytes);
+    bytes
+}
+
+fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
+    CommandSample {
+        stamp: Stamp {
+            tick,
+            stamp_ns: time_ns,
+            ..Stamp::default()
+        },
+        left_rad_s: left,
+        right_rad_s: right,
+        state: CommandState::Driving.into(),
+        ..CommandSample::default()
+    }
+}
+
+/// Connected, ordered to drive.
+fn driving(mut link: Link) -> Link {
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    link.step(Event::Order(Order::Drive), 0);
+    link
+}
+
+fn sent(effects: &[Effect]) -> Vec<Command> {
+    let mut decoder = Decoder::default();
+    for effect in effects {
+        if let Effect::Send(bytes) = effect {
+            decoder.push(bytes);
+        }
+    }
+    let mut commands = Vec::new();
+    while let Some(frame) = decoder.next_frame() {
+        commands.push(Command::parse(&frame).unwrap());
+    }
+    commands
+}
+
+fn velocities(effects: &[Effect]) -> Vec<[Option<i16>; 2]> {
+    let motion = |command: Command| match command {
+        Command::Motion(motion) => Some([motion.targets.of(0), motion.targets.of(1)]),
+        _ => None,
+    };
+    sent(effects).into_iter().filter_map(motion).collect()
+}
+
+fn ticks(effects: &[Effect]) -> Vec<(u64, RangeSample, WheelSample)> {
+    let tick = |effect: &Effect| match effect {
+        Effect::Tick {
+            tick,
+            range,
+            wheels,
+            ..
+        } => Some((*tick, *range, *wheels)),
+        _ => None,
+    };
+    effects.iter().filter_map(tick).collect()
+}
+
+#[test]
+fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
+    let mut link = on_the_wall();
+    let ping = Command::System(SystemSignal::Ping);
+    assert_eq!(sent(&link.step(Event::Quiet, 0)), [ping]);
+    assert_eq!(sent(&link.step(Event::Quiet, 100 * MS)), []);
+    assert_eq!(sent(&link.step(Event::Quiet, 200 * MS)), [ping]);
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
+    assert!(effects.contains(&Effect::Connected(true)));
+    let setup = sent(&effects);
+    assert_eq!(setup.len(), 8, "{setup:?}");
+    assert!(link.step(Event::Quiet, 500 * MS).is_empty());
+}
+
+#[test]
+fn a_tick_carries_the_newest_sonar_and_forward_counts() {
+    let mut link = driving(on_the_wall());
+    // Channel 0 counts down when driving forward: 32768 - 100 there is 100 counts forward.
+    let effects = link.step(Event::Datagram(&datagram(80, 32_668, 250)), 10 * MS);
+    let [(tick, range, wheels)] = ticks(&effects)[..] else {
+        panic!("{effects:?}");
+    };
+    assert_eq!(
+        (tick, wheels.left_counts, wheels.right_counts),
+        (0, 100, 250)
+    );
+    assert_eq!((range.range_m, range.raw_cm), (0.8, 80));
+    assert_eq!(range.status, u8::from(RangeStatus::Measured));
+}
+
+#[test]
+fn a_motor_frame_alone_makes_a_tick_without_a_reading() {
+    let mut link = driving(on_the_wall());
+    let mut bytes = Vec::new();
+    Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
+    link.step(Event::Datagram(&datagram(80, 0, 0)), MS);
+    let effects = link.step(Event::Datagram(&bytes), 2 * MS);
+    assert_eq!(ticks(&effects)[0].1.status, u8::from(RangeStatus::Absent));
+}
+
+#[test]
+fn every_sonar_byte_is_read_as_the_protocol_says() {
+    let status = |byte| RangeStatus::from_byte(reading(Some(byte)).status);
+    assert_eq!(status(0), RangeStatus::Invalid);
+    assert_eq!(status(4), RangeStatus::AtContact);
+    assert_eq!(status(5), RangeStatus::Measured);
+    assert_eq!(status(254), RangeStatus::Measured);
+    assert_eq!(status(255), RangeStatus::Nothing);
+    assert_eq!(reading(None).status, u8::from(RangeStatus::Absent));
+}
+
+#[test]
+fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    // A turn a second is 1200 counts/s, below the top speed of 2247.
+    let turn = std::f64::consts::TAU;
+    let effects = link.step(
+        Event::Command(&command(0, 10 * MS, turn, -0.5 * turn)),
+        11 * MS,
+    );
+    assert_eq!(velocities(&effects), [[Some(-1200), Some(-600)]]);
+    assert!(effects.contains(&Effect::Answered { began_ns: 10 * MS }));
+    let Command::Motion(motion) = sent(&effects)[0] else {
+        panic!();
+    };
+    assert_eq!(motion.limit_ms, Some(250));
+}
+
+#[test]
+fn no_number_moves_no_wheel() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    let effects = link.step(
+        Event::Command(&command(0, 10 * MS, f64::NAN, 1e300)),
+        11 * MS,
+    );
+    // NaN stands; the rest is cut to the top speed of 1 m/s.
+    assert_eq!(velocities(&effects), [[Some(0), Some(2247)]]);
+}
+
+#[test]
+fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    assert!(
+        link.step(Event::Quiet, 260 * MS).is_empty(),
+        "not yet over 250 ms"
+    );
+    let effects = link.step(Event::Quiet, 261 * MS);
+    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
+    assert!(effects.contains(&Effect::Stopped(Cause::CommandStale)));
+    assert!(link.step(Event::Quiet, 262 * MS).is_empty(), "said");
+    assert_eq!(
+        velocities(&link.step(Event::Quiet, 462 * MS)),
+        [[Some(0), Some(0)]]
+    );
+}
+
+#[test]
+fn the_supervisors_stop_stops_the_robot_and_later_commands_do_not_move_it() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    let effects = link.step(Event::Order(Order::Stop), 20 * MS);
+    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
+    let effects = link.step(Event::Command(&command(1, 20 * MS, 1.0, 1.0)), 21 * MS);
+    assert!(velocities(&effects).is_empty());
+}
+
+#[test]
+fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    let effects = link.step(Event::Quiet, 800 * MS);
+    assert!(effects.contains(&Effect::Connected(false)));
+    assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 900 * MS);
+    assert!(effects.contains(&Effect::Connected(true)));
+    assert_eq!(
+        ticks(&effects)[0].0,
+        1,
+        "the mission goes on with the next tick"
+    );
+}
+
+#[test]
+fn on_a_clock_of_ticks_the_order_asks_for_tick_0_and_each_command_for_the_next() {
+    let mut link = in_ticks();
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    assert_eq!(ticks(&effects), [], "the greeting's frames start nothing");
+    let effects = link.step(Event::Order(Order::Drive), 1);
+    assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
+    for tick in 0..3 {
+        let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 2);
+        assert_eq!(ticks(&effects)[0].0, tick);
+        let effects = link.step(
+            Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)),
+            3,
+        );
+        assert_eq!(velocities(&effects).len(), 1);
+    }
+}
+
+#[test]
+fn on_a_clock_of_ticks_a_robot_found_after_the_order_still_starts() {
+    let mut link = in_ticks();
+    link.step(Event::Order(Order::Drive), 0);
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
+    assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 2);
+    assert_eq!(ticks(&effects)[0].0, 0);
+}
+
+#[test]
+fn on_a_clock_of_ticks_an_unanswered_tick_is_given_again_and_answered_once() {
+    let mut link = driving(in_ticks());
+    let first = ticks(&link.step(Event::Datagram(&datagram(80, 5, 6)), 0));
+    assert_eq!(ticks(&link.step(Event::Quiet, 99 * MS)), []);
+    let again = ticks(&link.step(Event::Quiet, 100 * MS));
+    assert_eq!(again, first, "the same tick, to the bit");
+    let effects = link.step(Event::Command(&command(0, 0, 1.0, 1.0)), 101 * MS);
+    assert_eq!(velocities(&effects).len(), 1);
+    let effects = link.step(Event::Command(&command(0, 0, 1.0, 1.0)), 102 * MS);
+    let second = velocities(&effects);
+    assert!(second.is_empty(), "a tick given twice is answered once");
+}
+
+#[test]
+fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
+    let mut link = driving(on_the_wall());
+    let first = link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    let second = link.step(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
+    assert_eq!((ticks(&first)[0].0, ticks(&second)[0].0), (0, 1));
+}
+
+#[test]
+fn a_successor_numbers_its_ticks_after_its_predecessors() {
+    let clock = MissionClock::Ticks {
+        period_ns: PERIOD_NS,
+    };
+    let mut link = driving(Link::new(&mission(), clock, 41));
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    assert_eq!(ticks(&effects)[0].0, 41);
+}
