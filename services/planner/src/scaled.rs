@@ -1,0 +1,113 @@
+//! Non-negative numbers with the mantissa of an `f64` and an exponent of 32 bits: u reaches 1e-70000 on real mazes.
+
+/// A non-negative number, `mantissa` * 2^`exponent`, the mantissa in 1.0 .. 2.0; zero is (0.0, 0).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scaled {
+    /// 0, or in 1.0 .. 2.0.
+    pub mantissa: f64,
+    /// Power of two; 0 for zero.
+    pub exponent: i32,
+}
+
+impl Scaled {
+    /// Zero.
+    pub const ZERO: Self = Self {
+        mantissa: 0.0,
+        exponent: 0,
+    };
+    /// One.
+    pub const ONE: Self = Self {
+        mantissa: 1.0,
+        exponent: 0,
+    };
+
+    /// `value` * 2^`exponent`. Whatever is not a positive finite number becomes zero.
+    pub fn new(value: f64, exponent: i32) -> Self {
+        if !(value > 0.0 && value.is_finite()) {
+            return Self::ZERO;
+        }
+        // Subnormals first become normal, so that their exponent can be read from the bits.
+        let (value, exponent) = if value < f64::MIN_POSITIVE {
+            (value * pow2(64), exponent.saturating_sub(64))
+        } else {
+            (value, exponent)
+        };
+        let bits = value.to_bits();
+        let own = ((bits >> 52) & 0x7ff) as i32 - 1023;
+        let mantissa = f64::from_bits((bits & 0x000f_ffff_ffff_ffff) | (1023 << 52));
+        Self {
+            mantissa,
+            exponent: exponent.saturating_add(own),
+        }
+    }
+
+    /// Whether this is zero.
+    pub fn is_zero(self) -> bool {
+        self.mantissa == 0.0
+    }
+
+    /// The number divided by 2^`reference`: an ordinary `f64`, 0 where that underflows and infinite where it overflows.
+    pub fn relative_to(self, reference: i32) -> f64 {
+        // Zero has no exponent to compare: 0 * 2^huge would be no number.
+        if self.is_zero() {
+            0.0
+        } else {
+            self.mantissa * pow2(self.exponent.saturating_sub(reference))
+        }
+    }
+
+    /// Logarithm to base 10; negative infinity for zero.
+    pub fn log10(self) -> f64 {
+        self.mantissa.log10() + f64::from(self.exponent) * std::f64::consts::LOG10_2
+    }
+}
+
+impl PartialOrd for Scaled {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        match (self.is_zero(), other.is_zero()) {
+            (false, false) if self.exponent != other.exponent => {
+                self.exponent.partial_cmp(&other.exponent)
+            }
+            _ => self.mantissa.partial_cmp(&other.mantissa),
+        }
+    }
+}
+
+/// 2^`n`, exactly; 0 below the normal range and infinity above it.
+pub(crate) fn pow2(n: i32) -> f64 {
+    match n {
+        -1022..=1023 => f64::from_bits(((n + 1023) as u64) << 52),
+        i32::MIN..=-1023 => 0.0,
+        _ => f64::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scaled_number_keeps_its_value_beyond_the_range_of_f64() {
+        for value in [1.0, 0.3, 1e300, 1e-300, 5e-324] {
+            let tiny = Scaled::new(value, -200_000);
+            assert!((1.0..2.0).contains(&tiny.mantissa));
+            assert_eq!(tiny.exponent, Scaled::new(value, 0).exponent - 200_000);
+            assert!(
+                (tiny.log10() + 200_000.0 * std::f64::consts::LOG10_2 - value.log10()).abs() < 1e-6
+            );
+        }
+        assert!((Scaled::new(1.0, -200_000).log10() + 60_205.999).abs() < 1e-3);
+    }
+
+    #[test]
+    fn zero_stays_zero_whatever_it_is_taken_relative_to() {
+        assert_eq!(Scaled::ZERO.relative_to(-200_000), 0.0);
+    }
+
+    #[test]
+    fn order_follows_the_exponent_before_the_mantissa() {
+        assert!(Scaled::new(1.0, -5000) < Scaled::new(1.9, -4999));
+        assert!(Scaled::ZERO < Scaled::new(1.0, -5000));
+        assert!(Scaled::new(1.5, 7) > Scaled::new(1.25, 7));
+    }
+}

@@ -1,0 +1,149 @@
+//! From a domain to its field: the methods, the choice between them, and the verification that decides.
+//!
+//! - [`breadth`]: one breadth-first pass from the target: the order of elimination, and its price.
+//! - [`elimination`]: exact, in extended range; cheap where the map is narrow.
+//! - [`certificate`]: the check every field must pass before it is handed out.
+
+mod breadth;
+mod certificate;
+mod elimination;
+
+use std::num::NonZeroUsize;
+
+use crate::cancellation::Cancellation;
+use crate::domain::{Change, Domain};
+use crate::error::SolveError;
+use crate::field::{Certificate, Field, Method};
+
+/// How a solver may work; what it computes does not depend on it.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Threads a solve may use; the result is the same bit for bit.
+    pub threads: NonZeroUsize,
+    /// Bytes the elimination may take before a solve gives up with [`SolveError::TooCostly`].
+    pub memory_limit: u64,
+}
+
+impl Default for Settings {
+    /// One thread: the robot has others to feed. 2 GiB.
+    fn default() -> Self {
+        Self {
+            threads: NonZeroUsize::MIN,
+            memory_limit: 2 << 30,
+        }
+    }
+}
+
+/// A step of a solve that has just ended, for callers that measure time.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[non_exhaustive]
+pub enum Phase {
+    /// What does not depend on the target is ready.
+    SetUp,
+    /// A field was computed.
+    Solved,
+    /// The field was checked; if it failed, a costlier method follows with phases of its own.
+    Verified,
+}
+
+/// What an update did, and whether its field may be followed.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[must_use]
+pub enum Verdict {
+    /// The field is right: a full solve would change no direction that matters.
+    Repaired,
+    /// The field leads to the target from everywhere; a full solve would give better directions far away.
+    RepairedAdviseFull,
+    /// The change closed (or opened) a passage: do not call the field safe before a full solve.
+    PassageClosed,
+}
+
+/// Solves fields. Keeps between solves what does not depend on the target.
+#[derive(Debug, Default)]
+pub struct Solver {
+    settings: Settings,
+}
+
+impl Solver {
+    /// A solver that has prepared nothing yet.
+    pub fn new(settings: Settings) -> Self {
+        Self { settings }
+    }
+
+    /// The verified field of `domain`.
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`], [`SolveError::TooCostly`], [`SolveError::Unverified`].
+    pub fn solve(
+        &mut self,
+        domain: &Domain,
+        cancellation: &Cancellation,
+    ) -> Result<Field, SolveError> {
+        self.solve_observed(domain, cancellation, &mut |_| {})
+    }
+
+    /// [`solve`](Self::solve), calling `observe` at the end of each phase: the library has no clock of its own.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_observed(
+        &mut self,
+        domain: &Domain,
+        cancellation: &Cancellation,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<Field, SolveError> {
+        cancellation.check()?;
+        let pass = breadth::Pass::from_target(domain);
+        let tree = elimination::Tree::of(&pass);
+        observe(Phase::SetUp);
+        let store = elimination::solve(
+            domain,
+            &pass,
+            &tree,
+            self.settings.memory_limit,
+            cancellation,
+        )?;
+        observe(Phase::Solved);
+        let check = certificate::check(domain, &store, &pass);
+        observe(Phase::Verified);
+        if !check.holds(certificate::RESIDUAL_LIMIT) {
+            return Err(SolveError::Unverified {
+                worst_residual: check.worst_residual,
+                stalled: check.stalled,
+            });
+        }
+        let certificate = Certificate {
+            worst_residual: check.worst_residual,
+            method: Method::Elimination,
+            reachable: pass.order.len(),
+        };
+        Ok(Field::new(
+            (domain.width(), domain.height()),
+            domain.target(),
+            store,
+            certificate,
+        ))
+    }
+
+    /// Applies `changes` to `domain` and brings its `field` up to date.
+    ///
+    /// # Errors
+    /// [`SolveError::Outside`], [`SolveError::TargetBlocked`] and [`SolveError::ForeignField`], with neither domain nor
+    /// field changed; the errors of [`solve`](Self::solve), with the changes made to the domain alone.
+    pub fn update(
+        &mut self,
+        domain: &mut Domain,
+        field: &mut Field,
+        changes: &[Change],
+        cancellation: &Cancellation,
+    ) -> Result<Verdict, SolveError> {
+        if (field.width(), field.height(), field.target())
+            != (domain.width(), domain.height(), domain.target())
+        {
+            return Err(SolveError::ForeignField);
+        }
+        domain.apply(changes)?;
+        *field = self.solve(domain, cancellation)?;
+        Ok(Verdict::Repaired)
+    }
+}

@@ -1,0 +1,114 @@
+//! Full solves: right in every cell of every kind of map.
+
+use planner::testing::{Kind, Map, Reference, follow};
+use planner::{Cancellation, Cell, Domain, Field, SolveError, Solver};
+
+fn solve(domain: &Domain) -> Field {
+    Solver::default()
+        .solve(domain, &Cancellation::new())
+        .expect("the map has a field")
+}
+
+/// Checks one map against the reference.
+fn assert_right(map: &Map, name: &str) {
+    let domain = map.domain().expect("a valid map");
+    let field = solve(&domain);
+    let reference = Reference::solve(&domain);
+    assert!(
+        reference.worst_residual < 1e-11,
+        "{name}: the reference itself is off by {}",
+        reference.worst_residual
+    );
+    assert_eq!(
+        follow(&field),
+        1.0,
+        "{name}: some cell does not lead to the target"
+    );
+    let (off, worst) = reference.compare(&field);
+    assert!(
+        off <= 1e-3,
+        "{name}: {off} of the directions are off by more than a degree"
+    );
+    assert!(
+        worst <= 1.0,
+        "{name}: a clear direction is off by {worst} degrees"
+    );
+}
+
+#[test]
+fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
+    for seed in 0..3 {
+        for kind in [
+            Kind::Empty,
+            Kind::Drums,
+            Kind::Office,
+            Kind::Maze { corridor: 1 },
+            Kind::Maze { corridor: 4 },
+            Kind::Serpentine { corridor: 3 },
+            Kind::Trap,
+            Kind::Noise { density: 0.3 },
+        ] {
+            assert_right(
+                &Map::generate(kind, 60, 75, seed),
+                &format!("{kind:?}, seed {seed}"),
+            );
+        }
+    }
+}
+
+#[test]
+fn the_field_holds_down_to_ten_to_the_minus_twenty_thousand() {
+    let map = Map::generate(Kind::Serpentine { corridor: 2 }, 40, 4200, 0);
+    let field = solve(&map.domain().expect("a valid map"));
+    assert!(
+        field.log10_u_min() < -20_000.0,
+        "only down to 1e{}",
+        field.log10_u_min()
+    );
+    assert_right(&map, "a serpentine of 4200 rows");
+}
+
+#[test]
+fn a_strip_of_one_cell_falls_by_two_minus_root_three_a_cell() {
+    // u_i = (u_(i-1) + u_(i+1)) / 4 has the decaying solution (2 - sqrt 3)^i.
+    let domain = Domain::new(9000, 1, vec![false; 9000], Cell::new(0, 0)).expect("a valid map");
+    let field = solve(&domain);
+    let expected = 4000.0 * (2.0 - 3.0_f64.sqrt()).log10();
+    assert!((field.u(Cell::new(4000, 0)).log10() - expected).abs() < 1e-6);
+}
+
+#[test]
+fn invalid_domains_are_refused_with_the_reason() {
+    let at = Cell::new(0, 0);
+    assert!(matches!(
+        Domain::new(0, 3, vec![], at),
+        Err(SolveError::MapEmpty { .. })
+    ));
+    assert!(matches!(
+        Domain::new(20_000, 1, vec![], at),
+        Err(SolveError::MapTooLarge { .. })
+    ));
+    assert!(matches!(
+        Domain::new(2, 2, vec![false; 3], at),
+        Err(SolveError::WrongLength { .. })
+    ));
+    assert!(matches!(
+        Domain::new(2, 2, vec![false; 4], Cell::new(2, 0)),
+        Err(SolveError::Outside { .. })
+    ));
+    assert!(matches!(
+        Domain::new(1, 1, vec![true], at),
+        Err(SolveError::TargetBlocked { .. })
+    ));
+}
+
+#[test]
+fn a_cancelled_solve_says_so() {
+    let cancellation = Cancellation::new();
+    cancellation.clone().cancel();
+    let domain = Domain::new(3, 3, vec![false; 9], Cell::new(1, 1)).expect("a valid map");
+    assert_eq!(
+        Solver::default().solve(&domain, &cancellation).err(),
+        Some(SolveError::Cancelled)
+    );
+}
