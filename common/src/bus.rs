@@ -20,6 +20,7 @@ use std::{
     ops::Deref,
     os::fd::{AsFd, BorrowedFd},
     path::PathBuf,
+    time::Duration,
 };
 
 pub use iceoryx2::prelude::ZeroCopySend;
@@ -46,7 +47,7 @@ use crate::{
     clock::MissionTime,
     domain::Domain,
     samples::Stamped,
-    topics::{EVERY_STAGE, Spec},
+    topics::{EVERY_STAGE, Rate, Spec},
 };
 
 /// How much a topic holds.
@@ -185,6 +186,13 @@ impl<H, T> SliceTopic<H, T> {
 pub trait AnyTopic: Sync {
     /// What the table says.
     fn spec(&self) -> &'static Spec;
+    /// How often its writer says it again when nothing changes; zero for topics of each tick.
+    fn restated_every(&self) -> Duration {
+        match self.spec().rate {
+            Rate::EachTick => Duration::ZERO,
+            Rate::OnChange(at_least_every) => at_least_every,
+        }
+    }
     /// Create its services on `bus`; they exist as long as the result is held.
     ///
     /// # Errors

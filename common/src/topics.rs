@@ -6,14 +6,14 @@
 use std::time::Duration;
 
 use crate::{
-    bus::{self, Limits},
+    bus::Limits,
     samples::{
         CommandSample, DirectiveSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
         HealthSample, LinkSample, PoseSample, RangeSample, RosterEntry, RosterHeader, WheelSample,
     },
 };
 
-pub use crate::bus::{SliceTopic, Topic};
+pub use crate::bus::{AnyTopic, SliceTopic, Topic};
 
 /// How often a topic speaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +67,7 @@ macro_rules! topics {
             });
         )*
         /// Every topic, in the order of the pipeline.
-        pub static TABLE: &[&dyn bus::AnyTopic] = &[$(&$id),*];
+        pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
     };
 }
 

@@ -7,6 +7,7 @@
 //! from ratios of neighbouring cells.
 //!
 //! The library is pure: no shared memory, no files, no clock, no threads unless [`Settings::threads`] asks for them.
+//! Around it stands the stage: [`step`], pure too, and [`shell`], which wires it to the topics.
 //!
 //! # Frames and units
 //! Cells are named by column and row; positions are continuous in cell units with the cell centres at the integers, so
@@ -25,7 +26,9 @@ mod error;
 mod field;
 mod guidance;
 mod scaled;
+pub mod shell;
 mod solver;
+pub mod step;
 #[cfg(feature = "testing")]
 pub mod testing;
 

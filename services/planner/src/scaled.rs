@@ -56,6 +56,11 @@ impl Scaled {
         }
     }
 
+    /// Logarithm to base 2; negative infinity for zero.
+    pub fn log2(self) -> f64 {
+        self.mantissa.log2() + f64::from(self.exponent)
+    }
+
     /// Logarithm to base 10; negative infinity for zero.
     pub fn log10(self) -> f64 {
         self.mantissa.log10() + f64::from(self.exponent) * std::f64::consts::LOG10_2

@@ -1,0 +1,356 @@
+//! The stage, pure: follow the `grid`, keep the field right, answer for a pose.
+
+use common::{
+    grid::{Applied, CellState, GridFrame, Replica, Revision, Window},
+    kinematics::Pose2,
+    mission::Mission,
+    samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
+};
+use glam::DVec2;
+
+use crate::{
+    Absorption, Cancellation, Cell, Change, Domain, Field, Guidance, Settings, SolveError, Solver,
+};
+
+/// What taking a grid sample led to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// Nothing changed.
+    None,
+    /// The field was computed anew.
+    FullSolve,
+    /// The field was brought up to date around what changed.
+    LocalUpdate,
+    /// A version is missing: the field is as it was until a keyframe comes.
+    Missed,
+}
+
+/// The planner of (11).
+#[derive(Debug)]
+pub struct Planner {
+    target: DVec2,
+    absorption: f64,
+    solver: Solver,
+    grid: Replica<u8>,
+    belief: GridHeader,
+    solved: Option<Solved>,
+    full_solves: u64,
+    local_updates: u64,
+}
+
+/// A field and the domain it is of.
+#[derive(Debug)]
+struct Solved {
+    frame: GridFrame,
+    domain: Domain,
+    field: Field,
+}
+
+impl Planner {
+    /// For a mission; it knows nothing until the first keyframe.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        Self {
+            target: mission.target,
+            absorption: mission.planner.absorption,
+            solver: Solver::new(Settings::default()),
+            grid: Replica::default(),
+            belief: GridHeader::default(),
+            solved: None,
+            full_solves: 0,
+            local_updates: 0,
+        }
+    }
+
+    /// Follow one grid sample.
+    ///
+    /// # Errors
+    /// When the field cannot be solved: the target's cell is hazard, or the map is no map.
+    pub fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
+        let work = match self.grid.apply(&header.part.revision(), cells) {
+            Applied::Missed => Work::Missed,
+            Applied::Whole => self.solve()?,
+            Applied::Window(window) if window.area() == 0 && self.solved.is_some() => Work::None,
+            Applied::Window(window) => self.update(window)?,
+        };
+        if work != Work::Missed {
+            self.belief = *header;
+        }
+        Ok(work)
+    }
+
+    fn solve(&mut self) -> Result<Work, SolveError> {
+        self.solved = None;
+        let Some(frame) = self.grid.frame() else {
+            return Ok(Work::Missed);
+        };
+        let side = frame.cells as usize;
+        let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
+        let target = frame.to_cells(self.target).round().as_u64vec2();
+        let target = Cell::new(target.x as usize, target.y as usize);
+        let domain = Domain::new(side, side, blocked.collect(), target)?
+            .with_absorption(Absorption::Uniform(self.absorption))?;
+        let field = self.solver.solve(&domain, &Cancellation::default())?;
+        self.full_solves += 1;
+        self.solved = Some(Solved {
+            frame,
+            domain,
+            field,
+        });
+        Ok(Work::FullSolve)
+    }
+
+    fn update(&mut self, window: Window) -> Result<Work, SolveError> {
+        let Some(solved) = &mut self.solved else {
+            return self.solve();
+        };
+        let changes = changes_in(&solved.domain, &solved.frame, window, self.grid.cells());
+        if changes.is_empty() {
+            return Ok(Work::None);
+        }
+        // The verdict asks for a full solve exactly where this one already was one.
+        let _verdict = self.solver.update(
+            &mut solved.domain,
+            &mut solved.field,
+            &changes,
+            &Cancellation::default(),
+        )?;
+        self.local_updates += 1;
+        Ok(Work::LocalUpdate)
+    }
+
+    /// The reference direction for a robot at `pose`.
+    #[must_use]
+    pub fn guide(&self, pose: &Pose2) -> GuidanceSample {
+        let to_target = self.target - pose.position;
+        let (status, direction) = match &self.solved {
+            None => (GuidanceStatus::Waiting, DVec2::ZERO),
+            Some(solved) => {
+                let at = solved.frame.to_cells(pose.position);
+                match solved.field.guidance(at.x, at.y) {
+                    Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
+                    Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
+                    // Within the target's cell the field has said all it knows; the rest is straight.
+                    Guidance::AtTarget => (GuidanceStatus::Along, to_target.normalize_or(DVec2::X)),
+                    Guidance::Unreachable => (GuidanceStatus::Unreachable, DVec2::ZERO),
+                }
+            }
+        };
+        GuidanceSample {
+            ex: direction.x,
+            ey: direction.y,
+            distance_m: to_target.length(),
+            status: status.into(),
+            grid_version: self.grid.version(),
+            safety_events: self.belief.safety_events,
+            epoch: self.belief.epoch,
+            full_solves: self.full_solves,
+            local_updates: self.local_updates,
+            ..GuidanceSample::default()
+        }
+    }
+
+    /// The whole field as the `field` topic carries it in its `version`-th version; none before the first
+    /// solve.
+    #[must_use]
+    pub fn policy(&self, version: u64) -> Option<(FieldHeader, Vec<FieldCell>)> {
+        let Solved { frame, field, .. } = self.solved.as_ref()?;
+        let certificate = field.certificate();
+        let header = FieldHeader {
+            part: Revision {
+                frame: *frame,
+                window: frame.whole(),
+                version,
+                keyframe: true,
+            }
+            .into(),
+            grid_version: self.grid.version(),
+            target_x_m: self.target.x,
+            target_y_m: self.target.y,
+            worst_residual: certificate.worst_residual,
+            reachable: certificate.reachable as u64,
+            ..FieldHeader::default()
+        };
+        let side = frame.cells as usize;
+        let cells = (0..side * side).map(|index| cell_policy(field, index % side, index / side));
+        Some((header, cells.collect()))
+    }
+}
+
+fn cell_policy(field: &Field, col: usize, row: usize) -> FieldCell {
+    let cell = Cell::new(col, row);
+    let [ex, ey] = field.direction(cell).unwrap_or_default();
+    FieldCell {
+        ex: ex as f32,
+        ey: ey as f32,
+        log2_u: field.u(cell).log2() as f32,
+    }
+}
+
+/// Cells of `window` that are hazard now and were not when `domain` was solved, and the other way round.
+fn changes_in(domain: &Domain, frame: &GridFrame, window: Window, cells: &[u8]) -> Vec<Change> {
+    let mut changes = Vec::new();
+    for row in window.row..window.row + window.height {
+        for col in window.col..window.col + window.width {
+            let cell = Cell::new(col as usize, row as usize);
+            let blocked = is_hazard(cells[frame.index(common::grid::Cell { col, row })]);
+            if blocked != domain.is_blocked(cell) {
+                changes.push(Change { cell, blocked });
+            }
+        }
+    }
+    changes
+}
+
+const fn is_hazard(cell: u8) -> bool {
+    CellState::from_byte(cell).is_hazard()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn mission() -> Mission {
+        let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }";
+        Mission::parse(text, Path::new("test.toml")).unwrap()
+    }
+
+    /// A keyframe with the perimeter, and `hazard` where it says so.
+    fn keyframe(version: u64, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
+        let frame = mission().grid_frame();
+        let cells = (0..frame.area() as u32).map(|index| {
+            let cell = common::grid::Cell {
+                col: index % frame.cells,
+                row: index / frame.cells,
+            };
+            u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell)))
+        });
+        let header = GridHeader {
+            part: Revision {
+                frame,
+                window: frame.whole(),
+                version,
+                keyframe: true,
+            }
+            .into(),
+            ..GridHeader::default()
+        };
+        (header, cells.collect())
+    }
+
+    fn status(sample: &GuidanceSample) -> GuidanceStatus {
+        GuidanceStatus::from_byte(sample.status)
+    }
+
+    fn at(x: f64, y: f64) -> Pose2 {
+        Pose2 {
+            position: DVec2::new(x, y),
+            heading: 0.0,
+        }
+    }
+
+    #[test]
+    fn before_the_first_keyframe_there_is_no_guidance() {
+        let planner = Planner::new(&mission());
+        assert_eq!(
+            status(&planner.guide(&at(0.0, 0.0))),
+            GuidanceStatus::Waiting
+        );
+        assert!(planner.policy(1).is_none());
+    }
+
+    #[test]
+    fn an_empty_room_is_crossed_straight() {
+        let mut planner = Planner::new(&mission());
+        let (header, cells) = keyframe(1, |_| false);
+        assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::FullSolve);
+        let guidance = planner.guide(&at(0.0, 0.0));
+        assert_eq!(status(&guidance), GuidanceStatus::Along);
+        assert!(
+            guidance.ex > 0.999 && guidance.ey.abs() < 0.03,
+            "{guidance:?}"
+        );
+        assert_eq!(guidance.distance_m, 1.5);
+    }
+
+    #[test]
+    fn a_wall_that_appears_turns_the_guidance_aside() {
+        let mut planner = Planner::new(&mission());
+        let (header, cells) = keyframe(1, |_| false);
+        planner.take_grid(&header, &cells).unwrap();
+        // Open only above y = 1.
+        let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
+        let (header, cells) = keyframe(2, wall);
+        assert_eq!(
+            planner.take_grid(&header, &cells).unwrap(),
+            Work::LocalUpdate
+        );
+        let guidance = planner.guide(&at(0.3, 0.0));
+        assert!(guidance.ey > 0.7, "{guidance:?}");
+        assert_eq!((guidance.full_solves, guidance.local_updates), (1, 1));
+    }
+
+    #[test]
+    fn a_robot_walled_in_is_told_that_the_target_is_unreachable() {
+        let mut planner = Planner::new(&mission());
+        let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
+        let (header, cells) = keyframe(1, ring);
+        planner.take_grid(&header, &cells).unwrap();
+        assert_eq!(
+            status(&planner.guide(&at(0.0, 0.0))),
+            GuidanceStatus::Unreachable
+        );
+    }
+
+    #[test]
+    fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
+        let mut planner = Planner::new(&mission());
+        let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
+        let (header, cells) = keyframe(1, block);
+        planner.take_grid(&header, &cells).unwrap();
+        let guidance = planner.guide(&at(-0.15, 0.0));
+        assert_eq!(status(&guidance), GuidanceStatus::WayOut);
+        assert!(
+            guidance.ex < -0.9,
+            "the nearest free cell lies to the left: {guidance:?}"
+        );
+    }
+
+    #[test]
+    fn in_the_targets_cell_the_rest_is_straight() {
+        let mut planner = Planner::new(&mission());
+        let (header, cells) = keyframe(1, |_| false);
+        planner.take_grid(&header, &cells).unwrap();
+        let guidance = planner.guide(&at(1.48, 0.02));
+        assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
+    }
+
+    #[test]
+    fn a_missing_version_waits_for_a_keyframe() {
+        let mut planner = Planner::new(&mission());
+        let (mut header, _) = keyframe(5, |_| false);
+        header.part.keyframe = 0;
+        (header.part.width, header.part.height) = (1, 1);
+        assert_eq!(planner.take_grid(&header, &[1]).unwrap(), Work::Missed);
+    }
+
+    #[test]
+    fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
+        let mut planner = Planner::new(&mission());
+        let (header, cells) = keyframe(1, |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
+        planner.take_grid(&header, &cells).unwrap();
+        let (header, policy) = planner.policy(3).unwrap();
+        assert_eq!((policy.len(), header.part.version), (1600, 3));
+        for (cell, &state) in policy.iter().zip(&cells) {
+            let length = f64::from(cell.ex).hypot(f64::from(cell.ey));
+            let directed = (length - 1.0).abs() < 1e-6;
+            let target = cell.log2_u == 0.0;
+            assert_eq!(
+                directed || target,
+                state == 0,
+                "{cell:?} where the grid says {state}"
+            );
+        }
+    }
+}
