@@ -4,6 +4,8 @@
 
 use std::{
     fmt,
+    fs::File,
+    io,
     path::{Path, PathBuf},
     str::FromStr,
 };
@@ -93,6 +95,22 @@ impl Domain {
     #[must_use]
     pub fn lock_file(&self) -> PathBuf {
         self.directory.join("lock")
+    }
+
+    /// Held, shared, by every stage as long as it lives: a new supervisor waits for the last one's.
+    #[must_use]
+    pub fn tenants_file(&self) -> PathBuf {
+        self.directory.join("tenants")
+    }
+
+    /// Be a tenant of this domain until the result is dropped, or the process dies.
+    ///
+    /// # Errors
+    /// When there is no domain.
+    pub fn enter(&self) -> io::Result<File> {
+        let tenants = File::open(self.tenants_file())?;
+        tenants.lock_shared()?;
+        Ok(tenants)
     }
 
     /// Under it lie the node and service files of the middleware.

@@ -16,6 +16,7 @@
 //! | [`waiter`] | one wait for topics, sockets, signals, processes |
 //! | [`checkpoint`] | state that outlives a SIGKILL |
 //! | [`run`] | what the supervisor tells the stages of a run |
+//! | [`signals`] | signals as something to wait for |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`wire`] | the X80's protocol: frames and messages |
 //! | [`truth`] | what a simulated robot tells of itself |
@@ -32,6 +33,7 @@ pub mod mission;
 pub mod run;
 pub mod samples;
 pub mod shell;
+pub mod signals;
 pub mod topics;
 pub mod truth;
 pub mod waiter;

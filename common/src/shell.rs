@@ -2,9 +2,8 @@
 //!
 //! A stage's own shell file implements [`Process`]: it wires topics to its pure step, and nothing else.
 
-use std::{io::Read, os::unix::net::UnixStream, path::PathBuf, time::Duration};
+use std::{path::PathBuf, time::Duration};
 
-use signal_hook::consts::SIGTERM;
 use thiserror::Error;
 
 use crate::{
@@ -14,6 +13,7 @@ use crate::{
     domain::Domain,
     run::{Run, RunError},
     samples::{HealthSample, HealthState, name},
+    signals::{SIGTERM, Signals},
     topics,
     waiter::Waiter,
 };
@@ -122,9 +122,14 @@ pub trait Process: Sized {
 /// # Errors
 /// What [`Process`] says, or what keeps it from being opened.
 pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
-    let mut terminated = become_stage(life)?;
+    let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
+    become_child(life.stage, life.supervisor)?;
     let run = Run::load(&life.directory)?;
-    let bus = Bus::join(&Domain::of(run.robot.clone()), life.stage)?;
+    let domain = Domain::of(run.robot.clone());
+    let _tenancy = domain
+        .enter()
+        .map_err(system("enter the robot's directory"))?;
+    let bus = Bus::join(&domain, life.stage)?;
     let mut waiter = Waiter::default();
     waiter.on_readable(&terminated)?;
     let mut heart = Heart::new(&bus, life)?;
@@ -140,7 +145,7 @@ pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
     tracing::info!(generation = life.generation, "ready");
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
-    while !is_readable(&mut terminated) {
+    while !terminated.came() {
         waiter.wait(BEAT)?;
         progress = process.turn()?;
         heart.beat_if_due(progress)?;
@@ -150,16 +155,17 @@ pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
     process.stop()
 }
 
-/// Take the stage's name, die with the supervisor, and turn SIGTERM into something to wait for.
-fn become_stage(life: &Life) -> Result<UnixStream, StageError> {
-    let system = |action| move |source: std::io::Error| StageError::System { action, source };
-    let (terminated, signal) = UnixStream::pair().map_err(system("make a signal pipe"))?;
-    terminated
-        .set_nonblocking(true)
-        .map_err(system("make a signal pipe"))?;
-    signal_hook::low_level::pipe::register(SIGTERM, signal).map_err(system("handle SIGTERM"))?;
-    // `ps` and `pkill` tell stages apart by this. A name with a zero byte cannot come from the table.
-    if let Ok(name) = std::ffi::CString::new(life.stage) {
+fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {
+    move |source| StageError::System { action, source }
+}
+
+/// Take a name that `ps` and `pkill` show, and get SIGTERM when `supervisor` dies.
+///
+/// # Errors
+/// When the supervisor is gone already, or the system is no Linux.
+pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageError> {
+    // A name with a zero byte cannot come from the table.
+    if let Ok(name) = std::ffi::CString::new(process_name) {
         rustix::thread::set_name(&name)
             .map_err(|errno| system("name the process")(errno.into()))?;
     }
@@ -167,17 +173,13 @@ fn become_stage(life: &Life) -> Result<UnixStream, StageError> {
         .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
     // It may have died before that took hold.
     let parent = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get() as u32);
-    if parent != life.supervisor {
-        return Err(StageError::Other(format!(
-            "supervisor {} is gone; start stages through `firsthand run`",
-            life.supervisor
-        )));
+    if parent == supervisor {
+        Ok(())
+    } else {
+        Err(StageError::Other(format!(
+            "supervisor {supervisor} is gone; start stages through `firsthand run`"
+        )))
     }
-    Ok(terminated)
-}
-
-fn is_readable(stream: &mut UnixStream) -> bool {
-    matches!(stream.read(&mut [0; 16]), Ok(read) if read > 0)
 }
 
 /// Beats from inside the work loop: a stage that hangs or spins stops beating.

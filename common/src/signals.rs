@@ -1,0 +1,45 @@
+//! Signals as something to wait for: a descriptor that becomes readable, so that none is ever missed
+//! between looking and waiting.
+
+use std::{
+    ffi::c_int,
+    io::{self, Read},
+    os::{
+        fd::{AsFd, BorrowedFd},
+        unix::net::UnixStream,
+    },
+};
+
+pub use signal_hook::consts::{SIGINT, SIGTERM};
+
+/// Signals caught by this process.
+#[derive(Debug)]
+pub struct Signals {
+    pipe: UnixStream,
+}
+
+impl Signals {
+    /// Catch `signals` from now on.
+    ///
+    /// # Errors
+    /// When the process has no descriptor left.
+    pub fn catch(signals: &[c_int]) -> io::Result<Self> {
+        let (pipe, written_by_handler) = UnixStream::pair()?;
+        pipe.set_nonblocking(true)?;
+        for &signal in signals {
+            signal_hook::low_level::pipe::register(signal, written_by_handler.try_clone()?)?;
+        }
+        Ok(Self { pipe })
+    }
+
+    /// Whether one came since this was last asked.
+    pub fn came(&mut self) -> bool {
+        matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
+    }
+}
+
+impl AsFd for Signals {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.pipe.as_fd()
+    }
+}

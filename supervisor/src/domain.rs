@@ -1,0 +1,244 @@
+//! The supervisor's hold on a robot's domain: locked, wiped, its services created and held open.
+
+use std::{
+    fs::{self, DirBuilder, File, OpenOptions},
+    io,
+    os::unix::fs::{DirBuilderExt, MetadataExt},
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, BusError, Services},
+    domain::{Domain, SHARED_MEMORY},
+};
+use thiserror::Error;
+
+/// Why a robot's domain cannot be had.
+#[derive(Debug, Error)]
+pub(crate) enum DomainError {
+    /// Somebody else supervises it.
+    #[error("robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot")]
+    Held {
+        /// The robot.
+        robot: String,
+        /// What the lock file says.
+        holder: String,
+    },
+    /// Stages of a dead supervisor live on.
+    #[error("stages of an earlier supervisor of robot {robot:?} are still running; end them with `pkill -f 'firsthand stage'`")]
+    Tenants {
+        /// The robot.
+        robot: String,
+    },
+    /// Shared memory is missing or full.
+    #[error("{SHARED_MEMORY} {problem}; {remedy}")]
+    SharedMemory {
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The directory is not ours.
+    #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
+    Foreign {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {action} {path}: {source}; is it writable and not full?", path = path.display())]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// The system's word.
+        source: io::Error,
+    },
+    /// The middleware refused.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+/// Free space without which the topics do not fit: all of them, at N = 256, measured, and as much again.
+const SHARED_MEMORY_NEEDED: u64 = 32 << 20;
+/// Stages get SIGTERM when their supervisor dies and are gone within this.
+const TENANTS_LEAVE: Duration = Duration::from_secs(2);
+/// How often it is looked whether they have.
+const TENANTS_LOOK: Duration = Duration::from_millis(10);
+
+/// A domain held by this process. Dropping it leaves nothing behind.
+pub(crate) struct Held {
+    domain: Domain,
+    // Dropped before the files are removed.
+    bus: Option<(Services, Bus)>,
+    _lock: File,
+}
+
+impl Held {
+    /// Lock `domain`, wipe what an earlier supervisor left, create its services.
+    pub(crate) fn acquire(domain: Domain) -> Result<Self, DomainError> {
+        make_directory(&domain)?;
+        let lock = lock(&domain)?;
+        wait_for_tenants(&domain)?;
+        wipe(&domain)?;
+        check_shared_memory()?;
+        let mut held = Self {
+            domain,
+            bus: None,
+            _lock: lock,
+        };
+        Bus::write_config(&held.domain)?;
+        let bus = Bus::join(&held.domain, "supervisor")?;
+        let services = bus.create_all()?;
+        held.bus = Some((services, bus));
+        Ok(held)
+    }
+
+    /// The bus.
+    pub(crate) fn bus(&self) -> Option<&Bus> {
+        self.bus.as_ref().map(|(_, bus)| bus)
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        self.bus = None;
+        // The lock goes last, with its directory: who waits for it finds nothing and makes its own.
+        let _ = wipe(&self.domain);
+        for file in [self.domain.tenants_file(), self.domain.lock_file()] {
+            let _ = fs::remove_file(file);
+        }
+        let _ = fs::remove_dir(self.domain.directory());
+    }
+}
+
+fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+    let path = path.to_path_buf();
+    move |source| DomainError::File {
+        action,
+        path,
+        source,
+    }
+}
+
+/// The user's directory and the robot's in it, for their owner only.
+fn make_directory(domain: &Domain) -> Result<(), DomainError> {
+    let directory = domain.directory();
+    let user = rustix::process::geteuid().as_raw();
+    for path in directory.parent().into_iter().chain([directory]) {
+        match DirBuilder::new().mode(0o700).create(path) {
+            Ok(()) => {}
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(failed("make", path)(error)),
+        }
+        // Anyone may have made it in /tmp before us.
+        let found = fs::symlink_metadata(path).map_err(failed("look at", path))?;
+        if !found.is_dir() || found.uid() != user {
+            return Err(DomainError::Foreign {
+                path: path.to_path_buf(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Lock the domain; the file names the holder for whoever comes too late.
+fn lock(domain: &Domain) -> Result<File, DomainError> {
+    let path = domain.lock_file();
+    loop {
+        let file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(&path)
+            .map_err(failed("open", &path))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(fs::TryLockError::WouldBlock) => {
+                let holder = fs::read_to_string(&path).unwrap_or_default();
+                return Err(DomainError::Held {
+                    robot: domain.robot.to_string(),
+                    holder: holder.trim().to_owned(),
+                });
+            }
+            Err(fs::TryLockError::Error(error)) => return Err(failed("lock", &path)(error)),
+        }
+        // Its last holder may have removed it between our opening and our locking.
+        let (ours, there) = (file.metadata(), fs::metadata(&path));
+        if let (Ok(ours), Ok(there)) = (ours, there)
+            && ours.ino() == there.ino()
+        {
+            fs::write(&path, format!("{}\n", std::process::id())).map_err(failed("write", &path))?;
+            return Ok(file);
+        }
+    }
+}
+
+/// Wait until no stage of an earlier supervisor lives: what they use is wiped next.
+fn wait_for_tenants(domain: &Domain) -> Result<(), DomainError> {
+    let path = domain.tenants_file();
+    let tenants = File::create(&path).map_err(failed("make", &path))?;
+    let began = Instant::now();
+    loop {
+        match tenants.try_lock() {
+            Ok(()) => return Ok(()),
+            Err(fs::TryLockError::WouldBlock) if began.elapsed() < TENANTS_LEAVE => {
+                // A file lock has no descriptor to wait on.
+                std::thread::park_timeout(TENANTS_LOOK);
+            }
+            Err(fs::TryLockError::WouldBlock) => {
+                return Err(DomainError::Tenants {
+                    robot: domain.robot.to_string(),
+                });
+            }
+            Err(fs::TryLockError::Error(error)) => return Err(failed("lock", &path)(error)),
+        }
+    }
+}
+
+/// Remove every trace of the middleware in this domain.
+fn wipe(domain: &Domain) -> Result<(), DomainError> {
+    let root = domain.middleware_root();
+    match fs::remove_dir_all(&root) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(failed("remove", &root)(error)),
+    }
+    let config = domain.middleware_config();
+    match fs::remove_file(&config) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(failed("remove", &config)(error)),
+    }
+    let prefix = domain.shared_memory_prefix();
+    let shared = Path::new(SHARED_MEMORY);
+    let entries = fs::read_dir(shared).map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be read: {error}"),
+        remedy: "mount a tmpfs there",
+    })?;
+    for entry in entries.flatten() {
+        if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
+            let path = entry.path();
+            fs::remove_file(&path).map_err(failed("remove", &path))?;
+        }
+    }
+    Ok(())
+}
+
+/// A segment made in a full file system is a SIGBUS later: look before.
+fn check_shared_memory() -> Result<(), DomainError> {
+    let space = rustix::fs::statvfs(SHARED_MEMORY).map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be examined: {error}"),
+        remedy: "mount a tmpfs there",
+    })?;
+    let free = space.f_bavail * space.f_frsize;
+    if free < SHARED_MEMORY_NEEDED {
+        return Err(DomainError::SharedMemory {
+            problem: format!("has {} MiB free of the {} MiB needed", free >> 20, SHARED_MEMORY_NEEDED >> 20),
+            remedy: "remove what fills it, or enlarge it (docker: --shm-size)",
+        });
+    }
+    Ok(())
+}

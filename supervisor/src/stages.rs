@@ -1,0 +1,167 @@
+//! THE table of stages: what runs for a robot, what each reads and writes, and how long it may be silent.
+//!
+//! Start order, deadlines, `firsthand stage`, `firsthand stages` and the README's table come from it.
+
+use std::time::Duration;
+
+use common::{
+    shell::{Life, StageError, live},
+    topics::{AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, LINK, POSE, RANGE, WHEELS},
+};
+
+/// A row of the table.
+pub(crate) struct Stage {
+    /// Its name: of the process, of `firsthand stage NAME`, of the folder under `services/`.
+    pub(crate) name: &'static str,
+    /// Topics it reads, whose writers start before it.
+    pub(crate) inputs: &'static [&'static dyn AnyTopic],
+    /// Topics it reads that close the loop: their writers start after it.
+    pub(crate) feedback: &'static [&'static dyn AnyTopic],
+    /// Topics it alone writes.
+    pub(crate) outputs: &'static [&'static dyn AnyTopic],
+    /// From its start to its first beat as ready.
+    pub(crate) startup: Duration,
+    /// From beat to beat; they come every 20 ms.
+    pub(crate) heartbeat: Duration,
+    /// What the robot does while the stage is down.
+    pub(crate) while_down: &'static str,
+    /// Its process.
+    pub(crate) live: fn(&Life) -> Result<(), StageError>,
+}
+
+/// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded
+/// machine of two cores the slowest start seen took a tenth of it.
+const STARTUP: Duration = Duration::from_secs(3);
+/// Ten beats: a machine with more stages than cores delays a beat by several times 20 ms now and then.
+const HEARTBEAT: Duration = Duration::from_millis(200);
+/// The planner beats between solves, and the costliest solve of the largest map takes its time.
+const PLANNER_HEARTBEAT: Duration = Duration::from_secs(2);
+
+/// Every stage, in the order of the pipeline.
+pub(crate) static TABLE: [Stage; 5] = [
+    Stage {
+        name: "x80-link",
+        inputs: &[&DIRECTIVE],
+        feedback: &[&COMMAND],
+        outputs: &[&RANGE, &WHEELS, &LINK],
+        startup: STARTUP,
+        heartbeat: HEARTBEAT,
+        while_down: "stands when its timed command ends",
+        live: live::<x80_link::shell::Shell>,
+    },
+    Stage {
+        name: "dead-reckoning",
+        inputs: &[&WHEELS],
+        feedback: &[],
+        outputs: &[&POSE],
+        startup: STARTUP,
+        heartbeat: HEARTBEAT,
+        while_down: "stopped by the link when the command is stale",
+        live: live::<dead_reckoning::shell::Shell>,
+    },
+    Stage {
+        name: "mapper",
+        inputs: &[&RANGE, &POSE, &DIRECTIVE],
+        feedback: &[],
+        outputs: &[&GRID],
+        startup: STARTUP,
+        heartbeat: HEARTBEAT,
+        while_down: "stopped by the link when the command is stale",
+        live: live::<mapper::shell::Shell>,
+    },
+    Stage {
+        name: "planner",
+        inputs: &[&POSE, &GRID],
+        feedback: &[],
+        outputs: &[&GUIDANCE, &FIELD],
+        startup: STARTUP,
+        heartbeat: PLANNER_HEARTBEAT,
+        while_down: "stopped by the link when the command is stale",
+        live: live::<planner::shell::Shell>,
+    },
+    Stage {
+        name: "controller",
+        inputs: &[&POSE, &GUIDANCE],
+        feedback: &[],
+        outputs: &[&COMMAND],
+        startup: STARTUP,
+        heartbeat: HEARTBEAT,
+        while_down: "stopped by the link when the command is stale",
+        live: live::<controller::shell::Shell>,
+    },
+];
+
+/// The stage of that name.
+pub(crate) fn find(name: &str) -> Option<&'static Stage> {
+    TABLE.iter().find(|stage| stage.name == name)
+}
+
+/// The stages so that each comes after the writers of its inputs. Stopping goes the other way.
+pub(crate) fn start_order() -> Vec<&'static Stage> {
+    let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
+    while order.len() < TABLE.len() {
+        let waiting: Vec<&'static Stage> = TABLE
+            .iter()
+            .filter(|stage| !order.iter().any(|placed| placed.name == stage.name))
+            .collect();
+        let next = waiting.iter().find(|stage| {
+            stage.inputs.iter().all(|input| {
+                let writer = input.spec().writer;
+                !waiting.iter().any(|other| other.name == writer)
+            })
+        });
+        // Inputs that form a circle leave no next; the rest then starts in table order.
+        order.extend(next.or(waiting.first()));
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::topics::{self, EVERY_STAGE, SUPERVISOR};
+
+    #[test]
+    fn every_input_has_a_writer_and_every_output_names_its_stage() {
+        for stage in &TABLE {
+            for input in stage.inputs.iter().chain(stage.feedback) {
+                let writer = input.spec().writer;
+                assert!(
+                    writer == SUPERVISOR || find(writer).is_some(),
+                    "{} reads {}, which nobody writes",
+                    stage.name,
+                    input.spec().name
+                );
+            }
+            for output in stage.outputs {
+                assert_eq!(output.spec().writer, stage.name, "{}", output.spec().name);
+            }
+        }
+    }
+
+    #[test]
+    fn every_topic_is_written_by_the_stage_it_names() {
+        for topic in topics::TABLE {
+            let spec = topic.spec();
+            if spec.writer != SUPERVISOR && spec.writer != EVERY_STAGE {
+                let writer = find(spec.writer).unwrap();
+                let writes = writer.outputs.iter().any(|output| output.spec().name == spec.name);
+                assert!(writes, "{} does not write {}", spec.writer, spec.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_stage_starts_after_the_writers_of_its_inputs() {
+        let names: Vec<_> = start_order().iter().map(|stage| stage.name).collect();
+        let place = |name: &str| names.iter().position(|placed| *placed == name);
+        for stage in &TABLE {
+            for input in stage.inputs {
+                if let Some(writer) = place(input.spec().writer) {
+                    assert!(Some(writer) < place(stage.name), "{names:?}");
+                }
+            }
+        }
+        assert_eq!(names.len(), TABLE.len());
+    }
+}
