@@ -1,2 +1,6 @@
 //! The one executable.
+
+#[cfg(test)]
+mod picture;
+
 fn main() {}

@@ -1,0 +1,318 @@
+//! log2 u behind everything: pale bands between level sets, the same factor of u from each to the
+//! next.
+
+use common::{grid::GridFrame, samples::FieldCell};
+use glam::DVec2;
+
+use super::page::{Path, View, metres, round_up};
+
+/// Bytes this layer may take: a field in shreds is drawn coarser, not larger.
+const BUDGET: usize = 130_000;
+/// Samples along a side: more than this is finer than the bands are wide.
+const FINEST: usize = 160;
+/// About as many bands as the eye still tells apart.
+const BANDS: f64 = 12.0;
+/// Share of the map that may lie below the last level: close to hazards u has no floor.
+const BELOW: f64 = 0.02;
+
+/// From the target outwards.
+const RAMP: [[f64; 3]; 5] = [
+    [255.0, 250.0, 219.0],
+    [226.0, 240.0, 214.0],
+    [194.0, 224.0, 222.0],
+    [173.0, 203.0, 226.0],
+    [172.0, 182.0, 217.0],
+];
+
+/// Where the level sets lie: at -step, -2 step, ..., -count step of log2 u.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Levels {
+    /// From one to the next, in log2 u.
+    pub(super) step: f64,
+    /// How many.
+    pub(super) count: u32,
+}
+
+impl Levels {
+    /// The colour of the band below `nth` levels: 0 holds the target, `count` is the last.
+    pub(super) fn colour(&self, nth: u32) -> String {
+        let along = f64::from(nth) / f64::from(self.count.max(1)) * (RAMP.len() - 1) as f64;
+        let from = (along as usize).min(RAMP.len() - 2);
+        let part = along - from as f64;
+        let [red, green, blue] = [0, 1, 2].map(|channel| {
+            let (a, b) = (RAMP[from][channel], RAMP[from + 1][channel]);
+            (a + (b - a) * part).round() as u8
+        });
+        format!("#{red:02x}{green:02x}{blue:02x}")
+    }
+}
+
+/// log2 u of a field, sampled.
+pub(super) struct Bands<'a> {
+    frame: GridFrame,
+    cells: &'a [FieldCell],
+    levels: Levels,
+}
+
+impl<'a> Bands<'a> {
+    /// The bands of a field; none if the target can be reached from nowhere.
+    pub(super) fn of(frame: &GridFrame, cells: &'a [FieldCell]) -> Option<Self> {
+        let mut values: Vec<f32> = cells
+            .iter()
+            .map(|cell| cell.log2_u.min(0.0))
+            .filter(|value| value.is_finite())
+            .collect();
+        let low = (values.len() as f64 * BELOW) as usize;
+        if values.is_empty() {
+            return None;
+        }
+        let (_, quantile, _) = values.select_nth_unstable_by(low, f32::total_cmp);
+        let span = -f64::from(*quantile);
+        let step = round_up(span / BANDS);
+        Some(Self {
+            frame: *frame,
+            cells,
+            levels: Levels {
+                step,
+                count: (span / step).ceil().clamp(1.0, 2.0 * BANDS) as u32,
+            },
+        })
+    }
+
+    /// Where the level sets lie.
+    pub(super) const fn levels(&self) -> Levels {
+        self.levels
+    }
+
+    /// The layer.
+    pub(super) fn layer(&self, view: &View) -> String {
+        let mut finest = FINEST;
+        loop {
+            let areas = self.areas(view, finest);
+            if areas.iter().map(Path::len).sum::<usize>() <= BUDGET || finest < 8 {
+                return self.paint(&areas);
+            }
+            finest /= 2;
+        }
+    }
+
+    /// The areas above each level, the lowest first, from at most `finest` samples a side.
+    fn areas(&self, view: &View, finest: usize) -> Vec<Path> {
+        let samples = Samples::of(&self.frame, self.cells, finest, self.levels);
+        (1..=self.levels.count + 1)
+            .rev()
+            .map(|nth| samples.above(view, &self.frame, -self.levels.step * f64::from(nth)))
+            .collect()
+    }
+
+    /// `areas`, each over the one that contains it.
+    fn paint(&self, areas: &[Path]) -> String {
+        let painted: String = (0..=self.levels.count)
+            .rev()
+            .zip(areas)
+            .map(|(nth, area)| area.element(&format!("fill=\"{}\"", self.levels.colour(nth))))
+            .collect();
+        format!(
+            "<g fill-rule=\"evenodd\" stroke=\"#fff\" stroke-width=\"0.9\" stroke-opacity=\"0.75\" \
+             stroke-linejoin=\"round\">\n{painted}</g>\n"
+        )
+    }
+}
+
+/// Samples around the map: the inner ones carry the bands on to the edge of the plot, the outer ones
+/// are nowhere, so that every level set closes.
+const AROUND: usize = 2;
+
+/// log2 u at the middles of square blocks of cells, and [`AROUND`] them.
+struct Samples {
+    /// Samples along a side, those around the map included.
+    across: usize,
+    /// Cells along the side of a block.
+    block: usize,
+    /// Row-major, all finite.
+    values: Vec<f64>,
+}
+
+/// What a level set crosses on its way: the side from a sample to the next one along x or y.
+#[derive(Clone, Copy)]
+enum Side {
+    Below,
+    Right,
+    Above,
+    Left,
+}
+
+impl Samples {
+    fn of(frame: &GridFrame, cells: &[FieldCell], finest: usize, levels: Levels) -> Self {
+        let along = frame.cells as usize;
+        let block = along.div_ceil(finest).max(1);
+        let across = along.div_ceil(block) + 2 * AROUND;
+        let mut sums = vec![(0.0, 0_u32); across * across];
+        for (row, line) in cells.chunks(along.max(1)).enumerate() {
+            for (col, cell) in line.iter().enumerate() {
+                if cell.log2_u.is_finite() {
+                    let sum = &mut sums[(row / block + AROUND) * across + col / block + AROUND];
+                    sum.0 += f64::from(cell.log2_u.min(0.0));
+                    sum.1 += 1;
+                }
+            }
+        }
+        // Far below the last level nothing can be told apart; a floor keeps the level sets smooth.
+        let last = -levels.step * f64::from(levels.count);
+        let floor = last - 0.5 * levels.step;
+        let nowhere = last - 2.0 * levels.step;
+        let mean =
+            |&(sum, count): &(f64, u32)| (count > 0).then(|| (sum / f64::from(count)).max(floor));
+        let is_outermost = |at: usize| {
+            let (col, row) = (at % across, at / across);
+            col.min(row) == 0 || col.max(row) == across - 1
+        };
+        let values = (0..sums.len())
+            .map(|at| match mean(&sums[at]) {
+                Some(value) => value,
+                None if is_outermost(at) => nowhere,
+                None => mean(&sum_around(&sums, across, at)).unwrap_or(nowhere),
+            })
+            .collect();
+        Self {
+            across,
+            block,
+            values,
+        }
+    }
+
+    /// The area where log2 u is above `level`.
+    fn above(&self, view: &View, frame: &GridFrame, level: f64) -> Path {
+        // For each crossing the one that comes next, the area kept to the left: marching squares.
+        let mut next = vec![usize::MAX; 2 * self.values.len()];
+        for row in 0..self.across - 1 {
+            for col in 0..self.across - 1 {
+                for (from, to) in self.passages(col, row, level) {
+                    next[self.crossing(col, row, *from)] = self.crossing(col, row, *to);
+                }
+            }
+        }
+        let mut path = Path::default();
+        for start in 0..next.len() {
+            let mut ring = Vec::new();
+            let mut at = start;
+            while next[at] != usize::MAX {
+                ring.push(view.place(self.position(frame, at, level)));
+                at = std::mem::replace(&mut next[at], usize::MAX);
+            }
+            if ring.len() > 2 {
+                path.polygon(ring);
+            }
+        }
+        path
+    }
+
+    /// How a level set passes the square whose lower left sample is (col, row).
+    fn passages(&self, col: usize, row: usize, level: f64) -> &'static [(Side, Side)] {
+        use Side::{Above, Below, Left, Right};
+        let at = row * self.across + col;
+        let corners = [at, at + 1, at + self.across + 1, at + self.across];
+        let inside = corners.iter().enumerate().fold(0, |bits, (nth, &corner)| {
+            bits | usize::from(self.values[corner] >= level) << nth
+        });
+        const PASSAGES: [&[(Side, Side)]; 16] = [
+            &[],
+            &[(Below, Left)],
+            &[(Right, Below)],
+            &[(Right, Left)],
+            &[(Above, Right)],
+            &[(Below, Left), (Above, Right)],
+            &[(Above, Below)],
+            &[(Above, Left)],
+            &[(Left, Above)],
+            &[(Below, Above)],
+            &[(Right, Below), (Left, Above)],
+            &[(Right, Above)],
+            &[(Left, Right)],
+            &[(Below, Right)],
+            &[(Left, Below)],
+            &[],
+        ];
+        PASSAGES[inside]
+    }
+
+    /// The index of a side: even ones lead from their sample along x, odd ones along y.
+    fn crossing(&self, col: usize, row: usize, side: Side) -> usize {
+        let at = row * self.across + col;
+        match side {
+            Side::Below => 2 * at,
+            Side::Left => 2 * at + 1,
+            Side::Above => 2 * (at + self.across),
+            Side::Right => 2 * (at + 1) + 1,
+        }
+    }
+
+    /// Where `level` crosses that side, metres.
+    fn position(&self, frame: &GridFrame, crossing: usize, level: f64) -> DVec2 {
+        let from = crossing / 2;
+        let (col, row) = (from % self.across, from / self.across);
+        let (to, end) = if crossing.is_multiple_of(2) {
+            (from + 1, (col + 1, row))
+        } else {
+            (from + self.across, (col, row + 1))
+        };
+        let (a, b) = (self.values[from], self.values[to]);
+        let part = ((level - a) / (b - a)).clamp(0.0, 1.0);
+        let middle = |(col, row): (usize, usize)| {
+            let block = self.block as f64;
+            let centre = |index: usize| (index as f64 - AROUND as f64 + 0.5) * block - 0.5;
+            DVec2::new(centre(col), centre(row))
+        };
+        metres(frame, middle((col, row)).lerp(middle(end), part))
+    }
+}
+
+/// The sum of all samples around one that has none itself. With it the bands run on below the
+/// hazard cells, which are drawn over them, instead of following every step of their outline.
+fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
+    let (col, row) = (at % across, at / across);
+    (row - 1..=row + 1)
+        .flat_map(|row| (col - 1..=col + 1).map(move |col| row * across + col))
+        .map(|near| sums[near])
+        .fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn level_sets_close_around_the_whole_map_whatever_the_blocks() {
+        for cells in [10, 160, 161, 500] {
+            let frame = GridFrame {
+                cells,
+                resolution_m: 8.0 / f64::from(cells),
+                centre: DVec2::ZERO,
+            };
+            let view = View::of(&frame);
+            let field: Vec<FieldCell> = (0..frame.area())
+                .map(|at| FieldCell {
+                    log2_u: -((at % 7) as f32),
+                    ..FieldCell::default()
+                })
+                .collect();
+            let bands = Bands::of(&frame, &field).unwrap();
+            let lowest = bands.areas(&view, FINEST).swap_remove(0).element("");
+            assert_eq!(lowest.matches('M').count(), 1, "one ring for N = {cells}");
+            let corners = lowest
+                .split(['M', 'L', 'Z', '"'])
+                .filter_map(|point| point.split_once(' '))
+                .filter_map(|(x, y)| Some(DVec2::new(x.parse().ok()?, y.parse().ok()?)))
+                .collect::<Vec<_>>();
+            let middle = view.place(metres(&frame, DVec2::splat(f64::from(cells) / 2.0 - 0.5)));
+            assert!(corners.len() > 3);
+            for corner in corners {
+                let beyond = (corner - middle).abs().max_element();
+                assert!(
+                    beyond >= 400.0,
+                    "{corner} is inside the plot of N = {cells}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The robot: the ways driven and believed, its body at regular times, start, target, end.
+
+use common::{kinematics::Pose2, mission::Mission};
+use glam::DVec2;
+
+use super::{
+    Scene,
+    page::{Path, Px, View, ink},
+};
+
+/// Poses of one trajectory that are drawn at most: a day at 7 Hz still makes a small file.
+const MOST_POSES: usize = 4000;
+/// About as many bodies along the way.
+const BODIES: f64 = 16.0;
+/// Never more, whatever the times say.
+const MOST_BODIES: usize = 200;
+
+/// The robot in its world.
+pub(super) struct Motion<'a> {
+    mission: &'a Mission,
+    believed: &'a [Pose2],
+    truth: &'a [Pose2],
+    /// Mission time between two bodies, seconds, and the poses from one to the next.
+    every: Option<(f64, f64)>,
+}
+
+impl<'a> Motion<'a> {
+    /// The motion in `scene`.
+    pub(super) fn of(scene: &Scene<'a>) -> Self {
+        let mut motion = Self {
+            mission: scene.mission,
+            believed: scene.believed,
+            truth: scene.truth,
+            every: None,
+        };
+        let duration = scene.facts.mission_time_s;
+        let steps = motion.way().len().saturating_sub(1);
+        if steps > 0 && duration.is_finite() && duration > 0.0 {
+            let seconds = whole_period(duration / BODIES);
+            motion.every = Some((seconds, seconds / duration * steps as f64));
+        }
+        motion
+    }
+
+    /// The true trajectory, or the believed one if nobody knows the true one.
+    fn way(&self) -> &'a [Pose2] {
+        if self.truth.is_empty() {
+            self.believed
+        } else {
+            self.truth
+        }
+    }
+
+    /// Whether the true trajectory is known.
+    pub(super) const fn has_truth(&self) -> bool {
+        !self.truth.is_empty()
+    }
+
+    /// Whether the robot believed to be anywhere.
+    pub(super) const fn has_belief(&self) -> bool {
+        !self.believed.is_empty()
+    }
+
+    /// Mission time between two bodies, seconds, where any are drawn.
+    pub(super) fn period_s(&self) -> Option<f64> {
+        self.every.map(|(seconds, _)| seconds)
+    }
+
+    /// The layer.
+    pub(super) fn layer(&self, view: &View) -> String {
+        let radius = view.px(self.mission.body().radius_m);
+        let start = self.mission.start_pose();
+        [
+            target(
+                view.place(self.mission.target),
+                view.px(self.mission.arrival_tolerance_m),
+            ),
+            halo(&trajectory(view, self.truth)),
+            halo(&trajectory(view, self.believed)),
+            self.bodies(view, radius),
+            trajectory(view, self.truth).element(&truth_line()),
+            trajectory(view, self.believed).element(&believed_line()),
+            start_mark(view.place(start.position)),
+            self.end(view, radius),
+        ]
+        .concat()
+    }
+
+    fn bodies(&self, view: &View, radius: f64) -> String {
+        let Some((_, stride)) = self.every else {
+            return String::new();
+        };
+        let way = self.way();
+        let mut outlines = Path::default();
+        let poses = (0..MOST_BODIES)
+            .map(|nth| (nth as f64 * stride).round() as usize)
+            .map_while(|index| way.get(index))
+            .filter(|pose| is_shown(view, pose));
+        for pose in poses {
+            let at = view.place(pose.position);
+            add_body(&mut outlines, at, radius, pose.heading);
+        }
+        outlines.element(BODY)
+    }
+
+    /// Where it ended: the true body filled, the believed one dashed.
+    fn end(&self, view: &View, radius: f64) -> String {
+        let body = |pose: Option<&Pose2>, style: &str| {
+            let mut path = Path::default();
+            if let Some(pose) = pose.filter(|pose| is_shown(view, pose)) {
+                add_body(&mut path, view.place(pose.position), radius, pose.heading);
+            }
+            path.element(style)
+        };
+        let believed = if self.has_truth() {
+            body(self.believed.last(), &believed_end())
+        } else {
+            String::new()
+        };
+        body(self.way().last(), &final_body()) + &believed
+    }
+}
+
+/// Attributes of the bodies along the way.
+pub(super) const BODY: &str = "fill=\"#fff\" fill-opacity=\"0.45\" stroke=\"#0b0f14\" \
+     stroke-width=\"1\" stroke-opacity=\"0.75\"";
+
+/// Attributes of the body at the end.
+pub(super) fn final_body() -> String {
+    format!(
+        "fill=\"{0}\" fill-opacity=\"0.35\" stroke=\"{0}\" stroke-width=\"1.8\"",
+        ink::TRUTH
+    )
+}
+
+/// Attributes of the body at the end, where it was believed.
+fn believed_end() -> String {
+    format!(
+        "fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-dasharray=\"3 2.4\"",
+        ink::BELIEVED
+    )
+}
+
+/// Attributes of the true trajectory.
+pub(super) fn truth_line() -> String {
+    line_style(ink::TRUTH, "2.2", "none")
+}
+
+/// Attributes of the believed trajectory.
+pub(super) fn believed_line() -> String {
+    line_style(ink::BELIEVED, "2", "7 4.5")
+}
+
+fn line_style(colour: &str, width: &str, dashes: &str) -> String {
+    format!(
+        "fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-dasharray=\"{dashes}\" \
+         stroke-linejoin=\"round\""
+    )
+}
+
+/// White below a line, so that it stands out from field and hatch alike.
+fn halo(line: &Path) -> String {
+    line.element(
+        "fill=\"none\" stroke=\"#fff\" stroke-width=\"5.5\" stroke-opacity=\"0.75\" \
+         stroke-linejoin=\"round\" stroke-linecap=\"round\"",
+    )
+}
+
+fn trajectory(view: &View, poses: &[Pose2]) -> Path {
+    let stride = poses.len().div_ceil(MOST_POSES).max(1);
+    let kept = poses.iter().step_by(stride).chain(poses.last());
+    view.line(kept.map(|pose| pose.position))
+}
+
+fn is_shown(view: &View, pose: &Pose2) -> bool {
+    // A body beside the plot would only be cut away.
+    view.shows(pose.position, 0.0) && pose.heading.is_finite()
+}
+
+/// A disc with a tick from its centre to its rim along the heading.
+pub(super) fn add_body(path: &mut Path, at: DVec2, radius: f64, heading: f64) {
+    path.circle(at, radius);
+    // On the sheet y grows downwards.
+    let axis = DVec2::from_angle(-heading);
+    path.move_to(at + axis * (radius * 0.35));
+    path.line_to(at + axis * radius);
+}
+
+/// A ring of the tolerance around a bull's eye.
+pub(super) fn target(at: DVec2, tolerance: f64) -> String {
+    let (x, y, ring) = (Px(at.x), Px(at.y), Px(tolerance));
+    let colour = ink::TARGET;
+    format!(
+        "<circle cx=\"{x}\" cy=\"{y}\" r=\"{ring}\" fill=\"{colour}\" fill-opacity=\"0.14\" \
+         stroke=\"{colour}\" stroke-width=\"1.5\" stroke-dasharray=\"4 3\"/>\n\
+         <circle cx=\"{x}\" cy=\"{y}\" r=\"4.5\" fill=\"{colour}\" stroke=\"#fff\" \
+         stroke-width=\"1.5\"/>\n"
+    )
+}
+
+/// A square where it began.
+pub(super) fn start_mark(at: DVec2) -> String {
+    format!(
+        "<rect x=\"{}\" y=\"{}\" width=\"9\" height=\"9\" fill=\"#fff\" stroke=\"{}\" \
+         stroke-width=\"2\"/>\n",
+        Px(at.x - 4.5),
+        Px(at.y - 4.5),
+        ink::TRUTH
+    )
+}
+
+/// The least period people count in that is not below `least` seconds.
+fn whole_period(least: f64) -> f64 {
+    const PERIODS: [f64; 12] = [
+        0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0,
+    ];
+    PERIODS
+        .into_iter()
+        .find(|period| *period >= least)
+        .unwrap_or_else(|| super::page::round_up(least))
+}

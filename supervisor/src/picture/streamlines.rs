@@ -1,0 +1,253 @@
+//! Lines of the guidance field E, evenly spaced whatever the grid: B. Jobard, W. Lefer, "Creating
+//! evenly-spaced streamlines of arbitrary density" (1997).
+
+use common::{
+    grid::{Cell, GridFrame},
+    samples::FieldCell,
+};
+use glam::DVec2;
+
+use super::page::{PLOT_SIDE, Path, View, ink, metres};
+
+/// Bytes the lines may take: a field in shreds is drawn sparser, not larger.
+const BUDGET: usize = 100_000;
+/// Between a line and where the next one is begun, on the sheet.
+const SPACING: f64 = 23.0;
+/// Lines end where they come this near to another, in spacings.
+const MERGED: f64 = 0.5;
+/// Shorter lines are left out, in spacings.
+const SHORTEST: f64 = 1.4;
+/// From one arrowhead to the next along a line, in spacings.
+const ARROWS_APART: f64 = 6.0;
+/// A line is straight while it turns by less than this (its cosine).
+const STRAIGHT: f64 = 0.9985;
+/// Half the width and half the length of an arrowhead, on the sheet.
+const ARROWHEAD: (f64, f64) = (2.3, 3.4);
+
+/// The layer.
+pub(super) fn layer(view: &View, frame: &GridFrame, cells: &[FieldCell]) -> String {
+    let mut spacing = SPACING;
+    loop {
+        let (lines, arrowheads) = drawn(view, frame, cells, spacing);
+        if lines.len() + arrowheads.len() <= BUDGET || spacing > PLOT_SIDE {
+            return paint(&lines, &arrowheads);
+        }
+        spacing *= 1.5;
+    }
+}
+
+fn drawn(view: &View, frame: &GridFrame, cells: &[FieldCell], spacing: f64) -> (Path, Path) {
+    let (mut lines, mut arrowheads) = (Path::default(), Path::default());
+    for line in evenly_spaced(frame, cells, spacing) {
+        let on_sheet: Vec<DVec2> = line
+            .iter()
+            .map(|&at| view.place(metres(frame, at)))
+            .collect();
+        draw(&on_sheet, &mut lines, &mut arrowheads);
+    }
+    (lines, arrowheads)
+}
+
+fn paint(lines: &Path, arrowheads: &Path) -> String {
+    let colour = ink::GUIDANCE;
+    lines.element(&format!(
+        "fill=\"none\" stroke=\"{colour}\" stroke-width=\"0.8\" stroke-opacity=\"0.6\" \
+         stroke-linecap=\"round\" stroke-linejoin=\"round\""
+    )) + &arrowheads.element(&format!("fill=\"{colour}\" fill-opacity=\"0.75\""))
+}
+
+/// One line, its points only where it bends, and its arrowheads.
+fn draw(line: &[DVec2], lines: &mut Path, arrowheads: &mut Path) {
+    let Some((&first, rest)) = line.split_first() else {
+        return;
+    };
+    lines.move_to(first);
+    let mut heading = DVec2::ZERO;
+    let mut since_arrow = SPACING * ARROWS_APART / 2.0;
+    let mut from = first;
+    for (nth, &to) in rest.iter().enumerate() {
+        let step = (to - from).normalize_or_zero();
+        if heading == DVec2::ZERO {
+            heading = step;
+        }
+        if step.dot(heading) < STRAIGHT {
+            lines.line_to(from);
+            heading = step;
+        }
+        if nth + 1 == rest.len() {
+            lines.line_to(to);
+        }
+        since_arrow += from.distance(to);
+        if since_arrow >= SPACING * ARROWS_APART {
+            since_arrow = 0.0;
+            arrowheads.polygon(arrowhead(to, step));
+        }
+        from = to;
+    }
+}
+
+/// The corners of an arrowhead at `at` along `heading`.
+pub(super) fn arrowhead(at: DVec2, heading: DVec2) -> [DVec2; 3] {
+    let (width, length) = ARROWHEAD;
+    let (ahead, aside) = (heading * length, heading.perp() * width);
+    [at + ahead, at - ahead + aside, at - ahead - aside]
+}
+
+/// The lines, in cells (cell centres at whole numbers), each along E.
+fn evenly_spaced(frame: &GridFrame, cells: &[FieldCell], spacing: f64) -> Vec<Vec<DVec2>> {
+    let mut tracer = Tracer {
+        frame,
+        cells,
+        spacing: f64::from(frame.cells) * spacing / PLOT_SIDE,
+        drawn: Vec::new(),
+        per_side: (PLOT_SIDE / spacing) as usize + 2,
+    };
+    tracer.drawn = vec![Vec::new(); tracer.per_side * tracer.per_side];
+
+    let mut lines: Vec<Vec<DVec2>> = Vec::new();
+    // Seeds all over the map come last: they find the regions no line led into.
+    let lattice = (0..tracer.per_side * tracer.per_side).map(|at| {
+        let (col, row) = (at % tracer.per_side, at / tracer.per_side);
+        DVec2::new(col as f64, row as f64) * tracer.spacing
+    });
+    for seed in lattice.collect::<Vec<_>>() {
+        let mut seeded_from = lines.len();
+        lines.extend(tracer.line_through(seed));
+        // Beside a line that was drawn the next ones are begun.
+        while let Some(line) = lines.get(seeded_from) {
+            let beside = tracer.beside(line);
+            for seed in beside {
+                lines.extend(tracer.line_through(seed));
+            }
+            seeded_from += 1;
+        }
+    }
+    lines
+}
+
+struct Tracer<'a> {
+    frame: &'a GridFrame,
+    cells: &'a [FieldCell],
+    /// Between two lines, in cells.
+    spacing: f64,
+    /// Points of the lines so far, in square bins of one spacing.
+    drawn: Vec<Vec<DVec2>>,
+    /// Bins along a side.
+    per_side: usize,
+}
+
+impl Tracer<'_> {
+    /// E between the cell centres, a unit vector; none in a hazard and where there is no guidance.
+    fn direction(&self, at: DVec2) -> Option<DVec2> {
+        let e_at = |col: f64, row: f64| {
+            let last = f64::from(self.frame.cells.saturating_sub(1));
+            if !(0.0..=last).contains(&col) || !(0.0..=last).contains(&row) {
+                return DVec2::ZERO;
+            }
+            let index = self.frame.index(Cell {
+                col: col as u32,
+                row: row as u32,
+            });
+            self.cells.get(index).map_or(DVec2::ZERO, |cell| {
+                let e = DVec2::new(cell.ex.into(), cell.ey.into());
+                if e.is_finite() { e } else { DVec2::ZERO }
+            })
+        };
+        let nearest = at.round();
+        if e_at(nearest.x, nearest.y) == DVec2::ZERO {
+            return None;
+        }
+        let low = at.floor();
+        let part = at - low;
+        let below = e_at(low.x, low.y).lerp(e_at(low.x + 1.0, low.y), part.x);
+        let above = e_at(low.x, low.y + 1.0).lerp(e_at(low.x + 1.0, low.y + 1.0), part.x);
+        below.lerp(above, part.y).try_normalize()
+    }
+
+    /// The line through `seed`, if there is room for one that is long enough; it is taken as drawn.
+    fn line_through(&mut self, seed: DVec2) -> Option<Vec<DVec2>> {
+        if self.is_crowded(seed, 0.98) || self.direction(seed).is_none() {
+            return None;
+        }
+        let mut line = self.followed(seed, -1.0);
+        line.reverse();
+        line.push(seed);
+        line.extend(self.followed(seed, 1.0));
+        let length: f64 = line.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        if length < SHORTEST * self.spacing {
+            return None;
+        }
+        // A tenth of the spacing apart is near enough to keep others away.
+        let mut kept: Option<DVec2> = None;
+        for &point in &line {
+            if kept.is_some_and(|kept| kept.distance(point) < 0.1 * self.spacing) {
+                continue;
+            }
+            kept = Some(point);
+            let bin = self.bin(point);
+            if let Some(points) = self.drawn.get_mut(bin.1 * self.per_side + bin.0) {
+                points.push(point);
+            }
+        }
+        Some(line)
+    }
+
+    /// From `seed` on along E, or against it, until there is no guidance or another line is near.
+    fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
+        // Not longer than a cell, so that a wall of one cell is not stepped over.
+        let step = (0.2 * self.spacing).min(0.9) * sense;
+        let most = (3.0 * f64::from(self.frame.cells) / step.abs()) as usize;
+        let mut points = Vec::new();
+        let mut at = seed;
+        while points.len() < most {
+            let next = self
+                .direction(at)
+                .and_then(|here| self.direction(at + here * (step / 2.0)))
+                .map(|half_way| at + half_way * step);
+            match next {
+                // A turn by more than a right angle within a step: the target, or a ridge.
+                Some(next) if self.turns_back(at, next) => break,
+                Some(next) if !self.is_crowded(next, MERGED) => points.push(next),
+                _ => break,
+            }
+            at = points[points.len() - 1];
+        }
+        points
+    }
+
+    fn turns_back(&self, at: DVec2, next: DVec2) -> bool {
+        match (self.direction(at), self.direction(next)) {
+            (Some(here), Some(there)) => here.dot(there) < 0.0,
+            _ => true,
+        }
+    }
+
+    /// Seeds one spacing beside a line, on both sides.
+    fn beside(&self, line: &[DVec2]) -> Vec<DVec2> {
+        line.iter()
+            .step_by(4)
+            .filter_map(|&at| Some((at, self.direction(at)?.perp() * self.spacing)))
+            .flat_map(|(at, aside)| [at + aside, at - aside])
+            .collect()
+    }
+
+    fn bin(&self, at: DVec2) -> (usize, usize) {
+        // A negative coordinate, half a cell at most, saturates to the first bin.
+        let bin = at / self.spacing;
+        (bin.x as usize, bin.y as usize)
+    }
+
+    /// Whether a line lies nearer to `at` than `share` of the spacing.
+    fn is_crowded(&self, at: DVec2, share: f64) -> bool {
+        let (col, row) = self.bin(at);
+        let limit = share * self.spacing;
+        let rows = row.saturating_sub(1)..=(row + 1).min(self.per_side - 1);
+        rows.flat_map(|row| {
+            (col.saturating_sub(1)..=(col + 1).min(self.per_side - 1))
+                .map(move |col| row * self.per_side + col)
+        })
+        .filter_map(|bin| self.drawn.get(bin))
+        .flatten()
+        .any(|point| point.distance_squared(at) < limit * limit)
+    }
+}
