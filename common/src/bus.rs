@@ -9,7 +9,8 @@
 //!
 //! Why `unsafe` is allowed here: the listener's file descriptor can only be had through an `unsafe`
 //! call, and polling it needs a borrow of it. It is sound because the borrow never outlives the
-//! listener, which the same struct owns, and nobody closes the descriptor.
+//! listener, which the same struct owns, and nobody closes the descriptor. A payload's name, too, can
+//! only be asked for through an `unsafe` call, which does nothing but return it.
 #![allow(unsafe_code)]
 
 use std::{
@@ -186,6 +187,8 @@ impl<H, T> SliceTopic<H, T> {
 pub trait AnyTopic: Sync {
     /// What the table says.
     fn spec(&self) -> &'static Spec;
+    /// The name of its payload, for every language: a struct, or a header and a slice of elements.
+    fn payload(&self) -> String;
     /// How often its writer says it again when nothing changes; zero for topics of each tick.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
@@ -221,6 +224,10 @@ impl<P: Payload> AnyTopic for Topic<P> {
         self.spec
     }
 
+    fn payload(&self) -> String {
+        type_name::<P>().to_owned()
+    }
+
     fn create(&self, bus: &Bus) -> Result<Box<dyn Any>, BusError> {
         let samples = pub_sub!(bus, self.spec, P, ())
             .create()
@@ -234,12 +241,22 @@ impl<H: Payload, T: Payload> AnyTopic for SliceTopic<H, T> {
         self.spec
     }
 
+    fn payload(&self) -> String {
+        format!("{} + [{}]", type_name::<H>(), type_name::<T>())
+    }
+
     fn create(&self, bus: &Bus) -> Result<Box<dyn Any>, BusError> {
         let samples = pub_sub!(bus, self.spec, [T], H)
             .create()
             .map_err(refused("create", self.spec.name))?;
         Ok(Box::new((samples, bus.create_event(self.spec)?)))
     }
+}
+
+fn type_name<P: Payload>() -> &'static str {
+    // SAFETY: the name is only shown; that the layout is the same everywhere is promised where each
+    // payload derives the trait.
+    unsafe { <P as ZeroCopySend>::type_name() }
 }
 
 fn service_name(spec: &Spec) -> Result<ServiceName, BusError> {

@@ -18,7 +18,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub(crate) enum DomainError {
     /// Somebody else supervises it.
-    #[error("robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot")]
+    #[error(
+        "robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot"
+    )]
     Held {
         /// The robot.
         robot: String,
@@ -26,7 +28,9 @@ pub(crate) enum DomainError {
         holder: String,
     },
     /// Stages of a dead supervisor live on.
-    #[error("stages of an earlier supervisor of robot {robot:?} are still running; end them with `pkill -f 'firsthand stage'`")]
+    #[error(
+        "stages of an earlier supervisor of robot {robot:?} are still running; end them with `pkill -f 'firsthand stage'`"
+    )]
     Tenants {
         /// The robot.
         robot: String,
@@ -170,7 +174,8 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
         if let (Ok(ours), Ok(there)) = (ours, there)
             && ours.ino() == there.ino()
         {
-            fs::write(&path, format!("{}\n", std::process::id())).map_err(failed("write", &path))?;
+            fs::write(&path, format!("{}\n", std::process::id()))
+                .map_err(failed("write", &path))?;
             return Ok(file);
         }
     }
@@ -219,7 +224,11 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
         remedy: "mount a tmpfs there",
     })?;
     for entry in entries.flatten() {
-        if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
+        if entry
+            .file_name()
+            .as_encoded_bytes()
+            .starts_with(prefix.as_bytes())
+        {
             let path = entry.path();
             fs::remove_file(&path).map_err(failed("remove", &path))?;
         }
@@ -236,7 +245,11 @@ fn check_shared_memory() -> Result<(), DomainError> {
     let free = space.f_bavail * space.f_frsize;
     if free < SHARED_MEMORY_NEEDED {
         return Err(DomainError::SharedMemory {
-            problem: format!("has {} MiB free of the {} MiB needed", free >> 20, SHARED_MEMORY_NEEDED >> 20),
+            problem: format!(
+                "has {} MiB free of the {} MiB needed",
+                free >> 20,
+                SHARED_MEMORY_NEEDED >> 20
+            ),
             remedy: "remove what fills it, or enlarge it (docker: --shm-size)",
         });
     }

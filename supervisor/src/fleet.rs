@@ -81,14 +81,20 @@ impl Fleet {
 
     /// Descriptors that become readable when a stage ends.
     pub(crate) fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        let processes = self.members.iter().filter_map(|member| member.process.as_ref());
+        let processes = self
+            .members
+            .iter()
+            .filter_map(|member| member.process.as_ref());
         processes.map(AsFd::as_fd).collect()
     }
 
     /// Time until some policy must look at the clock.
     pub(crate) fn time_to_deadline(&self) -> Option<Now> {
         let now = self.now();
-        let deadlines = self.members.iter().filter_map(|member| member.policy.deadline());
+        let deadlines = self
+            .members
+            .iter()
+            .filter_map(|member| member.policy.deadline());
         deadlines.min().map(|deadline| deadline.saturating_sub(now))
     }
 
@@ -101,7 +107,10 @@ impl Fleet {
     /// How many do, and how many there are.
     pub(crate) fn alive(&self) -> (usize, usize) {
         let running = |member: &&Member| matches!(member.policy.phase(), Phase::Running { .. });
-        (self.members.iter().filter(running).count(), self.members.len())
+        (
+            self.members.iter().filter(running).count(),
+            self.members.len(),
+        )
     }
 
     /// Times each stage was started again.
@@ -115,7 +124,8 @@ impl Fleet {
     pub(crate) fn on_health(&mut self, health: &HealthSample) -> bool {
         let now = self.now();
         let Some(member) = self.members.iter_mut().find(|member| {
-            member.stage.name == name_str(&health.stage) && member.generation == health.stamp.generation
+            member.stage.name == name_str(&health.stage)
+                && member.generation == health.stamp.generation
         }) else {
             return false;
         };
@@ -132,7 +142,11 @@ impl Fleet {
     /// A stage published something.
     pub(crate) fn on_output(&mut self, stage: &str) {
         let now = self.now();
-        if let Some(member) = self.members.iter_mut().find(|member| member.stage.name == stage) {
+        if let Some(member) = self
+            .members
+            .iter_mut()
+            .find(|member| member.stage.name == stage)
+        {
             member.output = Some(now);
         }
     }
@@ -172,7 +186,10 @@ impl Fleet {
 
     /// Give a stage a fresh life.
     pub(crate) fn replace(&mut self, stage: &str) -> Result<(), FleetError> {
-        let found = self.members.iter().position(|member| member.stage.name == stage);
+        let found = self
+            .members
+            .iter()
+            .position(|member| member.stage.name == stage);
         found.map_or(Ok(()), |index| self.tell(index, Event::Replace, 0))
     }
 

@@ -1,6 +1,31 @@
-//! The one executable.
+//! The one executable: a robot's supervisor, its stages, the simulated robot, and the tools around them.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`stages`] | THE table of stages |
+//! | [`policy`] | what to do with one stage, pure |
+//! | [`stall`] | what to do when the robot does not move, pure |
+//! | [`process`], [`fleet`] | child processes; the stages under their policies |
+//! | [`domain`] | the robot's corner of the machine, held and wiped |
+//! | [`simulator`] | the simulated robot as a child |
+//! | [`observer`] | what is heard on the bus |
+//! | [`supervisor`] | the loop |
+//! | [`report`], [`picture`] | how a run ended |
+//! | [`cli`] | the command line |
 
-#[cfg(test)]
+mod cli;
+mod domain;
+mod fleet;
+mod observer;
 mod picture;
+mod policy;
+mod process;
+mod report;
+mod simulator;
+mod stages;
+mod stall;
+mod supervisor;
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

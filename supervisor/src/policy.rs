@@ -142,9 +142,12 @@ impl Policy {
                 self.phase = Phase::Running { since, beat: now };
                 None
             }
-            (Phase::Starting { since } | Phase::Running { since, .. } | Phase::Failing { since, .. }, Event::Exited) => {
-                self.bury(since, now)
-            }
+            (
+                Phase::Starting { since }
+                | Phase::Running { since, .. }
+                | Phase::Failing { since, .. },
+                Event::Exited,
+            ) => self.bury(since, now),
             (Phase::Starting { since } | Phase::Running { since, .. }, Event::Replace) => {
                 self.phase = Phase::Failing {
                     since,
@@ -161,12 +164,17 @@ impl Policy {
                 };
                 Some(Action::Abort)
             }
-            (Phase::Failing { kill, .. } | Phase::Stopping { kill }, Event::Time) if now >= kill => {
+            (Phase::Failing { kill, .. } | Phase::Stopping { kill }, Event::Time)
+                if now >= kill =>
+            {
                 self.retry_kill(now);
                 Some(Action::Kill)
             }
             (Phase::BackingOff { until }, Event::Time) if now >= until => Some(self.start(now)),
-            (Phase::Starting { .. } | Phase::Running { .. } | Phase::Failing { .. }, Event::Stop) => {
+            (
+                Phase::Starting { .. } | Phase::Running { .. } | Phase::Failing { .. },
+                Event::Stop,
+            ) => {
                 self.phase = Phase::Stopping {
                     kill: now + STOP_GRACE,
                 };

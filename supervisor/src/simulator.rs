@@ -67,12 +67,16 @@ struct Truth {
 
 impl Simulator {
     /// Start one on the mission in `directory`, and wait until it says where it listens.
-    pub(crate) fn start(directory: &Path, mission: &Path, pace: Pace) -> Result<Self, SimulatorError> {
+    pub(crate) fn start(
+        directory: &Path,
+        mission: &Path,
+        pace: Pace,
+    ) -> Result<Self, SimulatorError> {
         let log_path = directory.join("x80-sim.log");
         let log = File::create(&log_path).map_err(system("log"))?;
-        let mission = mission
-            .to_str()
-            .ok_or_else(|| SimulatorError::Startup("the run directory's name is not UTF-8".into()))?;
+        let mission = mission.to_str().ok_or_else(|| {
+            SimulatorError::Startup("the run directory's name is not UTF-8".into())
+        })?;
         let mut command = firsthand(&[
             "sim",
             mission,
@@ -178,7 +182,9 @@ impl Truth {
     fn take_lines(&mut self) -> Result<(), SimulatorError> {
         let Some(end) = self.pending.iter().rposition(|&byte| byte == b'\n') else {
             if self.pending.len() > LONGEST_LINE {
-                return Err(SimulatorError::Startup("it tells a line without end".into()));
+                return Err(SimulatorError::Startup(
+                    "it tells a line without end".into(),
+                ));
             }
             return Ok(());
         };

@@ -145,7 +145,10 @@ mod tests {
             let spec = topic.spec();
             if spec.writer != SUPERVISOR && spec.writer != EVERY_STAGE {
                 let writer = find(spec.writer).unwrap();
-                let writes = writer.outputs.iter().any(|output| output.spec().name == spec.name);
+                let writes = writer
+                    .outputs
+                    .iter()
+                    .any(|output| output.spec().name == spec.name);
                 assert!(writes, "{} does not write {}", spec.writer, spec.name);
             }
         }

@@ -79,7 +79,10 @@ impl StallWatch {
         if !(cut_off && guidance.epoch == self.epoch) {
             self.cut_off_since = None;
         } else if now.since(*self.cut_off_since.get_or_insert(now)) >= CUT_OFF_AFTER {
-            return Some(self.forget(now, "the belief isolates the robot from the target, again and again"));
+            return Some(self.forget(
+                now,
+                "the belief isolates the robot from the target, again and again",
+            ));
         }
         let here = Anchor {
             time: now,
@@ -149,7 +152,10 @@ mod tests {
         let mut watch = StallWatch::default();
         for tick in 0..100 {
             let pose = pose(f64::from(tick), f64::from(tick) * 0.03);
-            assert_eq!(watch.step(&pose, &guidance(GuidanceStatus::Along, 0), false), None);
+            assert_eq!(
+                watch.step(&pose, &guidance(GuidanceStatus::Along, 0), false),
+                None
+            );
         }
     }
 
@@ -160,7 +166,10 @@ mod tests {
         let rungs: Vec<_> = (0..=10)
             .filter_map(|second| watch.step(&pose(f64::from(second), 0.0), &along, false))
             .collect();
-        assert_eq!(rungs, [Rung::Replan, Rung::Replan, Rung::Forget { epoch: 1 }]);
+        assert_eq!(
+            rungs,
+            [Rung::Replan, Rung::Replan, Rung::Forget { epoch: 1 }]
+        );
     }
 
     #[test]
@@ -168,7 +177,10 @@ mod tests {
         let mut watch = StallWatch::default();
         let along = guidance(GuidanceStatus::Along, 0);
         for second in 0..20 {
-            assert_eq!(watch.step(&pose(f64::from(second), 0.0), &along, true), None);
+            assert_eq!(
+                watch.step(&pose(f64::from(second), 0.0), &along, true),
+                None
+            );
         }
     }
 
@@ -178,7 +190,11 @@ mod tests {
         let mut rungs = Vec::new();
         for tick in 0..100 {
             let cut_off = guidance(GuidanceStatus::Unreachable, watch.epoch());
-            rungs.extend(watch.step(&pose(f64::from(tick) * 0.5, f64::from(tick)), &cut_off, false));
+            rungs.extend(watch.step(
+                &pose(f64::from(tick) * 0.5, f64::from(tick)),
+                &cut_off,
+                false,
+            ));
             if matches!(rungs.last(), Some(Rung::GiveUp { .. })) {
                 break;
             }

@@ -352,11 +352,3 @@ fn the_same_scene_gives_the_same_bytes() {
     let run = three_drums();
     assert_eq!(svg(&run.scene()), svg(&run.scene()));
 }
-
-#[test]
-#[ignore = "guards nothing: writes firsthand-picture.svg to the temporary directory, to be looked at"]
-fn a_picture_to_look_at() {
-    let file = std::env::temp_dir().join("firsthand-picture.svg");
-    std::fs::write(&file, svg(&three_drums().scene())).unwrap();
-    println!("{}", file.display());
-}

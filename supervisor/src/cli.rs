@@ -1,0 +1,89 @@
+//! The command line: one file a subcommand.
+
+mod check;
+mod missions;
+mod run;
+mod sim;
+mod stage;
+mod status;
+mod tables;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Time-critical mobility for ground robots: a target, a perimeter, one sonar, and off it goes.
+///
+/// Without a subcommand: `firsthand run obstacle-course`.
+#[derive(Debug, Parser)]
+#[command(name = "firsthand", version, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(run::Arguments),
+    Stage(stage::Arguments),
+    Sim(sim::Arguments),
+    Missions(missions::Arguments),
+    Check(check::Arguments),
+    Status(status::Arguments),
+    Topics(tables::TopicArguments),
+    Stages(tables::StageArguments),
+}
+
+/// What `run` ends with.
+const EXIT_CODES: &str = "Exit codes of run:
+  0  target reached, or stopped by Ctrl-C or SIGTERM
+  1  could not start, or something failed
+  2  wrong usage
+  3  target unreachable
+  4  timeout
+  5  collision (simulated robot)
+  6  aborted by a fault";
+
+/// Run the command line of this process.
+pub(crate) fn main() -> ExitCode {
+    log_to_stderr();
+    let arguments = Arguments::parse();
+    let command = arguments
+        .command
+        .unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    let result = match command {
+        Command::Run(arguments) => run::main(&arguments),
+        Command::Stage(arguments) => stage::main(&arguments),
+        Command::Sim(arguments) => sim::main(arguments),
+        Command::Missions(arguments) => missions::main(&arguments),
+        Command::Check(arguments) => check::main(&arguments),
+        Command::Status(arguments) => status::main(&arguments),
+        Command::Topics(arguments) => tables::topics(&arguments),
+        Command::Stages(arguments) => tables::stages(&arguments),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("firsthand: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What a subcommand fails with: one clear sentence.
+type Failure = Box<dyn std::error::Error>;
+
+/// Stages log what they do, the rest what goes wrong; FIRSTHAND_LOG says otherwise.
+fn log_to_stderr() {
+    let is_child = std::env::args()
+        .nth(1)
+        .is_some_and(|name| name == "stage" || name == "sim");
+    let default = if is_child { "info" } else { "error" };
+    let filter = tracing_subscriber::EnvFilter::try_from_env("FIRSTHAND_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(default));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(false)
+        .init();
+}

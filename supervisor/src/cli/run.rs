@@ -1,0 +1,265 @@
+//! `firsthand run MISSION`: a mission from start to summary.
+
+use std::{
+    fs,
+    io::{self, IsTerminal, Write as _},
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use common::{
+    clock::Pace, domain::RobotName, kinematics::Pose2, mission::Mission, samples::PoseSample,
+};
+
+use super::{Failure, missions};
+use crate::{
+    picture::{self, Facts, Scene},
+    report::{self, Outcome, Summary},
+    supervisor::{self, Finished, Options, Progress},
+};
+
+/// Carry out a mission: bring up a robot's stages, let it drive, sum up.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A shipped mission (`firsthand missions`) or a mission file.
+    #[arg(default_value = "obstacle-course")]
+    mission: String,
+    /// Name of the robot, and of its corner of shared memory.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// Mission time of a simulated robot: `max`, or R times wall-clock.
+    #[arg(long, default_value = "max")]
+    pace: Pace,
+    /// Seed of everything random in the simulation, over the mission's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Where logs, checkpoints, summary and picture go; a new directory below `runs` otherwise.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Mission seconds after which to give up, over the mission's.
+    #[arg(long, value_name = "S")]
+    timeout: Option<f64>,
+    /// KEY=VALUE over the mission file, as often as needed: `--set start.heading_deg=90`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// End with one line of JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Default for Arguments {
+    fn default() -> Self {
+        use clap::Parser as _;
+        /// The defaults stand in one place: the attributes above.
+        #[derive(clap::Parser)]
+        struct Alone {
+            #[command(flatten)]
+            arguments: Arguments,
+        }
+        Alone::parse_from(["firsthand"]).arguments
+    }
+}
+
+#[allow(clippy::print_stdout)]
+pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let mut assignments = arguments.set.clone();
+    assignments.extend(
+        arguments
+            .timeout
+            .map(|timeout| format!("timeout_s = {timeout:?}")),
+    );
+    assignments.extend(arguments.seed.map(|seed| format!("seed = {seed}")));
+    let mission = missions::load(&arguments.mission, &assignments)?;
+    let directory = match &arguments.out {
+        Some(directory) => own_directory(directory)?,
+        None => numbered_directory(&mission.name)?,
+    };
+    let options = Options {
+        mission,
+        robot: arguments.robot.clone(),
+        pace: arguments.pace,
+        directory: directory.clone(),
+    };
+    let mut console = Console::new(&options);
+    let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
+        Ok(finished) => finished,
+        Err(error) => {
+            // A directory made for a run that never was is litter.
+            if arguments.out.is_none() {
+                let _ = fs::remove_dir(&directory);
+            }
+            return Err(error.into());
+        }
+    };
+    console.end();
+    let picture = directory.join("picture.svg");
+    fs::write(&picture, draw(&options.mission, &finished))?;
+    let json = serde_json::to_string(&finished.summary)?;
+    fs::write(directory.join("summary.json"), format!("{json}\n"))?;
+    if arguments.json {
+        println!("{json}");
+    } else {
+        print!("{}", finished.summary);
+        println!("picture: {}", picture.display());
+    }
+    Ok(exit_code(&finished.summary, finished.asked_for))
+}
+
+/// The documented code.
+fn exit_code(summary: &Summary, asked_for: bool) -> ExitCode {
+    if asked_for {
+        return ExitCode::SUCCESS;
+    }
+    ExitCode::from(match summary.outcome {
+        Outcome::Reached => 0,
+        Outcome::Unreachable => 3,
+        Outcome::Timeout => 4,
+        Outcome::Collision => 5,
+        Outcome::Aborted => 6,
+    })
+}
+
+/// The directory asked for; results of an earlier run are not mixed with this one's.
+fn own_directory(directory: &Path) -> Result<PathBuf, Failure> {
+    fs::create_dir_all(directory).map_err(|error| {
+        format!(
+            "cannot make {}: {error}; give another --out",
+            directory.display()
+        )
+    })?;
+    if directory.join(common::run::FILE_NAME).exists() {
+        return Err(format!(
+            "{} holds an earlier run; give an empty or new directory with --out",
+            directory.display()
+        )
+        .into());
+    }
+    Ok(fs::canonicalize(directory)?)
+}
+
+/// `runs/NAME-NNN`, the first number that is free.
+fn numbered_directory(name: &str) -> Result<PathBuf, Failure> {
+    let runs = Path::new("runs");
+    fs::create_dir_all(runs).map_err(|error| {
+        format!(
+            "cannot make {}: {error}; say where with --out",
+            runs.display()
+        )
+    })?;
+    let mut number = 1;
+    loop {
+        let directory = runs.join(format!("{name}-{number:03}"));
+        match fs::create_dir(&directory) {
+            Ok(()) => return Ok(fs::canonicalize(directory)?),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            Err(error) => {
+                return Err(format!("cannot make {}: {error}", directory.display()).into());
+            }
+        }
+    }
+}
+
+fn draw(mission: &Mission, finished: &Finished) -> String {
+    let record = &finished.record;
+    let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
+    let summary = &finished.summary;
+    picture::svg(&Scene {
+        mission,
+        grid: record
+            .grid
+            .frame()
+            .map(|frame| (frame, record.grid.cells())),
+        field: record
+            .field
+            .frame()
+            .map(|frame| (frame, record.field.cells())),
+        believed: &believed,
+        truth: &report::true_poses(&finished.truth),
+        facts: Facts {
+            outcome: summary.outcome.as_str(),
+            reached: summary.outcome == Outcome::Reached,
+            mission_time_s: summary.mission_time_s,
+            path_length_m: summary.path_length_m,
+            straight_m: summary.straight_m,
+            safety_events: summary.safety_events,
+            seed: mission.robot.address.is_none().then_some(mission.seed),
+        },
+        captions: &summary.captions(),
+    })
+}
+
+/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+struct Console {
+    rewrites: bool,
+    shown: Option<Instant>,
+    straight: f64,
+}
+
+/// Where lines cannot be rewritten they come so seldom.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+
+impl Console {
+    fn new(options: &Options) -> Self {
+        let mission = &options.mission;
+        let straight = mission.target.length();
+        eprintln!(
+            "mission {}: {straight:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
+            mission.name,
+            options.robot,
+            options.pace,
+            options.directory.display()
+        );
+        Self {
+            rewrites: io::stderr().is_terminal(),
+            shown: None,
+            straight,
+        }
+    }
+
+    fn show(&mut self, progress: &Progress<'_>) {
+        let due = self
+            .shown
+            .is_none_or(|shown| self.rewrites || shown.elapsed() >= LINE_EVERY);
+        if !due {
+            return;
+        }
+        self.shown = Some(Instant::now());
+        let line = self.line(progress);
+        if self.rewrites {
+            eprint!("\r\x1b[K{line}");
+            let _ = io::stderr().flush();
+        } else {
+            eprintln!("{line}");
+        }
+    }
+
+    fn line(&self, progress: &Progress<'_>) -> String {
+        let (alive, all) = progress.alive;
+        let stages = format!("{alive}/{all} stages alive");
+        if !progress.driving {
+            return format!("starting: {stages}");
+        }
+        let record = progress.record;
+        let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
+        let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
+        let distance = record
+            .command
+            .map_or(self.straight, |command| command.distance_m);
+        let events = record
+            .newest_guidance()
+            .map_or(0, |guidance| guidance.safety_events);
+        let lost = record.link.is_some_and(|link| link.connected == 0);
+        let robot = if lost { ", ROBOT LOST" } else { "" };
+        format!(
+            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {stages}{robot}"
+        )
+    }
+
+    fn end(&self) {
+        if self.rewrites {
+            eprintln!();
+        }
+    }
+}

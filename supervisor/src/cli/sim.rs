@@ -1,0 +1,60 @@
+//! `firsthand sim MISSION`: a simulated X80 to drive with anything that speaks its protocol.
+
+use std::{net::SocketAddr, process::ExitCode};
+
+use clap::Args;
+use common::{
+    clock::Pace,
+    shell::become_child,
+    signals::{SIGINT, SIGTERM, Signals},
+};
+use x80_sim::SimOptions;
+
+use super::{Failure, missions};
+
+/// Be a simulated X80 in a mission's world, for `run` or for any other software that drives an X80.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A shipped mission or a mission file.
+    mission: String,
+    /// Where to listen; port 0 takes a free one.
+    #[arg(long, default_value = "127.0.0.1:0")]
+    listen: SocketAddr,
+    /// Mission time: `max` waits for a command each tick, R runs R times wall-clock.
+    #[arg(long, default_value = "1")]
+    pace: Pace,
+    /// Seed of everything random, over the mission's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// KEY=VALUE over the mission file, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Tell the truth, a JSON object a line, on standard output.
+    #[arg(long)]
+    truth: bool,
+    /// End when this process, the parent, ends.
+    #[arg(long, hide = true)]
+    supervisor: Option<u32>,
+}
+
+pub(super) fn main(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let mut mission = missions::load(&arguments.mission, &arguments.set)?;
+    if let Some(seed) = arguments.seed {
+        mission.seed = seed;
+    }
+    let signals = Signals::catch(&[SIGINT, SIGTERM])?;
+    if let Some(supervisor) = arguments.supervisor {
+        become_child("x80-sim", supervisor)?;
+    }
+    let options = SimOptions {
+        mission,
+        pace: arguments.pace,
+        listen: arguments.listen,
+        transport: x80_sim::Transport::default(),
+        truth: arguments
+            .truth
+            .then(|| Box::new(std::io::stdout()) as Box<_>),
+    };
+    x80_sim::run(options, &signals)?;
+    Ok(ExitCode::SUCCESS)
+}

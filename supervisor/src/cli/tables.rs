@@ -1,0 +1,101 @@
+//! `firsthand topics` and `firsthand stages`: the two tables, as the README shows them.
+
+use std::{fmt::Write as _, process::ExitCode};
+
+use clap::Args;
+use common::topics::{self, AnyTopic, Rate};
+
+use super::Failure;
+use crate::stages;
+
+/// Print the table of topics.
+#[derive(Debug, Args)]
+pub(super) struct TopicArguments {}
+
+/// Print the table of stages.
+#[derive(Debug, Args)]
+pub(super) struct StageArguments {}
+
+#[allow(clippy::print_stdout)]
+pub(super) fn topics(_: &TopicArguments) -> Result<ExitCode, Failure> {
+    print!("{}", topic_table());
+    Ok(ExitCode::SUCCESS)
+}
+
+#[allow(clippy::print_stdout)]
+pub(super) fn stages(_: &StageArguments) -> Result<ExitCode, Failure> {
+    print!("{}", stage_table());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The topics as a Markdown table.
+pub(crate) fn topic_table() -> String {
+    let mut table = String::from(
+        "| topic | payload | written by | rate | too old after | meaning |\n|---|---|---|---|---|---|\n",
+    );
+    for topic in topics::TABLE {
+        let spec = topic.spec();
+        let rate = match spec.rate {
+            Rate::EachTick => "each tick".to_owned(),
+            Rate::OnChange(least) => format!("on change, at least every {} ms", least.as_millis()),
+        };
+        let age = spec
+            .max_age
+            .map_or("-".to_owned(), |age| format!("{} ms", age.as_millis()));
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            table,
+            "| `{}` | `{}` | {} | {rate} | {age} | {} |",
+            spec.name,
+            topic.payload(),
+            spec.writer,
+            spec.meaning.trim()
+        );
+    }
+    table
+}
+
+/// The stages as a Markdown table.
+pub(crate) fn stage_table() -> String {
+    let mut table = String::from(
+        "| stage | reads | writes | ready within | beats within | while it is down the robot |\n|---|---|---|---|---|---|\n",
+    );
+    for stage in &stages::TABLE {
+        let list = |topics: &[&dyn AnyTopic]| {
+            let names: Vec<_> = topics
+                .iter()
+                .map(|topic| format!("`{}`", topic.spec().name))
+                .collect();
+            names.join(", ")
+        };
+        let reads: Vec<&dyn AnyTopic> =
+            stage.inputs.iter().chain(stage.feedback).copied().collect();
+        let _ = writeln!(
+            table,
+            "| `{}` | {} | {} | {} ms | {} ms | {} |",
+            stage.name,
+            list(&reads),
+            list(stage.outputs),
+            stage.startup.as_millis(),
+            stage.heartbeat.as_millis(),
+            stage.while_down
+        );
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_readme_shows_the_tables_as_they_are() {
+        let readme = include_str!("../../../README.md");
+        for (command, table) in [("topics", topic_table()), ("stages", stage_table())] {
+            assert!(
+                readme.contains(&table),
+                "README.md is behind; paste the output of `firsthand {command}`:\n{table}"
+            );
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! How a run ended, as numbers: for people, for scripts, for the picture.
+
+use std::{collections::BTreeMap, fmt};
+
+use common::{clock::MissionTime, kinematics::Pose2, mission::Mission, truth::TruthTick};
+use serde::Serialize;
+
+use crate::observer::Record;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Outcome {
+    /// The target, within the tolerance.
+    Reached,
+    /// No way to the target, whatever was forgotten and planned anew.
+    Unreachable,
+    /// Mission time ran out.
+    Timeout,
+    /// The simulated robot touched something.
+    Collision,
+    /// Told to stop, or something failed.
+    Aborted,
+}
+
+impl Outcome {
+    /// The word for it.
+    pub(crate) const fn as_str(self) -> &'static str {
+        match self {
+            Self::Reached => "reached",
+            Self::Unreachable => "unreachable",
+            Self::Timeout => "timeout",
+            Self::Collision => "collision",
+            Self::Aborted => "aborted",
+        }
+    }
+}
+
+/// How a run ended, and why.
+#[derive(Clone, Debug)]
+pub(crate) struct Ending {
+    /// How.
+    pub(crate) outcome: Outcome,
+    /// Why, in a few words.
+    pub(crate) reason: String,
+    /// Whether it is what its user asked for: the target reached, or a stop by hand.
+    pub(crate) asked_for: bool,
+}
+
+/// Microseconds from the datagram in to the datagram out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct TickLatency {
+    p50: Option<f64>,
+    p99: Option<f64>,
+    max: Option<f64>,
+}
+
+/// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the
+/// truth about a real robot.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Summary {
+    pub(crate) outcome: Outcome,
+    pub(crate) reason: String,
+    pub(crate) mission_time_s: f64,
+    pub(crate) path_length_m: f64,
+    pub(crate) straight_m: f64,
+    pub(crate) min_clearance_m: Option<f64>,
+    pub(crate) collisions: Option<u64>,
+    pub(crate) pose_error_m: Option<f64>,
+    pub(crate) safety_events: u64,
+    pub(crate) full_solves: u64,
+    pub(crate) local_updates: u64,
+    pub(crate) ticks: u64,
+    pub(crate) restarts: BTreeMap<&'static str, u32>,
+    pub(crate) tick_latency_us: TickLatency,
+}
+
+impl Summary {
+    /// Of a run that ended like this. What came after the arrival does not count: it depends on how
+    /// fast the stop was.
+    pub(crate) fn of(
+        mission: &Mission,
+        ending: &Ending,
+        record: &Record,
+        truth: &[TruthTick],
+        restarts: impl Iterator<Item = (&'static str, u32)>,
+    ) -> Self {
+        let arrival = record
+            .arrival
+            .filter(|_| ending.outcome == Outcome::Reached);
+        let last_tick = match arrival {
+            Some(command) => Some(command.stamp.tick),
+            None => record.newest_tick(),
+        };
+        let pose = last_tick.and_then(|tick| record.pose_at(tick));
+        let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
+        let truth = truth_until(
+            truth,
+            pose.map(|pose| (pose.left_counts, pose.right_counts)),
+            arrival.is_some(),
+        );
+        let (full_solves, local_updates) = record.solves(guidance);
+        let latency = record.latency();
+        let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
+        let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
+        let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
+        Self {
+            outcome: ending.outcome,
+            reason: ending.reason.clone(),
+            mission_time_s: time.seconds(),
+            path_length_m: match ended {
+                Some(_) => path_length(truth),
+                None => pose.map_or(0.0, |pose| pose.travelled_m),
+            },
+            straight_m: mission.target.length(),
+            min_clearance_m: clearance.filter(|&clearance| clearance < TruthTick::NOTHING_NEAR),
+            collisions: truth.last().map(|tick| tick.contacts),
+            pose_error_m: pose
+                .zip(truth.last())
+                .map(|(pose, truth)| (pose.x_m - truth.x).hypot(pose.y_m - truth.y)),
+            safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
+            full_solves,
+            local_updates,
+            ticks: last_tick.map_or(0, |tick| tick + 1),
+            restarts: restarts.collect(),
+            tick_latency_us: TickLatency {
+                p50: latency.quantile_us(0.5),
+                p99: latency.quantile_us(0.99),
+                max: latency.quantile_us(1.0),
+            },
+        }
+    }
+
+    /// Lines below the picture.
+    pub(crate) fn captions(&self) -> Vec<String> {
+        let metres = |value: Option<f64>| {
+            value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))
+        };
+        vec![
+            format!(
+                "Least true clearance {} · pose error at the end {} · {} full solves, {} local updates",
+                metres(self.min_clearance_m),
+                metres(self.pose_error_m),
+                self.full_solves,
+                self.local_updates,
+            ),
+            format!(
+                "{} · {} ticks · {}",
+                self.tick_latency_us,
+                self.ticks,
+                self.restarted()
+            ),
+        ]
+    }
+
+    fn restarted(&self) -> String {
+        let some: Vec<_> = self
+            .restarts
+            .iter()
+            .filter(|(_, times)| **times > 0)
+            .map(|(stage, times)| format!("{stage} restarted {times}×"))
+            .collect();
+        if some.is_empty() {
+            "no restarts".to_owned()
+        } else {
+            some.join(", ")
+        }
+    }
+}
+
+impl fmt::Display for TickLatency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.p50, self.p99, self.max) {
+            (Some(p50), Some(p99), Some(max)) => {
+                write!(
+                    f,
+                    "tick latency {p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)"
+                )
+            }
+            _ => f.write_str("no tick was answered"),
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {}", self.outcome.as_str(), self.reason)?;
+        let ratio = self.path_length_m / self.straight_m;
+        writeln!(
+            f,
+            "{:.1} s, {:.2} m driven, {ratio:.2} x the straight {:.2} m, {} safety events",
+            self.mission_time_s, self.path_length_m, self.straight_m, self.safety_events
+        )?;
+        for caption in self.captions() {
+            writeln!(f, "{caption}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The truth up to the tick whose frames showed `counts`: wheel counts are what belief and truth have in
+/// common. All of it when the run did not end by arriving.
+fn truth_until(truth: &[TruthTick], counts: Option<(u16, u16)>, arrived: bool) -> &[TruthTick] {
+    if !arrived {
+        return truth;
+    }
+    let shows = |tick: &TruthTick| counts == Some((tick.left_counts, tick.right_counts));
+    let end = truth.iter().rposition(shows).map_or(truth.len(), |last| {
+        // A robot at rest shows the same counts for many ticks: the first of them is the arrival.
+        truth[..=last]
+            .iter()
+            .rposition(|tick| !shows(tick))
+            .map_or(0, |before| before + 1)
+    });
+    &truth[..truth.len().min(end + 1)]
+}
+
+fn path_length(truth: &[TruthTick]) -> f64 {
+    truth
+        .windows(2)
+        .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))
+        .sum()
+}
+
+/// Poses of the truth, for the picture.
+pub(crate) fn true_poses(truth: &[TruthTick]) -> Vec<Pose2> {
+    truth
+        .iter()
+        .map(|tick| Pose2 {
+            position: glam::DVec2::new(tick.x, tick.y),
+            heading: tick.heading,
+        })
+        .collect()
+}

@@ -1,0 +1,462 @@
+//! One robot's supervisor: brings its stages up, lets it drive, watches, brings all down again.
+
+use std::{
+    fs, io,
+    net::{SocketAddr, ToSocketAddrs},
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, BusError, SliceWriter, Writer},
+    clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    domain::{Domain, RobotName},
+    mission::Mission,
+    run::{Run, RunError},
+    samples::{DirectiveSample, Order, RosterEntry, RosterHeader},
+    signals::{SIGINT, SIGTERM, Signals},
+    topics,
+    waiter::Waiter,
+};
+use thiserror::Error;
+
+use crate::{
+    domain::{DomainError, Held},
+    fleet::{Fleet, FleetError},
+    observer::{Observer, Record},
+    report::{Ending, Outcome, Summary},
+    simulator::{Simulator, SimulatorError},
+    stages,
+    stall::{Rung, StallWatch},
+};
+
+/// On a clock of ticks nothing waits for wall-clock: a pipeline that makes no tick for so long is stuck.
+const NO_PROGRESS: Duration = Duration::from_secs(15);
+/// Time the link has to say that the robot was told to stand, before it is asked to go.
+const STAND_CONFIRMED: Duration = Duration::from_millis(100);
+
+/// What a run is made from.
+pub(crate) struct Options {
+    /// What to do.
+    pub(crate) mission: Mission,
+    /// For whom.
+    pub(crate) robot: RobotName,
+    /// How mission time passes; a real robot only knows wall-clock.
+    pub(crate) pace: Pace,
+    /// Where logs, checkpoints and results go; must exist.
+    pub(crate) directory: PathBuf,
+}
+
+/// Why a run could not be carried out.
+#[derive(Debug, Error)]
+pub(crate) enum SupervisorError {
+    /// The domain.
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A stage.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// The simulator.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    /// The run file.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The robot's address.
+    #[error("robot.address {address:?} is no host:port that resolves: {problem}")]
+    Address {
+        /// As the mission says it.
+        address: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The file system or the system.
+    #[error("cannot {action}: {source}")]
+    System {
+        /// What was tried.
+        action: String,
+        /// The system's word.
+        source: io::Error,
+    },
+}
+
+fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SupervisorError {
+    let action = action.into();
+    move |source| SupervisorError::System { action, source }
+}
+
+/// What a run leaves.
+pub(crate) struct Finished {
+    /// The numbers.
+    pub(crate) summary: Summary,
+    /// Whether it ended as its user wanted.
+    pub(crate) asked_for: bool,
+    /// What was heard.
+    pub(crate) record: Record,
+    /// What really happened, of a simulated robot.
+    pub(crate) truth: Vec<common::truth::TruthTick>,
+}
+
+/// How far a run has come, for whoever watches.
+pub(crate) struct Progress<'a> {
+    /// What was heard so far.
+    pub(crate) record: &'a Record,
+    /// Stages alive, of how many.
+    pub(crate) alive: (usize, usize),
+    /// Whether the robot is ordered to drive.
+    pub(crate) driving: bool,
+}
+
+/// Carry out a run. `watch` is called a few times a second.
+pub(crate) fn run(
+    options: &Options,
+    watch: &mut dyn FnMut(&Progress<'_>),
+) -> Result<Finished, SupervisorError> {
+    let mut signals = Signals::catch(&[SIGINT, SIGTERM]).map_err(system("catch signals"))?;
+    let held = Held::acquire(Domain::of(options.robot.clone()))?;
+    let Some(bus) = held.bus() else {
+        return Err(system("keep the bus")(io::ErrorKind::NotConnected.into()));
+    };
+    let mut supervisor = Supervisor::start(options, bus)?;
+    let ending = supervisor.drive(&mut signals, watch)?;
+    supervisor.stop()?;
+    Ok(supervisor.finish(&ending))
+}
+
+struct Supervisor<'a> {
+    options: &'a Options,
+    // Dropped in this order: the stages go before the robot they speak to.
+    fleet: Fleet,
+    simulator: Option<Simulator>,
+    observer: Observer,
+    waiter: Waiter,
+    directive: Writer<DirectiveSample>,
+    roster: SliceWriter<RosterHeader, RosterEntry>,
+    order: Order,
+    stall: StallWatch,
+    judged_tick: Option<u64>,
+    restated: Option<Instant>,
+    progressed: (Option<u64>, Instant),
+}
+
+impl<'a> Supervisor<'a> {
+    /// The robot, the run file, the stages.
+    fn start(options: &'a Options, bus: &Bus) -> Result<Self, SupervisorError> {
+        let directory = &options.directory;
+        let mission = &options.mission;
+        let (simulator, address, clock) = match &mission.robot.address {
+            Some(address) => (None, resolve(address)?, wall_clock(1.0)),
+            None => {
+                let simulator = start_simulator(directory, mission, options.pace)?;
+                let address = simulator.address();
+                let clock = match options.pace {
+                    Pace::Max => MissionClock::Ticks {
+                        period_ns: (1e9 / mission.robot.rate_hz) as u64,
+                    },
+                    Pace::Rate(rate) => wall_clock(rate),
+                };
+                (Some(simulator), address, clock)
+            }
+        };
+        let run = Run {
+            robot: options.robot.clone(),
+            address,
+            clock,
+            mission: mission.clone(),
+        };
+        run.save(directory)?;
+        let mut waiter = Waiter::default();
+        let observer = Observer::new(bus, &mut waiter)?;
+        let mut supervisor = Self {
+            options,
+            fleet: Fleet::new(directory.clone()),
+            simulator,
+            observer,
+            waiter,
+            directive: bus.writer(&topics::DIRECTIVE, 1)?,
+            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
+            order: Order::Hold,
+            stall: StallWatch::default(),
+            judged_tick: None,
+            restated: None,
+            progressed: (None, Instant::now()),
+        };
+        supervisor.restate()?;
+        supervisor.fleet.start_all()?;
+        Ok(supervisor)
+    }
+
+    /// Until the mission ends, one way or another.
+    fn drive(
+        &mut self,
+        signals: &mut Signals,
+        watch: &mut dyn FnMut(&Progress<'_>),
+    ) -> Result<Ending, SupervisorError> {
+        self.waiter.on_readable(&*signals)?;
+        loop {
+            if signals.came() {
+                return Ok(Ending {
+                    outcome: Outcome::Aborted,
+                    reason: "told to stop".to_owned(),
+                    asked_for: true,
+                });
+            }
+            if let Some(ending) = self.turn()? {
+                return Ok(ending);
+            }
+            if self.restate_if_due()? {
+                watch(&Progress {
+                    record: &self.observer.record,
+                    alive: self.fleet.alive(),
+                    driving: self.order == Order::Drive,
+                });
+            }
+            self.wait()?;
+        }
+    }
+
+    /// Wait for the bus, a child, a signal, a deadline.
+    fn wait(&self) -> Result<(), SupervisorError> {
+        let mut descriptors = self.fleet.descriptors();
+        if let Some(simulator) = &self.simulator {
+            descriptors.extend(simulator.descriptors());
+        }
+        let until_deadline = self.fleet.time_to_deadline().unwrap_or(topics::RESTATE);
+        self.waiter
+            .wait_also_for(&descriptors, until_deadline.min(topics::RESTATE))?;
+        Ok(())
+    }
+
+    /// Take what came, tend the stages, judge.
+    fn turn(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let became_ready = self.observer.take(&mut self.fleet)?;
+        let first_tick = self
+            .observer
+            .record
+            .newest_tick()
+            .map_or(0, |tick| tick + 1);
+        let ended = self.fleet.tend(first_tick)?;
+        if let Some(simulator) = &mut self.simulator
+            && !simulator.tend()?
+        {
+            return Ok(Some(fault("the simulated robot ended; see x80-sim.log")));
+        }
+        if self.order == Order::Hold && self.fleet.all_running() && self.robot_answers() {
+            tracing::info!("all stages ready: drive");
+            self.order = Order::Drive;
+            self.progressed = (None, Instant::now());
+            self.restate()?;
+        } else if became_ready || !ended.is_empty() {
+            self.restate()?;
+        }
+        self.judge()
+    }
+
+    fn robot_answers(&self) -> bool {
+        let link = self.observer.record.link;
+        link.is_some_and(|link| link.connected == 1)
+    }
+
+    fn judge(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let record = &self.observer.record;
+        if let Some(arrival) = record.arrival {
+            return Ok(Some(Ending {
+                outcome: Outcome::Reached,
+                reason: format!("{:.2} m from the target", arrival.distance_m),
+                asked_for: true,
+            }));
+        }
+        let truth = self
+            .simulator
+            .as_ref()
+            .and_then(|simulator| simulator.truth().last());
+        if let Some(truth) = truth
+            && truth.contacts > 0
+        {
+            return Ok(Some(Ending {
+                outcome: Outcome::Collision,
+                reason: format!("touched something near ({:.2}, {:.2})", truth.x, truth.y),
+                asked_for: false,
+            }));
+        }
+        let time = record
+            .pose
+            .map_or(MissionTime::default(), |pose| pose.stamp.time());
+        if time.seconds() >= self.options.mission.timeout_s {
+            return Ok(Some(Ending {
+                outcome: Outcome::Timeout,
+                reason: format!("not there after {} s", self.options.mission.timeout_s),
+                asked_for: false,
+            }));
+        }
+        if self.makes_no_progress() {
+            return Ok(Some(fault(
+                "the pipeline makes no progress; see the stages' logs",
+            )));
+        }
+        self.watch_for_stalls()
+    }
+
+    /// On a clock of ticks, whether no tick was made for too long.
+    fn makes_no_progress(&mut self) -> bool {
+        let tick = self.observer.record.newest_tick();
+        if tick != self.progressed.0 {
+            self.progressed = (tick, Instant::now());
+        }
+        // A real robot may be away for as long as it likes.
+        let waits = self.simulator.is_none() && self.order == Order::Drive;
+        !waits && self.progressed.1.elapsed() >= NO_PROGRESS
+    }
+
+    fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let record = &self.observer.record;
+        let (Some(pose), Some(guidance)) = (record.pose, record.newest_guidance()) else {
+            return Ok(None);
+        };
+        if self.order != Order::Drive || self.judged_tick == Some(pose.stamp.tick) {
+            return Ok(None);
+        }
+        self.judged_tick = Some(pose.stamp.tick);
+        let stopped = record.link.is_none_or(|link| link.stopped == 1);
+        let held = stopped || !self.fleet.all_running();
+        let guidance = *guidance;
+        match self.stall.step(&pose, &guidance, held) {
+            None => Ok(None),
+            Some(Rung::Replan) => {
+                tracing::warn!("the robot stalls: a fresh planner solves the full field");
+                self.fleet.replace("planner")?;
+                Ok(None)
+            }
+            Some(Rung::Forget { epoch }) => {
+                tracing::warn!(epoch, "no way forward: the sensed belief is forgotten");
+                self.restate()?;
+                Ok(None)
+            }
+            Some(Rung::GiveUp { reason }) => Ok(Some(Ending {
+                outcome: Outcome::Unreachable,
+                reason: format!("target unreachable: {reason}"),
+                asked_for: false,
+            })),
+        }
+    }
+
+    /// Say again what late joiners need; a few times a second. Says whether it did.
+    fn restate_if_due(&mut self) -> Result<bool, SupervisorError> {
+        let due = self
+            .restated
+            .is_none_or(|last| last.elapsed() >= topics::RESTATE);
+        if due {
+            self.restate()?;
+        }
+        Ok(due)
+    }
+
+    fn restate(&mut self) -> Result<(), SupervisorError> {
+        self.restated = Some(Instant::now());
+        let pose = self.observer.record.pose.unwrap_or_default();
+        let (tick, time) = (pose.stamp.tick, pose.stamp.time());
+        let directive = DirectiveSample {
+            order: self.order.into(),
+            epoch: self.stall.epoch(),
+            ..DirectiveSample::default()
+        };
+        self.directive.publish(tick, time, directive)?;
+        let header = RosterHeader {
+            supervisor_pid: std::process::id(),
+            order: self.order.into(),
+            ..RosterHeader::default()
+        };
+        self.roster
+            .publish(tick, time, header, self.fleet.roster().into_iter())?;
+        Ok(())
+    }
+
+    /// The robot to rest, then the stages down in reverse order, the link last, then the robot itself.
+    fn stop(&mut self) -> Result<(), SupervisorError> {
+        self.order = Order::Stop;
+        self.restate()?;
+        let began = Instant::now();
+        loop {
+            self.observer.take(&mut self.fleet)?;
+            let confirmed = self
+                .observer
+                .record
+                .link
+                .is_none_or(|link| link.stopped == 1);
+            if confirmed || began.elapsed() >= STAND_CONFIRMED {
+                break;
+            }
+            self.waiter.wait(STAND_CONFIRMED)?;
+        }
+        while self.fleet.stop_last()? {
+            self.wait()?;
+            self.observer.take(&mut self.fleet)?;
+            self.fleet.tend(0)?;
+        }
+        if let Some(simulator) = &mut self.simulator {
+            simulator.stop()?;
+        }
+        Ok(())
+    }
+
+    fn finish(self, ending: &Ending) -> Finished {
+        let record = self.observer.record;
+        let truth = self
+            .simulator
+            .map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
+        Finished {
+            summary: Summary::of(
+                &self.options.mission,
+                ending,
+                &record,
+                &truth,
+                self.fleet.restarts(),
+            ),
+            asked_for: ending.asked_for,
+            record,
+            truth,
+        }
+    }
+}
+
+fn fault(reason: &str) -> Ending {
+    Ending {
+        outcome: Outcome::Aborted,
+        reason: reason.to_owned(),
+        asked_for: false,
+    }
+}
+
+fn wall_clock(rate: f64) -> MissionClock {
+    MissionClock::Wall {
+        epoch_ns: monotonic_ns(),
+        rate,
+    }
+}
+
+fn resolve(address: &str) -> Result<SocketAddr, SupervisorError> {
+    let failed = |problem: String| SupervisorError::Address {
+        address: address.to_owned(),
+        problem,
+    };
+    let mut found = address
+        .to_socket_addrs()
+        .map_err(|error| failed(error.to_string()))?;
+    found.next().ok_or_else(|| failed("no address".to_owned()))
+}
+
+/// A simulator of this very mission, overrides included.
+fn start_simulator(
+    directory: &Path,
+    mission: &Mission,
+    pace: Pace,
+) -> Result<Simulator, SupervisorError> {
+    let file = directory.join("mission.toml");
+    let text = toml::to_string(mission)
+        .map_err(|error| system("write the mission")(io::Error::other(error)))?;
+    fs::write(&file, text).map_err(system(format!("write {}", file.display())))?;
+    Ok(Simulator::start(directory, &file, pace)?)
+}
