@@ -173,7 +173,7 @@ impl Default for Perimeter {
 impl Default for Mapper {
     fn default() -> Self {
         Self {
-            margin_cells: 3,
+            margin_cells: 2,
             map_within_m: 1.0,
         }
     }
