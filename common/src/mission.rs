@@ -15,7 +15,10 @@ use serde::{Deserialize, Serialize};
 
 pub use check::MissionError;
 pub use robot::{Body, Channel, Model, RobotConfig, SonarConfig};
-pub use simulation::Simulation;
+pub use simulation::{
+    BatteryPhysics, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
+    SonarPhysics, Thing, WheelPhysics,
+};
 
 use crate::{geometry::Shapes, grid::GridFrame, kinematics::Pose2};
 

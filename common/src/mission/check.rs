@@ -1,5 +1,7 @@
 //! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
 
+mod simulation;
+
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
@@ -162,9 +164,9 @@ impl Checker {
         )?;
         robot(mission)?;
         stages(mission)?;
-        simulation(mission)?;
         self.shapes("known", &mission.known)?;
         self.shapes("world", &mission.world)?;
+        self.simulation(&mission.simulation)?;
         start_is_free(mission)
     }
 
@@ -393,23 +395,6 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         ));
     }
     Ok(())
-}
-
-fn simulation(mission: &Mission) -> Result<(), Objection> {
-    let sonar = &mission.simulation.sonar;
-    within(
-        "simulation.sonar.cone_deg",
-        sonar.cone_deg,
-        0.0..=60.0,
-        "degrees",
-    )?;
-    within("simulation.sonar.noise_m", sonar.noise_m, 0.0..=1.0, "m")?;
-    within(
-        "simulation.sonar.noise_per_m",
-        sonar.noise_per_m,
-        0.0..=1.0,
-        "",
-    )
 }
 
 /// A robot that starts inside a hazard has already collided.

@@ -1,42 +1,291 @@
-//! How the simulated robot behaves: noise, lag, radio. Defaults are a good day in the laboratory.
+//! How the simulated robot behaves: its sensors, wheels and radio, and what moves around it.
+//!
+//! Every number has two presets. `realism = "laboratory"`, the default, is a good day: rough surfaces,
+//! a prompt speed loop, a perfect radio. `realism = "measured"` has the values seen on real robots.
+//! A key that a mission writes overrides its preset.
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The simulated X80.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+use crate::geometry::Shapes;
+
+/// The simulated X80 as a mission writes it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Simulation {
-    /// The front sonar's physics.
-    pub sonar: SonarPhysics,
+    /// The preset of every key that is not written.
+    pub realism: Realism,
+    /// Whether timed commands last as if they had no time, as one real robot's are said to.
+    pub ignores_time: bool,
+    /// After how much silence of the host the motors stop, seconds; without it they never do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stops_when_silent_s: Option<f64>,
+    /// The ultrasonic rangers' physics.
+    pub sonar: SonarKeys,
+    /// The infrared rangers' physics.
+    pub infrared: InfraredKeys,
+    /// The wheels' speed loops.
+    pub wheels: WheelKeys,
+    /// The batteries.
+    pub battery: BatteryKeys,
+    /// The radio between host and robot.
+    pub radio: RadioKeys,
+    /// Further ultrasonic rangers, besides the front one and the two at its sides.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ring: Vec<Ranger>,
+    /// Things that appear, vanish or move.
+    #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
+    pub things: Vec<Thing>,
 }
 
-#[allow(clippy::derivable_impls)]
-impl Default for Simulation {
-    fn default() -> Self {
-        Self {
-            sonar: SonarPhysics::default(),
+/// How far from ideal the simulated robot is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Realism {
+    /// A good day in the laboratory.
+    #[default]
+    Laboratory,
+    /// What was measured on real robots; the radio stays perfect unless it is written.
+    Measured,
+}
+
+/// A further ultrasonic ranger, mounted looking outward.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ranger {
+    /// Its index among the six of the standard frame.
+    pub index: u8,
+    /// Its distance from the robot's centre, metres.
+    pub forward_m: f64,
+    /// Its bearing from the robot's axis, degrees counter-clockwise.
+    pub bearing_deg: f64,
+}
+
+/// Something that is not always there, or not always in the same place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thing {
+    /// What it is, where it stands before any move.
+    pub shape: Shapes,
+    /// When it appears, seconds; it waits until it would not stand in the robot.
+    #[serde(default)]
+    pub from_s: f64,
+    /// When it vanishes, seconds; without it, never.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_s: Option<f64>,
+    /// Where it is when, in order of time; in a straight line between.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moves: Vec<Move>,
+}
+
+/// Where a thing is at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Move {
+    /// Mission time, seconds.
+    pub at_s: f64,
+    /// How far from where its shape says, metres.
+    pub by: DVec2,
+}
+
+/// A written number that cannot be.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct OutOfRange {
+    pub(super) key: &'static str,
+    pub(super) value: f64,
+    pub(super) range: std::ops::RangeInclusive<f64>,
+}
+
+/// One table of keys makes two structs: the settled one that the simulator reads, and the written one
+/// whose keys may all be missing. Columns: key, range, laboratory, measured.
+macro_rules! section {
+    (
+        $(#[$about:meta])*
+        $settled:ident, written as $written:ident in $table:literal {
+            $($(#[$doc:meta])* $key:ident in $range:expr => $laboratory:expr, $measured:expr;)*
         }
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $settled {
+            $($(#[$doc])* pub $key: f64,)*
+        }
+
+        impl $settled {
+            /// The values of a preset.
+            #[must_use]
+            pub const fn preset(realism: Realism) -> Self {
+                match realism {
+                    Realism::Laboratory => Self { $($key: $laboratory,)* },
+                    Realism::Measured => Self { $($key: $measured,)* },
+                }
+            }
+
+            pub(super) fn check(&self) -> Result<(), OutOfRange> {
+                $(
+                    let range: std::ops::RangeInclusive<f64> = $range;
+                    if !range.contains(&self.$key) {
+                        return Err(OutOfRange {
+                            key: concat!($table, ".", stringify!($key)),
+                            value: self.$key,
+                            range,
+                        });
+                    }
+                )*
+                Ok(())
+            }
+        }
+
+        #[doc = concat!("`[", $table, "]` as a mission writes it: [`", stringify!($settled), "`].")]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $written {
+            $($(#[$doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $key: Option<f64>,)*
+        }
+
+        impl $written {
+            /// What is written, and the preset for the rest.
+            #[must_use]
+            pub fn over(&self, realism: Realism) -> $settled {
+                let preset = $settled::preset(realism);
+                $settled { $($key: self.$key.unwrap_or(preset.$key),)* }
+            }
+        }
+    };
+}
+
+section! {
+    /// The ultrasonic rangers' physics (the DUR5200 of the X80, 40 kHz).
+    SonarPhysics, written as SonarKeys in "simulation.sonar" {
+        /// Half angle of the cone that answers at full range, degrees.
+        cone_deg in 0.0..=60.0 => 15.0, 15.0;
+        /// Half angle at which the last answer fades, degrees; no wider than the cone is no lobe.
+        lobe_deg in 0.0..=60.0 => 15.0, 25.0;
+        /// Standard deviation of a range, metres.
+        noise_m in 0.0..=1.0 => 0.01, 0.01;
+        /// Further standard deviation per metre of range.
+        noise_per_m in 0.0..=1.0 => 0.005, 0.005;
+        /// Greatest angle between beam and normal at which a wall answers, degrees; 90 is a rough wall.
+        wall_limit_deg in 0.0..=90.0 => 90.0, 22.5;
+        /// The same for drums, which answer over a wider angle.
+        drum_limit_deg in 0.0..=90.0 => 90.0, 50.0;
+        /// Share of pings that an edge answers when its wall does not.
+        edge_share in 0.0..=1.0 => 0.0, 0.5;
+        /// Farthest an edge answers, metres.
+        edge_reach_m in 0.0..=2.55 => 1.2, 1.2;
+        /// Share of pings at a wall too oblique to answer that come back by a second wall.
+        multipath_share in 0.0..=1.0 => 0.0, 0.3;
+        /// Share of answers lost.
+        dropout_share in 0.0..=1.0 => 0.0, 0.02;
+        /// The same where the answer is weak: near the limits, and from edges.
+        weak_dropout_share in 0.0..=1.0 => 0.0, 0.1;
+        /// Share of pings answered short by nothing at all.
+        false_echo_share in 0.0..=1.0 => 0.0, 0.005;
+        /// Share of pings that hear a neighbour's answer.
+        crosstalk_share in 0.0..=1.0 => 0.0, 0.005;
     }
 }
 
-/// An ultrasonic ranger's physics.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SonarPhysics {
-    /// Half angle of the cone that answers, degrees.
-    pub cone_deg: f64,
-    /// Standard deviation of a range, metres.
-    pub noise_m: f64,
-    /// Further standard deviation per metre of range.
-    pub noise_per_m: f64,
+section! {
+    /// The infrared rangers' physics.
+    InfraredPhysics, written as InfraredKeys in "simulation.infrared" {
+        /// Standard deviation of a reading, AD counts.
+        noise_counts in 0.0..=1000.0 => 5.0, 15.0;
+    }
 }
 
-impl Default for SonarPhysics {
-    fn default() -> Self {
-        Self {
-            cone_deg: 15.0,
-            noise_m: 0.01,
-            noise_per_m: 0.005,
+section! {
+    /// The wheels' speed loops and how they meet the ground.
+    WheelPhysics, written as WheelKeys in "simulation.wheels" {
+        /// Steady speed over commanded speed.
+        gain in 0.05..=2.0 => 1.0, 0.78;
+        /// Time before a command has any effect, seconds.
+        delay_s in 0.0..=1.0 => 0.0, 0.07;
+        /// Time constant of the speed loop, seconds.
+        lag_s in 0.0..=5.0 => 0.06, 0.08;
+        /// Commands below this do not turn the wheel, counts per second.
+        dead_band_counts in 0.0..=1000.0 => 0.0, 20.0;
+        /// Standard deviation of the speed of a turning wheel, counts per second.
+        noise_counts in 0.0..=1000.0 => 0.0, 12.0;
+        /// Share of the rolled way that slips away.
+        slip_share in 0.0..=0.5 => 0.0, 0.005;
+        /// Standard deviation of the way lost or won by slip, metres per square root of a metre.
+        slip_noise in 0.0..=0.5 => 0.0, 0.005;
+        /// Standard deviation of a reported wheel position, counts.
+        count_noise in 0.0..=100.0 => 0.0, 0.5;
+    }
+}
+
+section! {
+    /// The batteries: all three alike.
+    BatteryPhysics, written as BatteryKeys in "simulation.battery" {
+        /// Volts at the start.
+        start_v in 1.0..=9.0 => 7.8, 7.8;
+        /// Volts lost a minute.
+        drain_v_per_min in 0.0..=9.0 => 0.0, 0.01;
+    }
+}
+
+section! {
+    /// The radio: a channel that is good or out, both ways alike, and what it does to datagrams.
+    Radio, written as RadioKeys in "simulation.radio" {
+        /// Share of the time it is out.
+        outage_share in 0.0..=0.95 => 0.0, 0.0;
+        /// Mean duration of an outage, seconds.
+        outage_mean_s in 0.001..=60.0 => 0.5, 0.5;
+        /// No outage is longer, seconds.
+        outage_max_s in 0.001..=600.0 => 2.0, 2.0;
+        /// Share of datagrams lost while it is good.
+        loss_share in 0.0..=1.0 => 0.0, 0.0;
+        /// Time a datagram takes each way, seconds.
+        delay_s in 0.0..=5.0 => 0.0, 0.0;
+        /// Mean of the further time it takes, exponentially distributed, seconds.
+        jitter_s in 0.0..=5.0 => 0.0, 0.0;
+        /// Share of datagrams that arrive twice.
+        duplicate_share in 0.0..=1.0 => 0.0, 0.0;
+        /// Share of datagrams that arrive behind the next.
+        reorder_share in 0.0..=1.0 => 0.0, 0.0;
+        /// Share of datagrams that arrive in two parts.
+        split_share in 0.0..=1.0 => 0.0, 0.0;
+        /// Share of datagrams that arrive joined to the next.
+        merge_share in 0.0..=1.0 => 0.0, 0.0;
+    }
+}
+
+/// The simulated X80, every value known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Physics {
+    /// The ultrasonic rangers'.
+    pub sonar: SonarPhysics,
+    /// The infrared rangers'.
+    pub infrared: InfraredPhysics,
+    /// The wheels'.
+    pub wheels: WheelPhysics,
+    /// The batteries'.
+    pub battery: BatteryPhysics,
+    /// The radio's.
+    pub radio: Radio,
+}
+
+impl Simulation {
+    /// What is written, and the preset for the rest.
+    #[must_use]
+    pub fn physics(&self) -> Physics {
+        Physics {
+            sonar: self.sonar.over(self.realism),
+            infrared: self.infrared.over(self.realism),
+            wheels: self.wheels.over(self.realism),
+            battery: self.battery.over(self.realism),
+            radio: self.radio.over(self.realism),
         }
+    }
+
+    pub(super) fn check_physics(&self) -> Result<(), OutOfRange> {
+        let physics = self.physics();
+        physics.sonar.check()?;
+        physics.infrared.check()?;
+        physics.wheels.check()?;
+        physics.battery.check()?;
+        physics.radio.check()
     }
 }

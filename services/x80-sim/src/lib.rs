@@ -1,1 +1,48 @@
-//! A simulated X80: the robot's side of the wire, its body, its sonar and the world around it.
+//! A simulated X80: the other end of the wire. Nothing of it reaches the stages but bytes.
+//!
+//! Layout, from the ground up:
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`world`] | what stands around the robot, and what comes and goes |
+//! | [`body`] | a disc on two wheels, and what it touches |
+//! | [`motor`] | one channel: modes, timed commands, the speed loop |
+//! | [`sonar`], [`infrared`], [`sensors`] | what is heard and seen, as the frames carry it |
+//! | [`noise`] | seeded randomness, one stream for each source |
+//! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
+//! | [`shell`] | the process: socket, pace, truth |
+//!
+//! A robot is stepped by whoever holds it; only [`shell`] knows sockets and clocks:
+//!
+//! ```
+//! use std::path::Path;
+//! use common::{mission::Mission, wire::{Addressing, Command, Decoder}};
+//! use x80_sim::robot::{Heard, Robot};
+//!
+//! let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+//! let mut robot = Robot::new(&mission);
+//! let mut bytes = Vec::new();
+//! // Forward is negative on channel 0.
+//! Command::velocity([Some(-400), Some(400)], 250).encode(Addressing::Numbered, &mut bytes);
+//! let mut decoder = Decoder::default();
+//! decoder.push(&bytes);
+//! let mut replies = Vec::new();
+//! let frame = decoder.next_frame().unwrap();
+//! assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Motion);
+//! robot.advance_to_next_tick();
+//! assert!(robot.truth().x > 0.0);
+//! ```
+
+pub mod body;
+pub mod infrared;
+pub mod motor;
+pub mod noise;
+pub mod robot;
+pub mod sensors;
+pub mod shell;
+pub mod sonar;
+mod streams;
+mod transport;
+pub mod world;
+
+pub use shell::{SimError, SimOptions, Transport, run};

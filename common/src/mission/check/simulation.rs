@@ -1,0 +1,160 @@
+//! The simulation's part of a mission.
+
+use super::{Checker, MAX_TIMEOUT_S, Objection, objection, within};
+use crate::mission::simulation::{OutOfRange, Ranger, Simulation, Thing};
+
+/// More things that come and go than this are a mistake.
+const MAX_THINGS: usize = 1000;
+/// More stations on one thing's way than this are too.
+const MAX_MOVES: usize = 1000;
+
+impl Checker {
+    pub(super) fn simulation(&mut self, simulation: &Simulation) -> Result<(), Objection> {
+        simulation
+            .check_physics()
+            .map_err(|OutOfRange { key, value, range }| {
+                objection(
+                    key,
+                    format!("{value} is out of range"),
+                    format!("give {} to {}", range.start(), range.end()),
+                )
+            })?;
+        if let Some(silence) = simulation.stops_when_silent_s {
+            within(
+                "simulation.stops_when_silent_s",
+                silence,
+                0.01..=3600.0,
+                "s",
+            )?;
+        }
+        for ranger in &simulation.ring {
+            self::ranger(ranger)?;
+        }
+        if simulation.things.len() > MAX_THINGS {
+            return Err(objection(
+                "simulation.thing",
+                format!("more than {MAX_THINGS} things come and go"),
+                "give fewer",
+            ));
+        }
+        for thing in &simulation.things {
+            self.thing(thing)?;
+        }
+        Ok(())
+    }
+
+    fn thing(&mut self, thing: &Thing) -> Result<(), Objection> {
+        const KEY: &str = "simulation.thing";
+        self.shapes(KEY, &thing.shape)?;
+        within(KEY, thing.from_s, 0.0..=MAX_TIMEOUT_S, "s")?;
+        if let Some(until) = thing.until_s {
+            within(KEY, until, thing.from_s..=MAX_TIMEOUT_S, "s of until_s")?;
+        }
+        if thing.moves.len() > MAX_MOVES {
+            return Err(objection(
+                KEY,
+                format!("more than {MAX_MOVES} moves of one thing"),
+                "give fewer",
+            ));
+        }
+        let mut earliest = 0.0;
+        for station in &thing.moves {
+            within(
+                KEY,
+                station.at_s,
+                earliest..=MAX_TIMEOUT_S,
+                "s of at_s, in order,",
+            )?;
+            self.point(KEY, station.by)?;
+            earliest = station.at_s;
+        }
+        Ok(())
+    }
+}
+
+fn ranger(ranger: &Ranger) -> Result<(), Objection> {
+    const KEY: &str = "simulation.ring";
+    within(KEY, f64::from(ranger.index), 0.0..=5.0, "as the index")?;
+    within(KEY, ranger.forward_m, -5.0..=5.0, "m of forward_m")?;
+    within(KEY, ranger.bearing_deg, -180.0..=180.0, "degrees")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::mission::{Mission, MissionError};
+
+    fn parse(text: &str) -> Result<Mission, MissionError> {
+        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml"))
+    }
+
+    #[test]
+    fn a_written_key_overrides_its_preset_and_leaves_the_others() {
+        let mission = parse(
+            "[simulation]\nrealism = 'measured'\n[simulation.sonar]\nnoise_m = 0.02\n[simulation.wheels]\ngain = 1",
+        )
+        .unwrap();
+        let physics = mission.simulation.physics();
+        assert_eq!(physics.sonar.noise_m, 0.02);
+        assert_eq!(physics.sonar.wall_limit_deg, 22.5);
+        assert_eq!((physics.wheels.gain, physics.wheels.lag_s), (1.0, 0.08));
+        let written = toml::to_string(&mission).unwrap();
+        assert_eq!(Mission::parse(&written, Path::new("x")).unwrap(), mission);
+    }
+
+    #[test]
+    fn a_good_day_in_the_laboratory_is_the_default() {
+        let sonar = parse("").unwrap().simulation.physics().sonar;
+        assert_eq!(
+            (sonar.cone_deg, sonar.noise_m, sonar.noise_per_m),
+            (15.0, 0.01, 0.005)
+        );
+    }
+
+    #[test]
+    fn every_refusal_names_line_and_key() {
+        let cases = [
+            (
+                "[simulation.sonar]\ncone_deg = 80",
+                "m.toml:3: simulation.sonar.cone_deg: ",
+            ),
+            (
+                "[simulation.wheels]\nlag_s = nan",
+                "m.toml:3: simulation.wheels.lag_s: ",
+            ),
+            (
+                "[simulation.radio]\noutage_share = 1",
+                "m.toml:3: simulation.radio.outage_share: ",
+            ),
+            (
+                "[simulation.sonar]\ncone = 8",
+                "m.toml:3: unknown field `cone`",
+            ),
+            (
+                "[simulation]\nstops_when_silent_s = 0",
+                "m.toml:3: simulation.stops_when_silent_s: ",
+            ),
+            (
+                "[[simulation.thing]]\nfrom_s = 3\nuntil_s = 2\nshape = {}",
+                "m.toml:2: simulation.thing: 2 s of until_s is out of range",
+            ),
+            (
+                "[[simulation.thing]]\nshape = {}\nmoves = [{ at_s = 4, by = [0, 0] }, { at_s = 3, by = [1, 0] }]",
+                "m.toml:2: simulation.thing: 3 s of at_s",
+            ),
+            (
+                "[[simulation.thing]]\nshape.drum = [{ at = [nan, 0], radius_m = 1 }]",
+                "m.toml:2: simulation.thing: ",
+            ),
+            (
+                "[[simulation.ring]]\nindex = 6\nforward_m = 0\nbearing_deg = 0",
+                "m.toml:2: simulation.ring: ",
+            ),
+        ];
+        for (text, start) in cases {
+            let refusal = parse(text).expect_err(text).to_string();
+            assert!(refusal.starts_with(start), "{text:?} gave {refusal:?}");
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! What a frame asks of the robot, in every form that is in use.
+
+use super::{
+    ALONE, ALSO_ALONE, CHANNELS, Command, Feedback, Gains, Mode, Motion, Parameter, Quantity,
+    Request, Stream, TIME_FOLLOWS, Targets,
+};
+use crate::wire::{
+    did,
+    frame::{Frame, MessageError, SystemSignal, length},
+};
+
+pub(super) fn command(frame: &Frame<'_>) -> Result<Command, MessageError> {
+    let data = frame.data;
+    match frame.did {
+        did::POSITION => one(frame, Quantity::Position),
+        did::PWM => one(frame, Quantity::Pwm),
+        did::VELOCITY => one(frame, Quantity::Velocity),
+        did::POSITION_ALL => all(frame, Quantity::Position),
+        did::PWM_ALL => all(frame, Quantity::Pwm),
+        did::VELOCITY_ALL => all(frame, Quantity::Velocity),
+        did::PARAMETER => parameter(data),
+        did::ENABLE => match *data {
+            [on] => Ok(Command::Enable {
+                on: on != 0,
+                channel: None,
+            }),
+            [on, number, ..] => Ok(Command::Enable {
+                on: on != 0,
+                channel: Some(channel(did::ENABLE, number)?),
+            }),
+            [] => Err(length(did::ENABLE, data, "1 or 2")),
+        },
+        did::MOTOR => Ok(stream(Stream::Motor, data)),
+        did::CUSTOM => Ok(stream(Stream::Custom, data)),
+        did::STANDARD => Ok(stream(Stream::Standard, data)),
+        did::ALL_SENSORS => Ok(stream(Stream::All, data)),
+        did::SYSTEM => SystemSignal::parse(data).map(Command::System),
+        did => Err(MessageError::UnknownDid { did }),
+    }
+}
+
+fn channel(did: u8, number: u8) -> Result<u8, MessageError> {
+    if usize::from(number) < CHANNELS {
+        return Ok(number);
+    }
+    Err(MessageError::Value {
+        did,
+        what: "channel",
+        value: number,
+    })
+}
+
+fn target(low: u8, high: u8) -> Option<i16> {
+    match i16::from_le_bytes([low, high]) {
+        ALONE | ALSO_ALONE => None,
+        value => Some(value),
+    }
+}
+
+fn one(frame: &Frame<'_>, quantity: Quantity) -> Result<Command, MessageError> {
+    let did = frame.did;
+    let (number, low, high, limit_ms) = match *frame.data {
+        [number, low, high] => (number, low, high, None),
+        [number, low, high, _, first, second] => {
+            (number, low, high, Some(u16::from_le_bytes([first, second])))
+        }
+        _ => return Err(length(did, frame.data, "3 or 6")),
+    };
+    let channel = channel(did, number)?;
+    let targets = match target(low, high) {
+        Some(value) => Targets::One { channel, value },
+        None => Targets::All([None; CHANNELS]),
+    };
+    Ok(Command::Motion(Motion {
+        quantity,
+        targets,
+        limit_ms,
+    }))
+}
+
+fn all(frame: &Frame<'_>, quantity: Quantity) -> Result<Command, MessageError> {
+    let (values, time) = frame
+        .data
+        .split_at_checked(2 * CHANNELS)
+        .ok_or_else(|| length(frame.did, frame.data, "12, 14 or 15"))?;
+    let limit_ms = match *time {
+        [] => None,
+        [low, high] | [TIME_FOLLOWS, low, high] | [low, high, _] => {
+            Some(u16::from_le_bytes([low, high]))
+        }
+        _ => return Err(length(frame.did, frame.data, "12, 14 or 15")),
+    };
+    let mut targets = [None; CHANNELS];
+    for (slot, pair) in targets.iter_mut().zip(values.chunks_exact(2)) {
+        *slot = target(pair[0], pair[1]);
+    }
+    Ok(Command::Motion(Motion {
+        quantity,
+        targets: Targets::All(targets),
+        limit_ms,
+    }))
+}
+
+fn parameter(data: &[u8]) -> Result<Command, MessageError> {
+    let invalid = |what, value| MessageError::Value {
+        did: did::PARAMETER,
+        what,
+        value,
+    };
+    let (sub, number, rest) = match data {
+        [sub, number, rest @ ..] => (*sub, *number, rest),
+        _ => return Err(length(did::PARAMETER, data, "2 or more")),
+    };
+    let parameter = match (sub, rest) {
+        (7, terms) => Parameter::PositionPid(gains(terms)?),
+        (8, terms) => Parameter::VelocityPid(gains(terms)?),
+        (13, [source, ..]) => Parameter::Feedback(match source {
+            0 => Feedback::OnePot,
+            1 => Feedback::TwoPots,
+            2 => Feedback::Encoder,
+            &other => return Err(invalid("feedback source", other)),
+        }),
+        (14, [mode, ..]) => Parameter::Mode(match mode {
+            0 => Mode::Pwm,
+            1 => Mode::Position,
+            2 => Mode::Velocity,
+            &other => return Err(invalid("mode", other)),
+        }),
+        (13 | 14, []) => return Err(length(did::PARAMETER, data, "3")),
+        // Not every parameter has a channel in second place: do not judge the byte.
+        (sub, _) => {
+            return Ok(Command::Parameter {
+                channel: number,
+                parameter: Parameter::Other { sub },
+            });
+        }
+    };
+    Ok(Command::Parameter {
+        channel: channel(did::PARAMETER, number)?,
+        parameter,
+    })
+}
+
+fn gains(terms: &[u8]) -> Result<Gains, MessageError> {
+    let mut gains = Gains::default();
+    for term in terms.chunks(3) {
+        let &[number, low, high] = term else {
+            return Err(length(did::PARAMETER, terms, "3 for each gain"));
+        };
+        let slot = match number {
+            1 => &mut gains.kp,
+            2 => &mut gains.kd,
+            3 => &mut gains.ki_x100,
+            value => {
+                return Err(MessageError::Value {
+                    did: did::PARAMETER,
+                    what: "gain",
+                    value,
+                });
+            }
+        };
+        *slot = Some(u16::from_le_bytes([low, high]));
+    }
+    Ok(gains)
+}
+
+fn stream(stream: Stream, data: &[u8]) -> Command {
+    let request = match data.first() {
+        None | Some(255) => Request::Start,
+        Some(0) => Request::Stop,
+        Some(&count) => Request::Count(count),
+    };
+    Command::Stream { stream, request }
+}

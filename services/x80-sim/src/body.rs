@@ -1,0 +1,220 @@
+//! The body: a disc on two driven wheels that cannot go through things.
+
+use common::{
+    kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
+    mission::Mission,
+};
+use glam::DVec2;
+
+use crate::world::World;
+
+/// One number for each wheel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wheels<T> {
+    /// The left wheel's.
+    pub left: T,
+    /// The right wheel's.
+    pub right: T,
+}
+
+impl<T> Wheels<T> {
+    /// `change` of both.
+    pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Wheels<U> {
+        Wheels {
+            left: change(self.left),
+            right: change(self.right),
+        }
+    }
+}
+
+/// A body that touches nothing any more has moved at least this far off, metres.
+const RELEASE_M: f64 = 0.005;
+/// Attempts to push the body out of everything it penetrates; corners take two.
+const PUSHES: usize = 4;
+
+/// The disc, its pose and what it has touched.
+#[derive(Clone, Debug)]
+pub struct Body {
+    drive: DifferentialDrive,
+    wheel_radius: f64,
+    track: f64,
+    radius: f64,
+    pose: Pose2,
+    touching: bool,
+    contacts: u64,
+}
+
+impl Body {
+    /// The body of `mission`'s robot at its start.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        let top = body.top_speed_m_s / body.wheel_radius_m;
+        Self {
+            drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, top),
+            wheel_radius: body.wheel_radius_m,
+            track: body.track_m,
+            radius: body.radius_m,
+            pose: mission.start_pose(),
+            touching: false,
+            contacts: 0,
+        }
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn pose(&self) -> Pose2 {
+        self.pose
+    }
+
+    /// Its radius, metres.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// W: its track, metres.
+    #[must_use]
+    pub fn track(&self) -> f64 {
+        self.track
+    }
+
+    /// How often it has touched something: once for each time it came and stayed.
+    #[must_use]
+    pub fn contacts(&self) -> u64 {
+        self.contacts
+    }
+
+    /// From its surface to the nearest thing, metres.
+    #[must_use]
+    pub fn clearance(&self, world: &World) -> f64 {
+        world.clearance(self.pose.position) - self.radius
+    }
+
+    /// Move as the wheels ask, in metres of ground, and no farther than `world` lets it: it slides along
+    /// what it touches, or halts. Returns how far the wheels have really gone, metres: a wheel of a
+    /// body that is held stands.
+    pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
+        let turned = asked.map(|metres| metres / self.wheel_radius);
+        let step = self.drive.twist(WheelSpeeds {
+            right: turned.right,
+            left: turned.left,
+        });
+        let before = self.pose;
+        self.pose = before.along_arc(step.v, step.omega);
+        let touched = self.leave_things(before.position, world);
+        let clear = self.clearance(world) > RELEASE_M;
+        self.contacts += u64::from(touched && !self.touching);
+        self.touching = touched || (self.touching && !clear);
+        if !touched {
+            return asked;
+        }
+        let middle = DVec2::from_angle(before.heading + step.omega / 2.0);
+        let arc = (self.pose.position - before.position).dot(middle);
+        let half_turn = step.omega * self.track / 2.0;
+        Wheels {
+            left: arc - half_turn,
+            right: arc + half_turn,
+        }
+    }
+
+    /// Push the body out of everything it penetrates, or put it back to `before` where that fails.
+    /// Returns whether it penetrated anything.
+    fn leave_things(&mut self, before: DVec2, world: &World) -> bool {
+        for push in 0..PUSHES {
+            let position = self.pose.position;
+            let deepest = world
+                .surfaces()
+                .map(|surface| (surface.distance(position) - self.radius, surface))
+                .min_by(|(a, _), (b, _)| a.total_cmp(b));
+            let Some((gap, surface)) = deepest.filter(|(gap, _)| *gap < 0.0) else {
+                return push > 0;
+            };
+            let Some(outward) = surface.outward(position) else {
+                break;
+            };
+            // A hair more than needed, or rounding would find it penetrating for ever.
+            self.pose.position += outward * (1e-9 - gap);
+        }
+        if self.clearance(world) < 0.0 {
+            self.pose.position = before;
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{f64::consts::FRAC_PI_2, path::Path};
+
+    fn at_start(text: &str) -> (Body, World) {
+        let text = format!("target = [0, -5]\n{text}");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        (Body::new(&mission), World::new(&mission))
+    }
+
+    fn both(metres: f64) -> Wheels<f64> {
+        Wheels {
+            left: metres,
+            right: metres,
+        }
+    }
+
+    #[test]
+    fn wheels_turn_the_body_by_the_track() {
+        let (mut body, world) = at_start("robot.track_m = 0.25");
+        let quarter = FRAC_PI_2 * 0.25 / 2.0;
+        body.roll(
+            Wheels {
+                left: -quarter,
+                right: quarter,
+            },
+            &world,
+        );
+        assert!((body.pose().heading - FRAC_PI_2).abs() < 1e-12);
+        assert!(body.pose().position.length() < 1e-12);
+    }
+
+    #[test]
+    fn a_wall_holds_the_body_and_its_wheels_and_is_one_contact() {
+        let (mut body, world) = at_start("world.wall = [{ points = [[1, -2], [1, 2]] }]");
+        let mut rolled = 0.0;
+        for _ in 0..400 {
+            rolled += body.roll(both(0.005), &world).left;
+            assert!(body.clearance(&world) >= 0.0, "it went into the wall");
+        }
+        assert!((body.pose().position.x - 0.81).abs() < 1e-6);
+        assert!((rolled - 0.81).abs() < 1e-6, "the wheels went {rolled} m");
+        assert_eq!(body.contacts(), 1);
+        for _ in 0..40 {
+            body.roll(both(-0.005), &world);
+        }
+        for _ in 0..80 {
+            body.roll(both(0.005), &world);
+        }
+        assert_eq!(body.contacts(), 2, "it came back");
+    }
+
+    #[test]
+    fn an_oblique_wall_lets_the_body_slide_along_it() {
+        let (mut body, world) = at_start("world.wall = [{ points = [[0.3, -1], [2.3, 1]] }]");
+        for _ in 0..600 {
+            body.roll(both(0.005), &world);
+            assert!(body.clearance(&world) >= 0.0, "it went into the wall");
+        }
+        assert!(body.pose().position.y > 0.1, "it slid to {:?}", body.pose());
+        assert_eq!(body.contacts(), 1);
+    }
+
+    #[test]
+    fn a_corner_halts_the_body() {
+        let (mut body, world) =
+            at_start("world.wall = [{ points = [[0.2, -1.5], [1.2, 0], [0.2, 1.5]] }]");
+        for _ in 0..600 {
+            body.roll(both(0.005), &world);
+            assert!(body.clearance(&world) >= 0.0, "it went into the corner");
+        }
+        assert!(body.pose().position.x < 1.0);
+    }
+}

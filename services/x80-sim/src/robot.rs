@@ -1,0 +1,346 @@
+//! The robot as a pure state machine: commands in, mission time forward, frames out.
+
+use common::{
+    clock::MissionTime,
+    mission::{Mission, Physics},
+    truth::TruthTick,
+    wire::{
+        Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
+        StandardSensors, SystemSignal,
+    },
+};
+
+use crate::{
+    body::{Body, Wheels},
+    motor::Motor,
+    noise::{Noise, Source},
+    sensors::{self, Ranging},
+    streams::{Due, Streams},
+    world::World,
+};
+
+/// The longest step of the body, seconds.
+const STEP_S: f64 = 0.005;
+
+/// What a frame from the host was to the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// Not addressed to a robot.
+    Stranger,
+    /// An acknowledgement: nothing is answered to it.
+    Ack,
+    /// A ping.
+    Ping,
+    /// A motion command.
+    Motion,
+    /// Anything else, known or not.
+    Other,
+}
+
+/// A simulated X80 and the world around it.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    physics: Physics,
+    ignores_time: bool,
+    stops_when_silent: Option<f64>,
+    rate_hz: f64,
+    wiring: Wiring,
+    longest_step: f64,
+    metres_per_count: f64,
+
+    world: World,
+    body: Body,
+    motors: [Motor; 6],
+    streams: Streams,
+    ranging: Ranging,
+    wheel_noise: Noise,
+    count_noise: Noise,
+
+    time: f64,
+    tick: u64,
+    heard_at: f64,
+    addressing: Addressing,
+    least_clearance: f64,
+    standard: StandardSensors,
+    custom: CustomSensors,
+    motor: MotorSensors,
+}
+
+/// Which channel drives which wheel, and which way.
+#[derive(Clone, Copy, Debug)]
+struct Wiring {
+    channel: Wheels<usize>,
+    sign: Wheels<f64>,
+}
+
+impl Wiring {
+    fn of(mission: &Mission) -> Self {
+        let wheels = Wheels {
+            left: mission.robot.left,
+            right: mission.robot.right,
+        };
+        Self {
+            // A mission is checked: channels are 0 and 1.
+            channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
+            sign: wheels.map(|wheel| if wheel.reversed { -1.0 } else { 1.0 }),
+        }
+    }
+}
+
+impl Robot {
+    /// The robot of `mission`, booted and standing at the start; tick 0 is measured.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let physics = mission.simulation.physics();
+        let body = mission.body();
+        let top_counts = body.top_speed_m_s / body.metres_per_count();
+        let longest_step = STEP_S.min(0.5 * body.radius_m / body.top_speed_m_s);
+        let mut robot = Self {
+            physics,
+            ignores_time: mission.simulation.ignores_time,
+            stops_when_silent: mission.simulation.stops_when_silent_s,
+            rate_hz: mission.robot.rate_hz,
+            wiring: Wiring::of(mission),
+            longest_step,
+            metres_per_count: body.metres_per_count(),
+            world: World::new(mission),
+            body: Body::new(mission),
+            motors: std::array::from_fn(|_| Motor::new(physics.wheels, top_counts)),
+            streams: Streams::default(),
+            ranging: Ranging::new(mission),
+            wheel_noise: Noise::new(mission.seed, Source::Wheels),
+            count_noise: Noise::new(mission.seed, Source::Counts),
+            time: 0.0,
+            tick: 0,
+            heard_at: 0.0,
+            addressing: Addressing::default(),
+            least_clearance: f64::INFINITY,
+            standard: StandardSensors::default(),
+            custom: CustomSensors::default(),
+            motor: MotorSensors::default(),
+        };
+        robot.least_clearance = robot.body.clearance(&robot.world);
+        robot.measure();
+        robot
+    }
+
+    /// Mission time.
+    #[must_use]
+    pub fn time(&self) -> MissionTime {
+        MissionTime::from_seconds(self.time)
+    }
+
+    /// Mission time of the next tick, seconds.
+    #[must_use]
+    pub fn next_tick_s(&self) -> f64 {
+        (self.tick + 1) as f64 / self.rate_hz
+    }
+
+    /// One of the six channels of the motor board.
+    #[must_use]
+    pub fn motor(&self, channel: u8) -> Option<&Motor> {
+        self.motors.get(usize::from(channel))
+    }
+
+    /// Take a frame from the host and append what is answered at once to `replies`.
+    pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
+        let Some(addressing) = Addressing::of_robot(frame.rid) else {
+            return Heard::Stranger;
+        };
+        self.addressing = addressing;
+        self.heard_at = self.time;
+        let command = Command::parse(frame);
+        if command == Ok(Command::System(SystemSignal::Ack)) {
+            return Heard::Ack;
+        }
+        // Even what is not understood is acknowledged: it has come.
+        Report::System(SystemSignal::Ack).encode(addressing, replies);
+        match command {
+            Ok(Command::System(_)) => Heard::Ping,
+            Ok(Command::Motion(motion)) => {
+                self.obey(&motion);
+                Heard::Motion
+            }
+            Ok(Command::Parameter { channel, parameter }) => {
+                if let Some(motor) = self.motors.get_mut(usize::from(channel)) {
+                    motor.configure(parameter);
+                }
+                Heard::Other
+            }
+            Ok(Command::Enable { on, channel }) => {
+                for (number, motor) in self.motors.iter_mut().enumerate() {
+                    if channel.is_none_or(|only| usize::from(only) == number) {
+                        motor.enable(on);
+                    }
+                }
+                Heard::Other
+            }
+            Ok(Command::Stream { stream, request }) => {
+                self.streams.request(stream, request);
+                Heard::Other
+            }
+            Err(_) => Heard::Other,
+        }
+    }
+
+    fn obey(&mut self, motion: &Motion) {
+        let until = motion
+            .limit_ms
+            .filter(|_| !self.ignores_time)
+            .map(|limit| self.time + f64::from(limit) / 1000.0);
+        for (number, motor) in (0_u8..).zip(&mut self.motors) {
+            if let Some(value) = motion.targets.of(number) {
+                motor.order(motion.quantity, value, until);
+            }
+        }
+    }
+
+    /// Let mission time pass until `end`, seconds, in short steps, none of which reaches across the end
+    /// of a timed command. A time gone by is none.
+    pub fn advance_to(&mut self, end: f64) {
+        while self.time < end {
+            let ends = self.motors.iter().filter_map(Motor::ends_at);
+            let silence = self.stops_when_silent.map(|limit| self.heard_at + limit);
+            let until = ends
+                .chain(silence)
+                .filter(|moment| *moment > self.time)
+                .fold(end, f64::min);
+            let span = until - self.time;
+            let steps = (span / self.longest_step).ceil().max(1.0);
+            let from = self.time;
+            for step in 1..=steps as u64 {
+                self.step(span / steps);
+                self.time = from + span * step as f64 / steps;
+            }
+            // Exactly, so that what ends now has ended.
+            self.time = until;
+        }
+    }
+
+    /// One short step of `dt` seconds.
+    fn step(&mut self, dt: f64) {
+        let silent = self
+            .stops_when_silent
+            .is_some_and(|limit| self.time >= self.heard_at + limit);
+        if silent {
+            self.motors.iter_mut().for_each(Motor::halt);
+        }
+        let (centre, radius) = (self.body.pose().position, self.body.radius());
+        self.world.advance(self.time + dt, centre, radius);
+
+        let Wiring { channel, sign } = self.wiring;
+        let (now, noise) = (self.time, &mut self.wheel_noise);
+        let motors = &mut self.motors;
+        let mut asked = |channel: usize, sign: f64| {
+            let counts = motors
+                .get_mut(channel)
+                .map_or(0.0, |m| m.step(now, dt, noise));
+            sign * counts * self.metres_per_count
+        };
+        let rolled = Wheels {
+            left: asked(channel.left, sign.left),
+            right: asked(channel.right, sign.right),
+        };
+        let wheels = self.physics.wheels;
+        let ground = rolled.map(|metres| {
+            let lost = noise.normal(wheels.slip_noise * metres.abs().sqrt());
+            metres * (1.0 - wheels.slip_share) + lost
+        });
+        let went = self.body.roll(ground, &self.world);
+        // A wheel that slips turns all the same; one whose body is held does not.
+        let held = went != ground;
+        let turned = if held { went } else { rolled };
+        let mut turn = |channel: usize, sign: f64, metres: f64| {
+            if let Some(motor) = self.motors.get_mut(channel) {
+                motor.turn(sign * metres / self.metres_per_count, dt, held);
+            }
+        };
+        turn(channel.left, sign.left, turned.left);
+        turn(channel.right, sign.right, turned.right);
+        let clearance = self.body.clearance(&self.world);
+        self.least_clearance = self.least_clearance.min(clearance);
+    }
+
+    /// Let mission time pass until the next tick and measure there.
+    pub fn advance_to_next_tick(&mut self) {
+        self.advance_to(self.next_tick_s());
+        self.tick += 1;
+        self.measure();
+    }
+
+    /// Take the readings of this tick. Nothing random is drawn for sensors but here.
+    fn measure(&mut self) {
+        let noise = self.physics.wheels.count_noise;
+        for (channel, encoder) in self.motor.encoders.iter_mut().enumerate() {
+            let error = self.count_noise.normal(noise);
+            *encoder = sensors::encoder(&self.motors[channel], error);
+        }
+        self.motor.currents = sensors::currents(&self.motors);
+        (self.standard, self.custom) =
+            self.ranging
+                .measure(&self.world, &self.body, self.time, &self.physics);
+    }
+
+    /// Append the frames of this tick to `out`: of every stream that runs, the motor frame last. They
+    /// count against what a host has asked for.
+    pub fn stream(&mut self, out: &mut Vec<u8>) {
+        let due = self.streams.take();
+        self.write(due, out);
+    }
+
+    /// Append the frames of this tick once more; that counts against nothing.
+    pub fn repeat(&self, out: &mut Vec<u8>) {
+        self.write(self.streams.running(), out);
+    }
+
+    fn write(&self, due: Due, out: &mut Vec<u8>) {
+        if due.standard {
+            Report::Standard(self.standard).encode(self.addressing, out);
+        }
+        if due.custom {
+            Report::Custom(self.custom).encode(self.addressing, out);
+        }
+        if due.motor {
+            Report::Motor(self.motor).encode(self.addressing, out);
+        }
+    }
+
+    /// What is true at this tick. The least clearance begins anew.
+    pub fn truth(&mut self) -> TruthTick {
+        let pose = self.body.pose();
+        let Wiring { channel, sign } = self.wiring;
+        let speed =
+            |channel: usize, sign: f64| sign * self.motors[channel].speed() * self.metres_per_count;
+        let (left, right) = (
+            speed(channel.left, sign.left),
+            speed(channel.right, sign.right),
+        );
+        let counts = |channel: usize, sign: f64| {
+            let position = self.motor.encoders[channel].position;
+            if sign < 0.0 {
+                (COUNT_CYCLE - position) % COUNT_CYCLE
+            } else {
+                position
+            }
+        };
+        let clearance_m = self.least_clearance.min(TruthTick::NOTHING_NEAR);
+        self.least_clearance = self.body.clearance(&self.world);
+        TruthTick {
+            tick: self.tick,
+            time_s: self.time,
+            x: pose.position.x,
+            y: pose.position.y,
+            heading: pose.heading,
+            v: (left + right) / 2.0,
+            omega: (right - left) / self.body.track(),
+            clearance_m,
+            contacts: self.body.contacts(),
+            left_counts: counts(channel.left, sign.left),
+            right_counts: counts(channel.right, sign.right),
+            sonar_cm: self.ranging.front(&self.standard),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

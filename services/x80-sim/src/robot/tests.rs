@@ -1,0 +1,290 @@
+//! Promises of the robot as a state machine.
+
+use std::path::Path;
+
+use common::wire::{Decoder, Gains, Parameter, Quantity, Request, Stream, Targets};
+
+use super::*;
+
+fn robot(text: &str) -> Robot {
+    let text = format!("target = [3, 0]\n{text}");
+    Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+}
+
+/// Tell the robot `command`; what it was to it, and what it answered.
+fn tell_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Heard, Vec<u8>) {
+    let mut bytes = Vec::new();
+    command.encode(addressing, &mut bytes);
+    let mut decoder = Decoder::default();
+    decoder.push(&bytes);
+    let mut replies = Vec::new();
+    let heard = robot.on_frame(&decoder.next_frame().unwrap(), &mut replies);
+    (heard, replies)
+}
+
+fn tell(robot: &mut Robot, command: Command) -> (Heard, Vec<u8>) {
+    tell_as(robot, command, Addressing::Numbered)
+}
+
+/// Both wheels forward at so many counts per second.
+fn forward(counts: i16, limit_ms: impl Into<Option<u16>>) -> Command {
+    Command::velocity([Some(-counts), Some(counts)], limit_ms)
+}
+
+/// The streamed frames of this tick: RIDs and DIDs, and the reports.
+fn streamed(robot: &mut Robot) -> (Vec<(u8, u8)>, Vec<Report>) {
+    let mut bytes = Vec::new();
+    robot.stream(&mut bytes);
+    let mut decoder = Decoder::default();
+    decoder.push(&bytes);
+    let (mut ids, mut reports) = (Vec::new(), Vec::new());
+    while let Some(frame) = decoder.next_frame() {
+        ids.push((frame.rid, frame.did));
+        reports.push(Report::parse(&frame).unwrap());
+    }
+    (ids, reports)
+}
+
+fn motor(robot: &mut Robot) -> MotorSensors {
+    match streamed(robot).1.last() {
+        Some(Report::Motor(sensors)) => *sensors,
+        other => panic!("the last frame was {other:?}"),
+    }
+}
+
+#[test]
+fn all_three_streams_run_from_boot_and_the_motor_frame_comes_last() {
+    let mut robot = robot("");
+    assert_eq!(streamed(&mut robot).0, [(0, 125), (0, 124), (0, 123)]);
+}
+
+#[test]
+fn streams_stop_start_and_count() {
+    let mut robot = robot("");
+    let request = |stream, request| Command::Stream { stream, request };
+    tell(&mut robot, request(Stream::All, Request::Stop));
+    tell(&mut robot, request(Stream::Standard, Request::Count(2)));
+    let dids = |robot: &mut Robot| -> Vec<u8> {
+        streamed(robot).0.into_iter().map(|(_, did)| did).collect()
+    };
+    assert_eq!(dids(&mut robot), [125]);
+    assert_eq!(dids(&mut robot), [125]);
+    assert!(dids(&mut robot).is_empty());
+    tell(&mut robot, request(Stream::Motor, Request::Start));
+    assert_eq!(dids(&mut robot), [123]);
+}
+
+#[test]
+fn everything_but_an_acknowledgement_is_acknowledged() {
+    let mut robot = robot("");
+    let ack: &[u8] = &[0x5e, 0x02, 0, 0, 0xff, 1, 1, 0x48, 0x5e, 0x0d];
+    let commands = [
+        Command::System(SystemSignal::Ping),
+        forward(100, None),
+        Command::Enable {
+            on: false,
+            channel: Some(3),
+        },
+    ];
+    for command in commands {
+        assert_eq!(tell(&mut robot, command).1, ack, "{command:?}");
+    }
+    let (heard, replies) = tell(&mut robot, Command::System(SystemSignal::Ack));
+    assert_eq!((heard, replies.len()), (Heard::Ack, 0));
+    let unknown = Frame {
+        rid: 8,
+        sn: 0,
+        did: 99,
+        data: &[1],
+    };
+    let mut replies = Vec::new();
+    assert_eq!(robot.on_frame(&unknown, &mut replies), Heard::Other);
+    assert_eq!(replies, ack);
+}
+
+#[test]
+fn one_is_answered_in_the_form_one_is_addressed_in() {
+    let mut robot = robot("");
+    let ping = Command::System(SystemSignal::Ping);
+    let (_, replies) = tell_as(&mut robot, ping, Addressing::Lettered);
+    assert_eq!(replies[2], 0xb8);
+    assert_eq!(streamed(&mut robot).0[0].0, 0xb8);
+    tell(&mut robot, ping);
+    assert_eq!(streamed(&mut robot).0[0].0, 0x00);
+}
+
+#[test]
+fn frames_that_speak_to_a_host_are_none_of_its_business() {
+    let mut robot = robot("");
+    let mut replies = Vec::new();
+    let reflected = Frame {
+        rid: 0,
+        sn: 0,
+        did: 255,
+        data: &[0],
+    };
+    assert_eq!(robot.on_frame(&reflected, &mut replies), Heard::Stranger);
+    assert!(replies.is_empty());
+}
+
+#[test]
+fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
+    let mut robot = robot("[simulation.wheels]\nlag_s = 0\n[perimeter]\nwidth_m = 100");
+    tell(&mut robot, forward(1000, None));
+    for _ in 0..7 {
+        robot.advance_to_next_tick();
+    }
+    // One second: 1000 counts, 2 pi 0.085 / 1200 m each. Channel 0 is reversed and wraps below 0.
+    let sensors = motor(&mut robot);
+    assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
+    assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
+    let truth = robot.truth();
+    assert_eq!((truth.left_counts, truth.right_counts), (1000, 1000));
+    assert!((truth.x - 0.445_059).abs() < 1e-6, "{}", truth.x);
+    for _ in 0..7 * 32 {
+        robot.advance_to_next_tick();
+    }
+    assert_eq!(robot.truth().left_counts, 33_000 - 32_768);
+}
+
+#[test]
+fn wheels_may_be_wired_the_other_way_round() {
+    let mut robot = robot(
+        "[robot]\nleft = { channel = 1, reversed = false }\nright = { channel = 0, reversed = true }\n[simulation.wheels]\nlag_s = 0",
+    );
+    // Right wheel only: the robot turns left.
+    tell(&mut robot, Command::velocity([Some(-500), None], None));
+    robot.advance_to_next_tick();
+    let truth = robot.truth();
+    assert!(truth.heading > 0.0 && truth.omega > 0.0);
+    assert_eq!((truth.left_counts, truth.right_counts), (0, 71));
+}
+
+#[test]
+fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
+    let moved = |text: &str| {
+        let mut robot = robot(text);
+        tell(&mut robot, forward(700, 100));
+        robot.advance_to_next_tick();
+        robot.advance_to_next_tick();
+        robot.truth().right_counts
+    };
+    assert_eq!(moved("[simulation.wheels]\nlag_s = 0"), 70);
+    assert_eq!(
+        moved("[simulation]\nignores_time = true\n[simulation.wheels]\nlag_s = 0"),
+        200
+    );
+}
+
+#[test]
+fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
+    let speed = |text: &str| {
+        let mut robot = robot(text);
+        tell(&mut robot, forward(500, None));
+        robot.advance_to(3.0);
+        motor_speed(&robot)
+    };
+    assert!(speed("") > 499.0, "it keeps going");
+    assert_eq!(speed("[simulation]\nstops_when_silent_s = 1.5"), 0.0);
+}
+
+fn motor_speed(robot: &Robot) -> f64 {
+    robot.motor(1).unwrap().speed()
+}
+
+#[test]
+fn parameters_and_enabling_reach_their_channel() {
+    let mut robot = robot("");
+    tell(
+        &mut robot,
+        Command::Parameter {
+            channel: 1,
+            parameter: Parameter::VelocityPid(Gains {
+                kp: Some(15),
+                ..Default::default()
+            }),
+        },
+    );
+    let (position, velocity) = robot.motor(1).unwrap().gains();
+    assert_eq!((position.kp, velocity.kp, velocity.kd), (50, 15, 5));
+    tell(
+        &mut robot,
+        Command::Enable {
+            on: true,
+            channel: None,
+        },
+    );
+    assert!(robot.motor(5).unwrap().enabled());
+    let other = Motion {
+        quantity: Quantity::Velocity,
+        targets: Targets::One {
+            channel: 4,
+            value: 100,
+        },
+        limit_ms: None,
+    };
+    tell(&mut robot, Command::Motion(other));
+    robot.advance_to_next_tick();
+    assert_eq!(robot.truth().v, 0.0, "channel 4 drives no wheel");
+}
+
+#[test]
+fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
+    let mut robot = robot("world.wall = [{ points = [[0.5, -1], [0.5, 1]] }]");
+    assert!((robot.truth().clearance_m - 0.31).abs() < 1e-12);
+    tell(&mut robot, forward(2000, None));
+    robot.advance_to_next_tick();
+    let first = robot.truth();
+    assert!(first.clearance_m < 0.31 && first.contacts == 0);
+    for _ in 0..7 {
+        robot.advance_to_next_tick();
+    }
+    let truth = robot.truth();
+    assert_eq!(truth.contacts, 1);
+    assert!((0.0..1e-6).contains(&truth.clearance_m), "{truth:?}");
+    assert_eq!(truth.v, 0.0, "the wall holds it");
+}
+
+#[test]
+fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
+    let mut robot = robot(
+        "[sonar]\nindex = 3\n[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\n[[world.wall]]\npoints = [[1, -1], [1, 1]]\n[[world.drum]]\nat = [0, 1]\nradius_m = 0.5",
+    );
+    let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
+        panic!("no standard frame");
+    };
+    // Ahead: 1 - 0.1915 m. Left: the drum at (0, 1) lies 45 degrees off that ranger, so its flank or
+    // nothing; right: nothing but the end of the wall.
+    assert_eq!(sensors.ultrasonic[3], 81);
+    assert_eq!(sensors.ultrasonic[0], 255);
+    assert_eq!(sensors.ultrasonic[1], 255);
+    assert_eq!(sensors.ultrasonic[5], 255);
+    assert_ne!(sensors.ultrasonic[4], 255);
+    assert_eq!(robot.truth().sonar_cm, 81);
+}
+
+#[test]
+fn reading_the_frames_again_draws_nothing() {
+    let mut robot = robot("world.wall = [{ points = [[1, -1], [1, 1]] }]");
+    let (mut first, mut again) = (Vec::new(), Vec::new());
+    robot.repeat(&mut first);
+    robot.repeat(&mut again);
+    assert_eq!(first, again);
+    let mut streamed = Vec::new();
+    robot.stream(&mut streamed);
+    assert_eq!(first, streamed);
+}
+
+#[test]
+fn batteries_drain_as_the_mission_says() {
+    let mut robot = robot("[simulation.battery]\nstart_v = 8\ndrain_v_per_min = 1");
+    let volts = |robot: &mut Robot| match streamed(robot).1.first() {
+        Some(Report::Standard(sensors)) => common::wire::volts(sensors.board_battery, 9.0),
+        other => panic!("{other:?}"),
+    };
+    assert!((volts(&mut robot) - 8.0).abs() < 0.01);
+    for _ in 0..7 * 60 {
+        robot.advance_to_next_tick();
+    }
+    assert!((volts(&mut robot) - 7.0).abs() < 0.01);
+}

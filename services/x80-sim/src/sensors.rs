@@ -1,0 +1,151 @@
+//! What the robot's sensors read at a tick.
+
+use common::{
+    mission::{Mission, Physics},
+    wire::{COUNT_CYCLE, CustomSensors, Encoder, StandardSensors},
+};
+
+use crate::{
+    body::Body,
+    infrared,
+    motor::Motor,
+    noise::{Noise, Source},
+    sonar::{self, Mount},
+    world::World,
+};
+
+/// Bearing of the two rangers beside the front one, degrees; and their distance from the centre, metres.
+const SIDE_BEARING_DEG: f64 = 45.0;
+const SIDE_FORWARD_M: f64 = 0.194;
+/// A sensor that sees nothing out of the ordinary, AD counts.
+const MIDDLE: u16 = 2048;
+/// Supply of the AD converters, AD counts.
+const REFERENCE: u16 = 2730;
+/// Motor current of a standing motor, and for each count per second, AD counts.
+const CURRENT: (f64, f64) = (20.0, 0.2);
+
+/// The ultrasonic and infrared rangers and the rest of the multimedia board.
+#[derive(Clone, Debug)]
+pub struct Ranging {
+    front: usize,
+    mounts: [Option<Mount>; 6],
+    sonar_noise: Noise,
+    infrared_noise: Noise,
+}
+
+impl Ranging {
+    /// The rangers of `mission`'s robot: the front one, one at either side of it, and what the mission
+    /// adds.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let front = usize::from(mission.sonar.index) % 6;
+        let mut mounts = [None; 6];
+        let ahead = mission.sonar.bearing_deg;
+        let sides = [
+            ((front + 5) % 6, SIDE_FORWARD_M, ahead + SIDE_BEARING_DEG),
+            ((front + 1) % 6, SIDE_FORWARD_M, ahead - SIDE_BEARING_DEG),
+        ];
+        let written = mission.simulation.ring.iter().map(|ranger| {
+            let index = usize::from(ranger.index) % 6;
+            (index, ranger.forward_m, ranger.bearing_deg)
+        });
+        let last = [(front, mission.sonar.forward_m, ahead)];
+        for (index, forward, bearing_deg) in sides.into_iter().chain(written).chain(last) {
+            mounts[index] = Some(Mount {
+                forward,
+                bearing: f64::to_radians(bearing_deg),
+            });
+        }
+        Self {
+            front,
+            mounts,
+            sonar_noise: Noise::new(mission.seed, Source::Sonar),
+            infrared_noise: Noise::new(mission.seed, Source::Infrared),
+        }
+    }
+
+    /// The front ranger's byte.
+    #[must_use]
+    pub fn front(&self, sensors: &StandardSensors) -> u8 {
+        sensors.ultrasonic[self.front]
+    }
+
+    /// The standard and the custom frame at mission time `time`, seconds.
+    pub fn measure(
+        &mut self,
+        world: &World,
+        body: &Body,
+        time: f64,
+        physics: &Physics,
+    ) -> (StandardSensors, CustomSensors) {
+        let pose = body.pose();
+        let noise = &mut self.sonar_noise;
+        let mut ranges = self.mounts.map(|mount| {
+            mount.map_or(f64::INFINITY, |mount| {
+                sonar::listen(world, mount.on(pose), &physics.sonar, noise)
+            })
+        });
+        let heard = ranges;
+        for (index, range) in ranges.iter_mut().enumerate() {
+            let neighbour = heard[(index + 1) % 6].min(heard[(index + 5) % 6]);
+            let listens = self.mounts[index].is_some();
+            if listens && noise.chance(physics.sonar.crosstalk_share) {
+                *range = range.min(neighbour);
+            }
+        }
+        let ultrasonic = ranges.map(|range| sonar::byte(range, &physics.sonar, noise));
+        let infrared = infrared::read(
+            world,
+            pose,
+            body.radius(),
+            &physics.infrared,
+            &mut self.infrared_noise,
+        );
+        let drained = physics.battery.drain_v_per_min * time / 60.0;
+        let volts = (physics.battery.start_v - drained).max(0.0);
+        let standard = StandardSensors {
+            ultrasonic,
+            human: [MIDDLE; 4],
+            tilt: [MIDDLE; 2],
+            overheat: [MIDDLE; 2],
+            temperature: MIDDLE,
+            infrared: infrared[0],
+            infrared_code: [0; 4],
+            board_battery: ad(volts, 9.0),
+            motor_battery: ad(volts, 24.0),
+            servo_battery: ad(volts, 9.0),
+            reference: REFERENCE,
+        };
+        let mut custom = CustomSensors::default();
+        custom.ad[2..].copy_from_slice(&infrared[1..]);
+        (standard, custom)
+    }
+}
+
+fn ad(volts: f64, full_scale: f64) -> u16 {
+    (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
+}
+
+/// What the encoder of `motor` reports, `error` counts off.
+#[must_use]
+pub fn encoder(motor: &Motor, error: f64) -> Encoder {
+    let position = (motor.turned() + error).round();
+    Encoder {
+        position: position.rem_euclid(f64::from(COUNT_CYCLE)) as u16,
+        speed: motor.speed().abs().round().min(f64::from(u16::MAX)) as u16,
+        positive: motor.speed() >= 0.0,
+    }
+}
+
+/// What the motors draw, AD counts.
+#[must_use]
+pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
+    std::array::from_fn(|channel| {
+        let motor = &motors[channel];
+        if !motor.enabled() {
+            return 0;
+        }
+        let (standing, per_speed) = CURRENT;
+        (standing + per_speed * motor.speed().abs()).min(4095.0) as u16
+    })
+}

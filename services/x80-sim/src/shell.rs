@@ -1,0 +1,212 @@
+//! The process around the robot: a socket, a pace and the truth. All else is [`crate::robot`].
+
+mod session;
+
+use std::{
+    io::{self, Write},
+    net::SocketAddr,
+    os::fd::AsFd,
+};
+
+use common::{
+    clock::{Pace, monotonic_ns},
+    mission::Mission,
+};
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    io::Errno,
+};
+use thiserror::Error;
+
+use self::session::Session;
+use crate::transport::Udp;
+
+/// Datagrams taken in one go before time and the stop are looked at again.
+const MOST_AT_ONCE: usize = 64;
+
+/// How bytes reach the robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Transport {
+    /// Datagrams.
+    #[default]
+    Udp,
+}
+
+/// What a simulated robot is started with.
+pub struct SimOptions {
+    /// The mission, seed and all.
+    pub mission: Mission,
+    /// How mission time passes.
+    ///
+    /// At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period
+    /// under that command and the frames of the next tick are sent. A ping is answered with the frames
+    /// of this tick once more. The same commands give the same bytes.
+    ///
+    /// At [`Pace::Rate`] it follows the machine's clock and frames are sent unasked. While the process
+    /// is not scheduled for more than a period, mission time waits for it.
+    pub pace: Pace,
+    /// Where to listen; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// How to listen.
+    pub transport: Transport,
+    /// Where the truth is written: a [`common::truth::TruthHeader`], then a
+    /// [`common::truth::TruthTick`] each tick, one JSON object a line, each
+    /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
+    /// without.
+    pub truth: Option<Box<dyn Write + Send>>,
+}
+
+/// Why a simulated robot could not start or go on.
+#[derive(Debug, Error)]
+pub enum SimError {
+    /// The address cannot be listened on.
+    #[error(
+        "the simulated robot cannot listen on {address}: {source}; stop what listens there, or give port 0 to take a free one"
+    )]
+    Bind {
+        /// The address.
+        address: SocketAddr,
+        /// The system's word.
+        source: io::Error,
+    },
+    /// The socket failed later.
+    #[error("the simulated robot lost its socket on {address}: {source}; start it again")]
+    Lost {
+        /// Where it listened.
+        address: String,
+        /// The system's word.
+        source: io::Error,
+    },
+    /// The system would not let it wait.
+    #[error("the simulated robot cannot wait for its socket: {0}; start it again")]
+    Wait(#[source] io::Error),
+}
+
+/// Run a simulated robot until `stop` becomes readable (or its other end is closed).
+///
+/// # Errors
+/// When it cannot listen, or its socket fails.
+pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
+    let SimOptions {
+        mission,
+        pace,
+        listen,
+        transport: Transport::Udp,
+        truth,
+    } = options;
+    let socket = Udp::bind(listen)?;
+    tracing::info!(address = socket.address(), %pace, "a simulated X80 listens");
+    let mut session = Session::new(&mission, pace, socket, truth);
+    let mut clock = SimClock::new(pace, session.next_tick_s());
+    let mut buffer = vec![0; 65_536];
+    loop {
+        let timeout = clock.wait_for(session.next_tick_s(), monotonic_ns());
+        let [came, stopped] = wait(&session, &stop, timeout)?;
+        if stopped {
+            return Ok(());
+        }
+        if came {
+            session.listen_to(&mut buffer, MOST_AT_ONCE, || clock.now(monotonic_ns()))?;
+        }
+        if clock
+            .now(monotonic_ns())
+            .is_some_and(|now| now >= session.next_tick_s())
+        {
+            session.tick();
+            clock.forgive(session.next_tick_s(), monotonic_ns());
+        }
+    }
+}
+
+/// Wait for bytes, the stop or the timeout; which of the first two it was.
+fn wait(
+    session: &Session,
+    stop: &impl AsFd,
+    timeout: Option<Timespec>,
+) -> Result<[bool; 2], SimError> {
+    let mut fds = [
+        PollFd::from_borrowed_fd(session.readable(), PollFlags::IN),
+        PollFd::from_borrowed_fd(stop.as_fd(), PollFlags::IN),
+    ];
+    match poll(&mut fds, timeout.as_ref()) {
+        Ok(_) => Ok([0, 1].map(|at| !fds[at].revents().is_empty())),
+        Err(Errno::INTR) => Ok([false; 2]),
+        Err(error) => Err(SimError::Wait(error.into())),
+    }
+}
+
+/// Mission time by the machine's clock; none at the pace of the commands.
+#[derive(Clone, Copy, Debug)]
+struct SimClock {
+    /// Machine time at mission time 0, and mission seconds a machine second.
+    runs: Option<(u64, f64)>,
+    period_s: f64,
+}
+
+impl SimClock {
+    fn new(pace: Pace, period_s: f64) -> Self {
+        let runs = match pace {
+            Pace::Max => None,
+            Pace::Rate(rate) => Some((monotonic_ns(), rate)),
+        };
+        Self { runs, period_s }
+    }
+
+    /// Mission time at machine time `machine_ns`, seconds.
+    fn now(&self, machine_ns: u64) -> Option<f64> {
+        let (epoch, rate) = self.runs?;
+        Some(machine_ns.saturating_sub(epoch) as f64 * 1e-9 * rate)
+    }
+
+    /// How long to wait for mission time `due`; for ever at the pace of the commands.
+    fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Timespec> {
+        let (_, rate) = self.runs?;
+        let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);
+        Some(Timespec {
+            tv_sec: seconds as i64,
+            tv_nsec: (seconds.fract() * 1e9) as i64,
+        })
+    }
+
+    /// When more than a period is owed at machine time `machine_ns`, `due` being the next tick, let
+    /// mission time have waited: a process that was held up must not make the robot race.
+    fn forgive(&mut self, due: f64, machine_ns: u64) {
+        let owed = self.now(machine_ns).map_or(0.0, |now| now - due);
+        if let Some((epoch, rate)) = &mut self.runs
+            && owed > self.period_s
+        {
+            *epoch += (owed / *rate * 1e9) as u64;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mission_time_runs_at_its_rate_and_waits_for_a_process_that_was_held_up() {
+        let mut clock = SimClock {
+            runs: Some((1_000_000_000, 2.0)),
+            period_s: 0.1,
+        };
+        assert_eq!(clock.now(2_500_000_000), Some(3.0));
+        let wait = clock.wait_for(3.5, 2_500_000_000).unwrap();
+        assert_eq!((wait.tv_sec, wait.tv_nsec), (0, 250_000_000));
+        clock.forgive(2.95, 2_500_000_000);
+        assert_eq!(
+            clock.now(2_500_000_000),
+            Some(3.0),
+            "half a period is caught up"
+        );
+        clock.forgive(1.0, 2_500_000_000);
+        assert!((clock.now(2_500_000_000).unwrap() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn at_the_pace_of_the_commands_there_is_nothing_to_wait_for() {
+        let clock = SimClock::new(Pace::Max, 0.1);
+        assert_eq!(clock.wait_for(5.0, 0), None);
+        assert_eq!(clock.now(9), None);
+    }
+}

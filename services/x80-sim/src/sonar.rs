@@ -1,0 +1,268 @@
+//! An ultrasonic ranger: the nearest point in its cone that answers.
+//!
+//! In the laboratory every surface answers wherever the cone meets it. With smooth walls the echo comes
+//! back only from where the wall is square to the sound: a wall answers at the foot of the
+//! perpendicular while that is not too far off the axis, a drum over a wider angle, an edge sometimes.
+//! What does not answer still hides what is behind it.
+
+use std::f64::consts::FRAC_PI_2;
+
+use common::{kinematics::Pose2, mission::SonarPhysics, wire::Echo};
+use glam::DVec2;
+
+use crate::{
+    noise::Noise,
+    world::{Surface, World},
+};
+
+/// The farthest a ranger tells, metres.
+pub const REACH_M: f64 = 2.55;
+/// An echo is hidden by what lies nearer than this before it, metres.
+const HIDES_M: f64 = 0.01;
+/// A reflected beam starts so far off its mirror, or it would meet it again, metres.
+const NUDGE_M: f64 = 1e-6;
+
+/// How a ranger is mounted, looking outward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mount {
+    /// Distance from the robot's centre, metres.
+    pub forward: f64,
+    /// Bearing from the robot's axis, radians.
+    pub bearing: f64,
+}
+
+impl Mount {
+    /// Where the ranger is and which way it looks on a robot at `robot`.
+    #[must_use]
+    pub fn on(&self, robot: Pose2) -> Pose2 {
+        let heading = robot.heading + self.bearing;
+        Pose2 {
+            position: robot.position + self.forward * DVec2::from_angle(heading),
+            heading,
+        }
+    }
+}
+
+/// Where an echo may come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Candidate {
+    range: f64,
+    /// Unit vector from the ranger.
+    along: DVec2,
+    /// An answer near a limit, or of an edge: often lost.
+    weak: bool,
+    /// Share of pings it answers.
+    share: f64,
+}
+
+/// A sector in front of a ranger. The cosine and sine of its half angle are what geometry needs.
+#[derive(Clone, Copy, Debug)]
+struct Sector {
+    origin: DVec2,
+    axis: DVec2,
+    half: f64,
+}
+
+impl Sector {
+    fn edges(&self) -> [DVec2; 2] {
+        [self.half, -self.half].map(|angle| DVec2::from_angle(angle).rotate(self.axis))
+    }
+
+    fn contains(&self, direction: DVec2) -> bool {
+        off_axis(self.axis, direction) <= self.half + 1e-12
+    }
+
+    /// The point of the face `from`..`to` in this sector that is nearest to its apex, from the apex.
+    fn nearest(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
+        let surface = Surface::Face { from, to };
+        let foot = common::geometry::nearest_on_segment(self.origin, from, to);
+        let crossings = self.edges().into_iter().filter_map(|edge| {
+            let range = surface.hit(self.origin, edge)?;
+            Some(edge * range)
+        });
+        [foot, from, to]
+            .into_iter()
+            .map(|point| point - self.origin)
+            .filter(|offset| self.contains(*offset))
+            .chain(crossings)
+            .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+    }
+}
+
+fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
+    axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
+}
+
+/// What a ranger at `pose` hears: metres, infinite for nothing. Noise of the range is not in it yet.
+pub fn listen(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> f64 {
+    let ears = Ears::new(pose, physics);
+    let mut candidates: Vec<Candidate> = world
+        .surfaces()
+        .flat_map(|surface| ears.candidates(surface))
+        .flatten()
+        .collect();
+    candidates.sort_by(|a, b| a.range.total_cmp(&b.range));
+    let answer = candidates.into_iter().find(|candidate| {
+        let hidden = world
+            .first_hit(pose.position, candidate.along)
+            .is_some_and(|(first, _)| first < candidate.range - HIDES_M);
+        !hidden && (candidate.share >= 1.0 || noise.chance(candidate.share))
+    });
+    let lost = match answer {
+        Some(candidate) if candidate.weak => noise.chance(physics.weak_dropout_share),
+        Some(_) => noise.chance(physics.dropout_share),
+        None => false,
+    };
+    let mut range = match answer {
+        Some(candidate) if !lost => candidate.range,
+        Some(_) => f64::INFINITY,
+        None => bounced(world, pose, physics, noise).unwrap_or(f64::INFINITY),
+    };
+    if noise.chance(physics.false_echo_share) {
+        range = 0.1 + noise.uniform() * (range.min(REACH_M) - 0.1).max(0.0);
+    }
+    range
+}
+
+/// The byte for a `range` with its noise.
+pub fn byte(range: f64, physics: &SonarPhysics, noise: &mut Noise) -> u8 {
+    if range > REACH_M {
+        return Echo::byte_at(f64::INFINITY);
+    }
+    Echo::byte_at(range + noise.normal(physics.noise_m + physics.noise_per_m * range))
+}
+
+/// The axis of the beam, thrown off a wall that does not answer itself, onto one that is square to it.
+fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> Option<f64> {
+    if !noise.chance(physics.multipath_share) {
+        return None;
+    }
+    let axis = pose.axis();
+    let (there, Surface::Face { from, to }) = world.first_hit(pose.position, axis)? else {
+        return None;
+    };
+    let normal = (to - from).perp().try_normalize()?;
+    let onward = axis - 2.0 * axis.dot(normal) * normal;
+    let mirror = pose.position + axis * there;
+    let (further, second) = world.first_hit(mirror + onward * NUDGE_M, onward)?;
+    let outward = second.outward(mirror)?;
+    let square = off_axis(outward, -onward) <= physics.wall_limit_deg.to_radians();
+    let range = there + further + NUDGE_M;
+    (square && range <= REACH_M).then_some(range)
+}
+
+/// A ranger's ears, turned one way.
+struct Ears<'a> {
+    physics: &'a SonarPhysics,
+    cone: Sector,
+    lobe: f64,
+}
+
+impl<'a> Ears<'a> {
+    fn new(pose: Pose2, physics: &'a SonarPhysics) -> Self {
+        let half = physics.cone_deg.to_radians();
+        Self {
+            physics,
+            cone: Sector {
+                origin: pose.position,
+                axis: pose.axis(),
+                half,
+            },
+            lobe: physics.lobe_deg.to_radians().max(half),
+        }
+    }
+
+    /// How far an answer from so far off the axis is heard, metres: full in the cone, then less and less.
+    fn reach(&self, off: f64) -> f64 {
+        let cone = self.cone.half;
+        if off <= cone + 1e-12 {
+            REACH_M
+        } else if off < self.lobe {
+            REACH_M * (self.lobe - off) / (self.lobe - cone)
+        } else {
+            0.0
+        }
+    }
+
+    /// Up to two places of a surface that may answer.
+    fn candidates(&self, surface: Surface) -> [Option<Candidate>; 2] {
+        match surface {
+            Surface::Drum { at, radius } => [self.drum(at, radius), None],
+            Surface::Face { from, to } => self.face(from, to),
+        }
+    }
+
+    fn drum(&self, at: DVec2, radius: f64) -> Option<Candidate> {
+        let to_centre = at - self.cone.origin;
+        let range = to_centre.length() - radius;
+        if range <= 0.0 {
+            return Some(heard(self.cone.axis * 1e-9, false));
+        }
+        let off = off_axis(self.cone.axis, to_centre);
+        if range <= self.reach(off) {
+            let weak = off > self.cone.half + 1e-12;
+            return Some(heard(to_centre.normalize_or_zero() * range, weak));
+        }
+        // Its nearest point is out of the cone, but the cone may still meet its flank.
+        let drum = Surface::Drum { at, radius };
+        let limit = self.physics.drum_limit_deg.to_radians();
+        let flank = |edge: DVec2| {
+            let range = drum.hit(self.cone.origin, edge)?;
+            let incidence = off_axis(-edge, edge * range - to_centre);
+            (range <= REACH_M && incidence <= limit).then_some(edge * range)
+        };
+        let nearest = self
+            .cone
+            .edges()
+            .into_iter()
+            .filter_map(flank)
+            .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+        Some(heard(nearest, true))
+    }
+
+    fn face(&self, from: DVec2, to: DVec2) -> [Option<Candidate>; 2] {
+        let origin = self.cone.origin;
+        let Some(along) = (to - from).try_normalize() else {
+            return [None; 2];
+        };
+        let foot = from + along * (origin - from).dot(along) - origin;
+        let limit = self.physics.wall_limit_deg.to_radians();
+        let off = if foot.length_squared() > 1e-18 {
+            off_axis(self.cone.axis, foot)
+        } else {
+            0.0
+        };
+        // A rough wall answers even where the cone only grazes it.
+        if off <= limit + 1e-12 || limit >= FRAC_PI_2 {
+            let share = (foot + origin - from).dot(along) / (to - from).length();
+            if (0.0..=1.0).contains(&share) && foot.length() <= self.reach(off) {
+                let weak = off > 0.8 * limit || off > self.cone.half + 1e-12;
+                return [Some(heard(foot, weak)), None];
+            }
+            let nearest = self.cone.nearest(from, to);
+            let nearest = nearest.filter(|offset| offset.length() <= REACH_M);
+            return [nearest.map(|offset| heard(offset, false)), None];
+        }
+        [from, to].map(|end| {
+            let offset = end - origin;
+            let near = offset.length() <= self.physics.edge_reach_m && self.cone.contains(offset);
+            let share = self.physics.edge_share;
+            (near && share > 0.0).then(|| Candidate {
+                share,
+                ..heard(offset, true)
+            })
+        })
+    }
+}
+
+fn heard(offset: DVec2, weak: bool) -> Candidate {
+    Candidate {
+        range: offset.length(),
+        along: offset.normalize_or_zero(),
+        weak,
+        share: 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,166 @@
+//! Ranges worked by hand, in the laboratory and with smooth walls.
+
+use std::path::Path;
+
+use common::mission::{Mission, Realism};
+
+use super::*;
+use crate::noise::Source;
+
+fn heard_in(text: &str, physics: &SonarPhysics, heading_deg: f64) -> f64 {
+    let text = format!("target = [0, -5]\n{text}");
+    let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+    let pose = Pose2 {
+        position: DVec2::ZERO,
+        heading: heading_deg.to_radians(),
+    };
+    let mut noise = Noise::new(1, Source::Sonar);
+    listen(&World::new(&mission), pose, physics, &mut noise)
+}
+
+fn laboratory(text: &str, heading_deg: f64) -> f64 {
+    let physics = SonarPhysics::preset(Realism::Laboratory);
+    heard_in(text, &physics, heading_deg)
+}
+
+/// The measured reflections, without what is random.
+fn smooth(text: &str, heading_deg: f64) -> f64 {
+    let physics = SonarPhysics {
+        edge_share: 0.0,
+        multipath_share: 0.0,
+        dropout_share: 0.0,
+        weak_dropout_share: 0.0,
+        false_echo_share: 0.0,
+        ..SonarPhysics::preset(Realism::Measured)
+    };
+    heard_in(text, &physics, heading_deg)
+}
+
+fn close(got: f64, want: f64) {
+    assert!((got - want).abs() < 1e-9, "heard {got} m, want {want} m");
+}
+
+const WALL: &str = "world.wall = [{ points = [[1.5, -3], [1.5, 3]] }]";
+const DRUM: &str = "world.drum = [{ at = [2, 0], radius_m = 0.5 }]";
+
+#[test]
+fn the_nearest_point_in_the_cone_answers() {
+    close(laboratory(WALL, 0.0), 1.5);
+    close(laboratory(WALL, 10.0), 1.5);
+    // 40 degrees off: the cone's near edge meets the wall at 25 degrees.
+    close(laboratory(WALL, 40.0), 1.5 / 25_f64.to_radians().cos());
+    close(laboratory(DRUM, 14.0), 1.5);
+    assert_eq!(laboratory(DRUM, 32.0), f64::INFINITY, "out of the cone");
+}
+
+#[test]
+fn a_drum_half_out_of_the_cone_answers_with_its_flank() {
+    // At 20 degrees the cone's edge passes 5 degrees beside the centre: 2 cos 5 - sqrt(.25 - (2 sin 5)^2).
+    let (sin, cos) = 5_f64.to_radians().sin_cos();
+    let want = 2.0 * cos - (0.25 - 4.0 * sin * sin).sqrt();
+    close(laboratory(DRUM, 20.0), want);
+}
+
+#[test]
+fn a_post_before_a_wall_hides_it_and_the_end_of_a_wall_is_heard() {
+    close(
+        laboratory(
+            &format!("{WALL}\nworld.drum = [{{ at = [1, 0], radius_m = 0.1 }}]"),
+            0.0,
+        ),
+        0.9,
+    );
+    close(
+        laboratory("world.wall = [{ points = [[1, 0.1], [1, 3]] }]", 0.0),
+        DVec2::new(1.0, 0.1).length(),
+    );
+}
+
+#[test]
+fn nothing_beyond_the_reach_is_heard() {
+    assert_eq!(
+        laboratory("world.wall = [{ points = [[2.56, -1], [2.56, 1]] }]", 0.0),
+        f64::INFINITY
+    );
+}
+
+#[test]
+fn a_smooth_wall_answers_square_on_and_not_when_oblique() {
+    close(smooth(WALL, 0.0), 1.5);
+    close(
+        smooth("world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]", 20.0),
+        0.5,
+    );
+    assert_eq!(smooth(WALL, 24.0), f64::INFINITY);
+    assert_eq!(smooth(WALL, 45.0), f64::INFINITY);
+}
+
+#[test]
+fn an_oblique_smooth_wall_hides_what_stands_behind_it() {
+    // The wall passes 45 degrees across the axis; the drum behind it is square on.
+    let scene = "world.wall = [{ points = [[0, -1], [2, 1]] }]\nworld.drum = [{ at = [2, 0], radius_m = 0.5 }]";
+    assert_eq!(smooth(scene, 0.0), f64::INFINITY);
+}
+
+#[test]
+fn a_drum_answers_over_a_wider_angle_than_a_wall() {
+    // 24 degrees off the axis of a ranger 0.5 m from either.
+    let near_wall = "world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]";
+    let near_drum = "world.drum = [{ at = [0.7, 0], radius_m = 0.2 }]";
+    assert_eq!(smooth(near_wall, 24.0), f64::INFINITY);
+    assert!(smooth(near_drum, 24.0) < 0.55);
+}
+
+#[test]
+fn an_oblique_wall_throws_the_beam_on_to_a_square_one() {
+    // Off a wall at 45 degrees 1 m ahead, onto a wall 0.8 m to the left: 1.8 m in all.
+    let scene =
+        "world.wall = [{ points = [[0.9, -0.1], [1.3, 0.3]] }, { points = [[0, 0.8], [3, 0.8]] }]";
+    let physics = SonarPhysics {
+        multipath_share: 1.0,
+        edge_share: 0.0,
+        dropout_share: 0.0,
+        false_echo_share: 0.0,
+        ..SonarPhysics::preset(Realism::Measured)
+    };
+    close(heard_in(scene, &physics, 0.0), 1.8);
+}
+
+#[test]
+fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
+    let physics = SonarPhysics {
+        dropout_share: 0.1,
+        false_echo_share: 0.05,
+        ..SonarPhysics::preset(Realism::Laboratory)
+    };
+    let mission = Mission::parse(&format!("target = [0, -5]\n{WALL}"), Path::new("m")).unwrap();
+    let world = World::new(&mission);
+    let mut noise = Noise::new(2, Source::Sonar);
+    let pings = 20_000;
+    let heard: Vec<f64> = (0..pings)
+        .map(|_| listen(&world, Pose2::default(), &physics, &mut noise))
+        .collect();
+    let share = |want: fn(f64) -> bool| {
+        heard.iter().filter(|range| want(**range)).count() as f64 / f64::from(pings)
+    };
+    let lost = share(|range| range > REACH_M);
+    assert!((lost - 0.1 * 0.95).abs() < 0.01, "{lost} were lost");
+    let short = share(|range| range < 1.499);
+    // A lost answer that is invented anew may come out beyond the wall.
+    assert!((0.04..=0.055).contains(&short), "{short} were short");
+}
+
+#[test]
+fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
+    let physics = SonarPhysics::preset(Realism::Laboratory);
+    let mut noise = Noise::new(4, Source::Sonar);
+    let bytes: Vec<f64> = (0..20_000)
+        .map(|_| f64::from(byte(2.0, &physics, &mut noise)))
+        .collect();
+    let mean = bytes.iter().sum::<f64>() / bytes.len() as f64;
+    let sd = (bytes.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / bytes.len() as f64).sqrt();
+    // 1 cm + 0.5 % of 2 m is 2 cm; rounding adds 1/12 cm^2.
+    assert!((mean - 200.0).abs() < 0.1, "{mean}");
+    assert!((sd - (4.0_f64 + 1.0 / 12.0).sqrt()).abs() < 0.05, "{sd}");
+    assert_eq!(byte(f64::INFINITY, &physics, &mut noise), 255);
+}

@@ -1,0 +1,101 @@
+//! Which sensor streams run, and for how many frames more.
+
+use common::wire::{Request, Stream};
+
+/// How long a stream runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Run {
+    ForEver,
+    Frames(u8),
+}
+
+impl Run {
+    const fn runs(self) -> bool {
+        !matches!(self, Self::Frames(0))
+    }
+
+    fn take(&mut self) -> bool {
+        match self {
+            Self::ForEver => true,
+            Self::Frames(0) => false,
+            Self::Frames(left) => {
+                *left -= 1;
+                true
+            }
+        }
+    }
+}
+
+/// The three streams; all run from boot.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Streams {
+    motor: Run,
+    custom: Run,
+    standard: Run,
+}
+
+/// Which frames are to be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Due {
+    /// 123.
+    pub(crate) motor: bool,
+    /// 124.
+    pub(crate) custom: bool,
+    /// 125.
+    pub(crate) standard: bool,
+}
+
+impl Default for Streams {
+    fn default() -> Self {
+        Self {
+            motor: Run::ForEver,
+            custom: Run::ForEver,
+            standard: Run::ForEver,
+        }
+    }
+}
+
+impl Streams {
+    /// Start, stop or count a stream.
+    pub(crate) fn request(&mut self, stream: Stream, request: Request) {
+        let run = match request {
+            Request::Start => Run::ForEver,
+            Request::Stop => Run::Frames(0),
+            Request::Count(frames) => Run::Frames(frames),
+        };
+        let (motor, custom, standard) = match stream {
+            Stream::Motor => (true, false, false),
+            Stream::Custom => (false, true, false),
+            Stream::Standard => (false, false, true),
+            Stream::All => (true, true, true),
+        };
+        for (named, slot) in [
+            (motor, &mut self.motor),
+            (custom, &mut self.custom),
+            (standard, &mut self.standard),
+        ] {
+            if named {
+                *slot = run;
+            }
+        }
+    }
+
+    /// The streams that run, one frame of each counted as sent.
+    pub(crate) fn take(&mut self) -> Due {
+        Due {
+            motor: self.motor.take(),
+            custom: self.custom.take(),
+            standard: self.standard.take(),
+        }
+    }
+
+    /// The streams that run.
+    #[must_use]
+    pub(crate) const fn running(&self) -> Due {
+        Due {
+            motor: self.motor.runs(),
+            custom: self.custom.runs(),
+            standard: self.standard.runs(),
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! A simulated robot in a thread, and a host that talks to it.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests may stop at the first broken promise too"
+)]
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::{
+    io::{BufRead, BufReader},
+    net::{Shutdown, SocketAddr, UdpSocket},
+    os::unix::net::UnixStream,
+    path::Path,
+    thread::JoinHandle,
+    time::Duration,
+};
+
+use common::{
+    clock::Pace,
+    mission::Mission,
+    truth::{TruthHeader, TruthTick},
+};
+use x80_sim::{SimError, SimOptions, Transport, run};
+
+/// Longer than anything here takes: a test that waits this long has failed.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
+
+pub(crate) fn mission(text: &str) -> Mission {
+    let text = format!("target = [3, 0]\n{text}");
+    Mission::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+/// A running simulated robot; dropping it stops it.
+pub(crate) struct Sim {
+    pub(crate) listening: String,
+    truth: BufReader<UnixStream>,
+    stop: Option<UnixStream>,
+    thread: Option<JoinHandle<Result<(), SimError>>>,
+}
+
+impl Sim {
+    pub(crate) fn start(text: &str, pace: Pace) -> Self {
+        Self::start_on(text, pace, Transport::Udp)
+    }
+
+    pub(crate) fn start_on(text: &str, pace: Pace, transport: Transport) -> Self {
+        let (truth_reader, truth_writer) = UnixStream::pair().unwrap();
+        let (stop, stopped) = UnixStream::pair().unwrap();
+        let options = SimOptions {
+            mission: mission(text),
+            pace,
+            listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+            transport,
+            truth: Some(Box::new(truth_writer)),
+        };
+        let thread = std::thread::spawn(move || run(options, stopped));
+        truth_reader.set_read_timeout(Some(PATIENCE)).unwrap();
+        let mut truth = BufReader::new(truth_reader);
+        let mut line = String::new();
+        truth.read_line(&mut line).unwrap();
+        let header: TruthHeader = serde_json::from_str(&line).unwrap();
+        Self {
+            listening: header.listening,
+            truth,
+            stop: Some(stop),
+            thread: Some(thread),
+        }
+    }
+
+    /// The truth of the next tick.
+    pub(crate) fn next_truth(&mut self) -> TruthTick {
+        let mut line = String::new();
+        self.truth.read_line(&mut line).unwrap();
+        serde_json::from_str(&line).unwrap()
+    }
+
+    /// A host's socket that speaks to this robot alone.
+    pub(crate) fn host(&self) -> UdpSocket {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.connect(&self.listening).unwrap();
+        socket.set_read_timeout(Some(PATIENCE)).unwrap();
+        socket
+    }
+
+    /// Stop it and see how it ended.
+    pub(crate) fn stop(mut self) -> Result<(), SimError> {
+        self.ask_to_stop();
+        self.thread.take().unwrap().join().unwrap()
+    }
+
+    fn ask_to_stop(&mut self) {
+        // A robot whose truth is not read waits for its reader.
+        let _ = self.truth.get_ref().shutdown(Shutdown::Both);
+        drop(self.stop.take());
+    }
+}
+
+impl Drop for Sim {
+    fn drop(&mut self) {
+        self.ask_to_stop();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The next datagram.
+pub(crate) fn receive(socket: &UdpSocket) -> Vec<u8> {
+    let mut buffer = [0; 2048];
+    let length = socket.recv(&mut buffer).expect("the robot answers");
+    buffer[..length].to_vec()
+}
