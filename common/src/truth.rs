@@ -39,6 +39,22 @@ pub struct TruthTick {
     pub right_counts: u16,
     /// The front ultrasonic byte of this tick's frame, centimetres; 255 is nothing.
     pub sonar_cm: u8,
+    /// What the radio has done so far; missing where it is perfect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radio: Option<TruthRadio>,
+}
+
+/// What the radio has done so far, both ways together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TruthRadio {
+    /// Whether it is out now.
+    pub out: bool,
+    /// Datagrams sent over it.
+    pub sent: u64,
+    /// Datagrams lost on it.
+    pub lost: u64,
+    /// The longest outage, seconds.
+    pub longest_outage_s: f64,
 }
 
 impl TruthTick {

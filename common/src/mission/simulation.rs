@@ -236,7 +236,7 @@ section! {
         /// No outage is longer, seconds.
         outage_max_s in 0.001..=600.0 => 2.0, 2.0;
         /// Share of datagrams lost while it is good.
-        loss_share in 0.0..=1.0 => 0.0, 0.0;
+        loss_share in 0.0..=0.95 => 0.0, 0.0;
         /// Time a datagram takes each way, seconds.
         delay_s in 0.0..=5.0 => 0.0, 0.0;
         /// Mean of the further time it takes, exponentially distributed, seconds.

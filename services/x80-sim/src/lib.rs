@@ -10,9 +10,10 @@
 //! | [`sonar`], [`infrared`], [`sensors`] | what is heard and seen, as the frames carry it |
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
-//! | [`shell`] | the process: socket, pace, truth |
+//! | [`radio`] | outages, losses, delays between host and robot |
+//! | [`shell`] | the process: transport, pace, truth |
 //!
-//! A robot is stepped by whoever holds it; only [`shell`] knows sockets and clocks:
+//! A robot is stepped by whoever holds it; only [`shell`] and its transports know sockets and clocks:
 //!
 //! ```
 //! use std::path::Path;
@@ -37,6 +38,7 @@ pub mod body;
 pub mod infrared;
 pub mod motor;
 pub mod noise;
+pub mod radio;
 pub mod robot;
 pub mod sensors;
 pub mod shell;

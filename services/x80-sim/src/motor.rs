@@ -14,8 +14,8 @@ use crate::noise::Noise;
 const PWM_STOP: f64 = 16_383.5;
 /// Speed per count of position error, 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
-/// Below this a wheel that is told to stand does, counts per second.
-const STANDSTILL: f64 = 0.5;
+/// Below this friction holds a wheel that is told to stand, counts per second (2 mm/s).
+const STANDSTILL: f64 = 5.0;
 /// Changes of the target under way through the delay. At 5 ms a step this is more than the longest
 /// delay holds; a host that sends faster overwrites its newest.
 const MOST_PENDING: usize = 1024;

@@ -1,7 +1,6 @@
 //! The robot as a pure state machine: commands in, mission time forward, frames out.
 
 use common::{
-    clock::MissionTime,
     mission::{Mission, Physics},
     truth::TruthTick,
     wire::{
@@ -124,10 +123,16 @@ impl Robot {
         robot
     }
 
-    /// Mission time.
+    /// Mission time, seconds.
     #[must_use]
-    pub fn time(&self) -> MissionTime {
-        MissionTime::from_seconds(self.time)
+    pub fn time_s(&self) -> f64 {
+        self.time
+    }
+
+    /// From tick to tick, seconds.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
     }
 
     /// Mission time of the next tick, seconds.
@@ -142,6 +147,20 @@ impl Robot {
         self.motors.get(usize::from(channel))
     }
 
+    /// What `frame` is to a robot, before any takes it.
+    #[must_use]
+    pub fn kind(frame: &Frame<'_>) -> Heard {
+        if Addressing::of_robot(frame.rid).is_none() {
+            return Heard::Stranger;
+        }
+        match Command::parse(frame) {
+            Ok(Command::System(SystemSignal::Ack)) => Heard::Ack,
+            Ok(Command::System(SystemSignal::Ping)) => Heard::Ping,
+            Ok(Command::Motion(_)) => Heard::Motion,
+            Ok(_) | Err(_) => Heard::Other,
+        }
+    }
+
     /// Take a frame from the host and append what is answered at once to `replies`.
     pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
         let Some(addressing) = Addressing::of_robot(frame.rid) else {
@@ -149,37 +168,34 @@ impl Robot {
         };
         self.addressing = addressing;
         self.heard_at = self.time;
-        let command = Command::parse(frame);
-        if command == Ok(Command::System(SystemSignal::Ack)) {
-            return Heard::Ack;
+        let heard = Self::kind(frame);
+        // Even what is not understood is acknowledged, for it has come; acknowledgements never are.
+        if heard != Heard::Ack {
+            Report::System(SystemSignal::Ack).encode(addressing, replies);
         }
-        // Even what is not understood is acknowledged: it has come.
-        Report::System(SystemSignal::Ack).encode(addressing, replies);
+        if let Ok(command) = Command::parse(frame) {
+            self.take(command);
+        }
+        heard
+    }
+
+    fn take(&mut self, command: Command) {
         match command {
-            Ok(Command::System(_)) => Heard::Ping,
-            Ok(Command::Motion(motion)) => {
-                self.obey(&motion);
-                Heard::Motion
-            }
-            Ok(Command::Parameter { channel, parameter }) => {
+            Command::Motion(motion) => self.obey(&motion),
+            Command::Parameter { channel, parameter } => {
                 if let Some(motor) = self.motors.get_mut(usize::from(channel)) {
                     motor.configure(parameter);
                 }
-                Heard::Other
             }
-            Ok(Command::Enable { on, channel }) => {
+            Command::Enable { on, channel } => {
                 for (number, motor) in self.motors.iter_mut().enumerate() {
                     if channel.is_none_or(|only| usize::from(only) == number) {
                         motor.enable(on);
                     }
                 }
-                Heard::Other
             }
-            Ok(Command::Stream { stream, request }) => {
-                self.streams.request(stream, request);
-                Heard::Other
-            }
-            Err(_) => Heard::Other,
+            Command::Stream { stream, request } => self.streams.request(stream, request),
+            Command::System(_) => {}
         }
     }
 
@@ -338,6 +354,7 @@ impl Robot {
             left_counts: counts(channel.left, sign.left),
             right_counts: counts(channel.right, sign.right),
             sonar_cm: self.ranging.front(&self.standard),
+            radio: None,
         }
     }
 }

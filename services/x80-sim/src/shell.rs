@@ -19,10 +19,14 @@ use rustix::{
 use thiserror::Error;
 
 use self::session::Session;
-use crate::transport::Udp;
+use crate::transport::Way;
 
 /// Datagrams taken in one go before time and the stop are looked at again.
 const MOST_AT_ONCE: usize = 64;
+const AT_ONCE: Timespec = Timespec {
+    tv_sec: 0,
+    tv_nsec: 0,
+};
 
 /// How bytes reach the robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,6 +34,10 @@ pub enum Transport {
     /// Datagrams.
     #[default]
     Udp,
+    /// A connection, one host at a time.
+    Tcp,
+    /// A pseudo-terminal, opened by its path like a serial port.
+    Pty,
 }
 
 /// What a simulated robot is started with.
@@ -45,7 +53,7 @@ pub struct SimOptions {
     /// At [`Pace::Rate`] it follows the machine's clock and frames are sent unasked. While the process
     /// is not scheduled for more than a period, mission time waits for it.
     pub pace: Pace,
-    /// Where to listen; port 0 takes a free one.
+    /// Where to listen; port 0 takes a free one. A pseudo-terminal gets its path from the system.
     pub listen: SocketAddr,
     /// How to listen.
     pub transport: Transport,
@@ -69,8 +77,11 @@ pub enum SimError {
         /// The system's word.
         source: io::Error,
     },
-    /// The socket failed later.
-    #[error("the simulated robot lost its socket on {address}: {source}; start it again")]
+    /// No pseudo-terminal is to be had.
+    #[error("the simulated robot gets no pseudo-terminal: {0}; mount /dev/pts, or use UDP or TCP")]
+    Line(#[source] io::Error),
+    /// The transport failed later.
+    #[error("the simulated robot can no longer listen on {address}: {source}; start it again")]
     Lost {
         /// Where it listened.
         address: String,
@@ -91,28 +102,34 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
         mission,
         pace,
         listen,
-        transport: Transport::Udp,
+        transport,
         truth,
     } = options;
-    let socket = Udp::bind(listen)?;
-    tracing::info!(address = socket.address(), %pace, "a simulated X80 listens");
-    let mut session = Session::new(&mission, pace, socket, truth);
-    let mut clock = SimClock::new(pace, session.next_tick_s());
+    let way = Way::open(transport, listen)?;
+    tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
+    let mut session = Session::new(&mission, pace, way, truth);
+    let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz);
     let mut buffer = vec![0; 65_536];
     loop {
-        let timeout = clock.wait_for(session.next_tick_s(), monotonic_ns());
+        let timeout = if session.moves_alone() {
+            Some(AT_ONCE)
+        } else {
+            clock.wait_for(session.next_due_s(), monotonic_ns())
+        };
         let [came, stopped] = wait(&session, &stop, timeout)?;
         if stopped {
             return Ok(());
         }
-        if came {
-            session.listen_to(&mut buffer, MOST_AT_ONCE, || clock.now(monotonic_ns()))?;
-        }
-        if clock
-            .now(monotonic_ns())
-            .is_some_and(|now| now >= session.next_tick_s())
-        {
+        if session.moves_alone() {
+            // What has come meanwhile waits, or the run would depend on when it came.
             session.tick();
+            continue;
+        }
+        if came {
+            session.listen(&mut buffer, MOST_AT_ONCE, || clock.now(monotonic_ns()))?;
+        }
+        if let Some(now) = clock.now(monotonic_ns()) {
+            session.pass(now);
             clock.forgive(session.next_tick_s(), monotonic_ns());
         }
     }
@@ -124,12 +141,17 @@ fn wait(
     stop: &impl AsFd,
     timeout: Option<Timespec>,
 ) -> Result<[bool; 2], SimError> {
+    let (first, second) = session.readable();
     let mut fds = [
-        PollFd::from_borrowed_fd(session.readable(), PollFlags::IN),
         PollFd::from_borrowed_fd(stop.as_fd(), PollFlags::IN),
+        PollFd::from_borrowed_fd(first, PollFlags::IN),
+        PollFd::from_borrowed_fd(second.unwrap_or(first), PollFlags::IN),
     ];
     match poll(&mut fds, timeout.as_ref()) {
-        Ok(_) => Ok([0, 1].map(|at| !fds[at].revents().is_empty())),
+        Ok(_) => {
+            let [stop, first, second] = fds.map(|fd| !fd.revents().is_empty());
+            Ok([first || second, stop])
+        }
         Err(Errno::INTR) => Ok([false; 2]),
         Err(error) => Err(SimError::Wait(error.into())),
     }

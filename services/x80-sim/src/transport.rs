@@ -1,72 +1,91 @@
-//! How bytes reach the robot: a UDP socket.
+//! How bytes reach the robot: datagrams, a connection or a serial line.
 
-use std::{
-    io::ErrorKind,
-    net::{SocketAddr, UdpSocket},
-    os::fd::{AsFd, BorrowedFd},
-};
+mod pty;
+mod tcp;
+mod udp;
 
-use crate::shell::SimError;
+use std::{io, net::SocketAddr, os::fd::BorrowedFd};
+
+use crate::shell::{SimError, Transport};
 
 /// Who bytes came from.
-pub(crate) type Source = SocketAddr;
-
-/// An open way to the robot.
-#[derive(Debug)]
-pub(crate) struct Udp {
-    socket: UdpSocket,
-    address: SocketAddr,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// A peer that sends datagrams.
+    Peer(SocketAddr),
+    /// The connection with this number.
+    Connection(u64),
+    /// Whoever is at the other end of the line.
+    Line,
 }
 
-impl Udp {
-    /// Listen on `address`; port 0 takes a free one.
-    pub(crate) fn bind(address: SocketAddr) -> Result<Self, SimError> {
+/// An open way to the robot. What cannot be sent on it is lost, as on a radio.
+#[derive(Debug)]
+pub(crate) enum Way {
+    Udp(udp::Udp),
+    Tcp(tcp::Tcp),
+    Pty(pty::Pty),
+}
+
+impl Way {
+    /// Open the way that `transport` says, at `address` where it has one.
+    pub(crate) fn open(transport: Transport, address: SocketAddr) -> Result<Self, SimError> {
         let bound = |source| SimError::Bind { address, source };
-        let socket = UdpSocket::bind(address).map_err(bound)?;
-        socket.set_nonblocking(true).map_err(bound)?;
-        let address = socket.local_addr().map_err(bound)?;
-        Ok(Self { socket, address })
-    }
-
-    /// Where it listens.
-    pub(crate) fn address(&self) -> String {
-        self.address.to_string()
-    }
-
-    /// What becomes readable when bytes have come.
-    pub(crate) fn readable(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
-    }
-
-    /// The next datagram, if one has come.
-    pub(crate) fn receive<'b>(
-        &self,
-        buffer: &'b mut [u8],
-    ) -> Result<Option<(Source, &'b [u8])>, SimError> {
-        loop {
-            match self.socket.recv_from(buffer) {
-                Ok((length, from)) => return Ok(Some((from, &buffer[..length]))),
-                Err(error) => match error.kind() {
-                    ErrorKind::WouldBlock => return Ok(None),
-                    // An answer to a peer that has gone comes back as an error of ours.
-                    ErrorKind::Interrupted
-                    | ErrorKind::ConnectionRefused
-                    | ErrorKind::ConnectionReset => {}
-                    _ => {
-                        return Err(SimError::Lost {
-                            address: self.address(),
-                            source: error,
-                        });
-                    }
-                },
-            }
+        match transport {
+            Transport::Udp => udp::Udp::bind(address).map(Self::Udp).map_err(bound),
+            Transport::Tcp => tcp::Tcp::bind(address).map(Self::Tcp).map_err(bound),
+            Transport::Pty => pty::Pty::open().map(Self::Pty).map_err(SimError::Line),
         }
     }
 
-    /// Send one datagram. What cannot be sent is lost, as on a radio.
-    pub(crate) fn send(&self, to: Source, bytes: &[u8]) {
-        if let Err(error) = self.socket.send_to(bytes, to) {
-            tracing::debug!(%to, %error, "a datagram is lost");
+    /// Where it listens: `address:port`, or the path of the line.
+    pub(crate) fn address(&self) -> String {
+        match self {
+            Self::Udp(udp) => udp.address().to_string(),
+            Self::Tcp(tcp) => tcp.address().to_string(),
+            Self::Pty(pty) => pty.path().to_owned(),
+        }
+    }
+
+    /// What becomes readable when something has come; the second only where there are two.
+    pub(crate) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+        match self {
+            Self::Udp(udp) => (udp.readable(), None),
+            Self::Tcp(tcp) => tcp.readable(),
+            Self::Pty(pty) => (pty.readable(), None),
+        }
+    }
+
+    /// The next bytes, if any have come.
+    pub(crate) fn receive<'b>(
+        &mut self,
+        buffer: &'b mut [u8],
+    ) -> Result<Option<(Source, &'b [u8])>, SimError> {
+        let received = match self {
+            Self::Udp(udp) => udp.receive(buffer),
+            Self::Tcp(tcp) => tcp.receive(buffer),
+            Self::Pty(pty) => pty.receive(buffer),
+        };
+        match received {
+            Ok(Some((source, length))) => Ok(buffer.get(..length).map(|bytes| (source, bytes))),
+            Ok(None) => Ok(None),
+            Err(source) => Err(SimError::Lost {
+                address: self.address(),
+                source,
+            }),
+        }
+    }
+
+    /// Send `bytes` to `to`, if it is still there.
+    pub(crate) fn send(&mut self, to: Source, bytes: &[u8]) {
+        let sent = match (self, to) {
+            (Self::Udp(udp), Source::Peer(peer)) => udp.send(peer, bytes),
+            (Self::Tcp(tcp), Source::Connection(number)) => tcp.send(number, bytes),
+            (Self::Pty(pty), Source::Line) => pty.send(bytes),
+            _ => Err(io::ErrorKind::NotConnected.into()),
+        };
+        if let Err(error) = sent {
+            tracing::debug!(?to, %error, "bytes to the host are lost");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Robot, socket and truth together: what is done with a datagram, and with a tick.
+//! Robot, radio, transport and truth together: what is done with bytes, and with a tick.
 
 use std::{io::Write, os::fd::BorrowedFd};
 
@@ -8,21 +8,32 @@ use common::{
     truth::TruthHeader,
     wire::{Decoder, Frame},
 };
-
 use serde::Serialize;
 
 use super::SimError;
 use crate::{
+    radio::Radio,
     robot::{Heard, Robot},
-    transport::{Source, Udp},
+    transport::{Source, Way},
 };
 
-/// A robot on a socket.
+/// Which way a datagram goes through the radio.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Leg {
+    ToRobot(Source),
+    ToHost(Source),
+}
+
+/// A robot that is spoken to.
 pub(super) struct Session {
     robot: Robot,
     /// Whether time waits for commands.
     lock_step: bool,
-    socket: Udp,
+    /// In lock-step: the frames of the last tick were lost, so nobody will send the next command.
+    unheard: bool,
+    way: Way,
+    /// None where it is perfect.
+    radio: Option<Radio<Leg>>,
     /// Whoever sent the last valid frame: all streams go there.
     peer: Option<Source>,
     /// The peer's and one other's: half a frame of the one must not garble the other's.
@@ -41,62 +52,116 @@ impl Session {
     pub(super) fn new(
         mission: &Mission,
         pace: Pace,
-        socket: Udp,
+        way: Way,
         truth: Option<Box<dyn Write + Send>>,
     ) -> Self {
-        let listening = socket.address();
+        let listening = way.address();
+        let radio = Radio::new(mission.simulation.physics().radio, mission.seed);
         let mut session = Self {
             robot: Robot::new(mission),
             lock_step: pace == Pace::Max,
-            socket,
+            unheard: false,
+            way,
+            radio: Some(radio).filter(|radio| !radio.is_perfect()),
             peer: None,
             ears: Vec::new(),
             truth,
         };
         session.tell(&TruthHeader { listening });
-        let truth = session.robot.truth();
-        session.tell(&truth);
+        session.tell_tick();
         session
     }
 
+    /// What becomes readable when bytes have come.
+    pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+        self.way.readable()
+    }
+
+    /// Mission time of the next tick, seconds.
     pub(super) fn next_tick_s(&self) -> f64 {
         self.robot.next_tick_s()
     }
 
-    pub(super) fn readable(&self) -> BorrowedFd<'_> {
-        self.socket.readable()
+    /// Mission time at which something happens by itself next, seconds.
+    pub(super) fn next_due_s(&self) -> f64 {
+        let flight = self.radio.as_ref().and_then(Radio::next_due);
+        flight.map_or(self.next_tick_s(), |due| due.min(self.next_tick_s()))
     }
 
-    /// Take up to `most` datagrams; `now` tells mission time where a clock makes it.
-    pub(super) fn listen_to(
+    /// Whether time moves on although no command has come: in lock-step, when no frame got through.
+    pub(super) fn moves_alone(&self) -> bool {
+        self.unheard
+    }
+
+    /// Take up to `most` pieces of what has come; `now` tells mission time where a clock makes it.
+    pub(super) fn listen(
         &mut self,
         buffer: &mut [u8],
         most: usize,
         now: impl Fn() -> Option<f64>,
     ) -> Result<(), SimError> {
         for _ in 0..most {
-            let Some((source, bytes)) = self.socket.receive(buffer)? else {
+            let Some((source, bytes)) = self.way.receive(buffer)? else {
                 return Ok(());
             };
             if let Some(now) = now() {
-                self.robot.advance_to(now.min(self.robot.next_tick_s()));
+                self.pass(now);
+                let now = self.robot.time_s();
+                if let Some(radio) = &mut self.radio {
+                    radio.send(now, Leg::ToRobot(source), bytes);
+                    continue;
+                }
             }
             self.hear(source, bytes);
+            if self.unheard {
+                return Ok(());
+            }
         }
         Ok(())
+    }
+
+    /// Let everything happen that is due by mission time `now`, in its order.
+    pub(super) fn pass(&mut self, now: f64) {
+        // More than a period is not caught up: the shell lets the clock wait for it.
+        let now = now.min(self.next_tick_s() + self.robot.period_s());
+        loop {
+            let due = self.next_due_s();
+            if due > now {
+                break;
+            }
+            let arrived = self.radio.as_mut().and_then(|radio| radio.arrived(due));
+            self.robot.advance_to(due.min(self.next_tick_s()));
+            match arrived {
+                Some((Leg::ToRobot(source), bytes)) => self.hear(source, &bytes),
+                Some((Leg::ToHost(source), bytes)) => self.way.send(source, &bytes),
+                None => self.tick(),
+            }
+        }
+        self.robot.advance_to(now.min(self.next_tick_s()));
     }
 
     /// Pass mission time to the next tick, tell the truth of it, and send its frames.
     pub(super) fn tick(&mut self) {
         self.robot.advance_to_next_tick();
-        let truth = self.robot.truth();
-        self.tell(&truth);
+        self.tell_tick();
         let mut frames = Vec::with_capacity(256);
         self.robot.stream(&mut frames);
-        self.send(&frames);
+        if !self.lock_step {
+            self.send(&frames);
+            return;
+        }
+        let now = self.robot.time_s();
+        self.unheard = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
+        if !self.unheard {
+            let (first, second) = match &mut self.radio {
+                Some(radio) => radio.split(frames),
+                None => (frames, Vec::new()),
+            };
+            self.deliver(&first);
+            self.deliver(&second);
+        }
     }
 
-    /// Take the bytes of one datagram.
     fn hear(&mut self, source: Source, bytes: &[u8]) {
         let known = self.ears.iter().position(|ear| ear.source == source);
         let mut ear = known.map_or_else(
@@ -122,27 +187,70 @@ impl Session {
 
     fn on_frame(&mut self, source: Source, frame: &Frame<'_>) {
         let mut answer = Vec::with_capacity(16);
-        let heard = self.robot.on_frame(frame, &mut answer);
-        if heard == Heard::Stranger {
+        if !self.lock_step {
+            if self.robot.on_frame(frame, &mut answer) != Heard::Stranger {
+                self.peer = Some(source);
+                self.send(&answer);
+            }
             return;
         }
-        self.peer = Some(source);
-        self.send(&answer);
-        match heard {
-            Heard::Motion if self.lock_step => self.tick(),
-            Heard::Ping if self.lock_step => {
+        match Robot::kind(frame) {
+            Heard::Stranger => {}
+            // The radio may lose the command or make it late; the period passes all the same.
+            Heard::Motion => {
+                self.peer = Some(source);
+                let now = self.robot.time_s();
+                let lost = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
+                if !lost {
+                    if let Some(radio) = &mut self.radio {
+                        let both_ways = radio.delay() + radio.delay();
+                        self.robot
+                            .advance_to((now + both_ways).min(self.next_tick_s()));
+                    }
+                    self.robot.on_frame(frame, &mut answer);
+                    self.deliver(&answer);
+                }
+                self.tick();
+            }
+            Heard::Ping => {
+                self.peer = Some(source);
+                self.robot.on_frame(frame, &mut answer);
+                self.deliver(&answer);
                 let mut frames = Vec::with_capacity(256);
                 self.robot.repeat(&mut frames);
-                self.send(&frames);
+                self.deliver(&frames);
             }
-            _ => {}
+            Heard::Ack | Heard::Other => {
+                self.peer = Some(source);
+                self.robot.on_frame(frame, &mut answer);
+                self.deliver(&answer);
+            }
         }
     }
 
-    fn send(&self, bytes: &[u8]) {
-        if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
-            self.socket.send(peer, bytes);
+    /// Send to the peer over the radio.
+    fn send(&mut self, bytes: &[u8]) {
+        let now = self.robot.time_s();
+        match (&mut self.radio, self.peer) {
+            (Some(radio), Some(peer)) if !bytes.is_empty() => {
+                radio.send(now, Leg::ToHost(peer), bytes);
+            }
+            _ => self.deliver(bytes),
         }
+    }
+
+    /// Hand to the peer what has come through.
+    fn deliver(&mut self, bytes: &[u8]) {
+        if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
+            self.way.send(peer, bytes);
+        }
+    }
+
+    fn tell_tick(&mut self) {
+        let mut truth = self.robot.truth();
+        let now = truth.time_s;
+        truth.radio = self.radio.as_mut().map(|radio| radio.truth(now));
+        self.tell(&truth);
     }
 
     /// Write one line of truth; when nobody reads it any more, no further ones.

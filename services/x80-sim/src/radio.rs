@@ -1,0 +1,259 @@
+//! The radio between host and robot: good or out in turns, late, and careless with datagrams.
+//!
+//! Whatever it does is drawn from one seeded stream, so a run can be had again; what it did is told
+//! in the truth.
+
+use std::collections::VecDeque;
+
+use common::{mission, truth::TruthRadio};
+
+use crate::noise::{Noise, Source};
+
+/// Datagrams under way at most; further ones are lost.
+const MOST_IN_FLIGHT: usize = 1024;
+/// A datagram that waits for the next one to go behind it, or with it, waits no longer than this, seconds.
+const LONGEST_HOLD_S: f64 = 0.5;
+
+/// Good and out in turns, each for an exponentially distributed time.
+#[derive(Clone, Debug)]
+struct Fading {
+    mean_good: f64,
+    mean_out: f64,
+    longest: f64,
+    out: bool,
+    since: f64,
+    until: f64,
+    longest_seen: f64,
+}
+
+impl Fading {
+    fn new(radio: &mission::Radio, noise: &mut Noise) -> Self {
+        let (mean, longest) = (radio.outage_mean_s, radio.outage_max_s);
+        // Cutting the longest outages short makes their mean shorter; the share must stay.
+        let cut_mean = mean * (1.0 - (-longest / mean).exp());
+        let share = radio.outage_share;
+        let mean_good = if share > 0.0 {
+            cut_mean * (1.0 - share) / share
+        } else {
+            f64::INFINITY
+        };
+        let mut fading = Self {
+            mean_good,
+            mean_out: mean,
+            longest,
+            out: false,
+            since: 0.0,
+            until: f64::INFINITY,
+            longest_seen: 0.0,
+        };
+        if mean_good.is_finite() {
+            fading.until = noise.exponential(mean_good);
+        }
+        fading
+    }
+
+    /// Whether it is out at mission time `now`, which must not go back.
+    fn is_out(&mut self, now: f64, noise: &mut Noise) -> bool {
+        while now >= self.until {
+            self.out = !self.out;
+            self.since = self.until;
+            self.until += if self.out {
+                // A floor, or a mean of nothing would never let time pass.
+                noise
+                    .exponential(self.mean_out)
+                    .clamp(1e-3, self.longest.max(1e-3))
+            } else {
+                noise.exponential(self.mean_good).max(1e-3)
+            };
+            if self.out && self.until <= now {
+                self.longest_seen = self.longest_seen.max(self.until - self.since);
+            }
+        }
+        if self.out {
+            self.longest_seen = self.longest_seen.max(now - self.since);
+        }
+        self.out
+    }
+}
+
+/// A datagram under way.
+#[derive(Clone, Debug)]
+struct Flight<W> {
+    due: f64,
+    way: W,
+    bytes: Vec<u8>,
+    held: Option<Hold>,
+}
+
+/// What a datagram waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hold {
+    /// To arrive behind the next.
+    Behind,
+    /// To arrive joined to the next.
+    Joined,
+}
+
+/// The radio. `W` says which way a datagram goes, and from or to whom.
+#[derive(Clone, Debug)]
+pub struct Radio<W> {
+    settings: mission::Radio,
+    noise: Noise,
+    fading: Fading,
+    /// In order of arrival.
+    in_flight: VecDeque<Flight<W>>,
+    sent: u64,
+    lost: u64,
+}
+
+impl<W: Copy + PartialEq> Radio<W> {
+    /// The radio of the run with `seed`.
+    #[must_use]
+    pub fn new(settings: mission::Radio, seed: u64) -> Self {
+        let mut noise = Noise::new(seed, Source::Radio);
+        Self {
+            fading: Fading::new(&settings, &mut noise),
+            settings,
+            noise,
+            in_flight: VecDeque::new(),
+            sent: 0,
+            lost: 0,
+        }
+    }
+
+    /// Whether it does nothing at all to datagrams.
+    #[must_use]
+    pub fn is_perfect(&self) -> bool {
+        let radio = &self.settings;
+        [
+            radio.outage_share,
+            radio.loss_share,
+            radio.delay_s,
+            radio.jitter_s,
+            radio.duplicate_share,
+            radio.reorder_share,
+            radio.split_share,
+            radio.merge_share,
+        ]
+        .iter()
+        .all(|share| *share == 0.0)
+    }
+
+    /// Whether a datagram sent at mission time `now` is lost. It counts as sent.
+    pub fn loses(&mut self, now: f64) -> bool {
+        self.sent += 1;
+        let out = self.fading.is_out(now, &mut self.noise);
+        let lost = self.noise.chance(self.settings.loss_share) || out;
+        self.lost += u64::from(lost);
+        lost
+    }
+
+    /// How long a datagram takes, seconds.
+    pub fn delay(&mut self) -> f64 {
+        self.settings.delay_s + self.noise.exponential(self.settings.jitter_s)
+    }
+
+    /// Cut `bytes` in two where the radio does.
+    pub fn split(&mut self, bytes: Vec<u8>) -> (Vec<u8>, Vec<u8>) {
+        let mut first = bytes;
+        if first.len() < 2 || !self.noise.chance(self.settings.split_share) {
+            return (first, Vec::new());
+        }
+        let inner = (first.len() - 1) as f64;
+        let second = first.split_off(1 + (self.noise.uniform() * inner) as usize);
+        (first, second)
+    }
+
+    /// Send `bytes` on their `way` at mission time `now`.
+    pub fn send(&mut self, now: f64, way: W, bytes: &[u8]) {
+        if self.loses(now) {
+            return;
+        }
+        let copies = 1 + usize::from(self.noise.chance(self.settings.duplicate_share));
+        for _ in 0..copies {
+            self.dispatch(now, way, bytes.to_vec());
+        }
+    }
+
+    fn dispatch(&mut self, now: f64, way: W, bytes: Vec<u8>) {
+        // Datagrams keep their order but where they are put out of it.
+        let same_way = self.in_flight.iter().filter(|flight| flight.way == way);
+        let before = same_way
+            .filter(|flight| flight.held.is_none())
+            .map(|flight| flight.due)
+            .fold(now, f64::max);
+        let due = (now + self.delay()).max(before);
+        let held = if self.noise.chance(self.settings.reorder_share) {
+            Some(Hold::Behind)
+        } else if self.noise.chance(self.settings.merge_share) {
+            Some(Hold::Joined)
+        } else {
+            None
+        };
+        let waiting = self
+            .in_flight
+            .iter()
+            .position(|flight| flight.way == way && flight.held.is_some())
+            .and_then(|at| self.in_flight.remove(at));
+        let (bytes, behind) = match waiting {
+            Some(Flight {
+                held: Some(Hold::Joined),
+                bytes: mut first,
+                ..
+            }) => {
+                first.extend(bytes);
+                (first, None)
+            }
+            Some(flight) => (bytes, Some(flight.bytes)),
+            None => (bytes, None),
+        };
+        let (first, second) = self.split(bytes);
+        let hold = if held.is_some() { LONGEST_HOLD_S } else { 0.0 };
+        self.put(due + hold, way, first, held);
+        self.put(due + hold, way, second, None);
+        self.put(due + hold, way, behind.unwrap_or_default(), None);
+    }
+
+    fn put(&mut self, due: f64, way: W, bytes: Vec<u8>, held: Option<Hold>) {
+        if bytes.is_empty() {
+            return;
+        }
+        if self.in_flight.len() >= MOST_IN_FLIGHT {
+            self.lost += 1;
+            return;
+        }
+        let at = self.in_flight.partition_point(|flight| flight.due <= due);
+        let flight = Flight {
+            due,
+            way,
+            bytes,
+            held,
+        };
+        self.in_flight.insert(at, flight);
+    }
+
+    /// When the next datagram arrives, mission time.
+    #[must_use]
+    pub fn next_due(&self) -> Option<f64> {
+        self.in_flight.front().map(|flight| flight.due)
+    }
+
+    /// The next datagram that has arrived by mission time `now`.
+    pub fn arrived(&mut self, now: f64) -> Option<(W, Vec<u8>)> {
+        let flight = self.in_flight.pop_front_if(|flight| flight.due <= now)?;
+        Some((flight.way, flight.bytes))
+    }
+
+    /// What it has done until mission time `now`.
+    pub fn truth(&mut self, now: f64) -> TruthRadio {
+        TruthRadio {
+            out: self.fading.is_out(now, &mut self.noise),
+            sent: self.sent,
+            lost: self.lost,
+            longest_outage_s: self.fading.longest_seen,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

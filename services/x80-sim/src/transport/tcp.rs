@@ -1,0 +1,91 @@
+//! A connection: one host at a time, and the newest is the one.
+
+use std::{
+    io::{self, ErrorKind, Read, Write},
+    net::{SocketAddr, TcpListener, TcpStream},
+    os::fd::{AsFd, BorrowedFd},
+};
+
+use super::Source;
+
+#[derive(Debug)]
+pub(crate) struct Tcp {
+    listener: TcpListener,
+    address: SocketAddr,
+    connection: Option<TcpStream>,
+    /// How many have been accepted: the number of the one that is open.
+    accepted: u64,
+}
+
+impl Tcp {
+    pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self {
+            address: listener.local_addr()?,
+            listener,
+            connection: None,
+            accepted: 0,
+        })
+    }
+
+    pub(super) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+        let connection = self.connection.as_ref().map(AsFd::as_fd);
+        (self.listener.as_fd(), connection)
+    }
+
+    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+        self.accept()?;
+        let Some(connection) = &mut self.connection else {
+            return Ok(None);
+        };
+        match connection.read(buffer) {
+            Ok(0) => {
+                self.connection = None;
+                Ok(None)
+            }
+            Ok(length) => Ok(Some((Source::Connection(self.accepted), length))),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(None),
+            Err(error) if error.kind() == ErrorKind::Interrupted => Ok(None),
+            // A host that vanished is no fault of the robot's.
+            Err(_) => {
+                self.connection = None;
+                Ok(None)
+            }
+        }
+    }
+
+    fn accept(&mut self) -> io::Result<()> {
+        match self.listener.accept() {
+            Ok((connection, _)) => {
+                connection.set_nonblocking(true)?;
+                connection.set_nodelay(true)?;
+                self.accepted += 1;
+                self.connection = Some(connection);
+                Ok(())
+            }
+            Err(error) => match error.kind() {
+                ErrorKind::WouldBlock | ErrorKind::Interrupted | ErrorKind::ConnectionAborted => {
+                    Ok(())
+                }
+                _ => Err(error),
+            },
+        }
+    }
+
+    /// A host that does not read is hung up on: half a frame would garble all that follow.
+    pub(super) fn send(&mut self, number: u64, bytes: &[u8]) -> io::Result<()> {
+        let Some(connection) = self.connection.as_mut().filter(|_| number == self.accepted) else {
+            return Err(ErrorKind::NotConnected.into());
+        };
+        let sent = connection.write_all(bytes);
+        if sent.is_err() {
+            self.connection = None;
+        }
+        sent
+    }
+}

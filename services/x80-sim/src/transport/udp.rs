@@ -1,0 +1,52 @@
+//! Datagrams.
+
+use std::{
+    io::{self, ErrorKind},
+    net::{SocketAddr, UdpSocket},
+    os::fd::{AsFd, BorrowedFd},
+};
+
+use super::Source;
+
+#[derive(Debug)]
+pub(crate) struct Udp {
+    socket: UdpSocket,
+    address: SocketAddr,
+}
+
+impl Udp {
+    pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
+        let socket = UdpSocket::bind(address)?;
+        socket.set_nonblocking(true)?;
+        let address = socket.local_addr()?;
+        Ok(Self { socket, address })
+    }
+
+    pub(super) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    pub(super) fn readable(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+
+    pub(super) fn receive(&self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+        loop {
+            match self.socket.recv_from(buffer) {
+                Ok((length, from)) => return Ok(Some((Source::Peer(from), length))),
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock => return Ok(None),
+                    // An answer to a peer that has gone comes back as an error of ours.
+                    ErrorKind::Interrupted
+                    | ErrorKind::ConnectionRefused
+                    | ErrorKind::ConnectionReset => {}
+                    _ => return Err(error),
+                },
+            }
+        }
+    }
+
+    pub(super) fn send(&self, to: SocketAddr, bytes: &[u8]) -> io::Result<()> {
+        self.socket.send_to(bytes, to).map(drop)
+    }
+}
