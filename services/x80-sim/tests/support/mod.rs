@@ -10,9 +10,10 @@
 
 use std::{
     io::{BufRead, BufReader},
-    net::{Shutdown, SocketAddr, UdpSocket},
+    net::{SocketAddr, UdpSocket},
     os::unix::net::UnixStream,
     path::Path,
+    sync::mpsc::{Receiver, channel},
     thread::JoinHandle,
     time::Duration,
 };
@@ -35,7 +36,8 @@ pub(crate) fn mission(text: &str) -> Mission {
 /// A running simulated robot; dropping it stops it.
 pub(crate) struct Sim {
     pub(crate) listening: String,
-    truth: BufReader<UnixStream>,
+    /// Lines of truth, read as they come: a robot waits for a reader that is slow.
+    truth: Receiver<String>,
     stop: Option<UnixStream>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
 }
@@ -56,11 +58,15 @@ impl Sim {
             truth: Some(Box::new(truth_writer)),
         };
         let thread = std::thread::spawn(move || run(options, stopped));
-        truth_reader.set_read_timeout(Some(PATIENCE)).unwrap();
-        let mut truth = BufReader::new(truth_reader);
-        let mut line = String::new();
-        truth.read_line(&mut line).unwrap();
-        let header: TruthHeader = serde_json::from_str(&line).unwrap();
+        let (line, truth) = channel();
+        std::thread::spawn(move || {
+            for read in BufReader::new(truth_reader).lines() {
+                if line.send(read.unwrap()).is_err() {
+                    return;
+                }
+            }
+        });
+        let header: TruthHeader = serde_json::from_str(&truth.recv().unwrap()).unwrap();
         Self {
             listening: header.listening,
             truth,
@@ -71,9 +77,19 @@ impl Sim {
 
     /// The truth of the next tick.
     pub(crate) fn next_truth(&mut self) -> TruthTick {
-        let mut line = String::new();
-        self.truth.read_line(&mut line).unwrap();
-        serde_json::from_str(&line).unwrap()
+        serde_json::from_str(&self.truth.recv_timeout(PATIENCE).unwrap()).unwrap()
+    }
+
+    /// Stop it; what it has told stays to be read.
+    pub(crate) fn finish(&mut self) {
+        drop(self.stop.take());
+        self.thread.take().unwrap().join().unwrap().unwrap();
+    }
+
+    /// The truth of the next tick of a robot that has finished.
+    pub(crate) fn last_truth(&mut self) -> Option<TruthTick> {
+        let line = self.truth.recv().ok()?;
+        Some(serde_json::from_str(&line).unwrap())
     }
 
     /// A host's socket that speaks to this robot alone.
@@ -86,20 +102,14 @@ impl Sim {
 
     /// Stop it and see how it ended.
     pub(crate) fn stop(mut self) -> Result<(), SimError> {
-        self.ask_to_stop();
-        self.thread.take().unwrap().join().unwrap()
-    }
-
-    fn ask_to_stop(&mut self) {
-        // A robot whose truth is not read waits for its reader.
-        let _ = self.truth.get_ref().shutdown(Shutdown::Both);
         drop(self.stop.take());
+        self.thread.take().unwrap().join().unwrap()
     }
 }
 
 impl Drop for Sim {
     fn drop(&mut self) {
-        self.ask_to_stop();
+        drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }

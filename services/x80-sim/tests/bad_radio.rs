@@ -1,0 +1,129 @@
+//! A whole simulated robot behind a bad radio.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests may stop at the first broken promise too"
+)]
+
+mod support;
+
+use common::{
+    clock::Pace,
+    truth::TruthTick,
+    wire::{Addressing, Command, Decoder, Report},
+};
+use support::{Sim, receive};
+
+fn forward(counts: i16) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    Command::velocity([Some(-counts), Some(counts)], 150).encode(Addressing::Numbered, &mut bytes);
+    bytes
+}
+
+/// Drive for `rounds` commands in lock-step: every byte that came, and the truth of every tick.
+fn lock_step(mission: &str, rounds: usize) -> (Vec<u8>, Vec<TruthTick>) {
+    let mut sim = Sim::start(mission, Pace::Max);
+    let host = sim.host();
+    let mut bytes = Vec::new();
+    let mut motor_frames = 0;
+    let mut decoder = Decoder::default();
+    for _ in 0..rounds {
+        host.send(&forward(400)).unwrap();
+        let before = motor_frames;
+        while motor_frames == before {
+            let datagram = receive(&host);
+            decoder.push(&datagram);
+            bytes.extend(datagram);
+            while let Some(frame) = decoder.next_frame() {
+                motor_frames += usize::from(matches!(Report::parse(&frame), Ok(Report::Motor(_))));
+            }
+        }
+    }
+    // The truth of the tick whose frames came last was written before they were sent.
+    sim.finish();
+    (bytes, std::iter::from_fn(|| sim.last_truth()).collect())
+}
+
+const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[simulation.radio]\noutage_share = 0.5\noutage_mean_s = 0.7\nsplit_share = 0.2\ndelay_s = 0.005\njitter_s = 0.003";
+
+#[test]
+fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
+    let (bytes, truth) = lock_step(OUT_HALF_THE_TIME, 400);
+    let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, 400);
+    assert!(
+        bytes == again && truth == truth_again,
+        "the same seed gave another run"
+    );
+    assert!(truth.len() > 600, "400 commands and {} ticks", truth.len());
+    let radio = truth.last().unwrap().radio.unwrap();
+    assert!(
+        radio.lost > 200 && radio.longest_outage_s > 0.5,
+        "{radio:?}"
+    );
+    let numbers: Vec<u64> = truth.iter().map(|tick| tick.tick).collect();
+    assert_eq!(numbers, (0..truth.len() as u64).collect::<Vec<_>>());
+}
+
+#[test]
+fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
+    let own_limits = [
+        "",
+        "\n[simulation]\nignores_time = true\nstops_when_silent_s = 0.15",
+    ];
+    for own in own_limits {
+        let radio =
+            OUT_HALF_THE_TIME.replace("[simulation.radio]", &format!("{own}\n[simulation.radio]"));
+        let (_, truth) = lock_step(&radio, 400);
+        let mut out_since = None;
+        let mut outages_at_rest = 0;
+        for tick in &truth {
+            if !tick.radio.unwrap().out {
+                out_since = None;
+                continue;
+            }
+            let since = *out_since.get_or_insert(tick.time_s);
+            // A command that came just before the outage lasts 0.15 s, the loop's lag 0.26 s more.
+            if tick.time_s - since > 0.15 + 0.3 {
+                outages_at_rest += 1;
+                assert_eq!(tick.v, 0.0, "it still moves: {tick:?}");
+            }
+        }
+        assert!(
+            outages_at_rest > 5,
+            "only {outages_at_rest} ticks of long outages"
+        );
+    }
+}
+
+#[test]
+fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
+    let mut sim = Sim::start(
+        "robot.rate_hz = 50\n[simulation.radio]\nloss_share = 0.1\ndelay_s = 0.02\njitter_s = 0.02\nduplicate_share = 0.1\nreorder_share = 0.1\nsplit_share = 0.1\nmerge_share = 0.1",
+        Pace::Rate(5.0),
+    );
+    let host = sim.host();
+    let mut decoder = Decoder::default();
+    let mut motor_frames = 0;
+    while motor_frames < 100 {
+        // Until one of them comes through there is no peer, and nothing is sent.
+        host.set_read_timeout(Some(std::time::Duration::from_millis(20)))
+            .unwrap();
+        host.send(&forward(0)).unwrap();
+        let mut buffer = [0; 4096];
+        let Ok(length) = host.recv(&mut buffer) else {
+            continue;
+        };
+        decoder.push(&buffer[..length]);
+        while let Some(frame) = decoder.next_frame() {
+            let report = Report::parse(&frame).expect("a frame that is sound is a report");
+            motor_frames += usize::from(matches!(report, Report::Motor(_)));
+        }
+    }
+    // A frame that is split and put out of order is lost to its reader; most are not.
+    sim.finish();
+    let last = std::iter::from_fn(|| sim.last_truth()).last().unwrap();
+    assert!(last.tick < 400, "100 motor frames of {} ticks", last.tick);
+    assert!(last.radio.unwrap().lost > 0);
+}
