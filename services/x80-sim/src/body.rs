@@ -40,22 +40,25 @@ pub struct Body {
     track: f64,
     radius: f64,
     pose: Pose2,
+    clearance: f64,
     touching: bool,
     contacts: u64,
 }
 
 impl Body {
-    /// The body of `mission`'s robot at its start.
+    /// The body of `mission`'s robot at its start in `world`.
     #[must_use]
-    pub fn new(mission: &Mission) -> Self {
+    pub fn new(mission: &Mission, world: &World) -> Self {
         let body = mission.body();
+        let pose = mission.start_pose();
         let top = body.top_speed_m_s / body.wheel_radius_m;
         Self {
             drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, top),
             wheel_radius: body.wheel_radius_m,
             track: body.track_m,
             radius: body.radius_m,
-            pose: mission.start_pose(),
+            pose,
+            clearance: world.clearance(pose.position) - body.radius_m,
             touching: false,
             contacts: 0,
         }
@@ -85,10 +88,10 @@ impl Body {
         self.contacts
     }
 
-    /// From its surface to the nearest thing, metres.
+    /// From its surface to the nearest thing, metres, where it came to stand last.
     #[must_use]
-    pub fn clearance(&self, world: &World) -> f64 {
-        world.clearance(self.pose.position) - self.radius
+    pub fn clearance(&self) -> f64 {
+        self.clearance
     }
 
     /// Move as the wheels ask, in metres of ground, and no farther than `world` lets it: it slides along
@@ -103,7 +106,7 @@ impl Body {
         let before = self.pose;
         self.pose = before.along_arc(step.v, step.omega);
         let touched = self.leave_things(before.position, world);
-        let clear = self.clearance(world) > RELEASE_M;
+        let clear = self.clearance > RELEASE_M;
         self.contacts += u64::from(touched && !self.touching);
         self.touching = touched || (self.touching && !clear);
         if !touched {
@@ -123,11 +126,12 @@ impl Body {
     fn leave_things(&mut self, before: DVec2, world: &World) -> bool {
         for push in 0..PUSHES {
             let position = self.pose.position;
-            let deepest = world
+            let nearest = world
                 .surfaces()
                 .map(|surface| (surface.distance(position) - self.radius, surface))
                 .min_by(|(a, _), (b, _)| a.total_cmp(b));
-            let Some((gap, surface)) = deepest.filter(|(gap, _)| *gap < 0.0) else {
+            self.clearance = nearest.map_or(f64::INFINITY, |(gap, _)| gap);
+            let Some((gap, surface)) = nearest.filter(|(gap, _)| *gap < 0.0) else {
                 return push > 0;
             };
             let Some(outward) = surface.outward(position) else {
@@ -136,8 +140,10 @@ impl Body {
             // A hair more than needed, or rounding would find it penetrating for ever.
             self.pose.position += outward * (1e-9 - gap);
         }
-        if self.clearance(world) < 0.0 {
+        self.clearance = world.clearance(self.pose.position) - self.radius;
+        if self.clearance < 0.0 {
             self.pose.position = before;
+            self.clearance = world.clearance(before) - self.radius;
         }
         true
     }
@@ -151,7 +157,10 @@ mod tests {
     fn at_start(text: &str) -> (Body, World) {
         let text = format!("target = [0, -5]\n{text}");
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        (Body::new(&mission), World::new(&mission))
+        (
+            Body::new(&mission, &World::new(&mission)),
+            World::new(&mission),
+        )
     }
 
     fn both(metres: f64) -> Wheels<f64> {
@@ -182,7 +191,7 @@ mod tests {
         let mut rolled = 0.0;
         for _ in 0..400 {
             rolled += body.roll(both(0.005), &world).left;
-            assert!(body.clearance(&world) >= 0.0, "it went into the wall");
+            assert!(body.clearance() >= 0.0, "it went into the wall");
         }
         assert!((body.pose().position.x - 0.81).abs() < 1e-6);
         assert!((rolled - 0.81).abs() < 1e-6, "the wheels went {rolled} m");
@@ -201,7 +210,7 @@ mod tests {
         let (mut body, world) = at_start("world.wall = [{ points = [[0.3, -1], [2.3, 1]] }]");
         for _ in 0..600 {
             body.roll(both(0.005), &world);
-            assert!(body.clearance(&world) >= 0.0, "it went into the wall");
+            assert!(body.clearance() >= 0.0, "it went into the wall");
         }
         assert!(body.pose().position.y > 0.1, "it slid to {:?}", body.pose());
         assert_eq!(body.contacts(), 1);
@@ -213,7 +222,7 @@ mod tests {
             at_start("world.wall = [{ points = [[0.2, -1.5], [1.2, 0], [0.2, 1.5]] }]");
         for _ in 0..600 {
             body.roll(both(0.005), &world);
-            assert!(body.clearance(&world) >= 0.0, "it went into the corner");
+            assert!(body.clearance() >= 0.0, "it went into the corner");
         }
         assert!(body.pose().position.x < 1.0);
     }

@@ -222,11 +222,13 @@ impl Motor {
         counts + jitter * dt
     }
 
-    /// The wheel has really turned by `counts` in `dt` seconds.
+    /// The wheel has really turned by `counts` in `dt` seconds. One whose body is `held` loses the speed
+    /// it could not turn with; a push gives it none.
     pub fn turn(&mut self, counts: f64, dt: f64, held: bool) {
         self.turned += counts;
         if held && dt > 0.0 {
-            self.speed = counts / dt;
+            let real = counts / dt;
+            self.speed = real.clamp(self.speed.min(0.0), self.speed.max(0.0));
         }
     }
 

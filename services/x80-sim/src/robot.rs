@@ -91,9 +91,10 @@ impl Robot {
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
         let physics = mission.simulation.physics();
-        let body = mission.body();
-        let top_counts = body.top_speed_m_s / body.metres_per_count();
-        let longest_step = STEP_S.min(0.5 * body.radius_m / body.top_speed_m_s);
+        let size = mission.body();
+        let top_counts = size.top_speed_m_s / size.metres_per_count();
+        let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
+        let world = World::new(mission);
         let mut robot = Self {
             physics,
             ignores_time: mission.simulation.ignores_time,
@@ -101,9 +102,9 @@ impl Robot {
             rate_hz: mission.robot.rate_hz,
             wiring: Wiring::of(mission),
             longest_step,
-            metres_per_count: body.metres_per_count(),
-            world: World::new(mission),
-            body: Body::new(mission),
+            metres_per_count: size.metres_per_count(),
+            body: Body::new(mission, &world),
+            world,
             motors: std::array::from_fn(|_| Motor::new(physics.wheels, top_counts)),
             streams: Streams::default(),
             ranging: Ranging::new(mission),
@@ -118,7 +119,7 @@ impl Robot {
             custom: CustomSensors::default(),
             motor: MotorSensors::default(),
         };
-        robot.least_clearance = robot.body.clearance(&robot.world);
+        robot.least_clearance = robot.body.clearance();
         robot.measure();
         robot
     }
@@ -273,8 +274,7 @@ impl Robot {
         };
         turn(channel.left, sign.left, turned.left);
         turn(channel.right, sign.right, turned.right);
-        let clearance = self.body.clearance(&self.world);
-        self.least_clearance = self.least_clearance.min(clearance);
+        self.least_clearance = self.least_clearance.min(self.body.clearance());
     }
 
     /// Let mission time pass until the next tick and measure there.
@@ -340,7 +340,7 @@ impl Robot {
             }
         };
         let clearance_m = self.least_clearance.min(TruthTick::NOTHING_NEAR);
-        self.least_clearance = self.body.clearance(&self.world);
+        self.least_clearance = self.body.clearance();
         TruthTick {
             tick: self.tick,
             time_s: self.time,

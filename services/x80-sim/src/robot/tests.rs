@@ -4,6 +4,8 @@ use std::path::Path;
 
 use common::wire::{Decoder, Gains, Parameter, Quantity, Request, Stream, Targets};
 
+use proptest::prelude::*;
+
 use super::*;
 
 fn robot(text: &str) -> Robot {
@@ -287,4 +289,59 @@ fn batteries_drain_as_the_mission_says() {
         robot.advance_to_next_tick();
     }
     assert!((volts(&mut robot) - 7.0).abs() < 0.01);
+}
+
+#[test]
+fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
+    let mut robot = robot(
+        "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 0.3 }]\nmoves = [{ at_s = 0, by = [0, 0] }, { at_s = 2, by = [-2, 0] }]",
+    );
+    for _ in 0..21 {
+        robot.advance_to_next_tick();
+    }
+    let truth = robot.truth();
+    assert!((truth.x + 0.49).abs() < 0.01, "{truth:?}");
+    assert_eq!(truth.contacts, 1);
+    // Pushed straight back, its wheels roll.
+    let back = 0.49 / (std::f64::consts::TAU * 0.085 / 1200.0);
+    let counted = 32_768.0 - f64::from(truth.left_counts);
+    assert!((counted - back).abs() < 25.0, "{counted} counts for {back}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn whatever_a_host_sends_the_robot_stays_out_of_walls_and_answers(
+        frames in prop::collection::vec(
+            (prop::sample::select(vec![3_u8, 4, 5, 6, 7, 26, 27, 30, 123, 124, 125, 127, 255, 9]),
+             prop::collection::vec(any::<u8>(), 0..16)),
+            1..40,
+        ),
+        measured in any::<bool>(),
+    ) {
+        let realism = if measured { "measured" } else { "laboratory" };
+        let mut robot = robot(&format!(
+            "[simulation]\nrealism = '{realism}'\n[[world.box]]\nat = [0.6, 0]\nsize_m = [0.2, 2]\n[[world.drum]]\nat = [-0.5, 0.3]\nradius_m = 0.2"
+        ));
+        for (did, data) in &frames {
+            let frame = Frame { rid: 1, sn: 0, did: *did, data };
+            let mut replies = Vec::new();
+            let heard = robot.on_frame(&frame, &mut replies);
+            prop_assert_eq!(replies.is_empty(), heard == Heard::Ack);
+            let due = robot.next_tick_s();
+            robot.advance_to_next_tick();
+            prop_assert_eq!(robot.time_s(), due);
+            let truth = robot.truth();
+            prop_assert!(truth.clearance_m >= -1e-9, "{:?}", truth);
+            prop_assert!(truth.x.is_finite() && truth.y.is_finite() && truth.heading.is_finite());
+            prop_assert!(truth.v.abs() <= 1.1, "{:?}", truth);
+            prop_assert!(truth.sonar_cm >= 4);
+            for report in streamed(&mut robot).1 {
+                if let Report::Motor(sensors) = report {
+                    prop_assert!(sensors.encoders.iter().all(|e| e.position < COUNT_CYCLE));
+                }
+            }
+        }
+    }
 }
