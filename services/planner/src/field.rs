@@ -13,8 +13,6 @@ pub enum Method {
     MultigridSingle,
     /// Multigrid in double precision.
     MultigridDouble,
-    /// Relaxation in order of distance, in extended range.
-    Relaxation,
 }
 
 impl Method {
@@ -24,7 +22,6 @@ impl Method {
             Self::Elimination => "elimination",
             Self::MultigridSingle => "multigrid f32",
             Self::MultigridDouble => "multigrid f64",
-            Self::Relaxation => "relaxation",
         }
     }
 }
@@ -46,9 +43,10 @@ pub(crate) const BLOCKED: f64 = -1.0;
 /// u as stored: positive where reachable, 0 where free but cut off, [`BLOCKED`] where blocked.
 #[derive(Clone, Debug)]
 pub(crate) enum Store {
-    #[allow(dead_code)] // The multigrid fills it.
     /// All of u fits an `f32` with one common exponent.
     Single { values: Vec<f32>, exponent: i32 },
+    /// All of u fits an `f64` with one common exponent.
+    Double { values: Vec<f64>, exponent: i32 },
     /// A mantissa and an exponent a cell.
     Extended {
         mantissas: Vec<f64>,
@@ -60,6 +58,7 @@ impl Store {
     fn raw(&self, index: usize) -> (f64, i32) {
         match self {
             Self::Single { values, exponent } => (f64::from(values[index]), *exponent),
+            Self::Double { values, exponent } => (values[index], *exponent),
             Self::Extended {
                 mantissas,
                 exponents,

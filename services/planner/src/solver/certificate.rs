@@ -1,10 +1,14 @@
 //! The check every field passes before it is handed out.
 //!
 //! Two promises, cell by cell: the equation holds relatively to u itself (a global norm says nothing of cells where u is
-//! 1e-50), and some neighbour is strictly better, so that following the field from anywhere ends at the target.
+//! 1e-50), and some neighbour is strictly better, so that following the field from anywhere ends at the target. A free cell
+//! of u = 0 beside one of u > 0 fails too. So the cells with u > 0 are a union of connected pieces, each leads somewhere
+//! better from all its cells but the target's, and therefore there is one piece: what can reach the target, no more and no
+//! less. That needs no search of its own.
 
-use super::breadth::{ABSENT, Pass};
-use crate::domain::Domain;
+use super::multigrid::Real;
+use super::wide::Wide;
+use crate::domain::{Absorption, Domain};
 use crate::field::Store;
 use crate::scaled::Scaled;
 
@@ -12,58 +16,209 @@ use crate::scaled::Scaled;
 pub(super) const RESIDUAL_LIMIT: f64 = 1e-4;
 
 /// What a check found.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Check {
-    /// Largest relative residual; infinite if a reachable cell has u = 0.
+    /// Largest relative residual of the cells with u > 0 but the target.
     pub worst_residual: f64,
-    /// Reachable cells but the target without a strictly better neighbour.
+    /// Cells with u > 0, but the target, without a strictly better neighbour.
     pub stalled: usize,
+    /// Free cells with u = 0 beside one with u > 0.
+    pub lost: usize,
+    /// Cells with u > 0.
+    pub reachable: usize,
 }
 
 impl Check {
     /// Whether the field may be handed out.
-    pub(super) fn holds(&self, limit: f64) -> bool {
-        self.stalled == 0 && self.worst_residual <= limit
+    pub(super) fn holds(&self) -> bool {
+        self.stalled == 0 && self.lost == 0 && self.worst_residual <= RESIDUAL_LIMIT
     }
 }
 
-/// Checks every reachable cell of a field of any range.
-pub(super) fn check(domain: &Domain, store: &Store, pass: &Pass) -> Check {
-    let u = |index: u32| match store {
-        Store::Single { values, exponent } => {
-            Scaled::new(f64::from(values[index as usize]), *exponent)
-        }
+/// Checks every cell of a field.
+pub(super) fn check(domain: &Domain, store: &Store) -> Check {
+    let mut found = match store {
+        Store::Single { values, .. } => check_plain(domain, values),
+        Store::Double { values, .. } => check_plain(domain, values),
         Store::Extended {
             mantissas,
             exponents,
-        } => Scaled::new(mantissas[index as usize], exponents[index as usize]),
+        } => check_extended(domain, mantissas, exponents),
     };
-    let mut found = Check {
-        worst_residual: 0.0,
-        stalled: 0,
-    };
-    for &cell in pass.order.iter().skip(1) {
-        let here = u(cell);
-        let mut best = Scaled::ZERO;
-        let mut sum = 0.0;
-        for place in pass.neighbours(cell) {
-            if place != ABSENT {
-                let neighbour = u(pass.order[place as usize]);
-                sum += neighbour.relative_to(here.exponent);
-                if neighbour > best {
-                    best = neighbour;
+    // The target is positive by construction and was left out.
+    found.reachable += 1;
+    found
+}
+
+/// Checks a field with one common exponent, row by row with wide vectors.
+fn check_plain<R: Real>(domain: &Domain, values: &[R]) -> Check {
+    Wide::default().run(
+        #[inline(always)]
+        || {
+            let (width, height) = (domain.width(), domain.height());
+            let mut found = Check::default();
+            let mut rows = Rows::new(width);
+            rows.take(values.get(..width));
+            for row in 0..height {
+                rows.take(values.get((row + 1) * width..(row + 2) * width));
+                rows.set_shares(domain, row);
+                let raw = &values[row * width..(row + 1) * width];
+                if row == domain.target().row {
+                    rows.check(raw, 0..domain.target().col, &mut found);
+                    rows.check(raw, domain.target().col + 1..width, &mut found);
+                } else {
+                    rows.check(raw, 0..width, &mut found);
+                }
+            }
+            found
+        },
+    )
+}
+
+/// Three neighbouring rows of u with a zero at either end, blocked cells zero.
+struct Rows<R> {
+    above: Vec<R>,
+    here: Vec<R>,
+    below: Vec<R>,
+    /// 0.25 / (1 + k) of each cell of the row.
+    shares: Vec<R>,
+    shares_set: bool,
+    residuals: Vec<R>,
+}
+
+impl<R: Real> Rows<R> {
+    fn new(width: usize) -> Self {
+        let row = vec![R::default(); width + 2];
+        Self {
+            above: row.clone(),
+            here: row.clone(),
+            below: row.clone(),
+            shares: row.clone(),
+            shares_set: false,
+            residuals: row,
+        }
+    }
+
+    /// Moves one row on; `next` is the one that comes in below, none after the last.
+    #[inline(always)]
+    fn take(&mut self, next: Option<&[R]>) {
+        std::mem::swap(&mut self.above, &mut self.here);
+        std::mem::swap(&mut self.here, &mut self.below);
+        let zero = R::default();
+        let width = self.below.len() - 2;
+        let below = &mut self.below[1..=width];
+        match next {
+            Some(next) => {
+                for (to, &from) in below.iter_mut().zip(next) {
+                    *to = if from > zero { from } else { zero };
+                }
+            }
+            None => below.fill(zero),
+        }
+    }
+
+    #[inline(always)]
+    fn set_shares(&mut self, domain: &Domain, row: usize) {
+        let width = domain.width();
+        match domain.absorption() {
+            Absorption::Uniform(k) if !self.shares_set => {
+                self.shares.fill(R::of(0.25 / (1.0 + k)));
+                self.shares_set = true;
+            }
+            Absorption::Uniform(_) => {}
+            Absorption::PerCell(cells) => {
+                for (share, &k) in self
+                    .shares
+                    .iter_mut()
+                    .zip(&cells[row * width..(row + 1) * width])
+                {
+                    *share = R::of(0.25 / (1.0 + f64::from(k)));
                 }
             }
         }
-        let mean = sum / (4.0 * (1.0 + domain.absorption_at(cell as usize)));
-        let residual = (here.mantissa - mean).abs() / here.mantissa;
-        // A zero u divides by zero: not a number, and then as bad as can be.
-        found.worst_residual = found.worst_residual.max(if residual.is_nan() {
-            f64::INFINITY
-        } else {
-            residual
-        });
-        if best <= here {
-            found.stalled += 1;
+    }
+
+    /// Checks the cells of `columns` of the middle row, `raw` as stored.
+    #[inline(always)]
+    fn check(&mut self, raw: &[R], columns: std::ops::Range<usize>, found: &mut Check) {
+        let (start, n) = (columns.start, columns.len());
+        let zero = R::default();
+        let raw = &raw[start..][..n];
+        let (here, west, east) = (
+            &self.here[start + 1..][..n],
+            &self.here[start..][..n],
+            &self.here[start + 2..][..n],
+        );
+        let (north, south) = (&self.above[start + 1..][..n], &self.below[start + 1..][..n]);
+        let shares = &self.shares[start..][..n];
+        let residuals = &mut self.residuals[..n];
+        let larger = |a: R, b: R| if a > b { a } else { b };
+        let (mut stalled, mut lost, mut reachable) = (0_u32, 0_u32, 0_u32);
+        for x in 0..n {
+            let sum = (west[x] + east[x]) + (north[x] + south[x]);
+            let best = larger(larger(west[x], east[x]), larger(north[x], south[x]));
+            let positive = here[x] > zero;
+            reachable += u32::from(positive);
+            stalled += u32::from(positive & (best <= here[x]));
+            // A value that is no number is neither blocked nor positive: lost.
+            let blocked = raw[x] < zero;
+            lost += u32::from(!positive & !blocked & (sum > zero));
+            let residual = (here[x] - shares[x] * sum).size();
+            residuals[x] = if positive { residual / here[x] } else { zero };
+        }
+        // In lanes: a running maximum over floats is otherwise taken one by one.
+        let mut worst = [zero; 16];
+        let chunks = residuals.chunks_exact(16);
+        for (lane, &residual) in worst.iter_mut().zip(chunks.remainder()) {
+            *lane = larger(residual, *lane);
+        }
+        for chunk in chunks {
+            for (lane, &residual) in worst.iter_mut().zip(chunk) {
+                *lane = larger(residual, *lane);
+            }
+        }
+        let worst = worst.into_iter().fold(zero, larger).wide();
+        found.worst_residual = found.worst_residual.max(worst);
+        found.stalled += stalled as usize;
+        found.lost += lost as usize;
+        found.reachable += reachable as usize;
+    }
+}
+
+/// Checks a field with an exponent a cell.
+fn check_extended(domain: &Domain, mantissas: &[f64], exponents: &[i32]) -> Check {
+    let (width, height) = (domain.width(), domain.height());
+    let target = domain.index(domain.target());
+    let mut found = Check::default();
+    for row in 0..height {
+        for col in 0..width {
+            let index = row * width + col;
+            if mantissas[index] < 0.0 || index == target {
+                continue;
+            }
+            let around = [
+                (col > 0).then(|| index - 1),
+                (col + 1 < width).then(|| index + 1),
+                (row > 0).then(|| index - width),
+                (row + 1 < height).then(|| index + width),
+            ];
+            let here = Scaled::new(mantissas[index], exponents[index]);
+            let (mut best, mut sum) = (Scaled::ZERO, 0.0);
+            for neighbour in around.into_iter().flatten() {
+                let u = Scaled::new(mantissas[neighbour], exponents[neighbour]);
+                sum += u.relative_to(here.exponent);
+                best = if u > best { u } else { best };
+            }
+            if here.is_zero() {
+                found.lost += usize::from(!best.is_zero());
+                continue;
+            }
+            let mean = sum / (4.0 * (1.0 + domain.absorption_at(index)));
+            found.worst_residual = found
+                .worst_residual
+                .max((here.mantissa - mean).abs() / here.mantissa);
+            found.stalled += usize::from(best <= here);
+            found.reachable += 1;
         }
     }
     found

@@ -1,19 +1,27 @@
 //! From a domain to its field: the methods, the choice between them, and the verification that decides.
 //!
-//! - [`breadth`]: one breadth-first pass from the target: the order of elimination, and its price.
+//! - [`pricing`]: which method to try first.
+//! - [`multigrid`]: a few sweeps' worth of work a cell; right where the map is wide.
 //! - [`elimination`]: exact, in extended range; cheap where the map is narrow.
+//! - [`breadth`]: the breadth-first pass that orders and prices the elimination.
+//! - [`full`]: one full solve: try, check, fall back.
 //! - [`certificate`]: the check every field must pass before it is handed out.
+//! - [`wide`]: the widest vectors of the machine.
 
 mod breadth;
 mod certificate;
 mod elimination;
+mod full;
+mod multigrid;
+mod pricing;
+mod wide;
 
 use std::num::NonZeroUsize;
 
 use crate::cancellation::Cancellation;
 use crate::domain::{Change, Domain};
 use crate::error::SolveError;
-use crate::field::{Certificate, Field, Method};
+use crate::field::Field;
 
 /// How a solver may work; what it computes does not depend on it.
 #[derive(Clone, Debug)]
@@ -58,16 +66,20 @@ pub enum Verdict {
     PassageClosed,
 }
 
-/// Solves fields. Keeps between solves what does not depend on the target.
+/// Solves fields. Keeps between solves what does not depend on the target, and patches it where cells changed.
 #[derive(Debug, Default)]
 pub struct Solver {
     settings: Settings,
+    full: full::Full,
 }
 
 impl Solver {
     /// A solver that has prepared nothing yet.
     pub fn new(settings: Settings) -> Self {
-        Self { settings }
+        Self {
+            settings,
+            full: full::Full::default(),
+        }
     }
 
     /// The verified field of `domain`.
@@ -92,37 +104,8 @@ impl Solver {
         cancellation: &Cancellation,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
-        cancellation.check()?;
-        let pass = breadth::Pass::from_target(domain);
-        let tree = elimination::Tree::of(&pass);
-        observe(Phase::SetUp);
-        let store = elimination::solve(
-            domain,
-            &pass,
-            &tree,
-            self.settings.memory_limit,
-            cancellation,
-        )?;
-        observe(Phase::Solved);
-        let check = certificate::check(domain, &store, &pass);
-        observe(Phase::Verified);
-        if !check.holds(certificate::RESIDUAL_LIMIT) {
-            return Err(SolveError::Unverified {
-                worst_residual: check.worst_residual,
-                stalled: check.stalled,
-            });
-        }
-        let certificate = Certificate {
-            worst_residual: check.worst_residual,
-            method: Method::Elimination,
-            reachable: pass.order.len(),
-        };
-        Ok(Field::new(
-            (domain.width(), domain.height()),
-            domain.target(),
-            store,
-            certificate,
-        ))
+        self.full
+            .solve(&self.settings, domain, cancellation, observe)
     }
 
     /// Applies `changes` to `domain` and brings its `field` up to date.

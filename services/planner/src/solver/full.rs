@@ -1,0 +1,201 @@
+//! One full solve: the planned method, its check, and the costlier methods where the check fails.
+
+use std::ops::Range;
+
+use super::certificate::{self, Check};
+use super::multigrid::{Multigrid, Real};
+use super::{Phase, Settings, breadth, elimination, pricing};
+use crate::cancellation::Cancellation;
+use crate::domain::{Absorption, Domain};
+use crate::error::SolveError;
+use crate::field::{BLOCKED, Certificate, Field, Method, Store};
+
+/// Coarse corrections above this share of u mean that a cell has not settled. The next cycle takes off another factor of
+/// three or more, which leaves directions well within a degree.
+const TOLERANCE: f64 = 1e-3;
+
+/// Cycles before the first check: the first ones have not reached every cell, and what is still zero settles at zero.
+const FIRST_CHECK: usize = 4;
+
+/// Cycles between a check that failed and the next.
+const BETWEEN_CHECKS: usize = 2;
+
+/// Cycles after which a precision is given up: its range of u at 1.4 orders of magnitude a cycle, and some.
+const SINGLE_CYCLES: usize = 60;
+const DOUBLE_CYCLES: usize = 450;
+
+/// What full solves keep between them.
+#[derive(Debug, Default)]
+pub(super) struct Full {
+    single: Prepared<f32>,
+    double: Prepared<f64>,
+}
+
+/// The levels of one precision, and the map they were set up for.
+#[derive(Debug)]
+struct Prepared<R> {
+    levels: Option<Multigrid<R>>,
+    width: usize,
+    blocked: Vec<bool>,
+    absorption: Absorption,
+}
+
+impl<R> Default for Prepared<R> {
+    fn default() -> Self {
+        Self {
+            levels: None,
+            width: 0,
+            blocked: Vec::new(),
+            absorption: Absorption::Uniform(0.0),
+        }
+    }
+}
+
+impl Full {
+    /// As [`Solver::solve_observed`](super::Solver::solve_observed).
+    pub(super) fn solve(
+        &mut self,
+        settings: &Settings,
+        domain: &Domain,
+        cancellation: &Cancellation,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<Field, SolveError> {
+        cancellation.check()?;
+        let mut plan = pricing::plan(domain);
+        let mut failed = Check::default();
+        for method in plan.methods {
+            let (store, check) = match method {
+                Method::MultigridSingle => {
+                    let store = |values| Store::Single {
+                        values,
+                        exponent: -f32::TOP,
+                    };
+                    self.single
+                        .solve(domain, SINGLE_CYCLES, store, cancellation, observe)?
+                }
+                Method::MultigridDouble => {
+                    let store = |values| Store::Double {
+                        values,
+                        exponent: -f64::TOP,
+                    };
+                    self.double
+                        .solve(domain, DOUBLE_CYCLES, store, cancellation, observe)?
+                }
+                Method::Elimination => {
+                    let (pass, tree) = plan.elimination.take().unwrap_or_else(|| {
+                        let pass = breadth::Pass::from_target(domain);
+                        let tree = elimination::Tree::of(&pass);
+                        (pass, tree)
+                    });
+                    observe(Phase::SetUp);
+                    let store = elimination::solve(
+                        domain,
+                        &pass,
+                        &tree,
+                        settings.memory_limit,
+                        cancellation,
+                    )?;
+                    observe(Phase::Solved);
+                    let check = certificate::check(domain, &store);
+                    observe(Phase::Verified);
+                    (store, check)
+                }
+            };
+            if check.holds() {
+                let certificate = Certificate {
+                    worst_residual: check.worst_residual,
+                    method,
+                    reachable: check.reachable,
+                };
+                return Ok(Field::new(
+                    (domain.width(), domain.height()),
+                    domain.target(),
+                    store,
+                    certificate,
+                ));
+            }
+            failed = check;
+        }
+        Err(SolveError::Unverified {
+            worst_residual: failed.worst_residual,
+            stalled: failed.stalled + failed.lost,
+        })
+    }
+}
+
+impl<R: Real> Prepared<R> {
+    /// Cycles until every cell has settled and the check holds, or this precision is given up; returns what there is then.
+    fn solve(
+        &mut self,
+        domain: &Domain,
+        most_cycles: usize,
+        store: impl Fn(Vec<R>) -> Store,
+        cancellation: &Cancellation,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<(Store, Check), SolveError> {
+        let levels = self.prepare(domain);
+        observe(Phase::SetUp);
+        levels.start(domain.target());
+        let mut next_check = FIRST_CHECK;
+        for cycle in 1.. {
+            cancellation.check()?;
+            let settled = levels.cycle(TOLERANCE).unsettled == 0;
+            let last = cycle == most_cycles;
+            if !(last || (settled && cycle >= next_check)) {
+                continue;
+            }
+            levels.finish();
+            let mut values = Vec::new();
+            levels.read(domain.target(), R::of(BLOCKED), &mut values);
+            let store = store(values);
+            observe(Phase::Solved);
+            let check = certificate::check(domain, &store);
+            observe(Phase::Verified);
+            // All settled and some lost: u goes below what this precision holds.
+            if check.holds() || check.lost > 0 || last {
+                return Ok((store, check));
+            }
+            next_check = cycle + BETWEEN_CHECKS;
+        }
+        Err(SolveError::Cancelled)
+    }
+
+    /// The levels for `domain`: new, patched where it changed, or as they are.
+    fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
+        let same_size =
+            self.width == domain.width() && self.blocked.len() == domain.blocked().len();
+        let changed =
+            if same_size && self.levels.is_some() && self.absorption == *domain.absorption() {
+                changed_rows(&self.blocked, domain)
+            } else {
+                Some(0..domain.height())
+            };
+        if !same_size {
+            self.levels = None;
+        }
+        let levels = self
+            .levels
+            .get_or_insert_with(|| Multigrid::new(domain.width(), domain.height()));
+        if let Some(rows) = changed {
+            levels.set_up_rows(domain, rows);
+            self.width = domain.width();
+            self.blocked.clear();
+            self.blocked.extend_from_slice(domain.blocked());
+            self.absorption.clone_from(domain.absorption());
+        }
+        levels
+    }
+}
+
+/// The rows between the first and the last in which the map differs from `before`.
+fn changed_rows(before: &[bool], domain: &Domain) -> Option<Range<usize>> {
+    let width = domain.width();
+    let mut differ = before
+        .chunks_exact(width)
+        .zip(domain.blocked().chunks_exact(width))
+        .enumerate()
+        .filter(|(_, (before, now))| before != now)
+        .map(|(row, _)| row);
+    let first = differ.next()?;
+    Some(first..differ.next_back().unwrap_or(first) + 1)
+}

@@ -1,0 +1,324 @@
+//! Multigrid with interpolation by the equations themselves (after Dendy's BoxMG).
+//!
+//! Every second column and row makes the next level. The interpolation follows the equations, so it stops at walls, and
+//! the coarse equations are the Galerkin product, so corrections do not leak through them: that, and not a norm, is what
+//! makes the solution relatively right in cells where u is 1e-40. The set-up depends on the map alone, the target is a
+//! source of inflow in the solve, and u is divided by its own value there at the end.
+//!
+//! - [`grid`]: the layout in four parity planes.
+//! - [`finest`], [`coarse`], [`coarsest`]: relaxation and transfer on the three kinds of level.
+//! - [`galerkin`]: the equations of a level from those of the finer one.
+
+mod coarse;
+mod coarsest;
+mod finest;
+mod galerkin;
+mod grid;
+mod real;
+
+use coarse::Coarse;
+use coarsest::Coarsest;
+pub(super) use finest::Progress;
+use finest::{Finest, Source};
+use grid::{EE, EO, Grid, OE};
+pub(super) use real::Real;
+
+use super::wide::Wide;
+
+use std::ops::Range;
+
+use crate::domain::{Absorption, Cell, Domain};
+
+/// Levels end when neither side is longer.
+const COARSEST_SIDE: usize = 5;
+
+/// The levels of one map, in one precision.
+#[derive(Debug)]
+pub(super) struct Multigrid<R> {
+    finest: Finest<R>,
+    coarse: Vec<Coarse<R>>,
+    coarsest: Coarsest,
+    wide: Wide,
+}
+
+impl<R: Real> Multigrid<R> {
+    /// Levels for maps of this size, with no equations yet.
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        let mut grid = Grid::new(width, height);
+        let finest = Finest::new(grid);
+        let mut coarse = Vec::new();
+        loop {
+            grid = Grid::new(grid.columns, grid.rows);
+            coarse.push(Coarse::new(grid));
+            if grid.width.max(grid.height) <= COARSEST_SIDE {
+                break;
+            }
+        }
+        Self {
+            finest,
+            coarse,
+            coarsest: Coarsest::default(),
+            wide: Wide::default(),
+        }
+    }
+
+    /// Sets the equations that depend on `rows` of the map, and no others, on all levels.
+    pub(super) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
+        let finest = &mut self.finest;
+        let width = domain.width();
+        self.wide.run(
+            #[inline(always)]
+            || {
+                for row in rows.clone() {
+                    let cells = row * width..(row + 1) * width;
+                    let blocked = &domain.blocked()[cells.clone()];
+                    match domain.absorption() {
+                        Absorption::Uniform(k) => {
+                            let inverse = R::of(0.25 / (1.0 + k));
+                            finest.set_row(row, blocked, |_| inverse);
+                        }
+                        Absorption::PerCell(all) => {
+                            let all = &all[cells];
+                            finest.set_row(row, blocked, |col| {
+                                R::of(0.25 / (1.0 + f64::from(all[col])))
+                            });
+                        }
+                    }
+                }
+            },
+        );
+        self.set_up_levels(rows);
+    }
+
+    /// Interpolation and coarse equations, where they depend on `rows` of the finest level.
+    fn set_up_levels(&mut self, mut rows: Range<usize>) {
+        let (finest, first) = (&mut self.finest, &mut self.coarse[0]);
+        let count = finest.grid.rows;
+        self.wide.run(
+            #[inline(always)]
+            || {
+                finest.interpolate_rows(rows_of_interpolation(&rows, count));
+                finest.coarsen(first, rows_of_next(&rows, count));
+            },
+        );
+        for level in 1..self.coarse.len() {
+            rows = rows_of_next(&rows, self.coarse[level - 1].grid.height);
+            let (fine, next) = self.coarse.split_at_mut(level);
+            let (fine, next) = (&mut fine[level - 1], &mut next[0]);
+            let count = fine.grid.rows;
+            self.wide.run(
+                #[inline(always)]
+                || {
+                    fine.interpolate(rows_of_interpolation(&rows, count));
+                    fine.coarsen(next, rows_of_next(&rows, count));
+                },
+            );
+        }
+        if let Some(last) = self.coarse.last() {
+            self.coarsest.set_up(last);
+        }
+    }
+
+    /// Makes `target` the only inflow and starts from the coarsest level's answer.
+    pub(super) fn start(&mut self, target: Cell) {
+        let (plane, at) = self.finest.grid.locate(target.col, target.row);
+        let value = R::of(crate::scaled::pow2(R::TOP));
+        self.finest.sources = vec![Source {
+            plane,
+            row: target.row / 2,
+            at,
+            value,
+        }];
+        for plane in &mut self.finest.u {
+            plane.fill(R::default());
+        }
+        self.restrict_sources();
+        let last = self.coarse.len() - 1;
+        self.coarsest.solve(&mut self.coarse[last]);
+        for level in (0..last).rev() {
+            for plane in &mut self.coarse[level].u {
+                plane.fill(R::default());
+            }
+            self.ascend(level);
+        }
+    }
+
+    /// One cycle; corrections above `tolerance` times u count as unsettled.
+    pub(super) fn cycle(&mut self, tolerance: f64) -> Progress {
+        let progress = self.pass(true, tolerance);
+        let last = self.coarse.len() - 1;
+        for level in 0..last {
+            let (fine, next) = self.coarse.split_at_mut(level + 1);
+            let fine = &mut fine[level];
+            self.wide.run(
+                #[inline(always)]
+                || fine.descend(&mut next[0]),
+            );
+        }
+        self.coarsest.solve(&mut self.coarse[last]);
+        for level in (0..last).rev() {
+            self.ascend(level);
+        }
+        progress
+    }
+
+    /// Brings the last coarse correction to the finest level, for u to be read. Cycles may follow.
+    pub(super) fn finish(&mut self) {
+        self.pass(false, 0.0);
+        for plane in &mut self.coarse[0].u {
+            plane.fill(R::default());
+        }
+    }
+
+    fn pass(&mut self, descend: bool, tolerance: f64) -> Progress {
+        let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
+        let tolerance = R::of(tolerance);
+        self.wide.run(
+            #[inline(always)]
+            || finest.pass(next, descend, tolerance),
+        )
+    }
+
+    fn ascend(&mut self, level: usize) {
+        let (fine, next) = self.coarse.split_at_mut(level + 1);
+        let fine = &mut fine[level];
+        self.wide.run(
+            #[inline(always)]
+            || fine.ascend(&next[0]),
+        );
+    }
+
+    /// Puts the inflow, interpolation transposed, on every coarse level; it touches a handful of cells on each.
+    fn restrict_sources(&mut self) {
+        let mut flows: Vec<((usize, usize), R)> = Vec::new();
+        for source in &self.finest.sources {
+            let finest = &self.finest;
+            spread(
+                &finest.grid,
+                (source.plane, source.at),
+                source.value,
+                |at| {
+                    [
+                        finest.west[at],
+                        finest.east[at],
+                        finest.north[at],
+                        finest.south[at],
+                    ]
+                },
+                |at| finest.corner_weights(at),
+                &mut flows,
+            );
+        }
+        for level in 0..self.coarse.len() {
+            let coarse = &mut self.coarse[level];
+            for plane in &mut coarse.f {
+                plane.fill(R::default());
+            }
+            let mut next = Vec::new();
+            for &((col, row), value) in &flows {
+                if col >= coarse.grid.width || row >= coarse.grid.height {
+                    continue;
+                }
+                let (plane, at) = coarse.grid.locate(col, row);
+                coarse.f[plane][at] += value;
+                spread(
+                    &coarse.grid,
+                    (plane, at),
+                    value,
+                    |at| {
+                        [
+                            coarse.west[at],
+                            coarse.east[at],
+                            coarse.north[at],
+                            coarse.south[at],
+                        ]
+                    },
+                    |at| coarse.corner_weights(at),
+                    &mut next,
+                );
+            }
+            next.sort_unstable_by_key(|flow| flow.0);
+            next.dedup_by(|b, a| {
+                let same = a.0 == b.0;
+                if same {
+                    a.1 += b.1;
+                }
+                same
+            });
+            flows = next;
+        }
+    }
+
+    /// u of every cell, row by row, times 2^TOP over u(target); `blocked` where the map is.
+    pub(super) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
+        let grid = &self.finest.grid;
+        let (plane, at) = grid.locate(target.col, target.row);
+        let top = crate::scaled::pow2(R::TOP);
+        let scale = R::of(top / self.finest.u[plane][at].wide());
+        into.clear();
+        into.resize(grid.width * grid.height, R::default());
+        let mut u = vec![R::default(); 2 * grid.columns];
+        let mut inverse = u.clone();
+        for (row, out) in into.chunks_exact_mut(grid.width).enumerate() {
+            grid::join_row(grid, &self.finest.u, row, &mut u);
+            grid::join_row(grid, &self.finest.inverse, row, &mut inverse);
+            for ((out, u), inverse) in out.iter_mut().zip(&u).zip(&inverse) {
+                // Not yet converged cells may be below zero; the check finds a zero there.
+                let u = if *u > R::default() {
+                    *u * scale
+                } else {
+                    R::default()
+                };
+                *out = if *inverse > R::default() { u } else { blocked };
+            }
+        }
+        into[target.row * grid.width + target.col] = R::of(top);
+    }
+}
+
+/// Rows of a level's planes whose interpolation depends on `rows` of its cells.
+fn rows_of_interpolation(rows: &Range<usize>, count: usize) -> Range<usize> {
+    (rows.start / 2).saturating_sub(1)..(rows.end / 2 + 2).min(count)
+}
+
+/// Rows of the next level whose equations depend on `rows` of a level's cells: one more on either side.
+fn rows_of_next(rows: &Range<usize>, count: usize) -> Range<usize> {
+    (rows.start / 2).saturating_sub(2)..(rows.end / 2 + 3).min(count)
+}
+
+/// Adds `value` of the cell at (plane, place) to the coarse cells it is interpolated from.
+fn spread<R: Real>(
+    grid: &Grid,
+    (plane, at): (usize, usize),
+    value: R,
+    weights: impl Fn(usize) -> [R; 4],
+    corner: impl Fn(usize) -> [R; 4],
+    flows: &mut Vec<((usize, usize), R)>,
+) {
+    let row = (at - grid::MARGIN) / grid.stride - 1;
+    let col = (at - grid::MARGIN) % grid.stride;
+    let [west, east, north, south] = weights(at);
+    let mut add = |col: usize, row: usize, weight: R| {
+        if weight > R::default() {
+            flows.push(((col, row), value * weight));
+        }
+    };
+    match plane {
+        EE => add(col, row, R::ONE),
+        OE => {
+            add(col, row, west);
+            add(col + 1, row, east);
+        }
+        EO => {
+            add(col, row, north);
+            add(col, row + 1, south);
+        }
+        _ => {
+            let [north_west, north_east, south_west, south_east] = corner(at);
+            add(col, row, north_west);
+            add(col + 1, row, north_east);
+            add(col, row + 1, south_west);
+            add(col + 1, row + 1, south_east);
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Which method to try first, from the shape of the free space.
+//!
+//! Multigrid costs some nanoseconds a cell for every one and a half orders of magnitude that u spans; elimination costs the
+//! square of the passages' width a cell, whatever u spans. The mean width of the free space is counted first. Where it is
+//! large the matter is decided; elsewhere one breadth-first pass from the target gives the length of the ways, with that
+//! the range of u, and the exact price of the elimination.
+
+use super::breadth::Pass;
+use super::elimination::Tree;
+use crate::domain::{Absorption, Domain};
+use crate::field::Method;
+
+/// Free space of this mean width, cells, is left to multigrid without a further look.
+const WIDE: f64 = 24.0;
+
+/// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
+const SINGLE_DECADES: f64 = 62.0;
+
+/// The same of double precision.
+const DOUBLE_DECADES: f64 = 540.0;
+
+/// Measured on one machine; only their ratios matter. Nanoseconds.
+const SET_UP_PER_CELL: f64 = 3.0;
+const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
+const DOUBLE_CYCLE_PER_CELL: f64 = 2.5;
+const ELIMINATION_PER_CELL: f64 = 60.0;
+const ELIMINATION_PER_OPERATION: f64 = 0.25;
+
+/// Cycles multigrid takes for a range of u.
+fn cycles(decades: f64) -> f64 {
+    4.0 + decades / 1.4
+}
+
+/// What to try, and what was found out on the way.
+pub(super) struct Plan {
+    /// Methods in the order in which to try them; elimination is the last resort in any case.
+    pub methods: Vec<Method>,
+    /// The pass and the tree of fronts, if they were needed.
+    pub elimination: Option<(Pass, Tree)>,
+}
+
+/// The plan for `domain`.
+pub(super) fn plan(domain: &Domain) -> Plan {
+    use Method::{Elimination, MultigridDouble, MultigridSingle};
+    let width = mean_width(domain);
+    // Absorption makes u fall by this much a cell on its own: cosh(1 / lambda) = 1 + 2 k.
+    let absorbed = (1.0 + 2.0 * least_absorption(domain)).acosh() / std::f64::consts::LN_10;
+    if width >= WIDE {
+        // Ways in wide space are not much longer than the map's diagonal.
+        let length = (domain.width() as f64).hypot(domain.height() as f64);
+        let first = if absorbed * length < SINGLE_DECADES {
+            MultigridSingle
+        } else {
+            MultigridDouble
+        };
+        return Plan {
+            methods: dedup([first, MultigridDouble, Elimination]),
+            elimination: None,
+        };
+    }
+    let pass = Pass::from_target(domain);
+    let cells = pass.order.len() as f64;
+    // Along a passage of width w, u falls like exp(-pi x / w).
+    let confined = std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
+    let decades = pass.levels.len() as f64 * confined.hypot(absorbed);
+    let multigrid = if decades < SINGLE_DECADES {
+        Some((MultigridSingle, SINGLE_CYCLE_PER_CELL))
+    } else if decades < DOUBLE_DECADES {
+        Some((MultigridDouble, DOUBLE_CYCLE_PER_CELL))
+    } else {
+        None
+    };
+    let price = |per_cycle: f64| {
+        (domain.blocked().len() as f64) * (SET_UP_PER_CELL + per_cycle * cycles(decades))
+    };
+    match multigrid {
+        // Elimination costs more than this on any map: no need to build its tree.
+        Some((method, cycle)) if price(cycle) < 0.5 * ELIMINATION_PER_CELL * cells => Plan {
+            methods: dedup([method, MultigridDouble, Elimination]),
+            elimination: None,
+        },
+        _ => {
+            let tree = Tree::of(&pass);
+            let exact =
+                ELIMINATION_PER_CELL * cells + ELIMINATION_PER_OPERATION * tree.price.operations;
+            let methods = match multigrid {
+                Some((method, cycle)) if price(cycle) < exact => {
+                    dedup([method, MultigridDouble, Elimination])
+                }
+                _ => vec![Elimination],
+            };
+            Plan {
+                methods,
+                elimination: Some((pass, tree)),
+            }
+        }
+    }
+}
+
+fn dedup(methods: [Method; 3]) -> Vec<Method> {
+    let mut methods = methods.to_vec();
+    methods.dedup();
+    methods
+}
+
+fn least_absorption(domain: &Domain) -> f64 {
+    match domain.absorption() {
+        Absorption::Uniform(k) => *k,
+        Absorption::PerCell(cells) => {
+            f64::from(cells.iter().copied().fold(f32::INFINITY, f32::min))
+        }
+    }
+}
+
+/// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.
+fn mean_width(domain: &Domain) -> f64 {
+    let width = domain.width();
+    let walls = vec![true; width];
+    let mut above: &[bool] = &walls;
+    let (mut free, mut along_rows, mut along_columns) = (0_usize, 0_usize, 0_usize);
+    for row in domain.blocked().chunks_exact(width) {
+        // Short sums in bytes, which the compiler adds up sixteen or more at a time.
+        for (row, above) in row.chunks(128).zip(above.chunks(128)) {
+            let (mut open, mut starts) = (0_u8, 0_u8);
+            for (&here, &above) in row.iter().zip(above) {
+                open += u8::from(!here);
+                starts += u8::from(!here & above);
+            }
+            free += usize::from(open);
+            along_columns += usize::from(starts);
+        }
+        along_rows += usize::from(!row[0]);
+        for (before, here) in row[..width - 1].chunks(128).zip(row[1..].chunks(128)) {
+            let mut starts = 0_u8;
+            for (&before, &here) in before.iter().zip(here) {
+                starts += u8::from(before & !here);
+            }
+            along_rows += usize::from(starts);
+        }
+        above = row;
+    }
+    free as f64 / along_rows.max(along_columns).max(1) as f64
+}
