@@ -1,6 +1,7 @@
 //! The harmonic field: u of every cell, with the certificate of its verification.
 
 use crate::domain::Cell;
+use crate::repair::Patch;
 use crate::scaled::Scaled;
 
 /// How a field was computed.
@@ -55,7 +56,8 @@ pub(crate) enum Store {
 }
 
 impl Store {
-    fn raw(&self, index: usize) -> (f64, i32) {
+    /// The stored value and its exponent.
+    pub(crate) fn raw(&self, index: usize) -> (f64, i32) {
         match self {
             Self::Single { values, exponent } => (f64::from(values[index]), *exponent),
             Self::Double { values, exponent } => (values[index], *exponent),
@@ -65,6 +67,67 @@ impl Store {
             } => (mantissas[index], exponents[index]),
         }
     }
+
+    /// Sets a cell to u, [`BLOCKED`] or 0; the whole store becomes extended if u is out of its range.
+    pub(crate) fn set(&mut self, index: usize, value: f64, exponent: i32) {
+        let u = Scaled::new(value, exponent);
+        // 0 and BLOCKED have no exponent to fit.
+        let plain = |common: i32| {
+            if value > 0.0 {
+                u.relative_to(common)
+            } else {
+                value
+            }
+        };
+        match self {
+            Self::Single {
+                values,
+                exponent: common,
+            } if fits(
+                plain(*common),
+                f64::from(f32::MIN_POSITIVE),
+                f64::from(f32::MAX),
+            ) =>
+            {
+                values[index] = plain(*common) as f32;
+            }
+            Self::Double {
+                values,
+                exponent: common,
+            } if fits(plain(*common), f64::MIN_POSITIVE, f64::MAX) => {
+                values[index] = plain(*common);
+            }
+            Self::Extended {
+                mantissas,
+                exponents,
+            } => {
+                mantissas[index] = if value > 0.0 { u.mantissa } else { value };
+                exponents[index] = u.exponent;
+            }
+            Self::Single { .. } | Self::Double { .. } => {
+                self.extend();
+                self.set(index, value, exponent);
+            }
+        }
+    }
+
+    fn extend(&mut self) {
+        let len = match self {
+            Self::Single { values, .. } => values.len(),
+            Self::Double { values, .. } => values.len(),
+            Self::Extended { .. } => return,
+        };
+        let (mantissas, exponents) = (0..len).map(|index| self.raw(index)).unzip();
+        *self = Self::Extended {
+            mantissas,
+            exponents,
+        };
+    }
+}
+
+/// Whether a plain value is 0 or [`BLOCKED`], or lies in a range of normal numbers.
+fn fits(value: f64, least: f64, largest: f64) -> bool {
+    value <= 0.0 || (least..=largest).contains(&value)
 }
 
 /// The field of one domain: u = 1 at the target, 0 where blocked or cut off, positive wherever the target can be reached.
@@ -77,6 +140,8 @@ pub struct Field {
     target: Cell,
     store: Store,
     certificate: Certificate,
+    /// Local updates since the field was solved.
+    patches: Vec<Patch>,
 }
 
 impl Field {
@@ -92,6 +157,7 @@ impl Field {
             target,
             store,
             certificate,
+            patches: Vec::new(),
         }
     }
 
@@ -147,6 +213,74 @@ impl Field {
             }
         }
         least.log10()
+    }
+
+    /// The neighbour with the largest u as seen from `cell`, `None` where u is zero and at the target.
+    ///
+    /// This is steepest ascent cell by cell; it ends at the target from every reachable cell.
+    pub fn ascent(&self, cell: Cell) -> Option<Cell> {
+        if cell == self.target || !self.is_reachable(cell) {
+            return None;
+        }
+        let (col, row) = (cell.col as i64, cell.row as i64);
+        let [dc, dr] = self.steepest_ascent(col, row);
+        Some(Cell::new((col + dc) as usize, (row + dr) as usize))
+    }
+
+    /// u of the cell `there` as seen from its neighbour `here`: their ratio is what counts, u(here) being what it is.
+    ///
+    /// A local update changes u in a window and leaves it beyond. Where u flows out of the window, everything beyond is
+    /// to be scaled by what u changed by at its rim, and that is done here rather than in every cell of the wake: across
+    /// such an edge the ratio stays what it was before.
+    pub(crate) fn seen(&self, here: (i64, i64), there: (i64, i64)) -> Scaled {
+        let u = self.u_at(there.0, there.1);
+        if self.patches.is_empty() {
+            return u;
+        }
+        let patch_of = |cell| self.patches.iter().position(|patch| patch.contains(cell));
+        let (from, to) = (patch_of(here), patch_of(there));
+        if from == to {
+            return u;
+        }
+        let before = |cell: (i64, i64), patch: Option<usize>| {
+            patch.map_or_else(
+                || self.u_at(cell.0, cell.1),
+                |patch| self.patches[patch].before(cell),
+            )
+        };
+        let (from_before, to_before) = (before(here, from), before(there, to));
+        // Patches keep a distance, so exactly one of the two lies in one.
+        let (outside, inside) = if from.is_none() {
+            (from_before, to_before)
+        } else {
+            (to_before, from_before)
+        };
+        // To single precision, as the window was solved.
+        let rounded = |u: Scaled| Scaled::new(f64::from(u.mantissa as f32), u.exponent);
+        if outside.is_zero() || inside.is_zero() || rounded(outside) > rounded(inside) {
+            return u;
+        }
+        let own = self.u_at(here.0, here.1);
+        Scaled::new(
+            own.mantissa * to_before.mantissa / from_before.mantissa,
+            own.exponent + to_before.exponent - from_before.exponent,
+        )
+    }
+
+    pub(crate) fn store(&self) -> &Store {
+        &self.store
+    }
+
+    pub(crate) fn store_mut(&mut self) -> &mut Store {
+        &mut self.store
+    }
+
+    pub(crate) fn patches(&self) -> &[Patch] {
+        &self.patches
+    }
+
+    pub(crate) fn patches_mut(&mut self) -> &mut Vec<Patch> {
+        &mut self.patches
     }
 
     /// u at a signed column and row: zero outside the map.

@@ -53,17 +53,17 @@ impl Field {
             return Guidance::AtTarget;
         }
         let position = [col, row];
-        let reference = self.u_at(here.0, here.1).exponent;
-        let gradient = self.interpolate(here, position, |c, r| {
-            self.central_difference(c, r, reference)
-        });
+        let gradient =
+            self.interpolate(here, position, |c, r| self.central_difference(here, (c, r)));
         let held = self.hold_off_walls(here, position, gradient);
         // What the walls took is given to the ascent from cell to cell, which leads around them; else a gradient straight
         // into a wall would keep its direction to the last, however little of it is left.
         let taken = (gradient[0] - held[0]).hypot(gradient[1] - held[1]);
         let mut total = held;
         if taken > 0.0 {
-            let ascent = self.interpolate(here, position, |c, r| self.steepest_ascent(c, r));
+            let ascent = self.interpolate(here, position, |c, r| {
+                self.steepest_ascent(c, r).map(|step| step as f64)
+            });
             let ascent = self.hold_off_walls(here, position, ascent);
             total = [held[0] + taken * ascent[0], held[1] + taken * ascent[1]];
         }
@@ -87,8 +87,8 @@ impl Field {
         }
     }
 
-    /// The bilinear mean of `value` over the free cells among the four centres around `position`, which lies in the free
-    /// cell `here`.
+    /// The bilinear mean of `value` over the reachable cells among the four centres around `position`, which lies in the
+    /// reachable cell `here`.
     fn interpolate(
         &self,
         here: (i64, i64),
@@ -100,7 +100,7 @@ impl Field {
         let (col, row) = (here.0 + side(offset[0]), here.1 + side(offset[1]));
         let [x, y] = [offset[0].abs(), offset[1].abs()];
 
-        let free = |c: i64, r: i64| !self.blocked_at(c, r);
+        let free = |c: i64, r: i64| !self.u_at(c, r).is_zero();
         let beside = free(col, here.1);
         let below = free(here.0, row);
         let diagonal = (beside || below) && free(col, row);
@@ -120,13 +120,34 @@ impl Field {
         sum
     }
 
-    /// Central difference of u / 2^`reference` at a cell.
-    fn central_difference(&self, col: i64, row: i64, reference: i32) -> [f64; 2] {
-        let u = |c: i64, r: i64| self.u_at(c, r).relative_to(reference);
-        [
-            0.5 * (u(col + 1, row) - u(col - 1, row)),
-            0.5 * (u(col, row + 1) - u(col, row - 1)),
-        ]
+    /// Central difference of u at `there`, which is `here` or one of its eight neighbours, in units of u(here).
+    fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
+        let own = self.u_at(there.0, there.1);
+        let u = |dc: i64, dr: i64| {
+            let seen = self.seen(there, (there.0 + dc, there.1 + dr));
+            seen.relative_to(own.exponent) / own.mantissa
+        };
+        let relative = [0.5 * (u(1, 0) - u(-1, 0)), 0.5 * (u(0, 1) - u(0, -1))];
+        let weight = self.ratio(here, there);
+        relative.map(|component| weight * component)
+    }
+
+    /// u(there) / u(here) of the same cell, a neighbour, or a diagonal neighbour by way of a free cell beside both.
+    fn ratio(&self, here: (i64, i64), there: (i64, i64)) -> f64 {
+        let step = |from: (i64, i64), to: (i64, i64)| {
+            let own = self.u_at(from.0, from.1);
+            self.seen(from, to).relative_to(own.exponent) / own.mantissa
+        };
+        if here == there {
+            1.0
+        } else if here.0 == there.0 || here.1 == there.1 {
+            step(here, there)
+        } else {
+            let beside = (there.0, here.1);
+            let zero = self.u_at(beside.0, beside.1).is_zero();
+            let between = if zero { (here.0, there.1) } else { beside };
+            step(here, between) * step(between, there)
+        }
     }
 
     /// Takes from `gradient` what points into a blocked cell: all of it at the wall, nothing half a cell away.
@@ -180,12 +201,12 @@ impl Field {
     }
 
     /// The step, along columns or rows, to the neighbour with the largest u.
-    fn steepest_ascent(&self, col: i64, row: i64) -> [f64; 2] {
-        let mut best = (Scaled::ZERO, [0.0; 2]);
+    pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
+        let mut best = (Scaled::ZERO, [0; 2]);
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let u = self.u_at(col + dc, row + dr);
+            let u = self.seen((col, row), (col + dc, row + dr));
             if u > best.0 {
-                best = (u, [dc as f64, dr as f64]);
+                best = (u, [dc, dr]);
             }
         }
         best.1
@@ -194,7 +215,7 @@ impl Field {
     /// Straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way
     /// there is free from anywhere in this one, and leads away from every wall it touches.
     fn toward_better_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
-        let [dc, dr] = self.steepest_ascent(here.0, here.1);
+        let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
         unit(
             [
                 here.0 as f64 + dc - position[0],

@@ -25,6 +25,7 @@ mod domain;
 mod error;
 mod field;
 mod guidance;
+mod repair;
 mod scaled;
 pub mod shell;
 mod solver;

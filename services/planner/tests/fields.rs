@@ -1,5 +1,9 @@
 //! Full solves: right in every cell of every kind of map.
-#![allow(clippy::expect_used, clippy::panic, reason = "helpers of tests may stop at the first broken promise")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests may stop at the first broken promise"
+)]
 
 use planner::testing::{Kind, Map, Reference, follow};
 use planner::{Cancellation, Cell, Domain, Field, SolveError, Solver};

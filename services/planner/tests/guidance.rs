@@ -1,5 +1,9 @@
 //! Guidance at any position of a solved map.
-#![allow(clippy::expect_used, clippy::panic, reason = "helpers of tests may stop at the first broken promise")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests may stop at the first broken promise"
+)]
 
 use planner::testing::{Kind, Map, Random, angle};
 use planner::{Cancellation, Cell, Domain, Field, Guidance, Solver};

@@ -13,11 +13,11 @@ use crate::field::Store;
 use crate::scaled::Scaled;
 
 /// Largest componentwise relative residual of a published field.
-pub(super) const RESIDUAL_LIMIT: f64 = 1e-4;
+pub(crate) const RESIDUAL_LIMIT: f64 = 1e-4;
 
 /// What a check found.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Check {
+pub(crate) struct Check {
     /// Largest relative residual of the cells with u > 0 but the target.
     pub worst_residual: f64,
     /// Cells with u > 0, but the target, without a strictly better neighbour.
@@ -30,13 +30,13 @@ pub(super) struct Check {
 
 impl Check {
     /// Whether the field may be handed out.
-    pub(super) fn holds(&self) -> bool {
+    pub(crate) fn holds(&self) -> bool {
         self.stalled == 0 && self.lost == 0 && self.worst_residual <= RESIDUAL_LIMIT
     }
 }
 
 /// Checks every cell of a field.
-pub(super) fn check(domain: &Domain, store: &Store) -> Check {
+pub(crate) fn check(domain: &Domain, store: &Store) -> Check {
     let mut found = match store {
         Store::Single { values, .. } => check_plain(domain, values),
         Store::Double { values, .. } => check_plain(domain, values),
@@ -69,6 +69,29 @@ fn check_plain<R: Real>(domain: &Domain, values: &[R]) -> Check {
                 } else {
                     rows.check(raw, 0..width, &mut found);
                 }
+            }
+            found
+        },
+    )
+}
+
+/// Checks a field given with one row or column of u around it, `width` cells wide without; `shares` are 0.25 / (1 + k) of
+/// the cells, 0 where no equation holds.
+pub(crate) fn check_framed(width: usize, values: &[f32], shares: &[f32]) -> Check {
+    Wide::default().run(
+        #[inline(always)]
+        || {
+            let framed = width + 2;
+            let height = values.len() / framed - 2;
+            let mut found = Check::default();
+            let mut rows = Rows::new(framed);
+            rows.take(values.get(..framed));
+            rows.take(values.get(framed..2 * framed));
+            for row in 0..height {
+                rows.take(values.get((row + 2) * framed..(row + 3) * framed));
+                rows.shares[1..=width].copy_from_slice(&shares[row * width..(row + 1) * width]);
+                let raw = &values[(row + 1) * framed..(row + 2) * framed];
+                rows.check(raw, 1..framed - 1, &mut found);
             }
             found
         },
@@ -164,7 +187,8 @@ impl<R: Real> Rows<R> {
             let blocked = raw[x] < zero;
             lost += u32::from(!positive & !blocked & (sum > zero));
             let residual = (here[x] - shares[x] * sum).size();
-            residuals[x] = if positive { residual / here[x] } else { zero };
+            let holds = positive & (shares[x] > zero);
+            residuals[x] = if holds { residual / here[x] } else { zero };
         }
         // In lanes: a running maximum over floats is otherwise taken one by one.
         let mut worst = [zero; 16];

@@ -9,10 +9,10 @@
 //! - [`wide`]: the widest vectors of the machine.
 
 mod breadth;
-mod certificate;
+pub(crate) mod certificate;
 mod elimination;
 mod full;
-mod multigrid;
+pub(crate) mod multigrid;
 mod pricing;
 mod wide;
 
@@ -22,6 +22,7 @@ use crate::cancellation::Cancellation;
 use crate::domain::{Change, Domain};
 use crate::error::SolveError;
 use crate::field::Field;
+use crate::repair::Repair;
 
 /// How a solver may work; what it computes does not depend on it.
 #[derive(Clone, Debug)]
@@ -71,6 +72,7 @@ pub enum Verdict {
 pub struct Solver {
     settings: Settings,
     full: full::Full,
+    repair: Repair,
 }
 
 impl Solver {
@@ -78,7 +80,7 @@ impl Solver {
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
-            full: full::Full::default(),
+            ..Self::default()
         }
     }
 
@@ -126,6 +128,18 @@ impl Solver {
             return Err(SolveError::ForeignField);
         }
         domain.apply(changes)?;
+        // By what the field knows, not by what the map was: a change may be reported twice.
+        let news: Vec<Change> = changes
+            .iter()
+            .copied()
+            .filter(|change| field.is_blocked(change.cell) != change.blocked)
+            .collect();
+        if news.is_empty() {
+            return Ok(Verdict::Repaired);
+        }
+        if let Some(verdict) = self.repair.update(domain, field, &news) {
+            return Ok(verdict);
+        }
         *field = self.solve(domain, cancellation)?;
         Ok(Verdict::Repaired)
     }

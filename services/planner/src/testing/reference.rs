@@ -172,35 +172,33 @@ pub fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
         .to_degrees()
 }
 
-/// Share of the cells with u > 0 from which steepest ascent over the four neighbours ends at the target.
+/// Share of the reachable cells from which steepest ascent ends at the target.
 pub fn follow(field: &Field) -> f64 {
-    let (width, height) = (field.width(), field.height());
-    let target = field.target().row * width + field.target().col;
-    let u: Vec<Scaled> = (0..width * height)
-        .map(|i| field.u(Cell::new(i % width, i / width)))
-        .collect();
-    // 0: not known yet, 1: arrives, 2: does not.
-    let mut known = vec![0_u8; u.len()];
-    known[target] = 1;
+    let width = field.width();
+    let cell = |index: usize| Cell::new(index % width, index / width);
+    // Whether the walk from a cell arrives, once known.
+    let mut arrives = vec![None; width * field.height()];
+    arrives[field.target().row * width + field.target().col] = Some(true);
     let (mut arrived, mut all) = (0_usize, 0_usize);
-    for start in (0..u.len()).filter(|&i| !u[i].is_zero()) {
+    for start in (0..arrives.len()).filter(|&index| field.is_reachable(cell(index))) {
         let mut path = Vec::new();
         let mut here = start;
-        while known[here] == 0 {
-            // Two until proven otherwise: a path that meets itself does not arrive.
-            known[here] = 2;
+        let result = loop {
+            if let Some(known) = arrives[here] {
+                break known;
+            }
+            // Not until proven: a walk that meets itself does not arrive.
+            arrives[here] = Some(false);
             path.push(here);
-            let best = neighbours(here, width, height)
-                .into_iter()
-                .flatten()
-                .fold(here, |b, n| if u[n] > u[b] { n } else { b });
-            here = best;
+            match field.ascent(cell(here)) {
+                Some(next) => here = next.row * width + next.col,
+                None => break false,
+            }
+        };
+        for index in path {
+            arrives[index] = Some(result);
         }
-        let result = known[here];
-        for cell in path {
-            known[cell] = result;
-        }
-        arrived += usize::from(known[start] == 1);
+        arrived += usize::from(arrives[start] == Some(true));
         all += 1;
     }
     arrived as f64 / all.max(1) as f64

@@ -42,7 +42,7 @@ pub(super) struct Finest<R> {
 
 /// What a pass tells of the convergence.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in super::super) struct Progress {
+pub(crate) struct Progress {
     /// Black cells whose coarse correction was above the tolerance, relatively to their u.
     pub unsettled: usize,
 }

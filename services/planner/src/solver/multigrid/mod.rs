@@ -18,10 +18,10 @@ mod real;
 
 use coarse::Coarse;
 use coarsest::Coarsest;
-pub(super) use finest::Progress;
+pub(crate) use finest::Progress;
 use finest::{Finest, Source};
 use grid::{EE, EO, Grid, OE};
-pub(super) use real::Real;
+pub(crate) use real::Real;
 
 use super::wide::Wide;
 
@@ -34,7 +34,7 @@ const COARSEST_SIDE: usize = 5;
 
 /// The levels of one map, in one precision.
 #[derive(Debug)]
-pub(super) struct Multigrid<R> {
+pub(crate) struct Multigrid<R> {
     finest: Finest<R>,
     coarse: Vec<Coarse<R>>,
     coarsest: Coarsest,
@@ -43,7 +43,7 @@ pub(super) struct Multigrid<R> {
 
 impl<R: Real> Multigrid<R> {
     /// Levels for maps of this size, with no equations yet.
-    pub(super) fn new(width: usize, height: usize) -> Self {
+    pub(crate) fn new(width: usize, height: usize) -> Self {
         let mut grid = Grid::new(width, height);
         let finest = Finest::new(grid);
         let mut coarse = Vec::new();
@@ -63,7 +63,7 @@ impl<R: Real> Multigrid<R> {
     }
 
     /// Sets the equations that depend on `rows` of the map, and no others, on all levels.
-    pub(super) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
+    pub(crate) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
         let finest = &mut self.finest;
         let width = domain.width();
         self.wide.run(
@@ -120,7 +120,7 @@ impl<R: Real> Multigrid<R> {
     }
 
     /// Makes `target` the only inflow and starts from the coarsest level's answer.
-    pub(super) fn start(&mut self, target: Cell) {
+    pub(crate) fn start(&mut self, target: Cell) {
         let (plane, at) = self.finest.grid.locate(target.col, target.row);
         let value = R::of(crate::scaled::pow2(R::TOP));
         self.finest.sources = vec![Source {
@@ -143,8 +143,54 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
+    /// Takes over equations that are not a map's: row-major 1 / diagonal (0 for a cell that stays zero) and first guess,
+    /// and what flows in by cell. Every pair of neighbours is coupled by one.
+    pub(crate) fn load(
+        &mut self,
+        inverse: &[R],
+        guess: &[R],
+        inflow: impl Iterator<Item = (Cell, R)>,
+    ) {
+        let finest = &mut self.finest;
+        let (grid, width, height) = (finest.grid, finest.grid.width, finest.grid.height);
+        let mut row_of = vec![R::default(); 2 * grid.columns];
+        for row in 0..height {
+            row_of[..width].copy_from_slice(&inverse[row * width..(row + 1) * width]);
+            grid::split_row(&grid, &mut finest.inverse, row, &row_of);
+            row_of[..width].copy_from_slice(&guess[row * width..(row + 1) * width]);
+            grid::split_row(&grid, &mut finest.u, row, &row_of);
+        }
+        finest.sources.clear();
+        finest.sources.extend(inflow.map(|(cell, value)| {
+            let (plane, at) = grid.locate(cell.col, cell.row);
+            Source {
+                plane,
+                row: cell.row / 2,
+                at,
+                value,
+            }
+        }));
+        finest
+            .sources
+            .sort_unstable_by_key(|source| (source.plane, source.row));
+        self.set_up_levels(0..height);
+        for plane in &mut self.coarse[0].u {
+            plane.fill(R::default());
+        }
+    }
+
+    /// u of every cell as it is, row by row.
+    pub(crate) fn unload(&self, into: &mut [R]) {
+        let grid = &self.finest.grid;
+        let mut row_of = vec![R::default(); 2 * grid.columns];
+        for (row, out) in into.chunks_exact_mut(grid.width).enumerate() {
+            grid::join_row(grid, &self.finest.u, row, &mut row_of);
+            out.copy_from_slice(&row_of[..grid.width]);
+        }
+    }
+
     /// One cycle; corrections above `tolerance` times u count as unsettled.
-    pub(super) fn cycle(&mut self, tolerance: f64) -> Progress {
+    pub(crate) fn cycle(&mut self, tolerance: f64) -> Progress {
         let progress = self.pass(true, tolerance);
         let last = self.coarse.len() - 1;
         for level in 0..last {
@@ -163,7 +209,7 @@ impl<R: Real> Multigrid<R> {
     }
 
     /// Brings the last coarse correction to the finest level, for u to be read. Cycles may follow.
-    pub(super) fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         self.pass(false, 0.0);
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
@@ -250,7 +296,7 @@ impl<R: Real> Multigrid<R> {
     }
 
     /// u of every cell, row by row, times 2^TOP over u(target); `blocked` where the map is.
-    pub(super) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
+    pub(crate) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
         let grid = &self.finest.grid;
         let (plane, at) = grid.locate(target.col, target.row);
         let top = crate::scaled::pow2(R::TOP);

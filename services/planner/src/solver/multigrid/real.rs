@@ -3,7 +3,7 @@
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
 /// A floating-point type.
-pub(in super::super) trait Real:
+pub(crate) trait Real:
     Copy
     + Default
     + PartialOrd

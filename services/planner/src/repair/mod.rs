@@ -1,0 +1,218 @@
+//! Local updates: newly blocked and newly freed cells, repaired in a window around them.
+//!
+//! A hazard changes the field in a wake that grows with the room, so a local update cannot be right everywhere. It is
+//! right near the change, it keeps every cell leading to the target, and it knows when that is not enough:
+//! - [`window`] solves the window for u between what flows in and what flows out, and estimates from the rim how far off
+//!   the directions beyond it are; the window grows until that is small.
+//! - [`patch`] keeps u as it was in each window. Across the outflow rim the ratios stay what they were, and windows that
+//!   would touch are solved anew as one, from u as it was before any of them. So a walk outside all windows always climbs
+//!   u of the last full solve, and each window is left higher, by that measure, than it is entered: the walk arrives.
+
+mod patch;
+mod window;
+
+pub(crate) use patch::{Patch, Rect};
+use window::{Judgement, Window};
+
+use crate::domain::{Change, Domain};
+use crate::field::{BLOCKED, Field};
+use crate::solver::Verdict;
+
+/// Sides of the windows, cells: the next is tried where the estimate asks for more.
+const SIDES: [usize; 6] = [49, 65, 97, 145, 193, 257];
+
+/// Cells between a change and the rim at least; the first window tried has about this much.
+const MARGIN: usize = 24;
+
+/// Estimates of the directions beyond the rim above this, in radians, make the window grow.
+const ANGLE: f64 = 0.0175;
+
+/// Beyond these ratios of u in the wake, after to before, a passage was closed or opened.
+const WAKE: (f64, f64) = (0.02, 50.0);
+
+/// Maps of at most this many cells are solved in full where a window does not do: that takes a millisecond.
+const SMALL: usize = 1 << 14;
+
+/// What came of growing a window.
+enum Grown {
+    /// The window of this index, the last that could be solved.
+    Solved(usize, Judgement),
+    /// The estimate asks for more than half of the map: a full solve costs no more.
+    TooWide,
+    /// No window could be solved.
+    Failed,
+}
+
+/// Windows kept between updates.
+#[derive(Debug, Default)]
+pub(crate) struct Repair {
+    windows: Vec<Window>,
+}
+
+impl Repair {
+    /// Repairs `field` after `changes`, which `domain` already has. `None` if a full solve is the cheaper.
+    pub(crate) fn update(
+        &mut self,
+        domain: &Domain,
+        field: &mut Field,
+        changes: &[Change],
+    ) -> Option<Verdict> {
+        let width = domain.width();
+        let changed = bounds(changes)?;
+        let mut rects = vec![changed];
+        // Patches near the change are undone and solved again together with it; that may bring others near.
+        let mut area = changed;
+        let (side, at) = loop {
+            let choice = choose(domain, &area, 0);
+            let Some((side, at)) = choice else {
+                break (0, (0, 0));
+            };
+            let reach = Rect {
+                col: at.0,
+                row: at.1,
+                width: side,
+                height: side,
+            };
+            let patches = field.patches_mut();
+            let Some(near) = patches
+                .iter()
+                .position(|patch| patch.rect().touches(&reach))
+            else {
+                break (side, at);
+            };
+            let patch = patches.swap_remove(near);
+            patch.restore(field.store_mut(), width);
+            area = area.union(patch.rect());
+            rects.push(*patch.rect());
+        };
+        let small = domain.blocked().len() <= SMALL;
+        if side != 0 && 2 * side * side > domain.blocked().len() {
+            return None;
+        }
+        let grown = if side == 0 {
+            Grown::Failed
+        } else {
+            self.grow(domain, field, &area, side, at)
+        };
+        let (window, judgement) = match grown {
+            Grown::Solved(window, judgement) => (window, judgement),
+            Grown::TooWide => return None,
+            Grown::Failed if small => return None,
+            Grown::Failed => {
+                // No window can tell. What is known must still hold: blocked cells are blocked.
+                for rect in rects {
+                    mark(domain, field, &rect);
+                }
+                return Some(Verdict::PassageClosed);
+            }
+        };
+        let (least, most) = judgement.wake;
+        let closed = !judgement.sound || least < WAKE.0 || most > WAKE.1;
+        if closed && small {
+            return None;
+        }
+        let window = &self.windows[window];
+        let patch = Patch::of(window.rect(), field.store(), width);
+        window.write(domain, field.store_mut());
+        field.patches_mut().push(patch);
+        Some(if closed {
+            Verdict::PassageClosed
+        } else if judgement.angle > ANGLE {
+            Verdict::RepairedAdviseFull
+        } else {
+            Verdict::Repaired
+        })
+    }
+
+    /// Solves windows of growing side until the estimate is small, or nothing wider can be solved.
+    fn grow(
+        &mut self,
+        domain: &Domain,
+        field: &Field,
+        area: &Rect,
+        side: usize,
+        at: (usize, usize),
+    ) -> Grown {
+        let mut next = Some((side, at));
+        let mut found = Grown::Failed;
+        while let Some((side, at)) = next {
+            if 2 * side * side > domain.blocked().len() {
+                return Grown::TooWide;
+            }
+            let reach = Rect {
+                col: at.0,
+                row: at.1,
+                width: side,
+                height: side,
+            };
+            if field
+                .patches()
+                .iter()
+                .any(|patch| patch.rect().touches(&reach))
+            {
+                break;
+            }
+            let index = self.window(side);
+            let Some(judgement) = self.windows[index].solve(domain, field.store(), at.0, at.1)
+            else {
+                break;
+            };
+            found = Grown::Solved(index, judgement);
+            // A wider window does not open a closed passage.
+            if judgement.angle <= ANGLE || judgement.wake.0 < WAKE.0 {
+                break;
+            }
+            next = choose(domain, area, side + 1);
+        }
+        found
+    }
+
+    fn window(&mut self, side: usize) -> usize {
+        if let Some(index) = self.windows.iter().position(|window| window.side() == side) {
+            return index;
+        }
+        self.windows.push(Window::new(side));
+        self.windows.len() - 1
+    }
+}
+
+/// The smallest window of at least `least` cells that leaves a margin around `area`, and its first cell.
+fn choose(domain: &Domain, area: &Rect, least: usize) -> Option<(usize, (usize, usize))> {
+    let wanted = (area.width.max(area.height) + 2 * MARGIN).max(least);
+    let side = SIDES.into_iter().find(|&side| side >= wanted)?;
+    let place = |start: usize, len: usize, end: usize| {
+        (side <= end).then(|| (start + len / 2).saturating_sub(side / 2).min(end - side))
+    };
+    Some((
+        side,
+        (
+            place(area.col, area.width, domain.width())?,
+            place(area.row, area.height, domain.height())?,
+        ),
+    ))
+}
+
+/// The rectangle around all changes.
+fn bounds(changes: &[Change]) -> Option<Rect> {
+    let cell = |change: &Change| Rect {
+        col: change.cell.col,
+        row: change.cell.row,
+        width: 1,
+        height: 1,
+    };
+    changes.iter().map(cell).reduce(|a, b| a.union(&b))
+}
+
+/// Makes the cells of `rect` blocked or cut off in the field as they are blocked or free in the map, u staying elsewhere.
+fn mark(domain: &Domain, field: &mut Field, rect: &Rect) {
+    for row in rect.row..rect.row + rect.height {
+        for index in row * domain.width() + rect.col..row * domain.width() + rect.col + rect.width {
+            let stored = field.store().raw(index).0;
+            if domain.blocked()[index] {
+                field.store_mut().set(index, BLOCKED, 0);
+            } else if stored < 0.0 {
+                field.store_mut().set(index, 0.0, 0);
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! A rectangle of cells whose u was computed anew, with what it was before.
+
+use crate::field::Store;
+use crate::scaled::Scaled;
+
+/// A rectangle of cells, inside the map.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) struct Rect {
+    /// First column.
+    pub col: usize,
+    /// First row.
+    pub row: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Rect {
+    pub(super) fn contains(&self, (col, row): (i64, i64)) -> bool {
+        let inside =
+            |at: i64, start: usize, len: usize| (start as i64..(start + len) as i64).contains(&at);
+        inside(col, self.col, self.width) && inside(row, self.row, self.height)
+    }
+
+    /// Whether the two overlap or touch, sides or corners.
+    pub(super) fn touches(&self, other: &Self) -> bool {
+        let touch =
+            |a: usize, a_len: usize, b: usize, b_len: usize| a <= b + b_len && b <= a + a_len;
+        touch(self.col, self.width, other.col, other.width)
+            && touch(self.row, self.height, other.row, other.height)
+    }
+
+    /// The smallest rectangle that holds both.
+    pub(super) fn union(&self, other: &Self) -> Self {
+        let join = |a: usize, a_len: usize, b: usize, b_len: usize| {
+            let start = a.min(b);
+            (start, (a + a_len).max(b + b_len) - start)
+        };
+        let (col, width) = join(self.col, self.width, other.col, other.width);
+        let (row, height) = join(self.row, self.height, other.row, other.height);
+        Self {
+            col,
+            row,
+            width,
+            height,
+        }
+    }
+}
+
+/// A local update: where, and u there before it.
+#[derive(Clone, Debug)]
+pub(crate) struct Patch {
+    rect: Rect,
+    /// Row-major over `rect`, as stored.
+    before: Vec<(f64, i32)>,
+}
+
+impl Patch {
+    /// Remembers u of the cells of `rect` in a map of `map_width` columns.
+    pub(super) fn of(rect: Rect, store: &Store, map_width: usize) -> Self {
+        let mut before = Vec::with_capacity(rect.width * rect.height);
+        for row in rect.row..rect.row + rect.height {
+            let start = row * map_width + rect.col;
+            before.extend((start..start + rect.width).map(|index| store.raw(index)));
+        }
+        Self { rect, before }
+    }
+
+    pub(super) fn rect(&self) -> &Rect {
+        &self.rect
+    }
+
+    /// Undoes the update.
+    pub(super) fn restore(&self, store: &mut Store, map_width: usize) {
+        for (row, cells) in self.before.chunks_exact(self.rect.width).enumerate() {
+            let start = (self.rect.row + row) * map_width + self.rect.col;
+            for (at, &(value, exponent)) in cells.iter().enumerate() {
+                store.set(start + at, value, exponent);
+            }
+        }
+    }
+
+    pub(crate) fn contains(&self, cell: (i64, i64)) -> bool {
+        self.rect.contains(cell)
+    }
+
+    /// u before the update, of a cell of the patch.
+    pub(crate) fn before(&self, cell: (i64, i64)) -> Scaled {
+        let (col, row) = (
+            cell.0 as usize - self.rect.col,
+            cell.1 as usize - self.rect.row,
+        );
+        let (value, exponent) = self.before[row * self.rect.width + col];
+        Scaled::new(value, exponent)
+    }
+}
