@@ -112,8 +112,7 @@ impl Repair {
             return None;
         }
         let window = &self.windows[window];
-        let patch = Patch::of(window.rect(), field.store(), width);
-        window.write(domain, field.store_mut());
+        let patch = window.write(domain, field.store_mut());
         field.patches_mut().push(patch);
         Some(if closed {
             Verdict::PassageClosed
@@ -153,8 +152,7 @@ impl Repair {
                 break;
             }
             let index = self.window(side);
-            let Some(judgement) = self.windows[index].solve(domain, field.store(), at.0, at.1)
-            else {
+            let Some(judgement) = self.windows[index].solve(domain, field.store(), at, area) else {
                 break;
             };
             found = Grown::Solved(index, judgement);

@@ -52,19 +52,25 @@ impl Rect {
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
     rect: Rect,
+    /// Row-major over `rect`: the cells of it that were solved for.
+    taken: Vec<bool>,
     /// Row-major over `rect`, as stored.
     before: Vec<(f64, i32)>,
 }
 
 impl Patch {
     /// Remembers u of the cells of `rect` in a map of `map_width` columns.
-    pub(super) fn of(rect: Rect, store: &Store, map_width: usize) -> Self {
+    pub(super) fn of(rect: Rect, taken: Vec<bool>, store: &Store, map_width: usize) -> Self {
         let mut before = Vec::with_capacity(rect.width * rect.height);
         for row in rect.row..rect.row + rect.height {
             let start = row * map_width + rect.col;
             before.extend((start..start + rect.width).map(|index| store.raw(index)));
         }
-        Self { rect, before }
+        Self {
+            rect,
+            taken,
+            before,
+        }
     }
 
     pub(super) fn rect(&self) -> &Rect {
@@ -82,16 +88,16 @@ impl Patch {
     }
 
     pub(crate) fn contains(&self, cell: (i64, i64)) -> bool {
-        self.rect.contains(cell)
+        self.rect.contains(cell) && self.taken[self.index(cell)]
     }
 
     /// u before the update, of a cell of the patch.
     pub(crate) fn before(&self, cell: (i64, i64)) -> Scaled {
-        let (col, row) = (
-            cell.0 as usize - self.rect.col,
-            cell.1 as usize - self.rect.row,
-        );
-        let (value, exponent) = self.before[row * self.rect.width + col];
+        let (value, exponent) = self.before[self.index(cell)];
         Scaled::new(value, exponent)
+    }
+
+    fn index(&self, (col, row): (i64, i64)) -> usize {
+        (row as usize - self.rect.row) * self.rect.width + col as usize - self.rect.col
     }
 }

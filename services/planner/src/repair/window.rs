@@ -5,9 +5,9 @@
 //! cell outside keeps its ratio to the cell inside: whatever changes in the window changes the wake in proportion. Holding
 //! u itself there would put false maxima just outside.
 
-use super::patch::Rect;
+use super::patch::{Patch, Rect};
 use crate::domain::{Cell, Domain};
-use crate::field::Store;
+use crate::field::{BLOCKED, Store};
 use crate::scaled::Scaled;
 use crate::solver::certificate::{Check, check_framed};
 use crate::solver::multigrid::Multigrid;
@@ -18,11 +18,9 @@ const TOLERANCE: f64 = 1e-3;
 /// Cycles before a window is given up.
 const CYCLES: usize = 24;
 
-/// Binary orders of magnitude of u that a window may span: what single precision holds, less a margin for products.
-const SPAN: i32 = 200;
-
-/// Power of two at which the largest u of a window is put.
-const TOP: i32 = 90;
+/// Binary orders of magnitude above and below u at the change that a window takes in. Cells beyond them are left outside as
+/// if they lay beyond the rim: the next corridor of a maze may be 1e-45 of this one.
+const SPAN: i32 = 80;
 
 /// The largest relative residual of a repaired window. It holds only until the next full solve.
 const RESIDUAL_LIMIT: f64 = 1e-3;
@@ -40,7 +38,12 @@ pub(super) struct Window {
     inverse: Vec<f32>,
     shares: Vec<f32>,
     values: Vec<f32>,
+    /// Framed: cells the window is solved for, blocked ones included.
+    taken: Vec<bool>,
+    /// Framed: cells that what flows in can reach.
     fed: Vec<bool>,
+    /// Free cells of the window with a neighbour it is not solved for.
+    rim: Vec<u32>,
     stack: Vec<u32>,
     reference: i32,
     rect: Rect,
@@ -68,7 +71,9 @@ impl Window {
             inverse: vec![0.0; side * side],
             shares: vec![0.0; side * side],
             values: vec![0.0; side * side],
+            taken: vec![false; framed],
             fed: vec![false; framed],
+            rim: Vec::new(),
             stack: Vec::new(),
             reference: 0,
             rect: Rect {
@@ -84,14 +89,14 @@ impl Window {
         self.side
     }
 
-    /// Solves the window at (`col`, `row`) for the map as it is now, `store` holding u as it was. `None` if u spans too
-    /// much, the solution does not settle, or fails its check.
+    /// Solves the window at (`col`, `row`) for the map as it is now, `store` holding u as it was and `changed` having
+    /// changed. `None` if the solution does not settle or fails its check.
     pub(super) fn solve(
         &mut self,
         domain: &Domain,
         store: &Store,
-        col: usize,
-        row: usize,
+        (col, row): (usize, usize),
+        changed: &Rect,
     ) -> Option<Judgement> {
         self.rect = Rect {
             col,
@@ -99,7 +104,10 @@ impl Window {
             width: self.side,
             height: self.side,
         };
-        self.gather(domain, store)?;
+        self.gather(domain, store, changed);
+        if self.misses_a_change(domain) {
+            return None;
+        }
         let touches_lost = self.feed(domain);
         self.set_equations(domain);
         let mut settled = false;
@@ -115,30 +123,32 @@ impl Window {
         let check: Check = check_framed(self.side, &self.after, &self.shares);
         let right = settled
             && !touches_lost
-            && check.stalled == self.targets(domain)
+            && check.stalled == 0
             && check.lost == 0
             && check.worst_residual <= RESIDUAL_LIMIT;
         right.then(|| self.judge())
     }
 
-    /// Writes u of the window to `store`.
-    pub(super) fn write(&self, domain: &Domain, store: &mut Store) {
+    /// Writes u of the cells solved for to `store`; returns the patch that remembers what it was.
+    pub(super) fn write(&self, domain: &Domain, store: &mut Store) -> Patch {
+        let taken = (0..self.side * self.side)
+            .map(|at| self.taken[self.framed(at)])
+            .collect();
+        let patch = Patch::of(self.rect, taken, store, domain.width());
+        let target = domain.index(domain.target());
         for (at, &u) in self.values.iter().enumerate() {
             let index = self.map_index(domain, at);
-            if index == domain.index(domain.target()) {
+            if index == target || !self.taken[self.framed(at)] {
                 continue;
             }
             let (value, exponent) = if domain.blocked()[index] {
-                (crate::field::BLOCKED, 0)
+                (BLOCKED, 0)
             } else {
                 (f64::from(u.max(0.0)), self.reference)
             };
             store.set(index, value, exponent);
         }
-    }
-
-    pub(super) fn rect(&self) -> Rect {
-        self.rect
+        patch
     }
 
     fn map_index(&self, domain: &Domain, at: usize) -> usize {
@@ -150,9 +160,9 @@ impl Window {
         (at / self.side + 1) * (self.side + 2) + at % self.side + 1
     }
 
-    /// Reads u as it was, window and frame.
-    fn gather(&mut self, domain: &Domain, store: &Store) -> Option<()> {
-        let framed = self.side + 2;
+    /// Reads u as it was, window and frame, and decides which cells to solve for.
+    fn gather(&mut self, domain: &Domain, store: &Store, changed: &Rect) {
+        let (side, framed) = (self.side, self.side + 2);
         let (width, height) = (domain.width(), domain.height());
         let mut cells = Vec::with_capacity(framed * framed);
         for row in 0..framed {
@@ -171,16 +181,44 @@ impl Window {
                 });
             }
         }
-        let exponents = cells.iter().filter(|u| !u.is_zero()).map(|u| u.exponent);
-        let (least, most) = exponents.fold((i32::MAX, i32::MIN), |(a, b), e| (a.min(e), b.max(e)));
-        if least > most || most - least > SPAN {
-            return None;
+        // The change and one cell around it; the frame is one cell itself.
+        let (first_col, first_row) = (changed.col - self.rect.col, changed.row - self.rect.row);
+        let near = (first_row..first_row + changed.height + 2)
+            .flat_map(|row| {
+                (first_col..first_col + changed.width + 2).map(move |col| row * framed + col)
+            })
+            .filter_map(|f| cells.get(f));
+        let exponents = |u: &Scaled| (!u.is_zero()).then_some(u.exponent);
+        let centre = near
+            .filter_map(exponents)
+            .max()
+            .or_else(|| cells.iter().filter_map(exponents).max());
+        self.reference = centre.unwrap_or(0);
+        for (f, u) in cells.iter().enumerate() {
+            let distance = u.exponent.saturating_sub(self.reference);
+            let clamped = Scaled {
+                exponent: self.reference + distance.clamp(-126, 120),
+                ..*u
+            };
+            self.before[f] = clamped.relative_to(self.reference) as f32;
+            let inside = (1..=side).contains(&(f / framed)) && (1..=side).contains(&(f % framed));
+            self.taken[f] = inside && (u.is_zero() || distance.abs() <= SPAN);
         }
-        self.reference = most - TOP;
-        for (to, u) in self.before.iter_mut().zip(&cells) {
-            *to = u.relative_to(self.reference) as f32;
+        self.rim.clear();
+        for at in 0..side * side {
+            let free = self.taken[self.framed(at)] && !domain.blocked()[self.map_index(domain, at)];
+            if free && self.outside(at).next().is_some() {
+                self.rim.push(at as u32);
+            }
         }
-        Some(())
+    }
+
+    /// Whether a cell that was blocked since is not among those solved for: one change on both sides of a wall, say.
+    fn misses_a_change(&self, domain: &Domain) -> bool {
+        (0..self.side * self.side).any(|at| {
+            let f = self.framed(at);
+            !self.taken[f] && domain.blocked()[self.map_index(domain, at)]
+        })
     }
 
     /// Marks the cells that what flows in can reach; true if that includes one beside a free cell of u = 0 outside, which
@@ -192,10 +230,10 @@ impl Window {
         let target = domain.index(domain.target());
         for at in 0..side * side {
             let index = self.map_index(domain, at);
-            if domain.blocked()[index] {
+            let f = self.framed(at);
+            if domain.blocked()[index] || !self.taken[f] {
                 continue;
             }
-            let f = self.framed(at);
             let fed = index == target
                 || self
                     .outside(at)
@@ -220,7 +258,7 @@ impl Window {
                 (f - framed, at >= side),
                 (f + framed, at + side < side * side),
             ] {
-                if inside && !self.fed[step] {
+                if inside && self.taken[step] && !self.fed[step] {
                     let next = (step / framed - 1) * side + step % framed - 1;
                     if !domain.blocked()[self.map_index(domain, next)] {
                         self.fed[step] = true;
@@ -232,18 +270,13 @@ impl Window {
         touches_lost
     }
 
-    /// Places in the frame beside a cell of the rim.
+    /// Places of the neighbours of a cell that the window is not solved for.
     fn outside(&self, at: usize) -> impl Iterator<Item = usize> + use<> {
-        let (side, framed, f) = (self.side, self.side + 2, self.framed(at));
-        let (col, row) = (at % side, at / side);
-        [
-            (col == 0).then_some(f - 1),
-            (col + 1 == side).then_some(f + 1),
-            (row == 0).then_some(f - framed),
-            (row + 1 == side).then_some(f + framed),
-        ]
-        .into_iter()
-        .flatten()
+        let (framed, f) = (self.side + 2, self.framed(at));
+        [f - 1, f + 1, f - framed, f + framed]
+            .map(|o| (!self.taken[o]).then_some(o))
+            .into_iter()
+            .flatten()
     }
 
     /// Whether u flows from the window's rim cell out to `o` of the frame.
@@ -265,36 +298,36 @@ impl Window {
                 self.inverse[at] = 0.0;
                 continue;
             }
-            let mut rest = diagonal;
-            let rim =
-                at % side == 0 || at % side + 1 == side || at < side || at + side >= side * side;
-            if rim {
-                for o in self.outside(at) {
-                    if self.flows_out(f, o) {
-                        rest -= self.before[o] / self.before[f];
-                    } else if self.before[o] > 0.0 {
-                        inflow.push((Cell::new(at % side, at / side), self.before[o]));
-                    }
+            self.inverse[at] = 1.0 / diagonal;
+        }
+        for &at in &self.rim {
+            let at = at as usize;
+            let f = self.framed(at);
+            if self.inverse[at] == 0.0 {
+                continue;
+            }
+            let mut rest = 1.0 / self.shares[at];
+            for o in self.outside(at) {
+                if self.flows_out(f, o) {
+                    rest -= self.before[o] / self.before[f];
+                } else if self.before[o] > 0.0 {
+                    inflow.push((Cell::new(at % side, at / side), self.before[o]));
                 }
             }
             self.inverse[at] = 1.0 / rest;
         }
-        if self
-            .rect
-            .contains((domain.target().col as i64, domain.target().row as i64))
-        {
-            let (col, row) = (
-                domain.target().col - self.rect.col,
-                domain.target().row - self.rect.row,
-            );
-            let u = self.before[self.framed(row * side + col)];
-            for (dc, dr) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
-                if let (Some(c), Some(r)) = (col.checked_add_signed(dc), row.checked_add_signed(dr))
-                    && c < side
-                    && r < side
-                {
-                    inflow.push((Cell::new(c, r), u));
-                }
+        if let Some(at) = self.target(domain) {
+            // The target's own equation does not hold: what it gives its neighbours flows in.
+            let f = self.framed(at);
+            let framed = side + 2;
+            for next in [f - 1, f + 1, f - framed, f + framed]
+                .into_iter()
+                .filter(|&next| self.taken[next])
+            {
+                inflow.push((
+                    Cell::new(next % framed - 1, next / framed - 1),
+                    self.before[f],
+                ));
             }
         }
         self.levels
@@ -305,20 +338,23 @@ impl Window {
     fn frame(&mut self, domain: &Domain) {
         let side = self.side;
         self.after.copy_from_slice(&self.before);
-        let target = domain.index(domain.target());
+        if let Some(target) = self.target(domain) {
+            self.values[target] = self.before[self.framed(target)];
+            self.shares[target] = 0.0;
+        }
         for at in 0..side * side {
-            let index = self.map_index(domain, at);
             let f = self.framed(at);
-            if index == target {
-                // The one cell whose equation does not hold; its share makes the check pass it over.
-                self.values[at] = self.before[f];
+            if !self.taken[f] {
                 self.shares[at] = 0.0;
-            }
-            self.after[f] = if domain.blocked()[index] {
-                -1.0
+            } else if domain.blocked()[self.map_index(domain, at)] {
+                self.after[f] = -1.0;
             } else {
-                self.values[at]
-            };
+                self.after[f] = self.values[at];
+            }
+        }
+        for &at in &self.rim {
+            let at = at as usize;
+            let f = self.framed(at);
             for o in self.outside(at) {
                 if self.flows_out(f, o) {
                     self.after[o] = self.values[at] * (self.before[o] / self.before[f]);
@@ -330,12 +366,12 @@ impl Window {
         }
     }
 
-    /// Cells of the window that need no better neighbour.
-    fn targets(&self, domain: &Domain) -> usize {
-        usize::from(
-            self.rect
-                .contains((domain.target().col as i64, domain.target().row as i64)),
-        )
+    /// The target's place among the cells the window is solved for.
+    fn target(&self, domain: &Domain) -> Option<usize> {
+        let col = domain.target().col.checked_sub(self.rect.col)?;
+        let row = domain.target().row.checked_sub(self.rect.row)?;
+        let at = row * self.side + col;
+        (col < self.side && row < self.side && self.taken[self.framed(at)]).then_some(at)
     }
 
     fn judge(&self) -> Judgement {
@@ -344,11 +380,8 @@ impl Window {
             wake: (f64::INFINITY, 0.0),
             sound: true,
         };
-        let side = self.side;
-        let rim = (0..side * side).filter(|at| {
-            at % side == 0 || at % side + 1 == side || *at < side || at + side >= side * side
-        });
-        for at in rim {
+        for &at in &self.rim {
+            let at = at as usize;
             let f = self.framed(at);
             if self.before[f] <= 0.0 {
                 continue;

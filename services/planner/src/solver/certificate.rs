@@ -182,12 +182,12 @@ impl<R: Real> Rows<R> {
             let best = larger(larger(west[x], east[x]), larger(north[x], south[x]));
             let positive = here[x] > zero;
             reachable += u32::from(positive);
-            stalled += u32::from(positive & (best <= here[x]));
             // A value that is no number is neither blocked nor positive: lost.
             let blocked = raw[x] < zero;
             lost += u32::from(!positive & !blocked & (sum > zero));
             let residual = (here[x] - shares[x] * sum).size();
             let holds = positive & (shares[x] > zero);
+            stalled += u32::from(holds & (best <= here[x]));
             residuals[x] = if holds { residual / here[x] } else { zero };
         }
         // In lanes: a running maximum over floats is otherwise taken one by one.
