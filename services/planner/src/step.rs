@@ -10,6 +10,7 @@ use glam::DVec2;
 
 use crate::{
     Absorption, Cancellation, Cell, Change, Domain, Field, Guidance, Settings, SolveError, Solver,
+    Verdict,
 };
 
 /// What taking a grid sample led to.
@@ -108,13 +109,19 @@ impl Planner {
         if changes.is_empty() {
             return Ok(Work::None);
         }
-        // The verdict asks for a full solve exactly where this one already was one.
-        let _verdict = self.solver.update(
+        let verdict = self.solver.update(
             &mut solved.domain,
             &mut solved.field,
             &changes,
             &Cancellation::default(),
         )?;
+        if verdict != Verdict::Repaired {
+            solved.field = self
+                .solver
+                .solve(&solved.domain, &Cancellation::default())?;
+            self.full_solves += 1;
+            return Ok(Work::FullSolve);
+        }
         self.local_updates += 1;
         Ok(Work::LocalUpdate)
     }

@@ -195,6 +195,7 @@ struct Console {
     rewrites: bool,
     shown: Option<Instant>,
     straight: f64,
+    title: String,
 }
 
 /// Where lines cannot be rewritten they come so seldom.
@@ -203,18 +204,18 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 impl Console {
     fn new(options: &Options) -> Self {
         let mission = &options.mission;
-        let straight = mission.target.length();
-        eprintln!(
-            "mission {}: {straight:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
-            mission.name,
-            options.robot,
-            options.pace,
-            options.directory.display()
-        );
         Self {
             rewrites: io::stderr().is_terminal(),
             shown: None,
-            straight,
+            straight: mission.target.length(),
+            title: format!(
+                "mission {}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
+                mission.name,
+                mission.target.length(),
+                options.robot,
+                options.pace,
+                options.directory.display()
+            ),
         }
     }
 
@@ -225,7 +226,9 @@ impl Console {
         if !due {
             return;
         }
-        self.shown = Some(Instant::now());
+        if self.shown.replace(Instant::now()).is_none() {
+            eprintln!("{}", self.title);
+        }
         let line = self.line(progress);
         if self.rewrites {
             eprint!("\r\x1b[K{line}");

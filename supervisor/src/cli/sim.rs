@@ -2,7 +2,7 @@
 
 use std::{net::SocketAddr, process::ExitCode};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use common::{
     clock::Pace,
     shell::become_child,
@@ -20,6 +20,9 @@ pub(super) struct Arguments {
     /// Where to listen; port 0 takes a free one.
     #[arg(long, default_value = "127.0.0.1:0")]
     listen: SocketAddr,
+    /// How to listen: datagrams, one connection at a time, or a pseudo-terminal in place of a serial port.
+    #[arg(long, value_enum, default_value_t)]
+    transport: Transport,
     /// Mission time: `max` waits for a command each tick, R runs R times wall-clock.
     #[arg(long, default_value = "1")]
     pace: Pace,
@@ -37,6 +40,25 @@ pub(super) struct Arguments {
     supervisor: Option<u32>,
 }
 
+/// How the robot is spoken to.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Transport {
+    #[default]
+    Udp,
+    Tcp,
+    Pty,
+}
+
+impl From<Transport> for x80_sim::Transport {
+    fn from(transport: Transport) -> Self {
+        match transport {
+            Transport::Udp => Self::Udp,
+            Transport::Tcp => Self::Tcp,
+            Transport::Pty => Self::Pty,
+        }
+    }
+}
+
 pub(super) fn main(arguments: Arguments) -> Result<ExitCode, Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     if let Some(seed) = arguments.seed {
@@ -50,7 +72,7 @@ pub(super) fn main(arguments: Arguments) -> Result<ExitCode, Failure> {
         mission,
         pace: arguments.pace,
         listen: arguments.listen,
-        transport: x80_sim::Transport::default(),
+        transport: arguments.transport.into(),
         truth: arguments
             .truth
             .then(|| Box::new(std::io::stdout()) as Box<_>),

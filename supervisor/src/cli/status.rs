@@ -1,6 +1,7 @@
 //! `firsthand status`: what runs.
 
 use std::{
+    fmt,
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -9,10 +10,12 @@ use clap::Args;
 use common::{
     bus::Bus,
     domain::{Domain, RobotName},
-    samples::{Order, StageState, name_str},
+    samples::{Order, RosterEntry, StageState, name_str},
     topics,
     waiter::Waiter,
 };
+
+use serde::Serialize;
 
 use super::Failure;
 
@@ -22,6 +25,33 @@ pub(super) struct Arguments {
     /// Whose.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
+    /// One line of JSON; an age of null is never.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The whole of `status --json`.
+#[derive(Serialize)]
+struct Status<'a> {
+    robot: &'a RobotName,
+    supervisor_pid: u32,
+    order: &'static str,
+    tick: u64,
+    mission_time_s: f64,
+    stages: Vec<StageStatus<'a>>,
+}
+
+/// One stage of it.
+#[derive(Serialize)]
+struct StageStatus<'a> {
+    name: &'a str,
+    state: &'static str,
+    pid: u32,
+    generation: u32,
+    restarts: u32,
+    uptime_s: Option<f64>,
+    beat_age_s: Option<f64>,
+    output_age_s: Option<f64>,
 }
 
 /// The roster comes five times a second.
@@ -48,47 +78,93 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         waiter.wait(PATIENCE)?;
     };
     let header = entries.header();
-    println!(
-        "robot {}: supervisor {}, {}",
-        arguments.robot,
-        header.supervisor_pid,
-        match Order::from_byte(header.order) {
-            Order::Hold => "starting",
-            Order::Drive => "driving",
-            Order::Stop => "stopping",
-        }
-    );
-    println!(
-        "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
-        "stage", "state", "pid", "life", "uptime", "restarts", "last beat", "last output"
-    );
-    for entry in entries.iter() {
-        println!(
-            "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
-            name_str(&entry.stage),
-            match StageState::from_byte(entry.state) {
-                StageState::Down => "down",
-                StageState::Starting => "starting",
-                StageState::Running => "running",
-                StageState::BackingOff => "backing off",
-                StageState::Stopping => "stopping",
-            },
-            entry.pid,
-            entry.generation,
-            age(entry.uptime_ns),
-            entry.restarts,
-            age(entry.beat_age_ns),
-            age(entry.output_age_ns),
-        );
+    let status = Status {
+        robot: &arguments.robot,
+        supervisor_pid: header.supervisor_pid,
+        order: order(Order::from_byte(header.order)),
+        tick: header.stamp.tick,
+        mission_time_s: header.stamp.time().seconds(),
+        stages: entries.iter().map(stage_status).collect(),
+    };
+    if arguments.json {
+        println!("{}", serde_json::to_string(&status)?);
+    } else {
+        print!("{status}");
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// An age for people; u64::MAX is never.
-fn age(nanoseconds: u64) -> String {
-    match nanoseconds {
-        u64::MAX => "never".to_owned(),
-        0..1_000_000_000 => format!("{} ms", nanoseconds / 1_000_000),
-        _ => format!("{:.1} s", nanoseconds as f64 * 1e-9),
+fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
+    StageStatus {
+        name: name_str(&entry.stage),
+        state: state(StageState::from_byte(entry.state)),
+        pid: entry.pid,
+        generation: entry.generation,
+        restarts: entry.restarts,
+        uptime_s: seconds(entry.uptime_ns),
+        beat_age_s: seconds(entry.beat_age_ns),
+        output_age_s: seconds(entry.output_age_ns),
+    }
+}
+
+const fn order(order: Order) -> &'static str {
+    match order {
+        Order::Hold => "starting",
+        Order::Drive => "driving",
+        Order::Stop => "stopping",
+    }
+}
+
+const fn state(state: StageState) -> &'static str {
+    match state {
+        StageState::Down => "down",
+        StageState::Starting => "starting",
+        StageState::Running => "running",
+        StageState::BackingOff => "backing off",
+        StageState::Stopping => "stopping",
+    }
+}
+
+impl fmt::Display for Status<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "robot {}: supervisor {}, {}, {:.1} s into the mission",
+            self.robot, self.supervisor_pid, self.order, self.mission_time_s
+        )?;
+        writeln!(
+            f,
+            "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
+            "stage", "state", "pid", "life", "uptime", "restarts", "last beat", "last output"
+        )?;
+        for stage in &self.stages {
+            writeln!(
+                f,
+                "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
+                stage.name,
+                stage.state,
+                stage.pid,
+                stage.generation,
+                age(stage.uptime_s),
+                stage.restarts,
+                age(stage.beat_age_s),
+                age(stage.output_age_s),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// u64::MAX nanoseconds are never.
+fn seconds(nanoseconds: u64) -> Option<f64> {
+    (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
+}
+
+/// An age for people.
+fn age(seconds: Option<f64>) -> String {
+    match seconds {
+        None => "never".to_owned(),
+        Some(seconds) if seconds < 1.0 => format!("{:.0} ms", seconds * 1e3),
+        Some(seconds) => format!("{seconds:.1} s"),
     }
 }
