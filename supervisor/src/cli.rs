@@ -54,7 +54,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match command {
         Command::Run(arguments) => run::main(&arguments),
         Command::Stage(arguments) => stage::main(&arguments),
-        Command::Sim(arguments) => sim::main(arguments),
+        Command::Sim(arguments) => sim::main(&arguments),
         Command::Missions(arguments) => missions::main(&arguments),
         Command::Check(arguments) => check::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),

@@ -59,7 +59,7 @@ impl From<Transport> for x80_sim::Transport {
     }
 }
 
-pub(super) fn main(arguments: Arguments) -> Result<ExitCode, Failure> {
+pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;

@@ -1,0 +1,148 @@
+//! Stages killed, frozen and stopped in the middle of missions.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use rustix::process::Signal;
+use support::{Run, assert_nothing_left, processes_of, run};
+
+const STAGES: [&str; 5] = [
+    "x80-link",
+    "dead-reckoning",
+    "mapper",
+    "planner",
+    "controller",
+];
+
+/// Mission time runs so many times as fast as the wall's: a mission takes ten seconds.
+const PACE: &str = "4";
+
+#[test]
+fn each_stage_killed_once_the_robot_arrives_and_knows_where_it_is() {
+    let (_, undisturbed) = run("calm", "obstacle-course", &["--pace", PACE]);
+    let mut killed = Run::start("kills", "obstacle-course", &["--pace", PACE]);
+    killed.wait_until_under_way(2.0);
+    for stage in STAGES {
+        killed.kill_and_await_successor(stage, Signal::KILL);
+    }
+    let (code, summary) = killed.finish();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(0), &"reached".into()),
+        "{summary}"
+    );
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    for stage in STAGES {
+        assert_eq!(summary["restarts"][stage], 1, "{summary}");
+    }
+    // A count of the encoders is half a millimetre; a lost pose is metres.
+    let error = |summary: &serde_json::Value| summary["pose_error_m"].as_f64().unwrap();
+    assert!(
+        error(&summary) <= error(&undisturbed) + 0.005,
+        "{summary} against {undisturbed}"
+    );
+    assert_nothing_left("kills");
+}
+
+#[test]
+fn a_stage_killed_on_a_clock_of_ticks_does_not_hang_the_mission() {
+    // The mission takes a second: the kill may come before, in or after it.
+    for stage in STAGES {
+        let robot = format!("t-{}", &stage[..6]);
+        let mut run = Run::start(&robot, "obstacle-course", &["--set", "perimeter.cells=200"]);
+        run.wait_until("stages run", |status| {
+            support::find(status, stage)["state"] == "running"
+        });
+        let status = run.status().unwrap();
+        let pid = support::find(&status, stage)["pid"].as_u64().unwrap() as u32;
+        support::signal_process(pid, Signal::KILL);
+        let (_, summary) = run.finish();
+        assert_eq!(summary["outcome"], "reached", "{stage}: {summary}");
+    }
+}
+
+#[test]
+fn a_frozen_stage_is_noticed_and_replaced() {
+    let mut frozen = Run::start("frozen", "obstacle-course", &["--pace", PACE]);
+    frozen.wait_until_under_way(2.0);
+    frozen.kill_and_await_successor("mapper", Signal::STOP);
+    let (code, summary) = frozen.finish();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(0), &"reached".into()),
+        "{summary}"
+    );
+    assert_eq!(summary["restarts"]["mapper"], 1);
+    assert_nothing_left("frozen");
+}
+
+#[test]
+fn ctrl_c_and_sigterm_end_a_run_in_order_and_leave_nothing() {
+    for (robot, signal) in [("ctrl-c", Signal::INT), ("sigterm", Signal::TERM)] {
+        let mut stopped = Run::start(robot, "obstacle-course", &["--pace", "1"]);
+        stopped.wait_until_under_way(0.5);
+        stopped.signal(signal);
+        let directory = stopped.directory();
+        let (code, summary, kept) = stopped.finish_in();
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(0), &"aborted".into()),
+            "{summary}"
+        );
+        let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
+        assert!(log.contains("robot told to stand"), "{log}");
+        assert_nothing_left(robot);
+        drop(kept);
+    }
+}
+
+#[test]
+fn stages_die_with_their_supervisor_and_the_link_stops_the_robot_first() {
+    let mut orphaned = Run::start("orphans", "obstacle-course", &["--pace", "1"]);
+    orphaned.wait_until_under_way(0.5);
+    let directory = orphaned.directory();
+    orphaned.signal(Signal::KILL);
+    let began = std::time::Instant::now();
+    let run_directory = directory.to_str().unwrap().to_owned();
+    while !processes_of(&run_directory).is_empty() {
+        assert!(
+            began.elapsed() < support::PATIENCE,
+            "{:?}",
+            processes_of(&run_directory)
+        );
+    }
+    let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
+    assert!(log.contains("robot told to stand"), "{log}");
+    drop(orphaned);
+    // What the dead supervisor left does not stand in the way of the next, and goes with it.
+    let (code, summary) = run("orphans", "open-room", &[]);
+    assert_eq!(code, Some(0), "{summary}");
+    assert_nothing_left("orphans");
+}
+
+#[test]
+fn two_robots_on_one_machine_do_not_see_each_other() {
+    let mut one = Run::start("one", "obstacle-course", &["--pace", PACE]);
+    let mut two = Run::start("two", "trap", &["--pace", PACE]);
+    let status = one.wait_until_under_way(1.0);
+    two.wait_until_under_way(1.0);
+    assert_ne!(
+        support::find(&status, "mapper")["pid"],
+        support::find(&two.status().unwrap(), "mapper")["pid"]
+    );
+    one.kill_and_await_successor("mapper", Signal::KILL);
+    let (_, one) = one.finish();
+    let (_, two) = two.finish();
+    assert_eq!(
+        (&one["outcome"], &one["restarts"]["mapper"]),
+        (&"reached".into(), &1.into()),
+        "{one}"
+    );
+    assert_eq!(
+        (&two["outcome"], &two["restarts"]["mapper"]),
+        (&"reached".into(), &0.into()),
+        "{two}"
+    );
+    assert_nothing_left("one");
+    assert_nothing_left("two");
+}

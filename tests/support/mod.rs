@@ -1,0 +1,187 @@
+//! What the system tests share: the real executable, robots of their own, words to wait for.
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::panic,
+    missing_docs,
+    unreachable_pub
+)]
+
+use std::{
+    path::Path,
+    process::{Child, Command, Output, Stdio},
+    time::{Duration, Instant},
+};
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Nothing a test waits for takes nearly as long; what does is broken.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// `firsthand` with these arguments.
+pub fn firsthand(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_firsthand"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+/// Run it to its end.
+pub fn output(arguments: &[&str]) -> Output {
+    firsthand(arguments).output().unwrap()
+}
+
+/// A run of a mission by a robot of its own.
+pub struct Run {
+    pub robot: String,
+    child: Child,
+    // Removed when the test ends.
+    directory: TempDir,
+}
+
+impl Run {
+    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments.
+    pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("run");
+        let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
+            .arg(&out)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Self {
+            robot: robot.to_owned(),
+            child,
+            directory,
+        }
+    }
+
+    pub fn directory(&self) -> std::path::PathBuf {
+        self.directory.path().join("run")
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// `firsthand status --json`; none before the robot has a bus.
+    pub fn status(&self) -> Option<Value> {
+        let output = output(&["status", "--robot", &self.robot, "--json"]);
+        let text = output.status.success().then_some(output.stdout)?;
+        serde_json::from_slice(&text).ok()
+    }
+
+    /// Ask for the status until `is_so` of it: each answer waits for the supervisor's next word.
+    pub fn wait_until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.status()
+                && is_so(&status)
+            {
+                return status;
+            }
+            if let Some(exit) = self.child.try_wait().unwrap() {
+                panic!("the run ended ({exit}) before {what}");
+            }
+            assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
+        }
+    }
+
+    /// Until the robot has been under way for `seconds` of mission time.
+    pub fn wait_until_under_way(&mut self, seconds: f64) -> Value {
+        self.wait_until("the robot is under way", |status| {
+            status["mission_time_s"].as_f64().unwrap() >= seconds
+        })
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        signal_process(self.pid(), signal);
+    }
+
+    /// Kill a stage and wait until its successor runs.
+    pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) {
+        let status = self.wait_until("the stage runs", |status| {
+            find(status, stage)["state"] == "running"
+        });
+        let generation = find(&status, stage)["generation"].as_u64().unwrap();
+        signal_process(find(&status, stage)["pid"].as_u64().unwrap() as u32, signal);
+        self.wait_until("its successor runs", |status| {
+            let stage = find(status, stage);
+            stage["generation"].as_u64() > Some(generation) && stage["state"] == "running"
+        });
+    }
+
+    /// Wait for the end: exit code, and the JSON of the last line.
+    pub fn finish(self) -> (Option<i32>, Value) {
+        let output = self.child.wait_with_output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let last = text.lines().last().unwrap_or_default();
+        let summary = serde_json::from_str(last).unwrap_or_else(|_| {
+            panic!(
+                "no JSON in {text:?}; stderr: {}",
+                String::from_utf8_lossy(&output.stderr)
+            )
+        });
+        (output.status.code(), summary)
+    }
+
+    /// Wait for the end and keep the run directory.
+    pub fn finish_in(mut self) -> (Option<i32>, Value, TempDir) {
+        let kept = std::mem::replace(&mut self.directory, tempfile::tempdir().unwrap());
+        let (code, summary) = self.finish();
+        (code, summary, kept)
+    }
+}
+
+/// A whole run.
+pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
+    Run::start(robot, mission, arguments).finish()
+}
+
+pub fn signal_process(pid: u32, signal: Signal) {
+    let pid = Pid::from_raw(pid as i32).unwrap();
+    kill_process(pid, signal).unwrap();
+}
+
+/// A stage's part of a status.
+pub fn find<'a>(status: &'a Value, stage: &str) -> &'a Value {
+    let stages = status["stages"].as_array().unwrap();
+    stages.iter().find(|entry| entry["name"] == stage).unwrap()
+}
+
+/// Nothing of `robot` is left: no process, no shared memory, no files.
+pub fn assert_nothing_left(robot: &str) {
+    let user = rustix::process::geteuid().as_raw();
+    let prefix = format!("fh{user}_{robot}_");
+    let shared: Vec<_> = std::fs::read_dir("/dev/shm")
+        .unwrap()
+        .flatten()
+        .map(|entry| entry.file_name())
+        .filter(|name| name.as_encoded_bytes().starts_with(prefix.as_bytes()))
+        .collect();
+    assert!(shared.is_empty(), "left in /dev/shm: {shared:?}");
+    let root = format!("/tmp/firsthand-{user}/{robot}");
+    assert!(!Path::new(&root).exists(), "{root} is left");
+    assert_eq!(processes_of(robot), Vec::<String>::new());
+}
+
+/// Command lines of processes that work for `robot`, by their run directory's mission or robot name.
+pub fn processes_of(robot: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir("/proc").unwrap().flatten() {
+        let Ok(line) = std::fs::read(entry.path().join("cmdline")) else {
+            continue;
+        };
+        let words: Vec<_> = line.split(|&byte| byte == 0).collect();
+        let is_ours = words
+            .first()
+            .is_some_and(|word| word.ends_with(b"firsthand"));
+        if is_ours && words.contains(&robot.as_bytes()) {
+            found.push(String::from_utf8_lossy(&line).replace('\0', " "));
+        }
+    }
+    found
+}
