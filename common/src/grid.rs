@@ -178,6 +178,26 @@ impl GridFrame {
         })
     }
 
+    /// The smallest window outside of which two whole maps are the same; empty if they are.
+    #[must_use]
+    pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
+        let side = self.cells as usize;
+        let mut window = Window::default();
+        let rows = old.chunks_exact(side).zip(new.chunks_exact(side));
+        for (row, (old, new)) in rows.enumerate() {
+            let differs = |(old, new): (&T, &T)| old != new;
+            let first = old.iter().zip(new).position(differs);
+            let last = old.iter().zip(new).rposition(differs);
+            for col in [first, last].into_iter().flatten() {
+                window = window.including(Cell {
+                    col: col as u32,
+                    row: row as u32,
+                });
+            }
+        }
+        window
+    }
+
     /// Whether `window` lies inside the map.
     #[must_use]
     pub fn contains(&self, window: Window) -> bool {
@@ -239,29 +259,6 @@ impl<T: Copy + PartialEq> Replica<T> {
         &self.cells
     }
 
-    /// The smallest window outside of which `cells` are those held.
-    fn difference(&self, frame: GridFrame, cells: &[T]) -> Window {
-        let rows = frame.cells as usize;
-        let mut window = Window::default();
-        for (row, (held, new)) in self
-            .cells
-            .chunks_exact(rows)
-            .zip(cells.chunks_exact(rows))
-            .enumerate()
-        {
-            let differs = |(held, new): (&T, &T)| held != new;
-            let first = held.iter().zip(new).position(differs);
-            let last = held.iter().zip(new).rposition(differs);
-            for col in [first, last].into_iter().flatten() {
-                window = window.including(Cell {
-                    col: col as u32,
-                    row: row as u32,
-                });
-            }
-        }
-        window
-    }
-
     /// Follow one revision.
     pub fn apply(&mut self, revision: &Revision, cells: &[T]) -> Applied {
         let Revision {
@@ -280,7 +277,7 @@ impl<T: Copy + PartialEq> Replica<T> {
             // A keyframe for late joiners must not look like more than what changed, or a consumer that
             // attaches would change what the others compute.
             let known = self.state.is_some_and(|(held, _)| held == frame);
-            let changed = known.then(|| self.difference(frame, cells));
+            let changed = known.then(|| frame.changed_window(&self.cells, cells));
             self.cells.clear();
             self.cells.extend_from_slice(cells);
             self.state = Some((frame, version));

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use common::{
     bus::{Reader, SliceReader, SliceWriter, Writer},
     clock::MissionTime,
+    grid::Revision,
     samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
     topics::{self, AnyTopic as _},
@@ -29,7 +30,10 @@ pub struct Shell {
     local_update_ns: u64,
     field_version: u64,
     field_changed: bool,
-    field_told: Option<MissionTime>,
+    /// The policy that consumers hold.
+    told: Vec<FieldCell>,
+    change_told: Option<MissionTime>,
+    keyframe_told: Option<MissionTime>,
     progress: Progress,
 }
 
@@ -52,7 +56,9 @@ impl Process for Shell {
             local_update_ns: 0,
             field_version: 0,
             field_changed: false,
-            field_told: None,
+            told: Vec::new(),
+            change_told: None,
+            keyframe_told: None,
             progress: Progress::default(),
         })
     }
@@ -123,25 +129,52 @@ impl Shell {
         Ok(())
     }
 
-    /// The field for consumers, after the robot has its guidance.
+    /// The field for consumers, after the robot has its guidance: what changed, or all of it when it was
+    /// not told for long or somebody new listens.
     fn tell_field(&mut self) -> Result<(), StageError> {
-        let at_least_every = topics::FIELD.restated_every();
-        let age = self.field_told.map(|told| self.progress.time.since(told));
-        let due = age.is_none_or(|age| {
-            age >= at_least_every || self.field_changed && age >= FIELD_AT_MOST_EVERY
-        });
-        if !(due || self.field.has_new_reader()) {
+        let since = |told: Option<MissionTime>| told.map(|told| self.progress.time.since(told));
+        let keyframe = self.field.has_new_reader()
+            || since(self.keyframe_told).is_none_or(|age| age >= topics::FIELD.restated_every());
+        let change = self.field_changed
+            && since(self.change_told).is_none_or(|age| age >= FIELD_AT_MOST_EVERY);
+        if !(keyframe || change) {
             return Ok(());
         }
-        if self.field_changed {
+        let Some((header, frame, cells)) = self.planner.policy() else {
+            return Ok(());
+        };
+        self.field_changed = false;
+        self.change_told = Some(self.progress.time);
+        let comparable = self.told.len() == cells.len();
+        let changed = if comparable {
+            frame.changed_window(&self.told, &cells)
+        } else {
+            frame.whole()
+        };
+        let keyframe = keyframe || changed == frame.whole();
+        if changed.area() > 0 {
             self.field_version += 1;
+        } else if !keyframe {
+            return Ok(());
         }
-        if let Some((header, cells)) = self.planner.policy(self.field_version) {
-            self.field_told = Some(self.progress.time);
-            self.field_changed = false;
-            let Progress { tick, time } = self.progress;
-            self.field.publish(tick, time, header, cells.into_iter())?;
+        let window = if keyframe { frame.whole() } else { changed };
+        if keyframe {
+            self.keyframe_told = Some(self.progress.time);
         }
+        let header = FieldHeader {
+            part: Revision {
+                frame,
+                window,
+                version: self.field_version,
+                keyframe,
+            }
+            .into(),
+            ..header
+        };
+        let Progress { tick, time } = self.progress;
+        let part = frame.cells_of(window, &cells);
+        self.field.publish(tick, time, header, part)?;
+        self.told = cells;
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The stage, pure: follow the `grid`, keep the field right, answer for a pose.
 
 use common::{
-    grid::{Applied, CellState, GridFrame, Replica, Revision, Window},
+    grid::{Applied, CellState, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::Mission,
     samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
@@ -157,20 +157,13 @@ impl Planner {
         }
     }
 
-    /// The whole field as the `field` topic carries it in its `version`-th version; none before the first
-    /// solve.
+    /// The policy of every cell, and what the `field` topic says of it besides stamp and part; none before
+    /// the first solve.
     #[must_use]
-    pub fn policy(&self, version: u64) -> Option<(FieldHeader, Vec<FieldCell>)> {
+    pub fn policy(&self) -> Option<(FieldHeader, GridFrame, Vec<FieldCell>)> {
         let Solved { frame, field, .. } = self.solved.as_ref()?;
         let certificate = field.certificate();
         let header = FieldHeader {
-            part: Revision {
-                frame: *frame,
-                window: frame.whole(),
-                version,
-                keyframe: true,
-            }
-            .into(),
             grid_version: self.grid.version(),
             target_x_m: self.target.x,
             target_y_m: self.target.y,
@@ -180,7 +173,7 @@ impl Planner {
         };
         let side = frame.cells as usize;
         let cells = (0..side * side).map(|index| cell_policy(field, index % side, index / side));
-        Some((header, cells.collect()))
+        Some((header, *frame, cells.collect()))
     }
 }
 
@@ -216,6 +209,7 @@ const fn is_hazard(cell: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use common::grid::Revision;
     use std::path::Path;
 
     fn mission() -> Mission {
@@ -264,7 +258,7 @@ mod tests {
             status(&planner.guide(&at(0.0, 0.0))),
             GuidanceStatus::Waiting
         );
-        assert!(planner.policy(1).is_none());
+        assert!(planner.policy().is_none());
     }
 
     #[test]
@@ -347,8 +341,8 @@ mod tests {
         let mut planner = Planner::new(&mission());
         let (header, cells) = keyframe(1, |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
         planner.take_grid(&header, &cells).unwrap();
-        let (header, policy) = planner.policy(3).unwrap();
-        assert_eq!((policy.len(), header.part.version), (1600, 3));
+        let (header, _, policy) = planner.policy().unwrap();
+        assert_eq!((policy.len(), header.grid_version), (1600, 1));
         for (cell, &state) in policy.iter().zip(&cells) {
             let length = f64::from(cell.ex).hypot(f64::from(cell.ey));
             let directed = (length - 1.0).abs() < 1e-6;
