@@ -64,8 +64,11 @@ pub(crate) enum DomainError {
     Bus(#[from] BusError),
 }
 
-/// Free space without which the topics do not fit: all of them, at N = 256, measured, and as much again.
-const SHARED_MEMORY_NEEDED: u64 = 32 << 20;
+/// Shared memory that the topics of small structs take, measured, and as much again.
+const SMALL_TOPICS_BYTES: u64 = 16 << 20;
+/// Shared memory a cell of the map takes: a byte in `grid` and twelve in `field`, in each of the samples
+/// that are under way at once when readers keep up.
+const CELL_BYTES: u64 = 8 * 13;
 /// Stages get SIGTERM when their supervisor dies and are gone within this.
 const TENANTS_LEAVE: Duration = Duration::from_secs(2);
 /// How often it is looked whether they have.
@@ -80,13 +83,17 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// Lock `domain`, wipe what an earlier supervisor left, create its services.
-    pub(crate) fn acquire(domain: Domain) -> Result<Self, DomainError> {
+    /// Lock `domain`, wipe what an earlier supervisor left, create the services for a map of so many
+    /// `cells`.
+    pub(crate) fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         make_directory(&domain)?;
         let lock = lock(&domain)?;
         wait_for_tenants(&domain)?;
         wipe(&domain)?;
-        check_shared_memory()?;
+        check_shared_memory(
+            SHARED_MEMORY,
+            SMALL_TOPICS_BYTES + CELL_BYTES * cells as u64,
+        )?;
         let mut held = Self {
             domain,
             bus: None,
@@ -237,21 +244,34 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
 }
 
 /// A segment made in a full file system is a SIGBUS later: look before.
-fn check_shared_memory() -> Result<(), DomainError> {
-    let space = rustix::fs::statvfs(SHARED_MEMORY).map_err(|error| DomainError::SharedMemory {
+fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
+    let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
         problem: format!("cannot be examined: {error}"),
         remedy: "mount a tmpfs there",
     })?;
     let free = space.f_bavail * space.f_frsize;
-    if free < SHARED_MEMORY_NEEDED {
+    if free < needed {
         return Err(DomainError::SharedMemory {
             problem: format!(
                 "has {} MiB free of the {} MiB needed",
                 free >> 20,
-                SHARED_MEMORY_NEEDED >> 20
+                needed >> 20
             ),
-            remedy: "remove what fills it, or enlarge it (docker: --shm-size)",
+            remedy: "remove what fills it, enlarge it (docker: --shm-size), or lower perimeter.cells",
         });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn too_little_or_no_shared_memory_is_said_with_the_remedy() {
+        let full = check_shared_memory(SHARED_MEMORY, u64::MAX).unwrap_err();
+        assert!(full.to_string().contains("--shm-size"), "{full}");
+        let missing = check_shared_memory("/no/such/mount", 1).unwrap_err();
+        assert!(missing.to_string().contains("mount a tmpfs"), "{missing}");
+    }
 }

@@ -116,7 +116,10 @@ pub(crate) fn run(
     watch: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<Finished, SupervisorError> {
     let mut signals = Signals::catch(&[SIGINT, SIGTERM]).map_err(system("catch signals"))?;
-    let held = Held::acquire(Domain::of(options.robot.clone()))?;
+    let held = Held::acquire(
+        Domain::of(options.robot.clone()),
+        options.mission.grid_frame().area(),
+    )?;
     let Some(bus) = held.bus() else {
         return Err(system("keep the bus")(io::ErrorKind::NotConnected.into()));
     };
