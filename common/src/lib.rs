@@ -38,3 +38,8 @@ pub mod topics;
 pub mod truth;
 pub mod waiter;
 pub mod wire;
+
+/// The README's Rust is compiled with the doc tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -135,6 +135,23 @@ mod tests {
     }
 
     #[test]
+    fn the_mission_in_the_readme_is_valid_and_shows_the_defaults() {
+        let readme = include_str!("../../../README.md");
+        let text = readme
+            .split("```toml\n")
+            .nth(1)
+            .unwrap()
+            .split("```")
+            .next()
+            .unwrap();
+        let mut shown = Mission::parse(text, Path::new("README.md")).unwrap();
+        shown.known = common::geometry::Shapes::default();
+        shown.world = common::geometry::Shapes::default();
+        let plain = Mission::parse("target = [4.0, 0.0]", Path::new("README.md")).unwrap();
+        assert_eq!(shown, plain);
+    }
+
+    #[test]
     fn an_assignment_changes_one_key_and_keeps_its_table() {
         let mission = load(
             "trap",
