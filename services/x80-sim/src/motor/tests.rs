@@ -1,0 +1,134 @@
+//! Promises of one channel and its speed loop.
+
+use super::*;
+use crate::noise::Source;
+use common::mission::Realism;
+
+const DT: f64 = 0.005;
+
+fn ideal() -> WheelPhysics {
+    WheelPhysics {
+        lag_s: 0.0,
+        ..WheelPhysics::preset(Realism::Laboratory)
+    }
+}
+
+/// Run for `seconds` from mission time `from`; the speed at every step.
+fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
+    let mut noise = Noise::new(1, Source::Wheels);
+    let steps = (seconds / DT).round() as usize;
+    (0..steps)
+        .map(|step| {
+            let counts = motor.step(from + step as f64 * DT, DT, &mut noise);
+            motor.turn(counts, DT, false);
+            motor.speed()
+        })
+        .collect()
+}
+
+#[test]
+fn it_boots_suspended_in_pwm_mode_on_one_pot_with_50_5_0() {
+    let motor = Motor::new(ideal(), 2000.0);
+    assert!(!motor.enabled());
+    assert_eq!(
+        (motor.mode(), motor.feedback()),
+        (Mode::Pwm, Feedback::OnePot)
+    );
+    let boot = PidGains {
+        kp: 50,
+        kd: 5,
+        ki_x100: 0,
+    };
+    assert_eq!(motor.gains(), (boot, boot));
+}
+
+#[test]
+fn a_velocity_command_alone_turns_the_wheel_and_ends_in_time() {
+    let mut motor = Motor::new(ideal(), 2000.0);
+    motor.order(Quantity::Velocity, 400, Some(0.5));
+    run(&mut motor, 0.0, 2.0);
+    assert!((motor.turned() - 200.0).abs() < 1e-6, "{}", motor.turned());
+    assert_eq!(motor.speed(), 0.0);
+}
+
+#[test]
+fn the_measured_loop_has_its_gain_and_answers_late() {
+    let physics = WheelPhysics {
+        noise_counts: 0.0,
+        ..WheelPhysics::preset(Realism::Measured)
+    };
+    let mut motor = Motor::new(physics, 2000.0);
+    motor.order(Quantity::Velocity, 500, None);
+    let speeds = run(&mut motor, 0.0, 2.0);
+    let steady = 500.0 * physics.gain;
+    assert!((speeds[399] - steady).abs() < 0.01);
+    let late = speeds.iter().position(|s| *s > 0.63 * steady).unwrap() as f64 * DT;
+    assert!((0.14..=0.16).contains(&late), "delay and lag are {late} s");
+    motor.order(Quantity::Velocity, 25, None);
+    assert_eq!(
+        run(&mut motor, 2.0, 2.0)[399],
+        0.0,
+        "25 * 0.78 lies in the dead band"
+    );
+}
+
+#[test]
+fn a_turning_wheel_jitters_as_much_as_measured_and_a_standing_one_not_at_all() {
+    let mut motor = Motor::new(WheelPhysics::preset(Realism::Measured), 2000.0);
+    motor.order(Quantity::Velocity, 500, Some(100.0));
+    let speeds = run(&mut motor, 0.0, 100.0);
+    let settled = &speeds[200..];
+    let mean = settled.iter().sum::<f64>() / settled.len() as f64;
+    let variance = settled.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / settled.len() as f64;
+    assert!((variance.sqrt() - 12.0).abs() < 1.0, "{}", variance.sqrt());
+    let standing = run(&mut motor, 100.0, 4.0);
+    assert_eq!(standing[799], 0.0);
+}
+
+#[test]
+fn a_wheel_told_to_stand_does_within_three_tenths_of_a_second() {
+    for realism in [Realism::Laboratory, Realism::Measured] {
+        let mut motor = Motor::new(WheelPhysics::preset(realism), 2000.0);
+        motor.order(Quantity::Velocity, 400, Some(1.0));
+        let speeds = run(&mut motor, 0.0, 2.0);
+        let after = speeds[200..].iter().position(|speed| *speed == 0.0);
+        let seconds = after.map(|step| step as f64 * DT);
+        assert!(seconds.is_some_and(|s| s < 0.3), "{realism:?}: {seconds:?}");
+    }
+}
+
+#[test]
+fn a_position_is_reached_the_shorter_way_round_and_held() {
+    let mut motor = Motor::new(ideal(), 2000.0);
+    motor.order(Quantity::Position, 32_700, None);
+    run(&mut motor, 0.0, 4.0);
+    assert!((motor.turned() + 68.0).abs() < 0.5, "{}", motor.turned());
+}
+
+#[test]
+fn half_a_pulse_width_stands_and_a_full_one_is_top_speed() {
+    let mut motor = Motor::new(ideal(), 2000.0);
+    motor.order(Quantity::Pwm, 16_383, None);
+    assert_eq!(run(&mut motor, 0.0, 0.1)[19], 0.0);
+    motor.order(Quantity::Pwm, 32_767, None);
+    assert!((run(&mut motor, 0.1, 0.1)[19] - 2000.0).abs() < 1e-6);
+    motor.order(Quantity::Pwm, 0, None);
+    assert_eq!(run(&mut motor, 0.2, 0.1)[19], -2000.0);
+}
+
+#[test]
+fn suspending_stops_and_resuming_does_not_start() {
+    let mut motor = Motor::new(ideal(), 2000.0);
+    motor.order(Quantity::Velocity, 400, None);
+    motor.enable(false);
+    motor.enable(true);
+    run(&mut motor, 0.0, 1.0);
+    assert_eq!(motor.turned(), 0.0);
+}
+
+#[test]
+fn speed_is_limited_by_what_the_wheel_can_do() {
+    let mut motor = Motor::new(ideal(), 1500.0);
+    motor.order(Quantity::Velocity, i16::MAX, None);
+    assert_eq!(run(&mut motor, 0.0, 1.0)[199], 1500.0);
+}
