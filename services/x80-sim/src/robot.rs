@@ -217,9 +217,7 @@ impl Robot {
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
             let ends = self.motors.iter().filter_map(Motor::ends_at);
-            let silence = self.stops_when_silent.map(|limit| self.heard_at + limit);
             let until = ends
-                .chain(silence)
                 .filter(|moment| *moment > self.time)
                 .fold(end, f64::min);
             let span = until - self.time;

@@ -23,10 +23,6 @@ use crate::transport::Way;
 
 /// Datagrams taken in one go before time and the stop are looked at again.
 const MOST_AT_ONCE: usize = 64;
-const AT_ONCE: Timespec = Timespec {
-    tv_sec: 0,
-    tv_nsec: 0,
-};
 
 /// How bytes reach the robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,19 +107,10 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
     let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz);
     let mut buffer = vec![0; 65_536];
     loop {
-        let timeout = if session.moves_alone() {
-            Some(AT_ONCE)
-        } else {
-            clock.wait_for(session.next_due_s(), monotonic_ns())
-        };
+        let timeout = clock.wait_for(session.next_due_s(), monotonic_ns());
         let [came, stopped] = wait(&session, &stop, timeout)?;
         if stopped {
             return Ok(());
-        }
-        if session.moves_alone() {
-            // What has come meanwhile waits, or the run would depend on when it came.
-            session.tick();
-            continue;
         }
         if came {
             session.listen(&mut buffer, MOST_AT_ONCE, || clock.now(monotonic_ns()))?;

@@ -22,17 +22,20 @@ fn forward(counts: i16) -> Vec<u8> {
     bytes
 }
 
-/// Drive for `rounds` commands in lock-step: every byte that came, and the truth of every tick.
-fn lock_step(mission: &str, rounds: usize) -> (Vec<u8>, Vec<TruthTick>) {
+/// Drive in lock-step for `rounds` of so many commands sent at once: every byte that came, and the truth of
+/// every tick.
+fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<TruthTick>) {
     let mut sim = Sim::start(mission, Pace::Max);
     let host = sim.host();
     let mut bytes = Vec::new();
     let mut motor_frames = 0;
     let mut decoder = Decoder::default();
     for _ in 0..rounds {
-        host.send(&forward(400)).unwrap();
+        for _ in 0..at_once {
+            host.send(&forward(400)).unwrap();
+        }
         let before = motor_frames;
-        while motor_frames == before {
+        while motor_frames < before + at_once {
             let datagram = receive(&host);
             decoder.push(&datagram);
             bytes.extend(datagram);
@@ -50,12 +53,15 @@ const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[s
 
 #[test]
 fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
-    let (bytes, truth) = lock_step(OUT_HALF_THE_TIME, 400);
-    let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, 400);
-    assert!(
-        bytes == again && truth == truth_again,
-        "the same seed gave another run"
-    );
+    let (bytes, truth) = lock_step(OUT_HALF_THE_TIME, 400, 1);
+    // Also when commands come earlier than they must: they wait until time has passed.
+    for (rounds, at_once) in [(400, 1), (200, 2)] {
+        let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, rounds, at_once);
+        assert!(
+            bytes == again && truth == truth_again,
+            "the same seed gave another run"
+        );
+    }
     assert!(truth.len() > 600, "400 commands and {} ticks", truth.len());
     let radio = truth.last().unwrap().radio.unwrap();
     assert!(
@@ -75,7 +81,7 @@ fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
     for own in own_limits {
         let radio =
             OUT_HALF_THE_TIME.replace("[simulation.radio]", &format!("{own}\n[simulation.radio]"));
-        let (_, truth) = lock_step(&radio, 400);
+        let (_, truth) = lock_step(&radio, 400, 1);
         let mut out_since = None;
         let mut outages_at_rest = 0;
         for tick in &truth {

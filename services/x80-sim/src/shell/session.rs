@@ -17,6 +17,9 @@ use crate::{
     transport::{Source, Way},
 };
 
+/// Ticks that lock-step makes unheard before it waits for a ping: the longest outage at the highest rate.
+const MOST_UNHEARD: usize = 120_000;
+
 /// Which way a datagram goes through the radio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
@@ -29,8 +32,6 @@ pub(super) struct Session {
     robot: Robot,
     /// Whether time waits for commands.
     lock_step: bool,
-    /// In lock-step: the frames of the last tick were lost, so nobody will send the next command.
-    unheard: bool,
     way: Way,
     /// None where it is perfect.
     radio: Option<Radio<Leg>>,
@@ -60,7 +61,6 @@ impl Session {
         let mut session = Self {
             robot: Robot::new(mission),
             lock_step: pace == Pace::Max,
-            unheard: false,
             way,
             radio: Some(radio).filter(|radio| !radio.is_perfect()),
             peer: None,
@@ -88,11 +88,6 @@ impl Session {
         flight.map_or(self.next_tick_s(), |due| due.min(self.next_tick_s()))
     }
 
-    /// Whether time moves on although no command has come: in lock-step, when no frame got through.
-    pub(super) fn moves_alone(&self) -> bool {
-        self.unheard
-    }
-
     /// Take up to `most` pieces of what has come; `now` tells mission time where a clock makes it.
     pub(super) fn listen(
         &mut self,
@@ -113,9 +108,6 @@ impl Session {
                 }
             }
             self.hear(source, bytes);
-            if self.unheard {
-                return Ok(());
-            }
         }
         Ok(())
     }
@@ -141,25 +133,37 @@ impl Session {
     }
 
     /// Pass mission time to the next tick, tell the truth of it, and send its frames.
-    pub(super) fn tick(&mut self) {
+    fn tick(&mut self) {
+        let frames = self.measured();
+        self.send(&frames);
+    }
+
+    /// A tick in lock-step. When the radio loses its frames nobody sends the next command, so time moves
+    /// on by itself until frames come through.
+    fn tick_until_heard(&mut self) {
+        for _ in 0..MOST_UNHEARD {
+            let frames = self.measured();
+            let now = self.robot.time_s();
+            let lost = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
+            if !lost {
+                let (first, second) = match &mut self.radio {
+                    Some(radio) => radio.split(frames),
+                    None => (frames, Vec::new()),
+                };
+                self.deliver(&first);
+                self.deliver(&second);
+                return;
+            }
+        }
+    }
+
+    /// The frames of the next tick, its truth told.
+    fn measured(&mut self) -> Vec<u8> {
         self.robot.advance_to_next_tick();
         self.tell_tick();
         let mut frames = Vec::with_capacity(256);
         self.robot.stream(&mut frames);
-        if !self.lock_step {
-            self.send(&frames);
-            return;
-        }
-        let now = self.robot.time_s();
-        self.unheard = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
-        if !self.unheard {
-            let (first, second) = match &mut self.radio {
-                Some(radio) => radio.split(frames),
-                None => (frames, Vec::new()),
-            };
-            self.deliver(&first);
-            self.deliver(&second);
-        }
+        frames
     }
 
     fn hear(&mut self, source: Source, bytes: &[u8]) {
@@ -210,7 +214,7 @@ impl Session {
                     self.robot.on_frame(frame, &mut answer);
                     self.deliver(&answer);
                 }
-                self.tick();
+                self.tick_until_heard();
             }
             Heard::Ping => {
                 self.peer = Some(source);
