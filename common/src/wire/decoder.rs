@@ -90,26 +90,31 @@ impl Decoder {
                     self.skip(noise);
                     break end;
                 }
-                Candidate::Sound { end, ending } => match right_frame_within(bytes, end) {
-                    None => {
+                Candidate::Sound { end, ending } => match inside(bytes, end) {
+                    Inside::Nothing => {
                         self.skip(noise);
                         break end;
                     }
-                    Some(_) if ending == Ending::Missing => {
+                    Inside::Frame(at) if ending == Ending::Wrong => {
+                        self.tally.bad_crc += 1;
+                        self.skip(noise + at);
+                    }
+                    // What comes next tells which of the two it is.
+                    Inside::Frame(_) | Inside::Unknown => {
                         self.skip(noise);
                         return None;
                     }
-                    Some(inner) => {
-                        self.tally.bad_crc += 1;
-                        self.skip(noise + inner);
-                    }
                 },
                 Candidate::Half { len } => {
-                    let hidden = (len > LONGEST_PLAUSIBLE)
-                        .then(|| right_frame_within(bytes, bytes.len()))
-                        .flatten();
-                    self.skip(noise + hidden.unwrap_or(0));
-                    hidden?;
+                    self.skip(noise);
+                    if len <= LONGEST_PLAUSIBLE {
+                        return None;
+                    }
+                    let bytes = &self.buffer[self.start..];
+                    let Inside::Frame(at) = inside(bytes, bytes.len()) else {
+                        return None;
+                    };
+                    self.skip(at);
                 }
                 // Only the header is given up: the frame behind a bad one may begin inside it.
                 Candidate::Broken => {
@@ -182,21 +187,35 @@ fn is_end(bytes: &[u8]) -> Ending {
     }
 }
 
-/// Offset of a sound frame with right end bytes that begins behind the start of `bytes` and before `end`.
-fn right_frame_within(bytes: &[u8], end: usize) -> Option<usize> {
-    let headers = bytes[1..]
-        .windows(2)
-        .enumerate()
-        .filter_map(|(at, pair)| (pair == HEADER).then_some(at + 1));
-    headers.take_while(|&at| at < end).find(|&at| {
-        matches!(
-            candidate(&bytes[at..]),
-            Candidate::Sound {
-                ending: Ending::Right,
-                ..
-            }
-        )
-    })
+/// What begins inside a frame that is not to be believed without question.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Inside {
+    Nothing,
+    /// A sound frame with right end bytes, at this offset.
+    Frame(usize),
+    /// A header, or the first byte of one, whose frame has not come whole.
+    Unknown,
+}
+
+/// Look behind the start of `bytes` and before `end`.
+fn inside(bytes: &[u8], end: usize) -> Inside {
+    let mut found = Inside::Nothing;
+    for at in 1..end.min(bytes.len()) {
+        if !HEADER.starts_with(&bytes[at..(at + 2).min(bytes.len())]) {
+            continue;
+        }
+        match candidate(&bytes[at..]) {
+            Candidate::Sound { ending, .. } => match ending {
+                Ending::Right => return Inside::Frame(at),
+                Ending::Missing => return Inside::Unknown,
+                Ending::Wrong => {}
+            },
+            Candidate::Half { len } if len <= LONGEST_PLAUSIBLE => return Inside::Unknown,
+            Candidate::Half { .. } => found = Inside::Unknown,
+            Candidate::Broken => {}
+        }
+    }
+    found
 }
 
 #[cfg(test)]
