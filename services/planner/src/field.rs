@@ -1,8 +1,10 @@
 //! The harmonic field: u of every cell, with the certificate of its verification.
 
+use std::ops::Range;
+
 use crate::domain::Cell;
 use crate::repair::Patch;
-use crate::scaled::Scaled;
+use crate::scaled::{Scaled, pow2};
 
 /// How a field was computed.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -111,6 +113,83 @@ impl Store {
         }
     }
 
+    /// u of a cell; zero where blocked or cut off.
+    pub(crate) fn u(&self, index: usize) -> Scaled {
+        let (value, exponent) = self.raw(index);
+        Scaled::new(value, exponent)
+    }
+
+    /// u of a run of cells in units of 2^`reference`, clamped to what an `f32` holds; 0 where u is.
+    pub(crate) fn read_row(&self, cells: Range<usize>, reference: i32, into: &mut [f32]) {
+        let clamp = |u: f64| {
+            if u > 0.0 {
+                u.clamp(LEAST_READ, MOST_READ) as f32
+            } else {
+                0.0
+            }
+        };
+        match self {
+            Self::Single { values, exponent } => {
+                let scale = pow2(exponent.saturating_sub(reference));
+                for (to, &u) in into.iter_mut().zip(&values[cells]) {
+                    *to = clamp(f64::from(u) * scale);
+                }
+            }
+            Self::Double { values, exponent } => {
+                // In two steps: the whole factor may be out of range where the product is not.
+                let shift = exponent.saturating_sub(reference);
+                let (half, rest) = (pow2(shift / 2), pow2(shift - shift / 2));
+                for (to, &u) in into.iter_mut().zip(&values[cells]) {
+                    *to = clamp(u * half * rest);
+                }
+            }
+            Self::Extended {
+                mantissas,
+                exponents,
+            } => {
+                for (to, index) in into.iter_mut().zip(cells) {
+                    let shift = exponents[index]
+                        .saturating_sub(reference)
+                        .clamp(-1000, 1000);
+                    *to = clamp(mantissas[index] * pow2(shift));
+                }
+            }
+        }
+    }
+
+    /// Sets the cells from `first` on for which `wanted` holds to u in units of 2^`reference`; negative is blocked.
+    pub(crate) fn set_row(
+        &mut self,
+        first: usize,
+        values: &[f32],
+        reference: i32,
+        wanted: &[bool],
+    ) {
+        for (at, (&value, _)) in values
+            .iter()
+            .zip(wanted)
+            .enumerate()
+            .filter(|(_, (_, wanted))| **wanted)
+        {
+            let index = first + at;
+            match self {
+                Self::Single { values, exponent } => {
+                    let plain = f64::from(value) * pow2(reference.saturating_sub(*exponent));
+                    if value <= 0.0 {
+                        values[index] = value;
+                        continue;
+                    }
+                    if fits(plain, f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) {
+                        values[index] = plain as f32;
+                        continue;
+                    }
+                }
+                Self::Double { .. } | Self::Extended { .. } => {}
+            }
+            self.set(index, f64::from(value), reference);
+        }
+    }
+
     fn extend(&mut self) {
         let len = match self {
             Self::Single { values, .. } => values.len(),
@@ -124,6 +203,10 @@ impl Store {
         };
     }
 }
+
+/// What [`Store::read_row`] clamps to: normal numbers, with room for a sum of a few.
+const LEAST_READ: f64 = 2e-38;
+const MOST_READ: f64 = 1e36;
 
 /// Whether a plain value is 0 or [`BLOCKED`], or lies in a range of normal numbers.
 fn fits(value: f64, least: f64, largest: f64) -> bool {

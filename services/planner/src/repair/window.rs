@@ -4,12 +4,13 @@
 //! Where it flows in, the cell outside keeps its u: the change is assumed not to reach upstream. Where it flows out, the
 //! cell outside keeps its ratio to the cell inside: whatever changes in the window changes the wake in proportion. Holding
 //! u itself there would put false maxima just outside.
+//!
+//! All arrays have a frame of one cell around the window, so a cell's neighbours are one or one row away.
 
 use super::patch::{Patch, Rect};
-use crate::domain::{Cell, Domain};
-use crate::field::{BLOCKED, Store};
-use crate::scaled::Scaled;
-use crate::solver::certificate::{Check, check_framed};
+use crate::domain::{Absorption, Cell, Domain};
+use crate::field::Store;
+use crate::solver::certificate::check_framed;
 use crate::solver::multigrid::Multigrid;
 
 /// Coarse corrections above this share of u mean that a cell has not settled.
@@ -18,9 +19,9 @@ const TOLERANCE: f64 = 1e-3;
 /// Cycles before a window is given up.
 const CYCLES: usize = 24;
 
-/// Binary orders of magnitude above and below u at the change that a window takes in. Cells beyond them are left outside as
-/// if they lay beyond the rim: the next corridor of a maze may be 1e-45 of this one.
-const SPAN: i32 = 80;
+/// u this far above and below u at the change is taken in. Cells beyond are left outside as if they lay beyond the rim: the
+/// next corridor of a maze may be 1e-45 of this one.
+const SPAN: std::ops::RangeInclusive<f32> = 1e-24..=1e24;
 
 /// The largest relative residual of a repaired window. It holds only until the next full solve.
 const RESIDUAL_LIMIT: f64 = 1e-3;
@@ -29,22 +30,27 @@ const RESIDUAL_LIMIT: f64 = 1e-3;
 #[derive(Debug)]
 pub(super) struct Window {
     side: usize,
+    /// Cells of a row, frame included.
+    stride: usize,
     levels: Multigrid<f32>,
-    /// u before the change with one cell all around, relatively to 2^`reference`; 0 where blocked or cut off.
+    /// u before the change, relatively to 2^`reference`; 0 where blocked or cut off.
     before: Vec<f32>,
-    /// u after it, the same way; around the window as seen from inside.
+    /// u after it, the same way; outside as seen from inside; negative where blocked.
     after: Vec<f32>,
-    /// Without the frame: 1 / diagonal, 0.25 / (1 + k), first guess and result.
+    /// 1 / diagonal of the cells solved for, 0 elsewhere.
     inverse: Vec<f32>,
+    /// 0.25 / (1 + k), 0 where no equation holds.
     shares: Vec<f32>,
-    values: Vec<f32>,
-    /// Framed: cells the window is solved for, blocked ones included.
+    /// Whether blocked now; beyond the map too.
+    blocked: Vec<bool>,
+    /// Cells the window is solved for, blocked ones included.
     taken: Vec<bool>,
-    /// Framed: cells that what flows in can reach.
+    /// Cells that what flows in can reach.
     fed: Vec<bool>,
     /// Free cells of the window with a neighbour it is not solved for.
-    rim: Vec<u32>,
-    stack: Vec<u32>,
+    rim: Vec<usize>,
+    stack: Vec<usize>,
+    inflow: Vec<(Cell, f32)>,
     reference: i32,
     rect: Rect,
 }
@@ -62,19 +68,23 @@ pub(super) struct Judgement {
 
 impl Window {
     pub(super) fn new(side: usize) -> Self {
-        let framed = (side + 2) * (side + 2);
+        let stride = side + 2;
+        let values = || vec![0.0; stride * stride];
+        let flags = || vec![false; stride * stride];
         Self {
             side,
+            stride,
             levels: Multigrid::new(side, side),
-            before: vec![0.0; framed],
-            after: vec![0.0; framed],
-            inverse: vec![0.0; side * side],
-            shares: vec![0.0; side * side],
-            values: vec![0.0; side * side],
-            taken: vec![false; framed],
-            fed: vec![false; framed],
+            before: values(),
+            after: values(),
+            inverse: values(),
+            shares: values(),
+            blocked: flags(),
+            taken: flags(),
+            fed: flags(),
             rim: Vec::new(),
             stack: Vec::new(),
+            inflow: Vec::new(),
             reference: 0,
             rect: Rect {
                 col: 0,
@@ -104,12 +114,26 @@ impl Window {
             width: self.side,
             height: self.side,
         };
-        self.gather(domain, store, changed);
-        if self.misses_a_change(domain) {
+        self.read(domain, store, changed);
+        self.take();
+        // A cell that was blocked since must be solved for: a change may lie on both sides of a wall.
+        let missed = self
+            .taken
+            .iter()
+            .zip(&self.blocked)
+            .zip(&self.before)
+            .any(|((&t, &b), &u)| b && !t && u > 0.0);
+        let target = self.target(domain);
+        if missed || self.feed(target) {
             return None;
         }
-        let touches_lost = self.feed(domain);
-        self.set_equations(domain);
+        self.set_equations(domain, target);
+        let (stride, side) = (self.stride, self.side);
+        let inside = |row: usize| (row + 1) * stride + 1..(row + 1) * stride + 1 + side;
+        self.levels.load(
+            |row| (&self.inverse[inside(row)], &self.after[inside(row)]),
+            self.inflow.iter().copied(),
+        );
         let mut settled = false;
         for cycle in 0..CYCLES {
             settled = self.levels.cycle(TOLERANCE).unsettled == 0;
@@ -118,11 +142,11 @@ impl Window {
             }
         }
         self.levels.finish();
-        self.levels.unload(&mut self.values);
-        self.frame(domain);
-        let check: Check = check_framed(self.side, &self.after, &self.shares);
+        self.levels
+            .unload(|row, values| self.after[inside(row)].copy_from_slice(values));
+        self.frame(target);
+        let check = check_framed(side, &self.after, &self.shares);
         let right = settled
-            && !touches_lost
             && check.stalled == 0
             && check.lost == 0
             && check.worst_residual <= RESIDUAL_LIMIT;
@@ -131,233 +155,219 @@ impl Window {
 
     /// Writes u of the cells solved for to `store`; returns the patch that remembers what it was.
     pub(super) fn write(&self, domain: &Domain, store: &mut Store) -> Patch {
-        let taken = (0..self.side * self.side)
-            .map(|at| self.taken[self.framed(at)])
-            .collect();
+        let mut taken = Vec::with_capacity(self.side * self.side);
+        for row in 1..=self.side {
+            taken.extend_from_slice(&self.taken[row * self.stride + 1..][..self.side]);
+        }
         let patch = Patch::of(self.rect, taken, store, domain.width());
-        let target = domain.index(domain.target());
-        for (at, &u) in self.values.iter().enumerate() {
-            let index = self.map_index(domain, at);
-            if index == target || !self.taken[self.framed(at)] {
-                continue;
-            }
-            let (value, exponent) = if domain.blocked()[index] {
-                (BLOCKED, 0)
-            } else {
-                (f64::from(u.max(0.0)), self.reference)
-            };
-            store.set(index, value, exponent);
+        for row in 0..self.side {
+            let start = (row + 1) * self.stride + 1;
+            let first = (self.rect.row + row) * domain.width() + self.rect.col;
+            store.set_row(
+                first,
+                &self.after[start..][..self.side],
+                self.reference,
+                &self.taken[start..],
+            );
+        }
+        let target = domain.target();
+        if self.rect.contains((target.col as i64, target.row as i64)) {
+            store.set(domain.index(target), 1.0, 0);
         }
         patch
     }
 
-    fn map_index(&self, domain: &Domain, at: usize) -> usize {
-        (self.rect.row + at / self.side) * domain.width() + self.rect.col + at % self.side
-    }
-
-    /// Place in the framed arrays of a cell of the window.
-    fn framed(&self, at: usize) -> usize {
-        (at / self.side + 1) * (self.side + 2) + at % self.side + 1
-    }
-
-    /// Reads u as it was, window and frame, and decides which cells to solve for.
-    fn gather(&mut self, domain: &Domain, store: &Store, changed: &Rect) {
-        let (side, framed) = (self.side, self.side + 2);
+    /// Reads u as it was and the map as it is, window and frame.
+    fn read(&mut self, domain: &Domain, store: &Store, changed: &Rect) {
         let (width, height) = (domain.width(), domain.height());
-        let mut cells = Vec::with_capacity(framed * framed);
-        for row in 0..framed {
-            for col in 0..framed {
-                // The frame may lie one cell outside the map.
-                let (col, row) = (
-                    (self.rect.col + col).wrapping_sub(1),
-                    (self.rect.row + row).wrapping_sub(1),
-                );
-                let inside = col < width && row < height;
-                cells.push(if inside {
-                    let (value, exponent) = store.raw(row * width + col);
-                    Scaled::new(value, exponent)
-                } else {
-                    Scaled::ZERO
-                });
+        // The scale: the largest u of the change and of the cells around it, else of anywhere in the window.
+        let largest = |cols: std::ops::Range<usize>, rows: std::ops::Range<usize>| {
+            let cells =
+                rows.flat_map(|row| cols.clone().map(move |col| store.u(row * width + col)));
+            cells.filter(|u| !u.is_zero()).map(|u| u.exponent).max()
+        };
+        let around = |start: usize, len: usize, end: usize| {
+            start.saturating_sub(1)..(start + len + 1).min(end)
+        };
+        self.reference = largest(
+            around(changed.col, changed.width, width),
+            around(changed.row, changed.height, height),
+        )
+        .or_else(|| {
+            let rect = self.rect;
+            largest(
+                rect.col..rect.col + rect.width,
+                rect.row..rect.row + rect.height,
+            )
+        })
+        .unwrap_or(0);
+
+        // The frame may lie one cell outside the map.
+        let first = self.rect.col.saturating_sub(1);
+        let end = (self.rect.col + self.side + 1).min(width);
+        let at = first + 1 - self.rect.col;
+        for framed_row in 0..self.stride {
+            let start = framed_row * self.stride;
+            let before = &mut self.before[start..][..self.stride];
+            let blocked = &mut self.blocked[start..][..self.stride];
+            before.fill(0.0);
+            blocked.fill(true);
+            let row = (self.rect.row + framed_row).wrapping_sub(1);
+            if row < height {
+                let cells = row * width + first..row * width + end;
+                store.read_row(cells.clone(), self.reference, &mut before[at..]);
+                blocked[at..at + cells.len()].copy_from_slice(&domain.blocked()[cells]);
             }
         }
-        // The change and one cell around it; the frame is one cell itself.
-        let (first_col, first_row) = (changed.col - self.rect.col, changed.row - self.rect.row);
-        let near = (first_row..first_row + changed.height + 2)
-            .flat_map(|row| {
-                (first_col..first_col + changed.width + 2).map(move |col| row * framed + col)
-            })
-            .filter_map(|f| cells.get(f));
-        let exponents = |u: &Scaled| (!u.is_zero()).then_some(u.exponent);
-        let centre = near
-            .filter_map(exponents)
-            .max()
-            .or_else(|| cells.iter().filter_map(exponents).max());
-        self.reference = centre.unwrap_or(0);
-        for (f, u) in cells.iter().enumerate() {
-            let distance = u.exponent.saturating_sub(self.reference);
-            let clamped = Scaled {
-                exponent: self.reference + distance.clamp(-126, 120),
-                ..*u
-            };
-            self.before[f] = clamped.relative_to(self.reference) as f32;
-            let inside = (1..=side).contains(&(f / framed)) && (1..=side).contains(&(f % framed));
-            self.taken[f] = inside && (u.is_zero() || distance.abs() <= SPAN);
+    }
+
+    /// Decides which cells to solve for, and finds the rim.
+    fn take(&mut self) {
+        let (side, stride) = (self.side, self.stride);
+        self.taken.fill(false);
+        let mut whole = true;
+        for row in 1..=side {
+            let start = row * stride + 1;
+            for (taken, &u) in self.taken[start..start + side]
+                .iter_mut()
+                .zip(&self.before[start..])
+            {
+                *taken = u == 0.0 || SPAN.contains(&u);
+                whole &= *taken;
+            }
         }
         self.rim.clear();
-        for at in 0..side * side {
-            let free = self.taken[self.framed(at)] && !domain.blocked()[self.map_index(domain, at)];
-            if free && self.outside(at).next().is_some() {
-                self.rim.push(at as u32);
+        for row in 1..=side {
+            // Where all of the window is solved for, the rim is its border.
+            let step = if whole && row > 1 && row < side {
+                side - 1
+            } else {
+                1
+            };
+            for col in (1..=side).step_by(step.max(1)) {
+                let f = row * stride + col;
+                if self.taken[f] && !self.blocked[f] && self.outside(f).next().is_some() {
+                    self.rim.push(f);
+                }
             }
         }
-    }
-
-    /// Whether a cell that was blocked since is not among those solved for: one change on both sides of a wall, say.
-    fn misses_a_change(&self, domain: &Domain) -> bool {
-        (0..self.side * self.side).any(|at| {
-            let f = self.framed(at);
-            !self.taken[f] && domain.blocked()[self.map_index(domain, at)]
-        })
     }
 
     /// Marks the cells that what flows in can reach; true if that includes one beside a free cell of u = 0 outside, which
     /// is then cut off no longer.
-    fn feed(&mut self, domain: &Domain) -> bool {
-        let (side, framed) = (self.side, self.side + 2);
+    fn feed(&mut self, target: Option<usize>) -> bool {
         self.fed.fill(false);
         self.stack.clear();
-        let target = domain.index(domain.target());
-        for at in 0..side * side {
-            let index = self.map_index(domain, at);
-            let f = self.framed(at);
-            if domain.blocked()[index] || !self.taken[f] {
-                continue;
-            }
-            let fed = index == target
-                || self
-                    .outside(at)
-                    .any(|o| self.before[o] > 0.0 && self.before[o] > self.before[f]);
-            if fed {
-                self.fed[f] = true;
-                self.stack.push(at as u32);
+        self.stack.extend(target);
+        for &f in &self.rim {
+            if self.outside(f).any(|o| self.before[o] > self.before[f]) {
+                self.stack.push(f);
             }
         }
-        let mut touches_lost = false;
-        while let Some(at) = self.stack.pop() {
-            let at = at as usize;
-            let f = self.framed(at);
-            for o in self.outside(at) {
-                let (col, row) = (self.rect.col + o % framed, self.rect.row + o / framed);
-                let free = !domain.is_blocked(Cell::new(col.wrapping_sub(1), row.wrapping_sub(1)));
-                touches_lost |= free && self.before[o] == 0.0;
-            }
-            for (step, inside) in [
-                (f - 1, !at.is_multiple_of(side)),
-                (f + 1, at % side + 1 < side),
-                (f - framed, at >= side),
-                (f + framed, at + side < side * side),
-            ] {
-                if inside && self.taken[step] && !self.fed[step] {
-                    let next = (step / framed - 1) * side + step % framed - 1;
-                    if !domain.blocked()[self.map_index(domain, next)] {
-                        self.fed[step] = true;
-                        self.stack.push(next as u32);
-                    }
+        for &f in &self.stack {
+            self.fed[f] = true;
+        }
+        while let Some(f) = self.stack.pop() {
+            for next in self.around(f) {
+                if self.taken[next] && !self.blocked[next] && !self.fed[next] {
+                    self.fed[next] = true;
+                    self.stack.push(next);
                 }
             }
         }
-        touches_lost
+        self.rim.iter().any(|&f| {
+            self.fed[f]
+                && self
+                    .outside(f)
+                    .any(|o| !self.blocked[o] && self.before[o] == 0.0)
+        })
     }
 
-    /// Places of the neighbours of a cell that the window is not solved for.
-    fn outside(&self, at: usize) -> impl Iterator<Item = usize> + use<> {
-        let (framed, f) = (self.side + 2, self.framed(at));
-        [f - 1, f + 1, f - framed, f + framed]
-            .map(|o| (!self.taken[o]).then_some(o))
-            .into_iter()
-            .flatten()
+    fn around(&self, f: usize) -> [usize; 4] {
+        [f - 1, f + 1, f - self.stride, f + self.stride]
     }
 
-    /// Whether u flows from the window's rim cell out to `o` of the frame.
+    /// The neighbours of a cell that the window is not solved for.
+    fn outside(&self, f: usize) -> impl Iterator<Item = usize> {
+        self.around(f).into_iter().filter(|&o| !self.taken[o])
+    }
+
+    /// Whether u flows from the window's rim cell out to `o`.
     fn flows_out(&self, f: usize, o: usize) -> bool {
         self.before[o] > 0.0 && self.before[f] > 0.0 && self.before[o] <= self.before[f]
     }
 
-    fn set_equations(&mut self, domain: &Domain) {
-        let side = self.side;
-        let target = domain.index(domain.target());
-        let mut inflow: Vec<(Cell, f32)> = Vec::new();
-        for at in 0..side * side {
-            let index = self.map_index(domain, at);
-            let f = self.framed(at);
-            let diagonal = 4.0 * (1.0 + domain.absorption_at(index)) as f32;
-            self.shares[at] = 1.0 / diagonal;
-            self.values[at] = if self.fed[f] { self.before[f] } else { 0.0 };
-            if !self.fed[f] || index == target {
-                self.inverse[at] = 0.0;
-                continue;
-            }
-            self.inverse[at] = 1.0 / diagonal;
-        }
-        for &at in &self.rim {
-            let at = at as usize;
-            let f = self.framed(at);
-            if self.inverse[at] == 0.0 {
-                continue;
-            }
-            let mut rest = 1.0 / self.shares[at];
-            for o in self.outside(at) {
-                if self.flows_out(f, o) {
-                    rest -= self.before[o] / self.before[f];
-                } else if self.before[o] > 0.0 {
-                    inflow.push((Cell::new(at % side, at / side), self.before[o]));
+    fn set_equations(&mut self, domain: &Domain, target: Option<usize>) {
+        let (side, stride) = (self.side, self.stride);
+        for row in 0..side {
+            let start = (row + 1) * stride + 1;
+            let shares = &mut self.shares[start..][..side];
+            match domain.absorption() {
+                Absorption::Uniform(k) => shares.fill((0.25 / (1.0 + k)) as f32),
+                Absorption::PerCell(cells) => {
+                    let first = (self.rect.row + row) * domain.width() + self.rect.col;
+                    for (share, &k) in shares.iter_mut().zip(&cells[first..]) {
+                        *share = 0.25 / (1.0 + k);
+                    }
                 }
             }
-            self.inverse[at] = 1.0 / rest;
+            let (inverse, guess) = (
+                &mut self.inverse[start..][..side],
+                &mut self.after[start..][..side],
+            );
+            let (before, fed) = (&self.before[start..][..side], &self.fed[start..][..side]);
+            for x in 0..side {
+                inverse[x] = if fed[x] { shares[x] } else { 0.0 };
+                guess[x] = if fed[x] { before[x] } else { 0.0 };
+            }
         }
-        if let Some(at) = self.target(domain) {
+        let cell = |f: usize| Cell::new(f % stride - 1, f / stride - 1);
+        self.inflow.clear();
+        if let Some(target) = target {
             // The target's own equation does not hold: what it gives its neighbours flows in.
-            let f = self.framed(at);
-            let framed = side + 2;
-            for next in [f - 1, f + 1, f - framed, f + framed]
+            self.inverse[target] = 0.0;
+            for next in self
+                .around(target)
                 .into_iter()
                 .filter(|&next| self.taken[next])
             {
-                inflow.push((
-                    Cell::new(next % framed - 1, next / framed - 1),
-                    self.before[f],
-                ));
+                self.inflow.push((cell(next), self.before[target]));
             }
         }
-        self.levels
-            .load(&self.inverse, &self.values, inflow.into_iter());
+        for &f in &self.rim {
+            if self.inverse[f] == 0.0 {
+                continue;
+            }
+            let mut rest = 1.0 / self.shares[f];
+            for o in self.around(f).into_iter().filter(|&o| !self.taken[o]) {
+                if self.flows_out(f, o) {
+                    rest -= self.before[o] / self.before[f];
+                } else if self.before[o] > 0.0 {
+                    self.inflow.push((cell(f), self.before[o]));
+                }
+            }
+            self.inverse[f] = 1.0 / rest;
+        }
     }
 
-    /// Puts the solution in its frame, as seen from inside.
-    fn frame(&mut self, domain: &Domain) {
-        let side = self.side;
-        self.after.copy_from_slice(&self.before);
-        if let Some(target) = self.target(domain) {
-            self.values[target] = self.before[self.framed(target)];
+    /// Completes the solution by what is not solved for, as seen from inside.
+    fn frame(&mut self, target: Option<usize>) {
+        if let Some(target) = target {
+            self.after[target] = self.before[target];
             self.shares[target] = 0.0;
         }
-        for at in 0..side * side {
-            let f = self.framed(at);
+        for f in 0..self.after.len() {
             if !self.taken[f] {
-                self.shares[at] = 0.0;
-            } else if domain.blocked()[self.map_index(domain, at)] {
+                self.after[f] = self.before[f];
+                self.shares[f] = 0.0;
+            } else if self.blocked[f] {
                 self.after[f] = -1.0;
-            } else {
-                self.after[f] = self.values[at];
             }
         }
-        for &at in &self.rim {
-            let at = at as usize;
-            let f = self.framed(at);
-            for o in self.outside(at) {
+        for &f in &self.rim {
+            for o in self.around(f).into_iter().filter(|&o| !self.taken[o]) {
                 if self.flows_out(f, o) {
-                    self.after[o] = self.values[at] * (self.before[o] / self.before[f]);
+                    self.after[o] = self.after[f] * (self.before[o] / self.before[f]);
                 } else if !self.fed[f] {
                     // Not fed from here, so nothing flows in.
                     self.after[o] = 0.0;
@@ -366,12 +376,14 @@ impl Window {
         }
     }
 
-    /// The target's place among the cells the window is solved for.
+    /// The target's place, if it is among the cells solved for.
     fn target(&self, domain: &Domain) -> Option<usize> {
-        let col = domain.target().col.checked_sub(self.rect.col)?;
-        let row = domain.target().row.checked_sub(self.rect.row)?;
-        let at = row * self.side + col;
-        (col < self.side && row < self.side && self.taken[self.framed(at)]).then_some(at)
+        let target = domain.target();
+        let inside = self.rect.contains((target.col as i64, target.row as i64));
+        let f = |target: Cell| {
+            (target.row - self.rect.row + 1) * self.stride + target.col - self.rect.col + 1
+        };
+        inside.then(|| f(target)).filter(|&f| self.taken[f])
     }
 
     fn judge(&self) -> Judgement {
@@ -380,44 +392,42 @@ impl Window {
             wake: (f64::INFINITY, 0.0),
             sound: true,
         };
-        for &at in &self.rim {
-            let at = at as usize;
-            let f = self.framed(at);
+        // The largest tangent of an angle; its arc is taken once, at the end.
+        let mut slope = 0.0_f64;
+        for &f in &self.rim {
             if self.before[f] <= 0.0 {
                 continue;
             }
             let ratio = f64::from(self.after[f]) / f64::from(self.before[f]);
-            let steepness = self.steepness(f);
-            for o in self.outside(at).filter(|&o| self.before[o] > 0.0) {
+            let scale = 1.0 / (self.steepness(f) * ratio.max(f64::MIN_POSITIVE));
+            for o in self.outside(f).filter(|&o| self.before[o] > 0.0) {
                 if self.flows_out(f, o) {
                     found.wake = (found.wake.0.min(ratio), found.wake.1.max(ratio));
                     for beside in self.beside(f, o) {
                         if self.before[beside] > 0.0 && self.after[beside] > 0.0 {
                             let other =
                                 f64::from(self.after[beside]) / f64::from(self.before[beside]);
-                            let jump = (ratio - other).abs() / ratio.max(f64::MIN_POSITIVE);
-                            found.angle = found.angle.max((jump / steepness).atan());
+                            slope = slope.max((ratio - other).abs() * scale);
                         }
                     }
                     // From the wake into the window and out upstream: u before must have grown on the way, or the walk
                     // might come back.
-                    if ratio * f64::from(self.before[f]) < f64::from(self.before[o]) {
-                        found.sound &= self.exit(at) > self.before[o];
+                    if self.after[f] < self.before[o] {
+                        found.sound &= self.exit(f) > self.before[o];
                     }
                 } else {
-                    let jump = (1.0 - ratio).abs() / ratio.max(f64::MIN_POSITIVE);
-                    found.angle = found.angle.max((jump / steepness).atan());
+                    slope = slope.max((1.0 - ratio).abs() * scale);
                 }
             }
         }
+        found.angle = slope.atan();
         found
     }
 
     /// The neighbours of `f` along the rim, across from `o` outside.
     fn beside(&self, f: usize, o: usize) -> [usize; 2] {
-        let framed = self.side + 2;
         if f.abs_diff(o) == 1 {
-            [f - framed, f + framed]
+            [f - self.stride, f + self.stride]
         } else {
             [f - 1, f + 1]
         }
@@ -425,36 +435,31 @@ impl Window {
 
     /// |gradient of ln u| before the change.
     fn steepness(&self, f: usize) -> f64 {
-        let framed = self.side + 2;
         let u = |at: usize| f64::from(self.before[at]) / f64::from(self.before[f]);
         let (x, y) = (
             0.5 * (u(f + 1) - u(f - 1)),
-            0.5 * (u(f + framed) - u(f - framed)),
+            0.5 * (u(f + self.stride) - u(f - self.stride)),
         );
         x.hypot(y).max(1e-6)
     }
 
     /// u before the change of the cell at which steepest ascent from a cell of the window leaves it; infinite at the
     /// target.
-    fn exit(&self, at: usize) -> f32 {
-        let framed = self.side + 2;
-        let mut here = self.framed(at);
+    fn exit(&self, mut here: usize) -> f32 {
         // u grows with every step, so no cell is met twice.
         for _ in 0..self.side * self.side {
-            let best = [here - 1, here + 1, here - framed, here + framed]
-                .into_iter()
-                .fold(here, |best, next| {
-                    if self.after[next] > self.after[best] {
-                        next
-                    } else {
-                        best
-                    }
-                });
+            let ascend = |best: usize, next: usize| {
+                if self.after[next] > self.after[best] {
+                    next
+                } else {
+                    best
+                }
+            };
+            let best = self.around(here).into_iter().fold(here, ascend);
             if best == here {
                 return f32::INFINITY;
             }
-            let (col, row) = (best % framed, best / framed);
-            if col == 0 || row == 0 || col == framed - 1 || row == framed - 1 {
+            if !self.taken[best] {
                 return self.before[best];
             }
             here = best;

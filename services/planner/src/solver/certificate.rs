@@ -75,8 +75,8 @@ fn check_plain<R: Real>(domain: &Domain, values: &[R]) -> Check {
     )
 }
 
-/// Checks a field given with one row or column of u around it, `width` cells wide without; `shares` are 0.25 / (1 + k) of
-/// the cells, 0 where no equation holds.
+/// Checks a field given with one row or column of u around it, `width` cells wide without; `shares`, framed too, are
+/// 0.25 / (1 + k), 0 where no equation holds.
 pub(crate) fn check_framed(width: usize, values: &[f32], shares: &[f32]) -> Check {
     Wide::default().run(
         #[inline(always)]
@@ -89,7 +89,8 @@ pub(crate) fn check_framed(width: usize, values: &[f32], shares: &[f32]) -> Chec
             rows.take(values.get(framed..2 * framed));
             for row in 0..height {
                 rows.take(values.get((row + 2) * framed..(row + 3) * framed));
-                rows.shares[1..=width].copy_from_slice(&shares[row * width..(row + 1) * width]);
+                rows.shares[..framed]
+                    .copy_from_slice(&shares[(row + 1) * framed..(row + 2) * framed]);
                 let raw = &values[(row + 1) * framed..(row + 2) * framed];
                 rows.check(raw, 1..framed - 1, &mut found);
             }

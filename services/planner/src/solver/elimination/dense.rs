@@ -1,5 +1,7 @@
 //! The dense matrix of a front: symmetric, upper triangle stored by rows.
 
+use super::super::wide::Wide;
+
 /// Pivots whose updates are applied to the rest of the matrix in one pass over it.
 const PANEL: usize = 8;
 
@@ -8,6 +10,7 @@ const PANEL: usize = 8;
 pub(super) struct Matrix {
     entries: Vec<f64>,
     size: usize,
+    wide: Wide,
 }
 
 impl Matrix {
@@ -42,37 +45,46 @@ impl Matrix {
 
     /// Gauss elimination of the first `pivots` rows; the rest becomes the Schur complement on the other rows.
     pub(super) fn eliminate(&mut self, pivots: usize) {
-        let size = self.size;
-        let mut start = 0;
-        while start < pivots {
-            let end = pivots.min(start + PANEL);
-            for pivot in start..end {
-                let (above, below) = self.entries.split_at_mut((pivot + 1) * size);
-                let source = &above[pivot * size..];
-                let inverse = 1.0 / source[pivot];
-                for row in pivot + 1..end {
-                    let multiplier = source[row] * inverse;
-                    if multiplier != 0.0 {
-                        let target = &mut below[(row - pivot - 1) * size..][row..size];
-                        for (t, s) in target.iter_mut().zip(&source[row..size]) {
-                            *t -= multiplier * s;
-                        }
+        self.wide.run(
+            #[inline(always)]
+            || eliminate(&mut self.entries, self.size, pivots),
+        );
+    }
+}
+
+/// See [`Matrix::eliminate`].
+#[inline(always)]
+fn eliminate(entries: &mut [f64], size: usize, pivots: usize) {
+    let mut start = 0;
+    while start < pivots {
+        let end = pivots.min(start + PANEL);
+        for pivot in start..end {
+            let (above, below) = entries.split_at_mut((pivot + 1) * size);
+            let source = &above[pivot * size..];
+            let inverse = 1.0 / source[pivot];
+            for row in pivot + 1..end {
+                let multiplier = source[row] * inverse;
+                if multiplier != 0.0 {
+                    let target = &mut below[(row - pivot - 1) * size..][row..size];
+                    for (t, s) in target.iter_mut().zip(&source[row..size]) {
+                        *t -= multiplier * s;
                     }
                 }
             }
-            let (panel, rest) = self.entries.split_at_mut(end * size);
-            let panel = &panel[start * size..];
-            if end - start == PANEL {
-                apply_full_panel(panel, rest, start, size);
-            } else {
-                apply_panel(panel, rest, start, end, size);
-            }
-            start = end;
         }
+        let (panel, rest) = entries.split_at_mut(end * size);
+        let panel = &panel[start * size..];
+        if end - start == PANEL {
+            apply_full_panel(panel, rest, start, size);
+        } else {
+            apply_panel(panel, rest, start, end, size);
+        }
+        start = end;
     }
 }
 
 /// Subtracts from every row of `rest` its share of the `PANEL` pivot rows in `panel`.
+#[inline(always)]
 fn apply_full_panel(panel: &[f64], rest: &mut [f64], start: usize, size: usize) {
     let inverse: [f64; PANEL] = std::array::from_fn(|q| 1.0 / panel[q * size + start + q]);
     for (row, target) in (start + PANEL..size).zip(rest.chunks_exact_mut(size)) {
@@ -95,6 +107,7 @@ fn apply_full_panel(panel: &[f64], rest: &mut [f64], start: usize, size: usize) 
 }
 
 /// As [`apply_full_panel`] for the last, narrower panel.
+#[inline(always)]
 fn apply_panel(panel: &[f64], rest: &mut [f64], start: usize, end: usize, size: usize) {
     for (row, target) in (end..size).zip(rest.chunks_exact_mut(size)) {
         for q in 0..end - start {

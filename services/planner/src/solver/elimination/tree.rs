@@ -42,7 +42,7 @@ impl Tree {
             price: Price::default(),
         };
         let distances = pass.levels.len() - 1;
-        let thickness = distances_per_front(pass);
+        let thickness = DISTANCES_PER_FRONT;
         let mut pieces = Pieces::default();
         // Fronts of the chunk before, farther out, whose boundary lies in this one.
         let mut waiting: Vec<u32> = Vec::new();
@@ -171,10 +171,9 @@ impl Price {
     }
 }
 
-/// Distances a front takes at once: several where the map is narrow, because a front has a cost of its own.
-fn distances_per_front(_pass: &Pass) -> usize {
-    4
-}
+/// Distances a front takes at once. Cells of one distance are never neighbours, so more of them only save the front's own
+/// cost, and where loops join many passages into one front the dense work of a thicker one outweighs that.
+const DISTANCES_PER_FRONT: usize = 1;
 
 /// Removes repeated values from a sorted slice; returns how many remain at its start.
 fn dedup(sorted: &mut [u32]) -> usize {

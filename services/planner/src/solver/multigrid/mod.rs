@@ -143,22 +143,22 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Takes over equations that are not a map's: row-major 1 / diagonal (0 for a cell that stays zero) and first guess,
-    /// and what flows in by cell. Every pair of neighbours is coupled by one.
-    pub(crate) fn load(
+    /// Takes over equations that are not a map's: for each row 1 / diagonal (0 for a cell that stays zero) and a first
+    /// guess, and what flows in by cell. Every pair of neighbours is coupled by one.
+    pub(crate) fn load<'a>(
         &mut self,
-        inverse: &[R],
-        guess: &[R],
+        rows: impl Fn(usize) -> (&'a [R], &'a [R]),
         inflow: impl Iterator<Item = (Cell, R)>,
     ) {
         let finest = &mut self.finest;
         let (grid, width, height) = (finest.grid, finest.grid.width, finest.grid.height);
-        let mut row_of = vec![R::default(); 2 * grid.columns];
+        let mut buffer = vec![R::default(); 2 * grid.columns];
         for row in 0..height {
-            row_of[..width].copy_from_slice(&inverse[row * width..(row + 1) * width]);
-            grid::split_row(&grid, &mut finest.inverse, row, &row_of);
-            row_of[..width].copy_from_slice(&guess[row * width..(row + 1) * width]);
-            grid::split_row(&grid, &mut finest.u, row, &row_of);
+            let (inverse, guess) = rows(row);
+            buffer[..width].copy_from_slice(inverse);
+            grid::split_row(&grid, &mut finest.inverse, row, &buffer);
+            buffer[..width].copy_from_slice(guess);
+            grid::split_row(&grid, &mut finest.u, row, &buffer);
         }
         finest.sources.clear();
         finest.sources.extend(inflow.map(|(cell, value)| {
@@ -179,13 +179,13 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// u of every cell as it is, row by row.
-    pub(crate) fn unload(&self, into: &mut [R]) {
+    /// u of every cell as it is, given row by row.
+    pub(crate) fn unload(&self, mut row_is: impl FnMut(usize, &[R])) {
         let grid = &self.finest.grid;
-        let mut row_of = vec![R::default(); 2 * grid.columns];
-        for (row, out) in into.chunks_exact_mut(grid.width).enumerate() {
-            grid::join_row(grid, &self.finest.u, row, &mut row_of);
-            out.copy_from_slice(&row_of[..grid.width]);
+        let mut buffer = vec![R::default(); 2 * grid.columns];
+        for row in 0..grid.height {
+            grid::join_row(grid, &self.finest.u, row, &mut buffer);
+            row_is(row, &buffer[..grid.width]);
         }
     }
 
