@@ -14,12 +14,15 @@ mod window;
 pub(crate) use patch::{Patch, Rect};
 use window::{Judgement, Window};
 
-use crate::domain::{Change, Domain};
+use std::cmp::Ordering;
+use std::collections::HashSet;
+
+use crate::domain::{Cell, Change, Domain};
 use crate::field::{BLOCKED, Field};
 use crate::solver::Verdict;
 
 /// Sides of the windows, cells: the next is tried where the estimate asks for more.
-const SIDES: [usize; 4] = [49, 65, 97, 145];
+const SIDES: [usize; 3] = [49, 65, 97];
 
 /// Cells between a change and the rim at least; the first window tried has about this much.
 const MARGIN: usize = 24;
@@ -107,13 +110,14 @@ impl Repair {
             }
         };
         let (least, most) = judgement.wake;
-        let closed = !judgement.sound || least < WAKE.0 || most > WAKE.1;
+        let closed = least < WAKE.0 || most > WAKE.1;
         if closed && small {
             return None;
         }
         let window = &self.windows[window];
         let patch = window.write(domain, field.store_mut());
         field.patches_mut().push(patch);
+        let closed = closed || !gets_ahead(field, judgement.doubtful, 16 * side);
         Some(if closed {
             Verdict::PassageClosed
         } else if judgement.angle > ANGLE {
@@ -134,6 +138,7 @@ impl Repair {
     ) -> Grown {
         let mut next = Some((side, at));
         let mut found = Grown::Failed;
+        let mut angle = f64::INFINITY;
         while let Some((side, at)) = next {
             if 2 * side * side > domain.blocked().len() {
                 return Grown::TooWide;
@@ -155,9 +160,13 @@ impl Repair {
             let Some(judgement) = self.windows[index].solve(domain, field.store(), at, area) else {
                 break;
             };
+            // A wider window does not open a closed passage, and where the wake fills a hall it does not help either.
+            let done = judgement.angle <= ANGLE
+                || judgement.wake.0 < WAKE.0
+                || judgement.angle > 0.7 * angle;
+            angle = judgement.angle;
             found = Grown::Solved(index, judgement);
-            // A wider window does not open a closed passage.
-            if judgement.angle <= ANGLE || judgement.wake.0 < WAKE.0 {
+            if done {
                 break;
             }
             next = choose(domain, area, side + 1);
@@ -172,6 +181,45 @@ impl Repair {
         self.windows.push(Window::new(side));
         self.windows.len() - 1
     }
+}
+
+/// Whether walks from `cells`, all outside patches, come out of the patches higher than they went in: above u of the cell
+/// they started from, which no patch changed. Then no walk can return to where it was. Tried one by one, from the highest
+/// down, so a walk that meets an earlier one is done.
+fn gets_ahead(field: &Field, mut cells: Vec<Cell>, most_steps: usize) -> bool {
+    let outside = |cell: Cell| {
+        !field
+            .patches()
+            .iter()
+            .any(|patch| patch.contains((cell.col as i64, cell.row as i64)))
+    };
+    cells.sort_by(|&a, &b| {
+        field
+            .u(b)
+            .partial_cmp(&field.u(a))
+            .unwrap_or(Ordering::Equal)
+    });
+    let mut proven = HashSet::new();
+    for start in cells {
+        let from = field.u(start);
+        let mut here = start;
+        let mut path = Vec::new();
+        loop {
+            if here == field.target()
+                || proven.contains(&here)
+                || (outside(here) && field.u(here) > from)
+            {
+                break;
+            }
+            path.push(here);
+            match field.ascent(here) {
+                Some(next) if path.len() < most_steps => here = next,
+                _ => return false,
+            }
+        }
+        proven.extend(path);
+    }
+    true
 }
 
 /// The smallest window of at least `least` cells that leaves a margin around `area`, and its first cell.

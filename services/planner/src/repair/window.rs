@@ -56,14 +56,15 @@ pub(super) struct Window {
 }
 
 /// What a window's solution says of the world outside.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Judgement {
     /// Estimate of the angle, in radians, by which directions beyond the rim are off.
     pub angle: f64,
     /// The smallest and the largest ratio of u after to u before on the outflow rim.
     pub wake: (f64, f64),
-    /// Whether every cell of the window leads to the target, as far as u before tells beyond the rim.
-    pub sound: bool,
+    /// Cells outside that lead into the window at a place now lower than they are: whether walks from there still get
+    /// ahead must be tried.
+    pub doubtful: Vec<Cell>,
 }
 
 impl Window {
@@ -390,7 +391,7 @@ impl Window {
         let mut found = Judgement {
             angle: 0.0,
             wake: (f64::INFINITY, 0.0),
-            sound: true,
+            doubtful: Vec::new(),
         };
         // The largest tangent of an angle; its arc is taken once, at the end.
         let mut slope = 0.0_f64;
@@ -410,10 +411,8 @@ impl Window {
                             slope = slope.max((ratio - other).abs() * scale);
                         }
                     }
-                    // From the wake into the window and out upstream: u before must have grown on the way, or the walk
-                    // might come back.
                     if self.after[f] < self.before[o] {
-                        found.sound &= self.exit(f) > self.before[o];
+                        found.doubtful.push(self.map_cell(o));
                     }
                 } else {
                     slope = slope.max((1.0 - ratio).abs() * scale);
@@ -443,27 +442,11 @@ impl Window {
         x.hypot(y).max(1e-6)
     }
 
-    /// u before the change of the cell at which steepest ascent from a cell of the window leaves it; infinite at the
-    /// target.
-    fn exit(&self, mut here: usize) -> f32 {
-        // u grows with every step, so no cell is met twice.
-        for _ in 0..self.side * self.side {
-            let ascend = |best: usize, next: usize| {
-                if self.after[next] > self.after[best] {
-                    next
-                } else {
-                    best
-                }
-            };
-            let best = self.around(here).into_iter().fold(here, ascend);
-            if best == here {
-                return f32::INFINITY;
-            }
-            if !self.taken[best] {
-                return self.before[best];
-            }
-            here = best;
-        }
-        0.0
+    /// The cell of the map at a place of the arrays that lies inside it.
+    fn map_cell(&self, f: usize) -> Cell {
+        Cell::new(
+            self.rect.col + f % self.stride - 1,
+            self.rect.row + f / self.stride - 1,
+        )
     }
 }
