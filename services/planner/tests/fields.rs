@@ -117,3 +117,67 @@ fn a_cancelled_solve_says_so() {
         Some(SolveError::Cancelled)
     );
 }
+
+#[test]
+fn a_strip_with_absorption_falls_as_its_difference_equation_does() {
+    // u_i = (u_(i-1) + u_(i+1)) / (4 (1 + k)) has the decaying solution (a - sqrt(a^2 - 1))^i, a = 2 (1 + k).
+    let domain = Domain::new(600, 1, vec![false; 600], Cell::new(0, 0)).expect("a valid map");
+    let domain = domain
+        .with_absorption(planner::Absorption::Uniform(0.3))
+        .expect("a valid absorption");
+    let a = 2.6_f64;
+    let expected = 300.0 * (a - (a * a - 1.0).sqrt()).log10();
+    assert!((solve(&domain).u(Cell::new(300, 0)).log10() - expected).abs() < 1e-3);
+}
+
+#[test]
+fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() {
+    let (n, centre, radius) = (161_usize, 80.0, 75.0);
+    let from_centre = |i: usize| ((i % n) as f64 - centre, (i / n) as f64 - centre);
+    let blocked = (0..n * n)
+        .map(|i| from_centre(i).0.hypot(from_centre(i).1) >= radius)
+        .collect();
+    let domain = Domain::new(n, n, blocked, Cell::new(80, 80)).expect("a valid map");
+    let field = solve(&domain);
+    let u = |r: usize| field.u(Cell::new(80 + r, 80)).relative_to(0);
+    for r in [20, 30, 50] {
+        let expected = (radius / r as f64).ln() / (radius / 10.0).ln();
+        assert!((u(r) / u(10) / expected - 1.0).abs() < 0.01, "at {r}");
+    }
+    for i in 0..n * n {
+        let (x, y) = from_centre(i);
+        if (10.0..60.0).contains(&x.hypot(y)) {
+            let direction = field
+                .direction(Cell::new(i % n, i / n))
+                .expect("free space");
+            assert!(
+                planner::testing::angle(direction, [-x, -y]) < 1.5,
+                "at {x}, {y}"
+            );
+        }
+    }
+}
+
+#[test]
+fn absorption_keeps_directions_within_a_degree_of_the_reference() {
+    for k in [0.002, 0.02, 0.5] {
+        for kind in [
+            Kind::Drums,
+            Kind::Office,
+            Kind::Trap,
+            Kind::Maze { corridor: 4 },
+        ] {
+            let domain = Map::generate(kind, 60, 75, 1)
+                .domain()
+                .expect("a valid map");
+            let domain = domain
+                .with_absorption(planner::Absorption::Uniform(k))
+                .expect("a valid absorption");
+            let (off, worst) = Reference::solve(&domain).compare(&solve(&domain));
+            assert!(
+                off <= 1e-3 && worst <= 1.0,
+                "{kind:?}, k = {k}: {off} off, worst {worst} degrees"
+            );
+        }
+    }
+}

@@ -23,6 +23,9 @@ const CYCLES: usize = 24;
 /// next corridor of a maze may be 1e-45 of this one.
 const SPAN: std::ops::RangeInclusive<f32> = 1e-24..=1e24;
 
+/// Numbers read from the store that are not clamped for certain.
+const EXACT: std::ops::RangeInclusive<f32> = 1e-35..=1e35;
+
 /// The largest relative residual of a repaired window. It holds only until the next full solve.
 const RESIDUAL_LIMIT: f64 = 1e-3;
 
@@ -125,7 +128,12 @@ impl Window {
             .zip(&self.before)
             .any(|((&t, &b), &u)| b && !t && u > 0.0);
         let target = self.target(domain);
-        if missed || self.feed(target) {
+        // Nor can a freed cell join passages whose u differs beyond what the window's numbers hold.
+        let beyond = self.rim.iter().any(|&f| {
+            self.outside(f)
+                .any(|o| self.before[o] > 0.0 && !EXACT.contains(&self.before[o]))
+        });
+        if missed || beyond || self.feed(target) {
             return None;
         }
         self.set_equations(domain, target);
