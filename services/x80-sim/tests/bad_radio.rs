@@ -73,6 +73,18 @@ fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
 }
 
 #[test]
+fn in_lock_step_a_slow_radio_makes_commands_late() {
+    let counts = |delay: &str| {
+        let mission = format!(
+            "robot.rate_hz = 20\nsimulation.wheels.lag_s = 0\nsimulation.radio.delay_s = {delay}"
+        );
+        lock_step(&mission, 1, 1).1[1].right_counts
+    };
+    // 400 counts/s for a period of 50 ms, less the way there and back.
+    assert_eq!([counts("0"), counts("0.01"), counts("0.04")], [20, 12, 0]);
+}
+
+#[test]
 fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
     let own_limits = [
         "",

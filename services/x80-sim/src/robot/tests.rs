@@ -248,6 +248,15 @@ fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
 }
 
 #[test]
+fn a_line_of_truth_has_the_names_that_its_readers_know() {
+    let line = serde_json::to_string(&robot("").truth()).unwrap();
+    let names: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
+    let known =
+        "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm";
+    assert_eq!(names, known.split(' ').collect::<Vec<_>>());
+}
+
+#[test]
 fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
     let mut robot = robot(
         "[sonar]\nindex = 3\n[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\n[[world.wall]]\npoints = [[1, -1], [1, 1]]\n[[world.drum]]\nat = [0, 1]\nradius_m = 0.5",
@@ -263,6 +272,19 @@ fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
     assert_eq!(sensors.ultrasonic[5], 255);
     assert_ne!(sensors.ultrasonic[4], 255);
     assert_eq!(robot.truth().sonar_cm, 81);
+}
+
+#[test]
+fn with_crosstalk_a_ranger_hears_its_neighbours_answer() {
+    let sonar = "[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\ncrosstalk_share = 1";
+    // Only the left one, at 45 degrees, has something before it: a drum 1 m from the centre.
+    let mut robot = robot(&format!(
+        "{sonar}\n[[world.drum]]\nat = [1, 1]\nradius_m = 0.414213562"
+    ));
+    let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
+        panic!("no standard frame");
+    };
+    assert_eq!(sensors.ultrasonic[..3], [81, 81, 255]);
 }
 
 #[test]
