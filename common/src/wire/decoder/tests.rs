@@ -118,16 +118,24 @@ fn a_noisy_header_that_claims_much_holds_no_frame_back() {
     assert_eq!(decode(&[&bytes]), vec![ping()]);
 }
 
+/// A torn frame that claims `len` data bytes, `has` some, and takes a byte of the ping behind it for its CRC:
+/// of the 256 serial numbers, one makes that right.
+fn torn_before_a_ping(len: u8, has: &[u8]) -> Vec<u8> {
+    let crc_at = 6 + usize::from(len);
+    (0..=255)
+        .map(|sn| [&[0x5e, 0x02, 0x01, sn, 0x09, len], has, &PING].concat())
+        .find(|bytes| crc8(&bytes[2..crc_at]) == bytes[crc_at])
+        .expect("the CRC takes every value over SN")
+}
+
 #[test]
-fn a_noisy_header_whose_crc_happens_to_fit_swallows_no_frame() {
-    // LEN 4 reaches into the ping behind it; SN is chosen so that a byte of the ping is its CRC.
-    let forged = (0..=255)
-        .map(|sn| [&[0x5e, 0x02, 0x01, sn, 0x09, 0x04][..], &PING].concat())
-        .find(|bytes| crc8(&bytes[2..10]) == bytes[10])
-        .expect("the CRC takes every value over SN");
-    for cut in 0..forged.len() {
-        let (first, second) = forged.split_at(cut);
-        assert_eq!(decode(&[first, second]), vec![ping()], "cut at {cut}");
+fn a_torn_frame_whose_crc_happens_to_fit_swallows_no_frame() {
+    // The CRC falls on the fifth byte of the ping, and on its very first.
+    for forged in [torn_before_a_ping(4, &[]), torn_before_a_ping(1, &[7])] {
+        for cut in 0..forged.len() {
+            let (first, second) = forged.split_at(cut);
+            assert_eq!(decode(&[first, second]), vec![ping()], "cut at {cut}");
+        }
     }
 }
 
