@@ -73,6 +73,29 @@ fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
 }
 
 #[test]
+fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
+    let mission =
+        "perimeter.width_m = 200\nsimulation.wheels.lag_s = 0\nsimulation.radio.loss_share = 0.3";
+    let (bytes, truth) = lock_step(mission, 200, 1);
+    let mut decoder = Decoder::default();
+    decoder.push(&bytes);
+    let mut acks: u16 = 0;
+    while let Some(frame) = decoder.next_frame() {
+        acks += u16::from(matches!(Report::parse(&frame), Ok(Report::System(_))));
+    }
+    assert!(
+        (120..160).contains(&acks),
+        "{acks} of 200 commands were acknowledged"
+    );
+    // 400 counts/s for the period of 1/7 s, or for all of the 150 ms where no command comes behind.
+    let counts = truth.last().unwrap().right_counts;
+    assert!(
+        (acks * 57..=acks * 60).contains(&counts),
+        "{counts} counts for {acks} commands"
+    );
+}
+
+#[test]
 fn in_lock_step_a_slow_radio_makes_commands_late() {
     let counts = |delay: &str| {
         let mission = format!(

@@ -85,15 +85,16 @@ fn end_bytes_inside_data_end_nothing() {
 }
 
 #[test]
-fn a_whole_frame_inside_data_is_data() {
-    let outer = encoded(9, &PING);
-    for cut in 0..outer.len() {
-        let (first, second) = outer.split_at(cut);
-        assert_eq!(
-            decode(&[first, second]),
-            vec![(1, 0, 9, PING.to_vec())],
-            "cut at {cut}"
-        );
+fn a_whole_frame_inside_data_is_data_with_either_ending() {
+    for last in [0x0d, 0x13] {
+        let mut outer = encoded(9, &PING);
+        outer.pop();
+        outer.push(last);
+        for cut in 0..outer.len() {
+            let (first, second) = outer.split_at(cut);
+            let data = vec![(1, 0, 9, PING.to_vec())];
+            assert_eq!(decode(&[first, second]), data, "cut at {cut}");
+        }
     }
 }
 
