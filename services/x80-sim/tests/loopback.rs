@@ -4,7 +4,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    reason = "helpers of tests may stop at the first broken promise too"
+    reason = "what tests share may stop at the first broken promise too"
 )]
 
 mod support;
