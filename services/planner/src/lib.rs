@@ -20,6 +20,7 @@
 //! - [`Guidance`]: the direction at any position, or the reason there is none.
 //! - `testing` (feature of that name): generated maps and the slow reference.
 
+pub mod beside;
 mod cancellation;
 mod domain;
 mod error;

@@ -4,18 +4,27 @@ use std::time::{Duration, Instant};
 
 use common::{
     bus::{Reader, SliceReader, SliceWriter, Writer},
-    clock::MissionTime,
+    clock::{MissionClock, MissionTime},
     grid::Revision,
     samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
     topics::{self, AnyTopic as _},
 };
 
-use crate::step::{Planner, Work};
+use crate::{
+    SolveError,
+    beside::{BesideSolver, Solved},
+    step::{Planner, Work},
+};
 
 /// Changes of the field are told at most so often in mission time: it is for eyes and loggers, and the
 /// robot should not wait for it.
 const FIELD_AT_MOST_EVERY: Duration = Duration::from_millis(250);
+
+/// On a clock of ticks the result of a full solve beside the live field is swapped in so many ticks after
+/// it began, sooner never and later never, so that a run can be repeated. At 7 Hz the largest map is solved
+/// by then on a wall clock, too.
+const SWAP_AFTER_TICKS: u64 = 2;
 
 /// The planner process.
 #[derive(Debug)]
@@ -25,6 +34,10 @@ pub struct Shell {
     guidance: Writer<GuidanceSample>,
     field: SliceWriter<FieldHeader, FieldCell>,
     planner: Planner,
+    beside: BesideSolver,
+    /// On a clock of ticks, the tick at which the job that runs is swapped in.
+    swap_at: Option<u64>,
+    in_ticks: bool,
     latest_pose: Option<PoseSample>,
     full_solve_ns: u64,
     local_update_ns: u64,
@@ -43,6 +56,10 @@ impl Process for Shell {
         let mission = &context.run.mission;
         let longest = mission.grid_frame().area();
         context.waiter.on(context.bus.alarm(&topics::GRID)?);
+        let beside = BesideSolver::start().map_err(|error| {
+            StageError::Other(format!("cannot start the thread of full solves: {error}"))
+        })?;
+        context.waiter.on_readable(&beside)?;
         Ok(Self {
             grid: context.bus.slice_reader(&topics::GRID)?,
             pose: context.bus.reader(&topics::POSE)?,
@@ -51,6 +68,9 @@ impl Process for Shell {
                 .bus
                 .slice_writer(&topics::FIELD, generation, longest)?,
             planner: Planner::new(mission),
+            beside,
+            swap_at: None,
+            in_ticks: matches!(context.run.clock, MissionClock::Ticks { .. }),
             latest_pose: None,
             full_solve_ns: 0,
             local_update_ns: 0,
@@ -64,11 +84,15 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        if let Some(grid) = self.follow_grid()? {
+        let grid = self.follow_grid()?;
+        if let Some(grid) = &grid {
             self.progress = Progress {
                 tick: grid.stamp.tick,
                 time: grid.stamp.time(),
             };
+        }
+        let swapped = self.tend_beside()?;
+        if grid.is_some() || swapped && !self.in_ticks {
             self.answer()?;
         }
         self.tell_field()?;
@@ -76,7 +100,64 @@ impl Process for Shell {
     }
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
+fn no_field(error: SolveError) -> StageError {
+    StageError::Other(format!("no field: {error}"))
+}
+
 impl Shell {
+    /// Begin and swap in full solves beside the live field. Says whether one was swapped in.
+    fn tend_beside(&mut self) -> Result<bool, StageError> {
+        let tick = self.progress.tick;
+        let mut swapped = false;
+        if self.planner.beside().is_none() {
+            self.swap_at = None;
+        }
+        if !self.in_ticks {
+            while let Some(solved) = self.beside.take() {
+                swapped |= self.swap_in(solved)?;
+            }
+        } else if self.swap_at.is_some_and(|at| tick >= at) {
+            self.swap_at = None;
+            let number = self.planner.beside();
+            while let Some(solved) = self.beside.wait() {
+                let awaited = Some(solved.number) == number;
+                swapped |= self.swap_in(solved)?;
+                if awaited {
+                    break;
+                }
+            }
+        }
+        if let Some(job) = self.planner.begin_beside() {
+            tracing::debug!(
+                number = job.number,
+                urgent = job.urgent,
+                "full solve begins"
+            );
+            // A robot that waits for it waits no longer than it must.
+            let after = if job.urgent { 1 } else { SWAP_AFTER_TICKS };
+            self.swap_at = Some(tick + after);
+            self.beside.begin(job);
+        }
+        Ok(swapped)
+    }
+
+    fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
+        let Solved { number, result } = solved;
+        match result {
+            Ok((domain, field)) => {
+                let swapped = self
+                    .planner
+                    .swap_in(number, domain, field)
+                    .map_err(no_field)?;
+                self.field_changed |= swapped;
+                Ok(swapped)
+            }
+            Err(SolveError::Cancelled) => Ok(false),
+            Err(error) => Err(no_field(error)),
+        }
+    }
+
     /// Follow every grid sample that came; the header of the newest that was followed.
     fn follow_grid(&mut self) -> Result<Option<GridHeader>, StageError> {
         let mut newest = None;
@@ -85,7 +166,7 @@ impl Shell {
             let work = self
                 .planner
                 .take_grid(grid.header(), &grid)
-                .map_err(|error| StageError::Other(format!("no field: {error}")))?;
+                .map_err(no_field)?;
             let took = began.elapsed().as_nanos() as u64;
             match work {
                 Work::Missed => {

@@ -13,6 +13,10 @@ use crate::{
     Verdict,
 };
 
+/// Maps of at most this many cells are solved in full at once where a repair does not do: that takes less
+/// than a thread takes to begin.
+const SMALL: usize = 1 << 14;
+
 /// What taking a grid sample led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Work {
@@ -35,6 +39,12 @@ pub struct Planner {
     grid: Replica<u8>,
     belief: GridHeader,
     solved: Option<Solved>,
+    /// A full solve would do the field good.
+    advised: bool,
+    /// Until then the field is not to be followed: a passage closed or opened.
+    unsafe_until_solved: bool,
+    beside: Option<Beside>,
+    jobs: u64,
     full_solves: u64,
     local_updates: u64,
 }
@@ -45,6 +55,26 @@ struct Solved {
     frame: GridFrame,
     domain: Domain,
     field: Field,
+}
+
+/// The full solve that runs beside the live field.
+#[derive(Debug)]
+struct Beside {
+    number: u64,
+    urgent: bool,
+    /// What changed since its map was taken.
+    since: Vec<Change>,
+}
+
+/// A full solve to run beside the live field.
+#[derive(Debug)]
+pub struct Job {
+    /// Names it.
+    pub number: u64,
+    /// Whether the live field waits for it.
+    pub urgent: bool,
+    /// The map to solve.
+    pub domain: Domain,
 }
 
 impl Planner {
@@ -58,6 +88,10 @@ impl Planner {
             grid: Replica::default(),
             belief: GridHeader::default(),
             solved: None,
+            advised: false,
+            unsafe_until_solved: false,
+            beside: None,
+            jobs: 0,
             full_solves: 0,
             local_updates: 0,
         }
@@ -82,6 +116,9 @@ impl Planner {
 
     fn solve(&mut self) -> Result<Work, SolveError> {
         self.solved = None;
+        self.beside = None;
+        self.advised = false;
+        self.unsafe_until_solved = false;
         let Some(frame) = self.grid.frame() else {
             return Ok(Work::Missed);
         };
@@ -109,13 +146,16 @@ impl Planner {
         if changes.is_empty() {
             return Ok(Work::None);
         }
+        if let Some(beside) = &mut self.beside {
+            beside.since.extend_from_slice(&changes);
+        }
         let verdict = self.solver.update(
             &mut solved.domain,
             &mut solved.field,
             &changes,
             &Cancellation::default(),
         )?;
-        if verdict != Verdict::Repaired {
+        if verdict != Verdict::Repaired && solved.frame.area() <= SMALL {
             solved.field = self
                 .solver
                 .solve(&solved.domain, &Cancellation::default())?;
@@ -123,7 +163,77 @@ impl Planner {
             return Ok(Work::FullSolve);
         }
         self.local_updates += 1;
+        self.heed(verdict);
         Ok(Work::LocalUpdate)
+    }
+
+    fn heed(&mut self, verdict: Verdict) {
+        self.advised |= verdict != Verdict::Repaired;
+        self.unsafe_until_solved |= verdict == Verdict::PassageClosed;
+    }
+
+    /// The full solve to begin beside the live field, if one is called for. One runs at a time and is
+    /// left to finish, or a robot that senses in every tick would never see one finish; only a passage
+    /// that closed makes the newest map win at once: then the job before is stale, its result unwanted.
+    pub fn begin_beside(&mut self) -> Option<Job> {
+        let busy = self
+            .beside
+            .as_ref()
+            .is_some_and(|beside| beside.urgent || !self.unsafe_until_solved);
+        if !self.advised || busy {
+            return None;
+        }
+        let domain = self.solved.as_ref()?.domain.clone();
+        self.advised = false;
+        self.jobs += 1;
+        self.beside = Some(Beside {
+            number: self.jobs,
+            urgent: self.unsafe_until_solved,
+            since: Vec::new(),
+        });
+        Some(Job {
+            number: self.jobs,
+            urgent: self.unsafe_until_solved,
+            domain,
+        })
+    }
+
+    /// The job that runs beside the live field, if any.
+    #[must_use]
+    pub fn beside(&self) -> Option<u64> {
+        self.beside.as_ref().map(|beside| beside.number)
+    }
+
+    /// Swap in what job `number` solved, brought up to date with what changed meanwhile. Says whether
+    /// the live field is another now; the result of a stale job changes nothing.
+    ///
+    /// # Errors
+    /// When it cannot be brought up to date; the live field stays.
+    pub fn swap_in(
+        &mut self,
+        number: u64,
+        mut domain: Domain,
+        mut field: Field,
+    ) -> Result<bool, SolveError> {
+        let Some(beside) = self.beside.take_if(|beside| beside.number == number) else {
+            return Ok(false);
+        };
+        self.unsafe_until_solved = false;
+        if !beside.since.is_empty() {
+            let verdict = self.solver.update(
+                &mut domain,
+                &mut field,
+                &beside.since,
+                &Cancellation::default(),
+            )?;
+            self.heed(verdict);
+        }
+        if let Some(solved) = &mut self.solved {
+            solved.domain = domain;
+            solved.field = field;
+            self.full_solves += 1;
+        }
+        Ok(true)
     }
 
     /// The reference direction for a robot at `pose`.
@@ -132,6 +242,7 @@ impl Planner {
         let to_target = self.target - pose.position;
         let (status, direction) = match &self.solved {
             None => (GuidanceStatus::Waiting, DVec2::ZERO),
+            Some(_) if self.unsafe_until_solved => (GuidanceStatus::Waiting, DVec2::ZERO),
             Some(solved) => {
                 let at = solved.frame.to_cells(pose.position);
                 match solved.field.guidance(at.x, at.y) {
@@ -325,6 +436,106 @@ mod tests {
         planner.take_grid(&header, &cells).unwrap();
         let guidance = planner.guide(&at(1.48, 0.02));
         assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
+    }
+
+    /// A room of 200 x 200 cells with a wall across it and a door in the wall.
+    fn large_room(version: u64, door_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
+        let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 200 }";
+        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+        let frame = mission.grid_frame();
+        let cells = (0..frame.area() as u32).map(|index| {
+            let cell = common::grid::Cell {
+                col: index % frame.cells,
+                row: index / frame.cells,
+            };
+            let at = frame.centre_of(cell);
+            let wall = (at.x - 0.8).abs() < 0.03;
+            let far_door = (1.0..1.4).contains(&at.y);
+            let near_door = !door_closed && at.y.abs() < 0.2;
+            u8::from(frame.is_rim(cell) || wall && !far_door && !near_door)
+        });
+        let header = GridHeader {
+            part: Revision {
+                frame,
+                window: frame.whole(),
+                version,
+                keyframe: true,
+            }
+            .into(),
+            ..GridHeader::default()
+        };
+        let cells = cells.collect();
+        (mission, header, cells)
+    }
+
+    #[test]
+    fn a_door_that_closes_halts_the_robot_until_the_full_solve_beside_is_swapped_in() {
+        let (mission, header, cells) = large_room(1, false);
+        let mut planner = Planner::new(&mission);
+        planner.take_grid(&header, &cells).unwrap();
+        assert!(
+            planner.begin_beside().is_none(),
+            "nothing calls for a solve"
+        );
+        let (_, header, cells) = large_room(2, true);
+        planner.take_grid(&header, &cells).unwrap();
+        let job = planner.begin_beside().unwrap();
+        assert!(job.urgent);
+        assert_eq!(
+            status(&planner.guide(&at(0.0, 0.0))),
+            GuidanceStatus::Waiting
+        );
+        assert!(planner.begin_beside().is_none(), "one at a time");
+        let field = Solver::default()
+            .solve(&job.domain, &Cancellation::default())
+            .unwrap();
+        assert!(planner.swap_in(job.number, job.domain, field).unwrap());
+        let guidance = planner.guide(&at(0.5, 0.0));
+        assert_eq!(status(&guidance), GuidanceStatus::Along);
+        assert!(guidance.ey > 0.7, "to the other door: {guidance:?}");
+    }
+
+    #[test]
+    fn the_result_of_a_stale_job_changes_nothing() {
+        let (mission, header, cells) = large_room(1, false);
+        let mut planner = Planner::new(&mission);
+        planner.take_grid(&header, &cells).unwrap();
+        let (_, header, closed) = large_room(2, true);
+        planner.take_grid(&header, &closed).unwrap();
+        let job = planner.begin_beside().unwrap();
+        let field = Solver::default()
+            .solve(&job.domain, &Cancellation::default())
+            .unwrap();
+        assert!(!planner.swap_in(job.number + 1, job.domain, field).unwrap());
+        assert_eq!(
+            status(&planner.guide(&at(0.0, 0.0))),
+            GuidanceStatus::Waiting
+        );
+    }
+
+    #[test]
+    fn what_changes_while_a_job_runs_is_in_the_field_it_brings() {
+        let (mission, header, cells) = large_room(1, false);
+        let mut planner = Planner::new(&mission);
+        planner.take_grid(&header, &cells).unwrap();
+        let (_, header, mut cells) = large_room(2, true);
+        planner.take_grid(&header, &cells).unwrap();
+        let job = planner.begin_beside().unwrap();
+        // A post between the robot and the other door.
+        let frame = mission.grid_frame();
+        let post = frame.cell_at(DVec2::new(0.4, 0.6)).unwrap();
+        cells[frame.index(post)] = 1;
+        let mut later = header;
+        later.part.version = 3;
+        planner.take_grid(&later, &cells).unwrap();
+        let field = Solver::default()
+            .solve(&job.domain, &Cancellation::default())
+            .unwrap();
+        planner.swap_in(job.number, job.domain, field).unwrap();
+        assert_eq!(
+            status(&planner.guide(&at(0.4, 0.6))),
+            GuidanceStatus::WayOut
+        );
     }
 
     #[test]
