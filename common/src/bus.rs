@@ -28,10 +28,7 @@ pub use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::{
     config::Config,
     node::{Node, NodeBuilder},
-    port::{
-        listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber,
-        update_connections::UpdateConnections,
-    },
+    port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber},
     prelude::{
         AllocationStrategy, CallbackProgression, FileDescriptorBased, LogLevel, NodeName,
         SemanticString, ServiceName, SignalHandlingMode, ipc, set_log_level_from_env_or,
@@ -317,7 +314,13 @@ impl Bus {
         }
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
-        Config::setup_global_config_from_file(&path).map_err(|error| join(format!("{error:?}")))?;
+        let config = Config::setup_global_config_from_file(&path)
+            .map_err(|error| join(format!("{error:?}")))?;
+        if config.global.prefix.as_bytes() != domain.shared_memory_prefix().as_bytes() {
+            return Err(join(
+                "this process already speaks to another robot".to_owned(),
+            ));
+        }
         let name = NodeName::new(name).map_err(|error| join(format!("{error:?}")))?;
         let node = NodeBuilder::new()
             .name(&name)
@@ -337,11 +340,6 @@ impl Bus {
             .map(|topic| topic.create(self))
             .collect::<Result<_, _>>()
             .map(Services)
-    }
-
-    /// Free what dead processes of the domain held.
-    pub fn clean_up_after_the_dead(&self) {
-        self.node.try_cleanup_dead_nodes();
     }
 
     fn create_event(&self, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {
@@ -508,12 +506,6 @@ impl<P: Payload + Stamped> Writer<P> {
             .send_copy(payload)
             .map_err(refused("publish on", self.topic))?;
         wake(&self.notifier, self.topic)
-    }
-
-    /// Give the last sample to readers that came since.
-    pub fn greet(&self) {
-        // What fails here fails again, and loudly, at the next publish.
-        let _ = self.publisher.update_connections();
     }
 }
 

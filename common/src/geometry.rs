@@ -82,28 +82,70 @@ impl Shapes {
         walls.chain(boxes)
     }
 
+    /// Everything that stands here, one by one.
+    pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> + '_ {
+        let walls = self.walls.iter().flat_map(|wall| {
+            wall.points
+                .windows(2)
+                .map(|pair| Piece::Edge(pair[0], pair[1]))
+        });
+        self.drums
+            .iter()
+            .map(Piece::Drum)
+            .chain(walls)
+            .chain(self.boxes.iter().map(Piece::Box))
+    }
+
     /// Distance from `point` to the nearest surface, metres; negative inside a drum or a box,
     /// infinite where nothing stands.
     #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
-        let drums = self
-            .drums
-            .iter()
-            .map(|drum| drum.at.distance(point) - drum.radius_m);
-        let walls = self.walls.iter().flat_map(|wall| {
-            wall.points
-                .windows(2)
-                .map(move |pair| distance_to_segment(point, pair[0], pair[1]))
-        });
-        let boxes = self.boxes.iter().map(|block| {
-            let axis = DVec2::from_angle(-block.angle_deg.to_radians());
-            let local = axis.rotate(point - block.at).abs() - block.size_m / 2.0;
-            local.max(DVec2::ZERO).length() + local.max_element().min(0.0)
-        });
-        drums
-            .chain(walls)
-            .chain(boxes)
+        self.pieces()
+            .map(|piece| piece.clearance(point))
             .fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// One thing: a drum, a straight edge of a wall, a box.
+#[derive(Clone, Copy, Debug)]
+pub enum Piece<'a> {
+    /// A disc.
+    Drum(&'a Drum),
+    /// A straight edge.
+    Edge(DVec2, DVec2),
+    /// A rectangle.
+    Box(&'a Box2),
+}
+
+impl Piece<'_> {
+    /// Distance from `point` to its surface, metres; negative inside.
+    #[must_use]
+    pub fn clearance(&self, point: DVec2) -> f64 {
+        match self {
+            Self::Drum(drum) => drum.at.distance(point) - drum.radius_m,
+            Self::Edge(from, to) => distance_to_segment(point, *from, *to),
+            Self::Box(block) => {
+                let axis = DVec2::from_angle(-block.angle_deg.to_radians());
+                let local = axis.rotate(point - block.at).abs() - block.size_m / 2.0;
+                local.max(DVec2::ZERO).length() + local.max_element().min(0.0)
+            }
+        }
+    }
+
+    /// The two corners, least and greatest, of an upright rectangle that contains it, metres.
+    #[must_use]
+    pub fn bounds(&self) -> (DVec2, DVec2) {
+        match self {
+            Self::Drum(drum) => {
+                let reach = DVec2::splat(drum.radius_m);
+                (drum.at - reach, drum.at + reach)
+            }
+            Self::Edge(from, to) => (from.min(*to), from.max(*to)),
+            Self::Box(block) => {
+                let reach = DVec2::splat(block.size_m.length() / 2.0);
+                (block.at - reach, block.at + reach)
+            }
+        }
     }
 }
 

@@ -36,6 +36,9 @@ impl CellState {
     }
 }
 
+/// The most cells along a side: 4096 x 4096 is the largest field that is solved.
+pub const MAX_CELLS: u32 = 4096;
+
 /// A cell: `col` grows with x, `row` grows with y.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cell {
@@ -267,7 +270,8 @@ impl<T: Copy + PartialEq> Replica<T> {
             version,
             keyframe,
         } = *revision;
-        if !frame.contains(window) || cells.len() != window.area() {
+        let sane = (1..=MAX_CELLS).contains(&frame.cells);
+        if !sane || !frame.contains(window) || cells.len() != window.area() {
             return Applied::Missed;
         }
         if keyframe {
@@ -286,7 +290,8 @@ impl<T: Copy + PartialEq> Replica<T> {
         let Some((held_frame, held)) = self.state else {
             return Applied::Missed;
         };
-        let follows = version == held && window.area() == 0 || version == held + 1;
+        let nothing = version == held && window.area() == 0;
+        let follows = nothing || held.checked_add(1) == Some(version);
         if held_frame != frame || !follows {
             self.state = None;
             return Applied::Missed;
@@ -389,6 +394,20 @@ mod tests {
             height: 1,
         };
         assert_eq!(replica.apply(&keyframe(2), &cells), Applied::Window(one));
+    }
+
+    #[test]
+    fn a_map_without_cells_is_refused() {
+        let none = Revision {
+            frame: frame(0),
+            window: Window::default(),
+            version: u64::MAX,
+            keyframe: true,
+        };
+        let mut replica = Replica::<u8>::default();
+        for _ in 0..2 {
+            assert_eq!(replica.apply(&none, &[]), Applied::Missed);
+        }
     }
 
     #[test]

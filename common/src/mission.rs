@@ -8,7 +8,11 @@ mod check;
 mod robot;
 mod simulation;
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::{self, Read as _},
+    path::{Path, PathBuf},
+};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -208,7 +212,7 @@ impl Mission {
     /// # Errors
     /// Also when the file cannot be read.
     pub fn load(path: &Path) -> Result<Self, MissionError> {
-        let text = std::fs::read_to_string(path).map_err(|source| MissionError::Unreadable {
+        let text = read_bounded(path).map_err(|source| MissionError::Unreadable {
             file: PathBuf::from(path),
             source,
         })?;
@@ -239,4 +243,18 @@ impl Mission {
     pub fn body(&self) -> Body {
         self.robot.body()
     }
+}
+
+/// A mission is a page or two; a file without end is no mission.
+const MAX_BYTES: u64 = 8 << 20;
+
+fn read_bounded(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let read = File::open(path)?
+        .take(MAX_BYTES)
+        .read_to_string(&mut text)?;
+    if read as u64 == MAX_BYTES {
+        return Err(io::Error::other(format!("it is {MAX_BYTES} bytes or more")));
+    }
+    Ok(text)
 }

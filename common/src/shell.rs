@@ -143,6 +143,19 @@ pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
     let mut process = P::open(&mut context)?;
     let waiter = &context.waiter;
     tracing::info!(generation = life.generation, "ready");
+    let worked = work(&mut process, &mut heart, waiter, &mut terminated);
+    // Whatever went wrong, goodbye is said: the link's stops the robot.
+    let stopped = process.stop();
+    tracing::info!("stopped");
+    worked.and(stopped)
+}
+
+fn work(
+    process: &mut impl Process,
+    heart: &mut Heart,
+    waiter: &Waiter,
+    terminated: &mut Signals,
+) -> Result<(), StageError> {
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
     while !terminated.came() {
@@ -150,9 +163,7 @@ pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
         progress = process.turn()?;
         heart.beat_if_due(progress)?;
     }
-    heart.beat(HealthState::Stopping, progress)?;
-    tracing::info!("stopping");
-    process.stop()
+    heart.beat(HealthState::Stopping, progress)
 }
 
 fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {

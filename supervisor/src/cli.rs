@@ -46,11 +46,16 @@ const EXIT_CODES: &str = "Exit codes of run:
 
 /// Run the command line of this process.
 pub(crate) fn main() -> ExitCode {
-    log_to_stderr();
     let arguments = Arguments::parse();
     let command = arguments
         .command
         .unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    match &command {
+        // It logs into its run directory.
+        Command::Run(_) => {}
+        Command::Stage(_) | Command::Sim(_) => log_to(std::io::stderr, "info"),
+        _ => log_to(std::io::stderr, "error"),
+    }
     let result = match command {
         Command::Run(arguments) => run::main(&arguments),
         Command::Stage(arguments) => stage::main(&arguments),
@@ -73,17 +78,16 @@ pub(crate) fn main() -> ExitCode {
 /// What a subcommand fails with: one clear sentence.
 type Failure = Box<dyn std::error::Error>;
 
-/// Stages log what they do, the rest what goes wrong; FIRSTHAND_LOG says otherwise.
-fn log_to_stderr() {
-    let is_child = std::env::args()
-        .nth(1)
-        .is_some_and(|name| name == "stage" || name == "sim");
-    let default = if is_child { "info" } else { "error" };
+/// Log to `writer` what FIRSTHAND_LOG asks for, or else everything from level `default` up.
+fn log_to<W>(writer: W, default: &str)
+where
+    W: for<'writer> tracing_subscriber::fmt::MakeWriter<'writer> + Send + Sync + 'static,
+{
     let filter = tracing_subscriber::EnvFilter::try_from_env("FIRSTHAND_LOG")
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(default));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(writer)
         .with_ansi(false)
         .init();
 }

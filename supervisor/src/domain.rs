@@ -86,7 +86,6 @@ impl Held {
     /// Lock `domain`, wipe what an earlier supervisor left, create the services for a map of so many
     /// `cells`.
     pub(crate) fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
-        make_directory(&domain)?;
         let lock = lock(&domain)?;
         wait_for_tenants(&domain)?;
         wipe(&domain)?;
@@ -158,13 +157,19 @@ fn make_directory(domain: &Domain) -> Result<(), DomainError> {
 fn lock(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.lock_file();
     loop {
-        let file = OpenOptions::new()
+        make_directory(domain)?;
+        let opened = OpenOptions::new()
             .create(true)
             .truncate(false)
             .read(true)
             .write(true)
-            .open(&path)
-            .map_err(failed("open", &path))?;
+            .open(&path);
+        let file = match opened {
+            Ok(file) => file,
+            // The last holder has just removed the directory.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error) => return Err(failed("open", &path)(error)),
+        };
         match file.try_lock() {
             Ok(()) => {}
             Err(fs::TryLockError::WouldBlock) => {

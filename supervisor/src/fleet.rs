@@ -6,7 +6,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
     path::PathBuf,
     process::Stdio,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use common::samples::{HealthSample, HealthState, RosterEntry, StageState, name, name_str};
@@ -28,6 +28,9 @@ pub(crate) struct FleetError {
     source: io::Error,
 }
 
+/// Time a stage has to say goodbye to a supervisor that fails.
+const GOODBYE: Duration = Duration::from_millis(300);
+
 /// One stage and its current life.
 struct Member {
     stage: &'static Stage,
@@ -44,6 +47,7 @@ pub(crate) struct Fleet {
     members: Vec<Member>,
     directory: PathBuf,
     clock: Instant,
+    ending: bool,
 }
 
 impl Fleet {
@@ -62,6 +66,7 @@ impl Fleet {
             members: start_order().into_iter().map(member).collect(),
             directory,
             clock: Instant::now(),
+            ending: false,
         }
     }
 
@@ -125,7 +130,7 @@ impl Fleet {
         let now = self.now();
         let Some(member) = self.members.iter_mut().find(|member| {
             member.stage.name == name_str(&health.stage)
-                && member.generation == health.stamp.generation
+                && member.process.as_ref().map(Process::id) == Some(health.pid)
         }) else {
             return false;
         };
@@ -184,6 +189,11 @@ impl Fleet {
         Ok(status)
     }
 
+    /// From now on a stage that ends stays down.
+    pub(crate) fn want_no_more(&mut self) {
+        self.ending = true;
+    }
+
     /// Give a stage a fresh life.
     pub(crate) fn replace(&mut self, stage: &str) -> Result<(), FleetError> {
         let found = self
@@ -220,16 +230,23 @@ impl Fleet {
         let member = &mut self.members[index];
         let stage = member.stage.name;
         let signal = match action {
+            Action::Start if self.ending => {
+                member.policy.step(Event::Stop, now);
+                member.policy.step(Event::Exited, now);
+                return Ok(());
+            }
             Action::Start => {
                 member.generation += 1;
                 member.started = now;
-                member.process = Some(spawn(member, &self.directory, first_tick).map_err(
-                    |source| FleetError {
-                        action: "start",
-                        stage,
-                        source,
-                    },
-                )?);
+                match spawn(member, &self.directory, first_tick) {
+                    Ok(process) => member.process = Some(process),
+                    // As if it had died at once: tried again with growing pauses, the others go on.
+                    Err(error) => {
+                        tracing::error!(stage, %error, "cannot be started; are processes, descriptors or disk used up?");
+                        member.policy.step(Event::Exited, now);
+                        member.policy.step(Event::Exited, now);
+                    }
+                }
                 return Ok(());
             }
             Action::Terminate => Signal::TERM,
@@ -260,6 +277,18 @@ impl Fleet {
             output_age_ns: age(member.output),
         };
         self.members.iter().map(entry).collect()
+    }
+}
+
+/// Should a supervisor end without its orderly stop, the stages still go in reverse order, each asked
+/// first: the link, the last, stops the robot.
+impl Drop for Fleet {
+    fn drop(&mut self) {
+        while let Some(member) = self.members.pop() {
+            if let Some(mut process) = member.process {
+                process.end(GOODBYE);
+            }
+        }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::fleet::Fleet;
 
 /// Guidance samples kept, so that the one of the arrival tick is still there when the command is seen.
 const GUIDANCE_KEPT: usize = 1024;
-/// Poses kept: three hours at 7 Hz. A longer run is drawn from its first three hours.
+/// Poses kept: three hours at 7 Hz. A longer run is drawn ever coarser.
 const POSES_KEPT: usize = 80_000;
 
 /// Readers of every topic the record is made of.
@@ -111,9 +111,15 @@ impl Observer {
         while let Some(pose) = self.pose.take()? {
             fleet.on_output(topics::POSE.spec().writer);
             record.pose = Some(pose);
-            if record.poses.len() < POSES_KEPT {
-                record.poses.push(pose);
+            if record.poses.len() == POSES_KEPT {
+                // Half as fine from here on; the ends of the way stay.
+                let mut nth = 0;
+                record.poses.retain(|_| {
+                    nth += 1;
+                    nth % 2 == 1
+                });
             }
+            record.poses.push(pose);
         }
         Ok(became_ready)
     }

@@ -222,7 +222,7 @@ mod tests {
         Duration::from_millis(count)
     }
 
-    /// Of the link: beats due every 200 ms, ready due after 3 s.
+    /// Of the link: beats due every 500 ms, ready due after 3 s.
     fn running() -> Policy {
         let mut policy = Policy::new(&TABLE[0]);
         assert_eq!(policy.start(ms(0)), Action::Start);
@@ -265,11 +265,11 @@ mod tests {
     #[test]
     fn a_stage_that_stops_beating_is_aborted_then_killed() {
         let mut policy = running();
-        assert_eq!(policy.step(Event::Time, ms(209)), None);
-        assert_eq!(policy.step(Event::Time, ms(210)), Some(Action::Abort));
-        assert_eq!(policy.step(Event::Time, ms(309)), None);
-        assert_eq!(policy.step(Event::Time, ms(310)), Some(Action::Kill));
-        assert_eq!(policy.step(Event::Exited, ms(311)), Some(Action::Start));
+        assert_eq!(policy.step(Event::Time, ms(509)), None);
+        assert_eq!(policy.step(Event::Time, ms(510)), Some(Action::Abort));
+        assert_eq!(policy.step(Event::Time, ms(609)), None);
+        assert_eq!(policy.step(Event::Time, ms(610)), Some(Action::Kill));
+        assert_eq!(policy.step(Event::Exited, ms(611)), Some(Action::Start));
     }
 
     #[test]

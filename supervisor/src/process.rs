@@ -7,9 +7,16 @@ use std::{
         unix::process::CommandExt,
     },
     process::{Child, ChildStdout, Command, ExitStatus, Stdio},
+    time::{Duration, Instant},
 };
 
-use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal},
+};
+
+/// The kernel ends a killed process within this, unless it hangs in the kernel itself.
+const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
 /// A `firsthand` subcommand in a process of its own.
 ///
@@ -65,6 +72,24 @@ impl Process {
     /// Reap it, if it has ended.
     pub(crate) fn try_reap(&mut self) -> io::Result<Option<ExitStatus>> {
         self.child.try_wait()
+    }
+}
+
+impl Process {
+    /// SIGTERM, and SIGKILL for one that is not gone after `grace`.
+    pub(crate) fn end(&mut self, grace: Duration) {
+        self.signal(Signal::TERM);
+        let began = Instant::now();
+        while matches!(self.child.try_wait(), Ok(None)) {
+            let left = grace.saturating_sub(began.elapsed());
+            if left.is_zero() {
+                self.signal(Signal::KILL);
+            }
+            let mut polled = [PollFd::new(&self.pidfd, PollFlags::IN)];
+            let timeout = Timespec::try_from(left.max(KILLED_WITHIN)).ok();
+            // Interrupted or not, the child is looked at again.
+            let _ = poll(&mut polled, timeout.as_ref());
+        }
     }
 }
 

@@ -17,7 +17,6 @@ use common::{
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     fs::{OFlags, fcntl_getfl, fcntl_setfl},
-    process::Signal,
 };
 use thiserror::Error;
 
@@ -141,14 +140,7 @@ impl Simulator {
 
     /// End it; what it told stays.
     pub(crate) fn stop(&mut self) -> Result<(), SimulatorError> {
-        self.process.signal(Signal::TERM);
-        let began = Instant::now();
-        while self.process.try_reap().map_err(system("end"))?.is_none() {
-            if began.elapsed() >= STOP_GRACE {
-                self.process.signal(Signal::KILL);
-            }
-            wait(&[self.process.as_fd()], STOP_GRACE)?;
-        }
+        self.process.end(STOP_GRACE);
         self.truth.take()
     }
 }

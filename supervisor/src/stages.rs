@@ -32,8 +32,9 @@ pub(crate) struct Stage {
 /// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded
 /// machine of two cores the slowest start seen took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
-/// Ten beats: a machine with more stages than cores delays a beat by several times 20 ms now and then.
-const HEARTBEAT: Duration = Duration::from_millis(200);
+/// Twenty-five beats: a loaded machine with more stages than cores delays one by ten times 20 ms now and
+/// then. The robot does not wait for it: the link stops it when the command is stale.
+const HEARTBEAT: Duration = Duration::from_millis(500);
 /// The planner beats between solves, and the costliest solve of the largest map takes its time.
 const PLANNER_HEARTBEAT: Duration = Duration::from_secs(2);
 

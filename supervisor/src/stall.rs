@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use common::{
     clock::MissionTime,
+    mission::Mission,
     samples::{GuidanceSample, GuidanceStatus, PoseSample},
 };
 
@@ -13,10 +14,12 @@ use common::{
 const STALLED_AFTER: Duration = Duration::from_secs(3);
 /// Mission time without a way to the target that is no passing false echo.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// Less than this is standing still, metres.
+/// Less than this is standing still, metres; less still for a robot that is to drive slower than that.
 const MOVED_M: f64 = 0.02;
-/// Less than this is not turning either, radians.
+/// Less than this is not turning either, radians; likewise.
 const TURNED_RAD: f64 = 0.1;
+/// The share of what full speed would give that counts as motion: near its target a robot crawls.
+const SHARE: f64 = 0.05;
 /// Fresh planners tried before the belief is blamed.
 const MOST_REPLANS: u32 = 2;
 /// Beliefs forgotten before the target is called unreachable.
@@ -40,8 +43,10 @@ pub(crate) enum Rung {
 }
 
 /// Watches one mission.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct StallWatch {
+    moved_m: f64,
+    turned_rad: f64,
     anchor: Option<Anchor>,
     cut_off_since: Option<MissionTime>,
     replans: u32,
@@ -57,6 +62,19 @@ struct Anchor {
 }
 
 impl StallWatch {
+    /// For the robot of a mission.
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let seconds = STALLED_AFTER.as_secs_f64();
+        Self {
+            moved_m: MOVED_M.min(mission.controller.speed_m_s * seconds * SHARE),
+            turned_rad: TURNED_RAD.min(mission.controller.turn_rad_s * seconds * SHARE),
+            anchor: None,
+            cut_off_since: None,
+            replans: 0,
+            epoch: 0,
+        }
+    }
+
     /// The belief's current epoch.
     pub(crate) const fn epoch(&self) -> u64 {
         self.epoch
@@ -90,8 +108,8 @@ impl StallWatch {
             heading: pose.heading_rad,
         };
         let anchor = *self.anchor.get_or_insert(here);
-        let moved = (here.travelled - anchor.travelled).abs() >= MOVED_M;
-        if moved || (here.heading - anchor.heading).abs() >= TURNED_RAD {
+        let moved = (here.travelled - anchor.travelled).abs() >= self.moved_m;
+        if moved || (here.heading - anchor.heading).abs() >= self.turned_rad {
             self.anchor = Some(here);
             if moved {
                 self.replans = 0;
@@ -128,6 +146,11 @@ mod tests {
     use super::*;
     use common::samples::Stamp;
 
+    fn watch() -> StallWatch {
+        let path = std::path::Path::new("test.toml");
+        StallWatch::new(&Mission::parse("target = [3, 0]", path).unwrap())
+    }
+
     fn pose(seconds: f64, travelled_m: f64) -> PoseSample {
         PoseSample {
             stamp: Stamp {
@@ -149,7 +172,7 @@ mod tests {
 
     #[test]
     fn a_robot_that_moves_is_left_alone() {
-        let mut watch = StallWatch::default();
+        let mut watch = watch();
         for tick in 0..100 {
             let pose = pose(f64::from(tick), f64::from(tick) * 0.03);
             assert_eq!(
@@ -161,7 +184,7 @@ mod tests {
 
     #[test]
     fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
-        let mut watch = StallWatch::default();
+        let mut watch = watch();
         let along = guidance(GuidanceStatus::Along, 0);
         let rungs: Vec<_> = (0..=10)
             .filter_map(|second| watch.step(&pose(f64::from(second), 0.0), &along, false))
@@ -174,7 +197,7 @@ mod tests {
 
     #[test]
     fn a_robot_held_by_something_else_is_not_stalled() {
-        let mut watch = StallWatch::default();
+        let mut watch = watch();
         let along = guidance(GuidanceStatus::Along, 0);
         for second in 0..20 {
             assert_eq!(
@@ -186,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_robot_cut_off_forgets_three_times_and_gives_up() {
-        let mut watch = StallWatch::default();
+        let mut watch = watch();
         let mut rungs = Vec::new();
         for tick in 0..100 {
             let cut_off = guidance(GuidanceStatus::Unreachable, watch.epoch());
@@ -209,7 +232,7 @@ mod tests {
 
     #[test]
     fn an_answer_from_before_the_reset_does_not_reset_again() {
-        let mut watch = StallWatch::default();
+        let mut watch = watch();
         let old = guidance(GuidanceStatus::Unreachable, 0);
         watch.step(&pose(0.0, 0.0), &old, false);
         let reset = watch.step(&pose(1.0, 0.0), &old, false);

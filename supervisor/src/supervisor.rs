@@ -124,8 +124,11 @@ pub(crate) fn run(
         return Err(system("keep the bus")(io::ErrorKind::NotConnected.into()));
     };
     let mut supervisor = Supervisor::start(options, bus)?;
-    let ending = supervisor.drive(&mut signals, watch)?;
-    supervisor.stop()?;
+    let ending = supervisor.drive(&mut signals, watch);
+    // Whatever went wrong, the robot is stopped first and the stages go in order.
+    let stopped = supervisor.stop();
+    let ending = ending?;
+    stopped?;
     Ok(supervisor.finish(&ending))
 }
 
@@ -143,6 +146,8 @@ struct Supervisor<'a> {
     judged_tick: Option<u64>,
     restated: Option<Instant>,
     progressed: (Option<u64>, Instant),
+    clock: MissionClock,
+    address: SocketAddr,
 }
 
 impl<'a> Supervisor<'a> {
@@ -182,10 +187,12 @@ impl<'a> Supervisor<'a> {
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
             order: Order::Hold,
-            stall: StallWatch::default(),
+            stall: StallWatch::new(mission),
             judged_tick: None,
             restated: None,
             progressed: (None, Instant::now()),
+            clock,
+            address,
         };
         supervisor.restate()?;
         supervisor.fleet.start_all()?;
@@ -285,9 +292,13 @@ impl<'a> Supervisor<'a> {
                 asked_for: false,
             }));
         }
-        let time = record
-            .pose
-            .map_or(MissionTime::default(), |pose| pose.stamp.time());
+        let time = match self.clock {
+            MissionClock::Ticks { .. } => record
+                .pose
+                .map_or(MissionTime::default(), |pose| pose.stamp.time()),
+            // A robot that is away, a pose that does not come: time passes all the same.
+            MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
+        };
         if time.seconds() >= self.options.mission.timeout_s {
             return Ok(Some(Ending {
                 outcome: Outcome::Timeout,
@@ -296,9 +307,13 @@ impl<'a> Supervisor<'a> {
             }));
         }
         if self.makes_no_progress() {
-            return Ok(Some(fault(
-                "the pipeline makes no progress; see the stages' logs",
-            )));
+            let reason = if self.order == Order::Hold && self.fleet.all_running() {
+                let address = self.address;
+                format!("no robot answers at {address}; is it on, is robot.address right?")
+            } else {
+                "the pipeline makes no progress; see the stages' logs".to_owned()
+            };
+            return Ok(Some(fault(&reason)));
         }
         self.watch_for_stalls()
     }
@@ -394,10 +409,15 @@ impl<'a> Supervisor<'a> {
             }
             self.waiter.wait(STAND_CONFIRMED)?;
         }
+        self.fleet.want_no_more();
         while self.fleet.stop_last()? {
             self.wait()?;
             self.observer.take(&mut self.fleet)?;
             self.fleet.tend(0)?;
+            if let Some(simulator) = &mut self.simulator {
+                // Its pipe must not fill: it could not say goodbye either.
+                simulator.tend()?;
+            }
         }
         if let Some(simulator) = &mut self.simulator {
             simulator.stop()?;
@@ -410,15 +430,18 @@ impl<'a> Supervisor<'a> {
         let truth = self
             .simulator
             .map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
+        let restarts = self.fleet.restarts();
+        let mut summary = Summary::of(&self.options.mission, ending, &record, &truth, restarts);
+        // The truth comes through a pipe of its own: a touch on the way may be seen after the arrival.
+        let touched =
+            summary.outcome == Outcome::Reached && summary.collisions.is_some_and(|n| n > 0);
+        if touched {
+            summary.outcome = Outcome::Collision;
+            summary.reason = "touched something on the way to the target".to_owned();
+        }
         Finished {
-            summary: Summary::of(
-                &self.options.mission,
-                ending,
-                &record,
-                &truth,
-                self.fleet.restarts(),
-            ),
-            asked_for: ending.asked_for,
+            summary,
+            asked_for: ending.asked_for && !touched,
             record,
             truth,
         }

@@ -43,7 +43,11 @@ pub struct Run {
 impl Run {
     /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
-        let directory = tempfile::tempdir().unwrap();
+        // Every process of the run has its directory on its command line.
+        let directory = tempfile::Builder::new()
+            .prefix(&mark(robot))
+            .tempdir()
+            .unwrap();
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
@@ -95,6 +99,11 @@ impl Run {
         self.wait_until("the robot is under way", |status| {
             status["mission_time_s"].as_f64().unwrap() >= seconds
         })
+    }
+
+    /// Wait until the supervisor itself is gone.
+    pub fn reap(&mut self) {
+        self.child.wait().unwrap();
     }
 
     pub fn signal(&self, signal: Signal) {
@@ -168,19 +177,22 @@ pub fn assert_nothing_left(robot: &str) {
     assert_eq!(processes_of(robot), Vec::<String>::new());
 }
 
-/// Command lines of processes that work for `robot`, by their run directory's mission or robot name.
+/// In the name of every directory that a run of `robot` in these tests uses.
+fn mark(robot: &str) -> String {
+    format!("firsthand-test-{robot}-")
+}
+
+/// Command lines of the processes that work for `robot`: supervisor, stages, simulator.
 pub fn processes_of(robot: &str) -> Vec<String> {
+    let mark = mark(robot);
     let mut found = Vec::new();
     for entry in std::fs::read_dir("/proc").unwrap().flatten() {
         let Ok(line) = std::fs::read(entry.path().join("cmdline")) else {
             continue;
         };
-        let words: Vec<_> = line.split(|&byte| byte == 0).collect();
-        let is_ours = words
-            .first()
-            .is_some_and(|word| word.ends_with(b"firsthand"));
-        if is_ours && words.contains(&robot.as_bytes()) {
-            found.push(String::from_utf8_lossy(&line).replace('\0', " "));
+        let line = String::from_utf8_lossy(&line).replace('\0', " ");
+        if line.contains(&mark) {
+            found.push(line);
         }
     }
     found

@@ -9,6 +9,7 @@ use thiserror::Error;
 use toml::de::{DeTable, DeValue};
 
 use super::Mission;
+use crate::grid::MAX_CELLS;
 
 /// Why a mission was refused.
 #[derive(Debug, Error)]
@@ -49,8 +50,6 @@ pub enum MissionError {
     },
 }
 
-/// The most cells along a side: 4096 x 4096 is the largest field that is solved.
-const MAX_CELLS: u32 = 4096;
 /// Fewer cells than this leave no room between the perimeter's two sides.
 const MIN_CELLS: u32 = 10;
 /// The longest mission, seconds: a day.
@@ -153,6 +152,14 @@ struct Checker {
 
 impl Checker {
     fn run(&mut self, mission: &Mission) -> Result<(), Objection> {
+        let plain = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+        if mission.name.starts_with('.') || !mission.name.chars().all(plain) {
+            return Err(objection(
+                "name",
+                format!("{:?} would not do as the name of a directory", mission.name),
+                "use letters, digits, '-' and '_'",
+            ));
+        }
         self.perimeter(mission)?;
         self.target(mission)?;
         within("timeout_s", mission.timeout_s, 1.0..=MAX_TIMEOUT_S, "s")?;

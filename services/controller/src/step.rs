@@ -95,7 +95,7 @@ impl Controller {
         );
         // Shared memory is outside too: only a direction is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
-        if !(goes && unit && distance.is_finite()) {
+        if !(goes && unit && distance.is_finite() && pose.heading.is_finite()) {
             return stand(CommandState::Halt, distance);
         }
         let alignment = Alignment::of(pose.axis(), direction);

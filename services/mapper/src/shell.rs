@@ -59,10 +59,8 @@ impl Process for Shell {
             mapper,
             latest_range: None,
             last_keyframe: None,
-            progress: Progress {
-                tick: context.life.first_tick,
-                ..Progress::default()
-            },
+            // Of no tick that is open: what is said before the first pose answers nobody.
+            progress: Progress::default(),
         })
     }
 

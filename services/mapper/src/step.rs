@@ -95,21 +95,29 @@ impl Mapper {
     }
 
     fn lay_foundation(&mut self, mission: &Mission) {
+        let frame = self.frame;
         // A known surface blocks what a hit on it would: its cell and the margin around.
-        let reach = (self.margin as f64 + 0.5) * self.frame.resolution_m;
-        for row in 0..self.frame.cells {
-            for col in 0..self.frame.cells {
-                let cell = Cell { col, row };
-                let state = if self.frame.is_rim(cell) {
-                    CellState::Perimeter
-                } else if Some(cell) != self.target
-                    && mission.known.clearance(self.frame.centre_of(cell)) <= reach
-                {
-                    CellState::Known
-                } else {
-                    CellState::Free
-                };
-                self.belief.cells[self.frame.index(cell)] = state as u8;
+        let reach = (self.margin as f64 + 0.5) * frame.resolution_m;
+        let last = f64::from(frame.cells) - 1.0;
+        for piece in mission.known.pieces() {
+            let (least, greatest) = piece.bounds();
+            let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
+            let from = inside(frame.to_cells(least - reach).floor());
+            let to = inside(frame.to_cells(greatest + reach).ceil());
+            for row in from.y as u32..=to.y as u32 {
+                for col in from.x as u32..=to.x as u32 {
+                    let cell = Cell { col, row };
+                    let covered = piece.clearance(frame.centre_of(cell)) <= reach;
+                    if covered && Some(cell) != self.target {
+                        self.belief.cells[frame.index(cell)] = CellState::Known as u8;
+                    }
+                }
+            }
+        }
+        let last = frame.cells - 1;
+        for along in 0..frame.cells {
+            for (col, row) in [(along, 0), (along, last), (0, along), (last, along)] {
+                self.belief.cells[frame.index(Cell { col, row })] = CellState::Perimeter as u8;
             }
         }
     }

@@ -197,7 +197,9 @@ impl Shell {
         if let Some(pose) = self.pose.newest()? {
             self.latest_pose = Some(pose);
         }
-        let Some(pose) = self.latest_pose else {
+        // A grid for newcomers may be of a tick that is over.
+        let tick = self.progress.tick;
+        let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) else {
             return Ok(());
         };
         let guidance = GuidanceSample {

@@ -22,6 +22,8 @@ use crate::failsafe::{self, Cause, Flags};
 /// A robot that said nothing for so many command limits is lost: longer than a radio's short fade, and
 /// the robot stands by then anyway.
 const SILENT_LIMITS: u32 = 3;
+/// However fast mission time runs, processes are late by so much now and then.
+const LEAST_SILENCE: Duration = Duration::from_millis(100);
 /// Between pings of a robot that does not answer.
 const PING_EVERY: Duration = Duration::from_millis(200);
 /// An open tick without a command is given again after this: ten times the longest tick measured.
@@ -110,6 +112,11 @@ pub struct Link {
     newest_command: Option<CommandSample>,
     stopped: Option<Cause>,
     stop_sent_ns: Option<u64>,
+    /// On a clock of ticks: motor frames that are due, one for each command and each ping since the order.
+    due: u32,
+    /// The mission's last command has passed: on a clock of ticks there is nothing to go on for.
+    arrived: bool,
+    silence: Duration,
     tally: Tally,
 }
 
@@ -136,6 +143,9 @@ impl Link {
             // Nothing has moved yet: what holds it needs no stop of its own.
             stopped: Some(Cause::NotOrdered),
             stop_sent_ns: None,
+            due: 0,
+            arrived: false,
+            silence: silence(mission, clock),
             tally: Tally::default(),
         }
     }
@@ -220,9 +230,14 @@ impl Link {
             self.connected = true;
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.greeting()));
+            // It may be driving still on the word of an earlier link.
+            self.stop_sent_ns = None;
             if self.in_ticks() {
                 // Those frames belong to the greeting: how many there are depends on how long the robot
                 // took to start. Ticks begin with the frames that answer the order.
+                if motor.is_some() {
+                    self.due = self.due.saturating_sub(1);
+                }
                 if self.order == Some(Order::Drive) {
                     self.ping(now_ns, effects);
                 }
@@ -260,8 +275,15 @@ impl Link {
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
-        if self.order != Some(Order::Drive) || (self.in_ticks() && self.open.is_some()) {
+        if self.order != Some(Order::Drive) {
             return;
+        }
+        if self.in_ticks() {
+            // Of several answers that are due only the last shows where the robot is.
+            self.due = self.due.saturating_sub(1);
+            if self.open.is_some() || self.due > 0 || self.arrived {
+                return;
+            }
         }
         let tick = self.next_tick;
         self.time = self.clock.at(tick, now_ns);
@@ -320,6 +342,10 @@ impl Link {
     }
 
     fn take_command(&mut self, command: &CommandSample, now_ns: u64, effects: &mut Vec<Effect>) {
+        let newer = |held: &CommandSample| held.stamp.tick <= command.stamp.tick;
+        if !self.newest_command.as_ref().is_none_or(newer) {
+            return;
+        }
         let answers = self.open.is_some() && command.stamp.tick == self.open_number();
         if self.in_ticks() && !answers {
             // A second answer to a tick that was given twice.
@@ -339,6 +365,8 @@ impl Link {
         let counts = wheels.map(|speed| self.counts_per_second(speed));
         effects.push(Effect::Send(self.velocity(counts)));
         self.tally.commands += 1;
+        self.due += 1;
+        self.arrived |= CommandState::from_byte(command.state) == CommandState::Arrived;
         if answers && let Some(open) = self.open.take() {
             effects.push(Effect::Answered {
                 began_ns: open.began_ns,
@@ -380,11 +408,14 @@ impl Link {
 
     fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.pinged_ns = Some(now_ns);
+        if self.order == Some(Order::Drive) {
+            self.due += 1;
+        }
         effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ping))));
     }
 
     fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let silent = passed(self.heard_ns, now_ns, self.command_limit * SILENT_LIMITS);
+        let silent = passed(self.heard_ns, now_ns, self.silence);
         // A robot that waits for a command is not lost; at most a datagram is, if it owes us a tick.
         let owes = self.order == Some(Order::Drive) && self.open.is_none();
         if self.connected && silent && !self.in_ticks() {
@@ -393,6 +424,10 @@ impl Link {
         }
         let asks = !self.connected || self.in_ticks() && owes && silent;
         if asks && passed(self.pinged_ns, now_ns, PING_EVERY) {
+            if self.connected {
+                // What was due is lost.
+                self.due = 0;
+            }
             self.ping(now_ns, effects);
         }
     }
@@ -413,12 +448,18 @@ impl Link {
 
     fn stop_cause(&self, now_ns: u64) -> Option<Cause> {
         // On a clock of ticks no time passes until the command has come.
-        let age = |command: &CommandSample| match self.clock {
-            MissionClock::Ticks { .. } => Duration::ZERO,
-            MissionClock::Wall { .. } => self
-                .clock
-                .at(self.next_tick, now_ns)
-                .since(command.stamp.time()),
+        let age = |command: &CommandSample| {
+            let stamp = command.stamp.time();
+            let now = match self.clock {
+                MissionClock::Ticks { .. } => stamp,
+                MissionClock::Wall { .. } => self.clock.at(self.next_tick, now_ns),
+            };
+            // A stamp from the future would never grow old.
+            if stamp <= now {
+                now.since(stamp)
+            } else {
+                Duration::MAX
+            }
         };
         let flags = Flags {
             order: self.order,
@@ -437,7 +478,7 @@ impl Link {
             effects.extend(self.farewell().into_iter().map(Effect::Send));
             effects.push(Effect::Stopped(cause));
         } else if !self.in_ticks()
-            && self.tally.commands > 0
+            && self.connected
             && passed(self.stop_sent_ns, now_ns, STOP_AGAIN)
         {
             effects.push(Effect::Send(self.velocity([0, 0])));
@@ -446,6 +487,15 @@ impl Link {
         }
         self.stopped = Some(cause);
         self.stop_sent_ns = Some(now_ns);
+    }
+}
+
+/// How long a robot may say nothing, on the machine's clock, before it is lost.
+fn silence(mission: &Mission, clock: MissionClock) -> Duration {
+    let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
+    match clock {
+        MissionClock::Wall { rate, .. } if rate > 0.0 => limit.div_f64(rate).max(LEAST_SILENCE),
+        _ => limit,
     }
 }
 

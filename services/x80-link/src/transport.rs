@@ -63,8 +63,13 @@ impl Transport {
     pub fn send(&self, bytes: &[u8]) -> io::Result<()> {
         match self.socket.send_to(bytes, self.robot) {
             Ok(_) => Ok(()),
-            Err(error) if is_passing(&error) || error.kind() == io::ErrorKind::WouldBlock => Ok(()),
-            Err(error) => Err(error),
+            Err(error)
+                if rustix::io::Errno::from_io_error(&error) == Some(rustix::io::Errno::BADF) =>
+            {
+                Err(error)
+            }
+            // A full queue, a firewall, a network that is down: lost, as on any radio.
+            Err(_) => Ok(()),
         }
     }
 

@@ -64,14 +64,16 @@ impl Default for Arguments {
 
 #[allow(clippy::print_stdout)]
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let mut assignments = arguments.set.clone();
-    assignments.extend(
-        arguments
-            .timeout
-            .map(|timeout| format!("timeout_s = {timeout:?}")),
-    );
-    assignments.extend(arguments.seed.map(|seed| format!("seed = {seed}")));
-    let mission = missions::load(&arguments.mission, &assignments)?;
+    let mut mission = missions::load(&arguments.mission, &arguments.set)?;
+    if let Some(seed) = arguments.seed {
+        mission.seed = seed;
+    }
+    if let Some(timeout) = arguments.timeout {
+        if !(timeout > 0.0 && timeout.is_finite()) {
+            return Err(format!("--timeout {timeout} is no time; give seconds above 0").into());
+        }
+        mission.timeout_s = timeout;
+    }
     let directory = match &arguments.out {
         Some(directory) => own_directory(directory)?,
         None => numbered_directory(&mission.name)?,
@@ -82,13 +84,14 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         pace: arguments.pace,
         directory: directory.clone(),
     };
+    log_to_file(&directory)?;
     let mut console = Console::new(&options);
     let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
         Ok(finished) => finished,
         Err(error) => {
             // A directory made for a run that never was is litter.
-            if arguments.out.is_none() {
-                let _ = fs::remove_dir(&directory);
+            if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
+                let _ = fs::remove_dir_all(&directory);
             }
             return Err(error.into());
         }
@@ -105,6 +108,13 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         println!("picture: {}", picture.display());
     }
     Ok(exit_code(&finished.summary, finished.asked_for))
+}
+
+/// The supervisor's own log lies beside its stages'.
+fn log_to_file(directory: &Path) -> Result<(), Failure> {
+    let log = fs::File::create(directory.join("supervisor.log"))?;
+    super::log_to(std::sync::Mutex::new(log), "info");
+    Ok(())
 }
 
 /// The documented code.
@@ -227,14 +237,13 @@ impl Console {
             return;
         }
         if self.shown.replace(Instant::now()).is_none() {
-            eprintln!("{}", self.title);
+            say(&format!("{}\n", self.title));
         }
         let line = self.line(progress);
         if self.rewrites {
-            eprint!("\r\x1b[K{line}");
-            let _ = io::stderr().flush();
+            say(&format!("\r\x1b[K{line}"));
         } else {
-            eprintln!("{line}");
+            say(&format!("{line}\n"));
         }
     }
 
@@ -262,7 +271,15 @@ impl Console {
 
     fn end(&self) {
         if self.rewrites {
-            eprintln!();
+            say("\n");
         }
     }
+}
+
+/// On standard error; a reader that went away does not end the mission.
+fn say(text: &str) {
+    let mut stderr = io::stderr();
+    let _ = stderr
+        .write_all(text.as_bytes())
+        .and_then(|()| stderr.flush());
 }

@@ -107,8 +107,69 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     let setup = sent(&effects);
-    assert_eq!(setup.len(), 8, "{setup:?}");
-    assert!(link.step(Event::Quiet, 500 * MS).is_empty());
+    let zero = 1;
+    assert_eq!(setup.len(), 8 + zero, "{setup:?}");
+    let later = sent(&link.step(Event::Quiet, 400 * MS));
+    assert!(!later.contains(&ping), "{later:?}");
+}
+
+#[test]
+fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
+    // The link before this one died; the robot ignores the time limit of its last command.
+    let mut link = on_the_wall();
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
+    assert!(velocities(&link.step(Event::Order(Order::Drive), MS)).is_empty());
+    let effects = link.step(Event::Quiet, 201 * MS);
+    assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
+}
+
+#[test]
+fn a_command_older_than_the_newest_is_ignored() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
+    link.step(Event::Command(&command(1, 150 * MS, 1.0, 1.0)), 151 * MS);
+    let old = command(0, 10 * MS, -1.0, -1.0);
+    assert!(link.step(Event::Command(&old), 152 * MS).is_empty());
+}
+
+#[test]
+fn a_command_from_the_future_moves_nothing() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    let future = command(0, 900 * MS, 1.0, 1.0);
+    let moves = |velocity: &[Option<i16>; 2]| *velocity != [Some(0), Some(0)];
+    let effects = link.step(Event::Command(&future), 11 * MS);
+    assert!(!velocities(&effects).iter().any(moves), "{effects:?}");
+}
+
+#[test]
+fn on_a_clock_of_ticks_a_second_answer_to_a_ping_is_no_tick() {
+    let mut link = in_ticks();
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    link.step(Event::Order(Order::Drive), 0);
+    // The robot is slow, so it is asked again; then both answers come.
+    link.step(Event::Order(Order::Hold), MS);
+    link.step(Event::Order(Order::Drive), 2 * MS);
+    assert!(ticks(&link.step(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
+    assert_eq!(ticks(&effects).len(), 1);
+}
+
+#[test]
+fn on_a_clock_of_ticks_nothing_follows_the_arrival() {
+    let mut link = driving(in_ticks());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
+    let arrived = CommandSample {
+        state: CommandState::Arrived.into(),
+        ..command(0, 0, 0.0, 0.0)
+    };
+    assert_eq!(
+        velocities(&link.step(Event::Command(&arrived), 2)),
+        [[Some(0), Some(0)]]
+    );
+    assert!(ticks(&link.step(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
 }
 
 #[test]
