@@ -13,7 +13,7 @@ use crate::field::Store;
 use crate::scaled::Scaled;
 
 /// Largest componentwise relative residual of a published field.
-pub(crate) const RESIDUAL_LIMIT: f64 = 1e-4;
+pub(crate) const RESIDUAL_LIMIT: f64 = 5e-4;
 
 /// What a check found.
 #[derive(Clone, Copy, Debug, Default)]

@@ -12,7 +12,7 @@ use crate::field::{BLOCKED, Certificate, Field, Method, Store};
 
 /// Coarse corrections above this share of u mean that a cell has not settled. The next cycle takes off another factor of
 /// three or more, which leaves directions well within a degree.
-const TOLERANCE: f64 = 1e-3;
+const TOLERANCE: f64 = 5e-3;
 
 /// Cycles before the first check: the first ones have not reached every cell, and what is still zero settles at zero.
 const FIRST_CHECK: usize = 4;

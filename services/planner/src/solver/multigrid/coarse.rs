@@ -5,7 +5,7 @@
 //! again. The odd-odd cells come last, so nothing is left on them, and first on the way up, so they need no correction:
 //! no interpolation to them is ever stored.
 
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, join_row, split_row};
+use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
 use super::real::Real;
 
 /// The couplings stored with a cell: to its east, south, south-east and south-west neighbour. The others are those
@@ -42,6 +42,7 @@ pub(super) struct Coarse<R> {
     pub east: Vec<R>,
     pub north: Vec<R>,
     pub south: Vec<R>,
+    scratch: Scratch<R>,
 }
 
 impl<R: Real> Coarse<R> {
@@ -56,6 +57,7 @@ impl<R: Real> Coarse<R> {
             east: grid.plane(),
             north: grid.plane(),
             south: grid.plane(),
+            scratch: Scratch::default(),
         }
     }
 
@@ -68,10 +70,15 @@ impl<R: Real> Coarse<R> {
             stride,
             ..
         } = self.grid;
-        let mut left = [self.grid.row_buffer::<R>(), self.grid.row_buffer::<R>()];
-        let mut beside = self.grid.row_buffer::<R>();
-        let mut own = self.grid.row_buffer::<R>();
-        let mut restricted = vec![R::default(); 2 * next.grid.columns + 2];
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.reset(&self.grid, &next.grid);
+        let Scratch {
+            left,
+            beside,
+            own,
+            restricted,
+            ..
+        } = &mut scratch;
         for y in 0..=rows {
             if y < rows {
                 self.relax_row(EE, y, []);
@@ -85,8 +92,8 @@ impl<R: Real> Coarse<R> {
             self.relax_row(OO, y, ALL);
 
             left.swap(0, 1);
-            self.gather_row(EE, y, ALL, &mut own);
-            self.gather_row(OE, y, [N, S, NW, NE, SW, SE], &mut beside);
+            self.gather_row(EE, y, ALL, own);
+            self.gather_row(OE, y, [N, S, NW, NE, SW, SE], beside);
             self.gather_row(EO, y, [W, E], &mut left[1]);
             let o = self.grid.start(y);
             let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
@@ -104,8 +111,9 @@ impl<R: Real> Coarse<R> {
                     (west[x] * b[x] + east[x] * b_west[x]) + (north[x] * h[x] + south[x] * a[x]);
                 out[x] = active[x].is_active() * own[x] + around;
             }
-            split_row(&next.grid, &mut next.f, y, &restricted);
+            split_row(&next.grid, &mut next.f, y, restricted);
         }
+        self.scratch = scratch;
     }
 
     /// Adds the correction from `next` and relaxes.
@@ -114,12 +122,13 @@ impl<R: Real> Coarse<R> {
         let Grid {
             columns: n, rows, ..
         } = self.grid;
-        let mut upper = vec![R::default(); 2 * next.grid.columns + 2];
-        let mut lower = upper.clone();
-        join_row(&next.grid, &next.u, 0, &mut upper);
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.reset(&self.grid, &next.grid);
+        let Scratch { upper, lower, .. } = &mut scratch;
+        join_row(&next.grid, &next.u, 0, upper);
         for y in 0..=rows {
             if y < rows {
-                join_row(&next.grid, &next.u, y + 1, &mut lower);
+                join_row(&next.grid, &next.u, y + 1, lower);
                 let o = self.grid.start(y);
                 let (c, c_east, c_south) = (&upper[..n], &upper[1..=n], &lower[..n]);
                 let active = &self.inverse[EE][o..][..n];
@@ -137,7 +146,7 @@ impl<R: Real> Coarse<R> {
                 for x in 0..n {
                     u[x] += north[x] * c[x] + south[x] * c_south[x];
                 }
-                std::mem::swap(&mut upper, &mut lower);
+                std::mem::swap(upper, lower);
             }
             if y > 0 {
                 self.relax_row(OO, y - 1, ALL);
@@ -146,6 +155,7 @@ impl<R: Real> Coarse<R> {
                 self.relax_row(EE, y - 1, ALL);
             }
         }
+        self.scratch = scratch;
     }
 
     /// u = (f + couplings times u of the neighbours at `steps`) / diagonal, for one row of a plane.

@@ -7,7 +7,7 @@
 //! exactly the residual left on black. It is restricted at once.
 
 use super::coarse::Coarse;
-use super::grid::{EE, EO, Grid, OE, OO, Planes, join_row, split_row};
+use super::grid::{EE, EO, Grid, OE, OO, Planes, Scratch, join_row, split_row};
 use super::real::Real;
 
 /// Full sweeps a pass makes, besides the half sweep whose changes it restricts.
@@ -38,6 +38,7 @@ pub(super) struct Finest<R> {
     pub south: Vec<R>,
     /// By plane and row.
     pub sources: Vec<Source<R>>,
+    scratch: Scratch<R>,
 }
 
 /// What a pass tells of the convergence.
@@ -58,6 +59,7 @@ impl<R: Real> Finest<R> {
             north: grid.plane(),
             south: grid.plane(),
             sources: Vec::new(),
+            scratch: Scratch::default(),
         }
     }
 
@@ -157,24 +159,25 @@ impl<R: Real> Finest<R> {
         } = self.grid;
         let grid = self.grid;
         let mut progress = Progress::default();
-        let mut upper = vec![R::default(); 2 * next.grid.columns + 2];
-        let mut lower = upper.clone();
-        join_row(&next.grid, &next.u, 0, &mut upper);
-        // What red changed by in the last two rows of either plane; what is left on black.
-        let mut even = [grid.row_buffer::<R>(), grid.row_buffer::<R>()];
-        let mut odd = [grid.row_buffer::<R>(), grid.row_buffer::<R>()];
-        let mut left = [
-            grid.row_buffer::<R>(),
-            grid.row_buffer::<R>(),
-            grid.row_buffer::<R>(),
-        ];
-        let mut restricted = vec![R::default(); 2 * next.grid.columns + 2];
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.reset(&grid, &next.grid);
+        let Scratch {
+            upper,
+            lower,
+            restricted,
+            even,
+            odd,
+            left,
+            beside,
+            ..
+        } = &mut scratch;
+        join_row(&next.grid, &next.u, 0, upper);
 
         for y in 0..rows + SWEEPS + 2 {
             if y < rows {
-                join_row(&next.grid, &next.u, y + 1, &mut lower);
-                progress.unsettled += self.correct_black(y, &upper, &lower, tolerance);
-                std::mem::swap(&mut upper, &mut lower);
+                join_row(&next.grid, &next.u, y + 1, lower);
+                progress.unsettled += self.correct_black(y, upper, lower, tolerance);
+                std::mem::swap(upper, lower);
             }
             // Every sweep follows the one before at a distance of one row.
             for sweep in 0..SWEEPS {
@@ -202,7 +205,7 @@ impl<R: Real> Finest<R> {
                 let y = y - 1;
                 self.relax_odd_odd_noting(y, &mut odd[1]);
                 left.swap(0, 1);
-                let [above, here, beside] = &mut left;
+                let [above, here] = &mut *left;
                 left_on_black(n, [&even[0], &even[1]], [&odd[0], &odd[1]], beside, here);
                 let o = grid.start(y);
                 let m = super::grid::MARGIN;
@@ -215,9 +218,10 @@ impl<R: Real> Finest<R> {
                     out[x] = (west[x] * b[x] + east[x] * b_west[x])
                         + (north[x] * h[x] + south[x] * a[x]);
                 }
-                split_row(&next.grid, &mut next.f, y, &restricted);
+                split_row(&next.grid, &mut next.f, y, restricted);
             }
         }
+        self.scratch = scratch;
         progress
     }
 

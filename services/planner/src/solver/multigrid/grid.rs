@@ -81,6 +81,39 @@ impl Grid {
     }
 }
 
+/// Rows under way in a pass over a level, kept between passes.
+#[derive(Debug, Default)]
+pub(super) struct Scratch<R> {
+    /// Rows of the next level in column order.
+    pub upper: Vec<R>,
+    pub lower: Vec<R>,
+    pub restricted: Vec<R>,
+    /// What even-even and odd-odd cells changed by in the last two rows.
+    pub even: [Vec<R>; 2],
+    pub odd: [Vec<R>; 2],
+    /// Residuals of even-odd cells in the last two rows, of odd-even and of even-even cells in one.
+    pub left: [Vec<R>; 2],
+    pub beside: Vec<R>,
+    pub own: Vec<R>,
+}
+
+impl<R: Real> Scratch<R> {
+    /// Makes all rows zero, and as long as `grid` and the `next` need them.
+    pub(super) fn reset(&mut self, grid: &Grid, next: &Grid) {
+        let reset = |row: &mut Vec<R>, len: usize| {
+            row.clear();
+            row.resize(len, R::default());
+        };
+        for row in [&mut self.upper, &mut self.lower, &mut self.restricted] {
+            reset(row, 2 * next.columns + 2);
+        }
+        let pairs = self.even.iter_mut().chain(&mut self.odd).chain(&mut self.left);
+        for row in pairs.chain([&mut self.beside, &mut self.own]) {
+            reset(row, grid.stride + MARGIN);
+        }
+    }
+}
+
 /// Writes row `row` of a level, given in column order, to the planes.
 #[inline(always)]
 pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize, values: &[R]) {
