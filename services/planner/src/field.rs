@@ -16,6 +16,8 @@ pub enum Method {
     MultigridSingle,
     /// Multigrid in double precision.
     MultigridDouble,
+    /// Multigrid in double precision, one band of u after the other, each with an exponent of its own.
+    MultigridBands,
 }
 
 impl Method {
@@ -25,6 +27,7 @@ impl Method {
             Self::Elimination => "elimination",
             Self::MultigridSingle => "multigrid f32",
             Self::MultigridDouble => "multigrid f64",
+            Self::MultigridBands => "multigrid bands",
         }
     }
 }

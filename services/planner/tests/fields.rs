@@ -181,3 +181,25 @@ fn absorption_keeps_directions_within_a_degree_of_the_reference() {
         }
     }
 }
+
+#[test]
+fn a_wide_map_with_strong_absorption_is_right_beyond_the_range_of_f64() {
+    let map = Map::generate(Kind::Empty, 60, 800, 1);
+    let domain = map.domain().expect("a valid map");
+    let domain = domain
+        .with_absorption(planner::Absorption::Uniform(5.0))
+        .expect("a valid absorption");
+    let field = solve(&domain);
+    assert!(
+        field.log10_u_min() < -700.0,
+        "only down to 1e{}",
+        field.log10_u_min()
+    );
+    assert_eq!(field.certificate().method, planner::Method::MultigridBands);
+    assert_eq!(follow(&field), 1.0);
+    let (off, worst) = Reference::solve(&domain).compare(&field);
+    assert!(
+        off <= 1e-3 && worst <= 1.0,
+        "{off} off, worst {worst} degrees"
+    );
+}

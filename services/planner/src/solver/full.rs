@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::certificate::{self, Check};
 use super::multigrid::{Multigrid, Real};
-use super::{Phase, Settings, breadth, elimination, pricing};
+use super::{Phase, Settings, bands, breadth, elimination, pricing};
 use crate::cancellation::Cancellation;
 use crate::domain::{Absorption, Domain};
 use crate::error::SolveError;
@@ -80,6 +80,13 @@ impl Full {
                     };
                     self.double
                         .solve(domain, DOUBLE_CYCLES, store, cancellation, observe)?
+                }
+                Method::MultigridBands => {
+                    let store = bands::solve(domain, cancellation)?;
+                    observe(Phase::Solved);
+                    let check = certificate::check(domain, &store);
+                    observe(Phase::Verified);
+                    (store, check)
                 }
                 Method::Elimination => {
                     let (pass, tree) = plan.elimination.take().unwrap_or_else(|| {

@@ -3,11 +3,13 @@
 //! - [`pricing`]: which method to try first.
 //! - [`multigrid`]: a few sweeps' worth of work a cell; right where the map is wide.
 //! - [`elimination`]: exact, in extended range; cheap where the map is narrow.
+//! - [`bands`]: multigrid again and again where u spans more than an `f64`.
 //! - [`breadth`]: the breadth-first pass that orders and prices the elimination.
 //! - [`full`]: one full solve: try, check, fall back.
 //! - [`certificate`]: the check every field must pass before it is handed out.
 //! - [`wide`]: the widest vectors of the machine.
 
+mod bands;
 mod breadth;
 pub(crate) mod certificate;
 mod elimination;

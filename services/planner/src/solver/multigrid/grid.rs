@@ -107,7 +107,11 @@ impl<R: Real> Scratch<R> {
         for row in [&mut self.upper, &mut self.lower, &mut self.restricted] {
             reset(row, 2 * next.columns + 2);
         }
-        let pairs = self.even.iter_mut().chain(&mut self.odd).chain(&mut self.left);
+        let pairs = self
+            .even
+            .iter_mut()
+            .chain(&mut self.odd)
+            .chain(&mut self.left);
         for row in pairs.chain([&mut self.beside, &mut self.own]) {
             reset(row, grid.stride + MARGIN);
         }

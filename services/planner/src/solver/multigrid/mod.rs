@@ -129,6 +129,11 @@ impl<R: Real> Multigrid<R> {
             at,
             value,
         }];
+        self.start_from_sources();
+    }
+
+    /// Starts from the coarsest level's answer to what flows in.
+    pub(crate) fn start_from_sources(&mut self) {
         for plane in &mut self.finest.u {
             plane.fill(R::default());
         }
