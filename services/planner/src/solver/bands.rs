@@ -12,8 +12,9 @@ use crate::error::SolveError;
 use crate::field::{BLOCKED, Store};
 use crate::scaled::{Scaled, pow2};
 
-/// Coarse corrections above this share of u mean that a cell has not settled.
-const TOLERANCE: f64 = 5e-3;
+/// Coarse corrections above this share of u mean that a cell has not settled. Stricter than for one solve that can be
+/// checked and continued.
+const TOLERANCE: f64 = 3e-4;
 
 /// Cycles for one band: its range at 1.4 orders of magnitude a cycle, and some.
 const CYCLES: usize = 450;
