@@ -6,7 +6,9 @@
 )]
 
 use planner::testing::{Kind, Map, Reference, follow};
-use planner::{Absorption, Cancellation, Cell, Change, Domain, Field, Guidance, Solver, Verdict};
+use planner::{
+    Absorption, Cancellation, Cell, Change, Domain, Field, Guidance, Settings, Solver, Verdict,
+};
 use proptest::prelude::*;
 
 /// Any grid of up to 48 x 48 cells, any free target, any absorption.
@@ -144,4 +146,26 @@ fn a_set_up_that_was_kept_and_patched_gives_the_same_field_bit_for_bit() {
             assert_eq!(patched.u(cell), fresh.u(cell), "step {step}, {cell:?}");
         }
     }
+}
+
+#[test]
+fn more_threads_give_the_same_field_and_certificate() {
+    let domain = Map::generate(Kind::Drums, 900, 800, 3)
+        .domain()
+        .expect("a valid map");
+    let solve = |threads| {
+        let threads = std::num::NonZeroUsize::new(threads).expect("at least one");
+        Solver::new(Settings {
+            threads,
+            ..Settings::default()
+        })
+        .solve(&domain, &Cancellation::new())
+        .expect("a field")
+    };
+    let (one, three) = (solve(1), solve(3));
+    assert_eq!(one.certificate(), three.certificate());
+    assert!(
+        (0..900 * 800)
+            .all(|i| one.u(Cell::new(i % 900, i / 900)) == three.u(Cell::new(i % 900, i / 900)))
+    );
 }

@@ -6,6 +6,9 @@
 //! better from all its cells but the target's, and therefore there is one piece: what can reach the target, no more and no
 //! less. That needs no search of its own.
 
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
 use super::multigrid::Real;
 use super::wide::Wide;
 use crate::domain::{Absorption, Domain};
@@ -14,6 +17,9 @@ use crate::scaled::Scaled;
 
 /// Largest componentwise relative residual of a published field.
 pub(crate) const RESIDUAL_LIMIT: f64 = 5e-4;
+
+/// A thread of its own takes some ten microseconds to start: cells it must be given to be worth that.
+const CELLS_PER_THREAD: usize = 1 << 18;
 
 /// What a check found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,38 +35,89 @@ pub(crate) struct Check {
 }
 
 impl Check {
+    /// The two together.
+    fn and(self, other: Self) -> Self {
+        Self {
+            worst_residual: self.worst_residual.max(other.worst_residual),
+            stalled: self.stalled + other.stalled,
+            lost: self.lost + other.lost,
+            reachable: self.reachable + other.reachable,
+        }
+    }
+
     /// Whether the field may be handed out.
     pub(crate) fn holds(&self) -> bool {
         self.stalled == 0 && self.lost == 0 && self.worst_residual <= RESIDUAL_LIMIT
     }
 }
 
-/// Checks every cell of a field.
-pub(crate) fn check(domain: &Domain, store: &Store) -> Check {
+/// Checks every cell of a field, on up to `threads` threads; what is found does not depend on how many.
+pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Check {
     let mut found = match store {
-        Store::Single { values, .. } => check_plain(domain, values),
-        Store::Double { values, .. } => check_plain(domain, values),
+        Store::Single { values, .. } => {
+            in_strips(domain, threads, |rows| check_plain(domain, values, rows))
+        }
+        Store::Double { values, .. } => {
+            in_strips(domain, threads, |rows| check_plain(domain, values, rows))
+        }
         Store::Extended {
             mantissas,
             exponents,
-        } => check_extended(domain, mantissas, exponents),
+        } => in_strips(domain, threads, |rows| {
+            check_extended(domain, mantissas, exponents, rows)
+        }),
     };
     // The target is positive by construction and was left out.
     found.reachable += 1;
     found
 }
 
-/// Checks a field with one common exponent, row by row with wide vectors.
-fn check_plain<R: Real>(domain: &Domain, values: &[R]) -> Check {
+/// Runs `check` on strips of rows, each on a thread of its own where that pays.
+fn in_strips(
+    domain: &Domain,
+    threads: NonZeroUsize,
+    check: impl Fn(Range<usize>) -> Check + Sync,
+) -> Check {
+    let height = domain.height();
+    let strips = threads
+        .get()
+        .min(domain.blocked().len() / CELLS_PER_THREAD)
+        .max(1);
+    if strips == 1 {
+        return check(0..height);
+    }
+    let rows = |strip: usize| height * strip / strips..height * (strip + 1) / strips;
+    let check = &check;
+    std::thread::scope(|scope| {
+        let others: Vec<_> = (1..strips)
+            .map(|strip| scope.spawn(move || check(rows(strip))))
+            .collect();
+        let first = check(rows(0));
+        // A thread that panicked has checked nothing: then nothing holds.
+        let failed = Check {
+            worst_residual: f64::INFINITY,
+            ..Check::default()
+        };
+        others
+            .into_iter()
+            .map(|other| other.join().unwrap_or(failed))
+            .fold(first, Check::and)
+    })
+}
+
+/// Checks rows of a field with one common exponent, with wide vectors.
+fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>) -> Check {
     Wide::default().run(
         #[inline(always)]
         || {
-            let (width, height) = (domain.width(), domain.height());
+            let width = domain.width();
+            let row_of = |row: usize| values.get(row * width..(row + 1) * width);
             let mut found = Check::default();
             let mut rows = Rows::new(width);
-            rows.take(values.get(..width));
-            for row in 0..height {
-                rows.take(values.get((row + 1) * width..(row + 2) * width));
+            rows.take(strip.start.checked_sub(1).and_then(row_of));
+            rows.take(row_of(strip.start));
+            for row in strip.clone() {
+                rows.take(row_of(row + 1));
                 rows.set_shares(domain, row);
                 let raw = &values[row * width..(row + 1) * width];
                 if row == domain.target().row {
@@ -164,7 +221,7 @@ impl<R: Real> Rows<R> {
 
     /// Checks the cells of `columns` of the middle row, `raw` as stored.
     #[inline(always)]
-    fn check(&mut self, raw: &[R], columns: std::ops::Range<usize>, found: &mut Check) {
+    fn check(&mut self, raw: &[R], columns: Range<usize>, found: &mut Check) {
         let (start, n) = (columns.start, columns.len());
         let zero = R::default();
         let raw = &raw[start..][..n];
@@ -211,11 +268,16 @@ impl<R: Real> Rows<R> {
 }
 
 /// Checks a field with an exponent a cell.
-fn check_extended(domain: &Domain, mantissas: &[f64], exponents: &[i32]) -> Check {
+fn check_extended(
+    domain: &Domain,
+    mantissas: &[f64],
+    exponents: &[i32],
+    strip: Range<usize>,
+) -> Check {
     let (width, height) = (domain.width(), domain.height());
     let target = domain.index(domain.target());
     let mut found = Check::default();
-    for row in 0..height {
+    for row in strip {
         for col in 0..width {
             let index = row * width + col;
             if mantissas[index] < 0.0 || index == target {

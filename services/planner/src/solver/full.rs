@@ -70,21 +70,33 @@ impl Full {
                         values,
                         exponent: -f32::TOP,
                     };
-                    self.single
-                        .solve(domain, SINGLE_CYCLES, store, cancellation, observe)?
+                    self.single.solve(
+                        settings,
+                        domain,
+                        SINGLE_CYCLES,
+                        store,
+                        cancellation,
+                        observe,
+                    )?
                 }
                 Method::MultigridDouble => {
                     let store = |values| Store::Double {
                         values,
                         exponent: -f64::TOP,
                     };
-                    self.double
-                        .solve(domain, DOUBLE_CYCLES, store, cancellation, observe)?
+                    self.double.solve(
+                        settings,
+                        domain,
+                        DOUBLE_CYCLES,
+                        store,
+                        cancellation,
+                        observe,
+                    )?
                 }
                 Method::MultigridBands => {
                     let store = bands::solve(domain, cancellation)?;
                     observe(Phase::Solved);
-                    let check = certificate::check(domain, &store);
+                    let check = certificate::check(domain, &store, settings.threads);
                     observe(Phase::Verified);
                     (store, check)
                 }
@@ -103,7 +115,7 @@ impl Full {
                         cancellation,
                     )?;
                     observe(Phase::Solved);
-                    let check = certificate::check(domain, &store);
+                    let check = certificate::check(domain, &store, settings.threads);
                     observe(Phase::Verified);
                     (store, check)
                 }
@@ -134,6 +146,7 @@ impl<R: Real> Prepared<R> {
     /// Cycles until every cell has settled and the check holds, or this precision is given up; returns what there is then.
     fn solve(
         &mut self,
+        settings: &Settings,
         domain: &Domain,
         most_cycles: usize,
         store: impl Fn(Vec<R>) -> Store,
@@ -156,7 +169,7 @@ impl<R: Real> Prepared<R> {
             levels.read(domain.target(), R::of(BLOCKED), &mut values);
             let store = store(values);
             observe(Phase::Solved);
-            let check = certificate::check(domain, &store);
+            let check = certificate::check(domain, &store, settings.threads);
             observe(Phase::Verified);
             // All settled and some lost: u goes below what this precision holds.
             if check.holds() || check.lost > 0 || last {

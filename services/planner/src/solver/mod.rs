@@ -29,7 +29,8 @@ use crate::repair::Repair;
 /// How a solver may work; what it computes does not depend on it.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Threads a solve may use; the result is the same bit for bit.
+    /// Threads a solve may use; the result is the same bit for bit. So far only the verification of large maps is spread
+    /// over them.
     pub threads: NonZeroUsize,
     /// Bytes the elimination may take before a solve gives up with [`SolveError::TooCostly`].
     pub memory_limit: u64,
