@@ -107,7 +107,7 @@ impl Full {
                         (pass, tree)
                     });
                     observe(Phase::SetUp);
-                    let store = elimination::solve(
+                    let mut store = elimination::solve(
                         domain,
                         &pass,
                         &tree,
@@ -115,8 +115,14 @@ impl Full {
                         cancellation,
                     )?;
                     observe(Phase::Solved);
-                    let check = certificate::check(domain, &store, settings.threads);
+                    let mut check = certificate::check(domain, &store, settings.threads);
                     observe(Phase::Verified);
+                    if !check.holds() {
+                        elimination::polish(domain, &pass, &mut store);
+                        observe(Phase::Solved);
+                        check = certificate::check(domain, &store, settings.threads);
+                        observe(Phase::Verified);
+                    }
                     (store, check)
                 }
             };

@@ -8,6 +8,7 @@
 //! underflows, whatever the range of u. The cost is about the cube of the fronts' width: right for corridors, not halls.
 
 mod dense;
+mod polish;
 mod substitution;
 mod tree;
 
@@ -16,6 +17,7 @@ use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::field::Store;
+pub(super) use polish::polish;
 pub(super) use tree::Tree;
 
 /// The solution of the five-point equations on `domain`, exact but for rounding.

@@ -1,0 +1,56 @@
+//! Repairs what elimination in `f64` weights can lose.
+//!
+//! A weight below the smallest `f64` becomes zero. That matters only where a cell takes its u from such a weight: in a long
+//! narrow passage whose far end is reached by a much wider one, u grows again towards that end, but cells just behind the
+//! turning point see the wide passage through weights of 1e-400. There the values next to them are right, and a few sweeps
+//! of relaxation in extended range carry them over, because in such passages u changes by orders of magnitude a cell.
+
+use super::super::breadth::{ABSENT, Pass};
+use crate::domain::Domain;
+use crate::field::Store;
+use crate::scaled::Scaled;
+
+/// Sweeps there and back before giving up.
+const SWEEPS: usize = 200;
+
+/// Largest relative change of a sweep that ends them.
+const SETTLED: f64 = 1e-7;
+
+/// Relaxes `store`, which must be extended, from the farthest cell to the nearest and back, until it settles.
+pub(in super::super) fn polish(domain: &Domain, pass: &Pass, store: &mut Store) {
+    let Store::Extended {
+        mantissas,
+        exponents,
+    } = store
+    else {
+        return;
+    };
+    for _ in 0..SWEEPS {
+        let mut change = 0.0_f64;
+        let inwards = pass.order[1..].iter().rev();
+        for &cell in inwards.chain(&pass.order[1..]) {
+            let mut largest = i32::MIN;
+            let around = pass.neighbours(cell).map(|place| {
+                let u = if place == ABSENT {
+                    Scaled::ZERO
+                } else {
+                    let neighbour = pass.order[place as usize] as usize;
+                    Scaled::new(mantissas[neighbour], exponents[neighbour])
+                };
+                if !u.is_zero() {
+                    largest = largest.max(u.exponent);
+                }
+                u
+            });
+            let sum: f64 = around.iter().map(|u| u.relative_to(largest)).sum();
+            let index = cell as usize;
+            let u = Scaled::new(0.25 * sum / (1.0 + domain.absorption_at(index)), largest);
+            let before = Scaled::new(mantissas[index], exponents[index]);
+            change = change.max((before.relative_to(u.exponent) / u.mantissa - 1.0).abs());
+            (mantissas[index], exponents[index]) = (u.mantissa, u.exponent);
+        }
+        if change <= SETTLED {
+            break;
+        }
+    }
+}
