@@ -15,6 +15,8 @@ mod finest;
 mod galerkin;
 mod grid;
 mod real;
+#[cfg(test)]
+mod tests;
 
 use coarse::Coarse;
 use coarsest::Coarsest;

@@ -1,0 +1,250 @@
+//! `cargo bench -p planner`: the table of the solver's times, beside what the machine can do and what else there is.
+//!
+//! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
+//! is the least of several runs. `cargo bench -p planner -- quick` leaves out the large maps.
+#![allow(
+    clippy::expect_used,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "a program for the developer's terminal"
+)]
+
+mod machine;
+mod others;
+
+use std::time::Instant;
+
+use planner::testing::{Kind, Map, Random};
+use planner::{Cancellation, Cell, Change, Domain, Phase, Solver};
+
+/// Milliseconds of the fastest of `runs` calls.
+fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
+    let mut best = f64::INFINITY;
+    for _ in 0..runs {
+        let start = Instant::now();
+        call();
+        best = best.min(start.elapsed().as_secs_f64() * 1e3);
+    }
+    best
+}
+
+/// More runs of what is short.
+fn runs(cells: usize) -> usize {
+    (4_000_000 / cells).clamp(3, 50)
+}
+
+fn main() {
+    let quick = std::env::args().any(|argument| argument == "quick");
+    machine_table(quick);
+    full_table(quick);
+    absorption_table();
+    update_table(quick);
+}
+
+fn machine_table(quick: bool) {
+    println!("\nThe machine: one pass over the grid, ms");
+    println!(
+        "{:>6} {:>14} {:>24}",
+        "N", "stream f32", "red-black sweep f32"
+    );
+    for n in if quick {
+        vec![50, 256, 512]
+    } else {
+        vec![50, 256, 512, 1024, 2048, 4096]
+    } {
+        println!(
+            "{n:>6} {:>14.4} {:>24.4}",
+            machine::stream(n),
+            machine::sweep(n)
+        );
+    }
+}
+
+fn full_table(quick: bool) {
+    println!(
+        "\nFull solves, k = 0: set-up + solve + verification, ms, and as sweeps of the same grid"
+    );
+    println!(
+        "{:<24} {:>5} {:<14} {:>9} {:>7} {:>9} {:>7} {:>9} {:>9} {:>8} {:>9}",
+        "map",
+        "N",
+        "method",
+        "scratch",
+        "sweeps",
+        "target",
+        "sweeps",
+        "dijkstra",
+        "x",
+        "faer",
+        "log10 u"
+    );
+    let kinds = [
+        Kind::Empty,
+        Kind::Drums,
+        Kind::Office,
+        Kind::Trap,
+        Kind::Maze { corridor: 1 },
+        Kind::Maze { corridor: 4 },
+        Kind::Maze { corridor: 8 },
+        Kind::Maze { corridor: 16 },
+        Kind::Maze { corridor: 32 },
+        Kind::Serpentine { corridor: 1 },
+        Kind::Serpentine { corridor: 8 },
+        Kind::Serpentine { corridor: 24 },
+    ];
+    for n in if quick {
+        vec![50, 512]
+    } else {
+        vec![50, 256, 512, 1024, 2048, 4096]
+    } {
+        let sweep = machine::sweep(n);
+        for kind in kinds {
+            let narrow = matches!(kind, Kind::Maze { .. } | Kind::Serpentine { .. });
+            // Seconds and gigabytes each, for nothing new.
+            if n > 1024 && narrow {
+                continue;
+            }
+            let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
+            let cancellation = Cancellation::new();
+            // Memory is kept, the set-up is not: the map before was another.
+            let other = Map::generate(Kind::Noise { density: 0.05 }, n, n, 2)
+                .domain()
+                .expect("a valid map");
+            let mut solver = Solver::default();
+            let mut scratch = f64::INFINITY;
+            for _ in 0..runs(n * n).min(12) {
+                solver.solve(&other, &cancellation).expect("a field");
+                scratch = scratch.min(fastest(1, || {
+                    solver.solve(&domain, &cancellation).expect("a field");
+                }));
+            }
+            let target = fastest(runs(n * n), || {
+                solver.solve(&domain, &cancellation).expect("a field");
+            });
+            let field = solver.solve(&domain, &cancellation).expect("a field");
+            let dijkstra = (n <= 1024).then(|| others::dijkstra(&domain));
+            let faer = (n <= 512).then(|| others::sparse_cholesky(&domain));
+            let show = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.2}"));
+            println!(
+                "{:<24} {n:>5} {:<14} {scratch:>9.3} {:>7.0} {target:>9.3} {:>7.0} {:>9} {:>9} {:>8} {:>9.1}",
+                format!("{kind:?}"),
+                field.certificate().method.name(),
+                scratch / sweep,
+                target / sweep,
+                show(dijkstra),
+                show(dijkstra.map(|time| scratch / time)),
+                show(faer),
+                field.log10_u_min(),
+            );
+        }
+    }
+}
+
+fn absorption_table() {
+    println!("\nFull solves with absorption, N = 512: ms by phase");
+    println!(
+        "{:<24} {:>6} {:<14} {:>9} {:>9} {:>9} {:>9}",
+        "map", "k", "method", "set-up", "solve", "verify", "log10 u"
+    );
+    for k in [0.0, 0.002, 0.02] {
+        for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
+            let domain = Map::generate(kind, 512, 512, 1)
+                .domain()
+                .expect("a valid map");
+            let domain = domain
+                .with_absorption(planner::Absorption::Uniform(k))
+                .expect("a valid absorption");
+            let mut phases = [f64::INFINITY; 3];
+            let mut method = "";
+            let mut least = 0.0;
+            for _ in 0..5 {
+                let mut times = [0.0; 3];
+                let mut start = Instant::now();
+                let field = Solver::default()
+                    .solve_observed(&domain, &Cancellation::new(), &mut |phase| {
+                        let slot = match phase {
+                            Phase::SetUp => 0,
+                            Phase::Solved => 1,
+                            _ => 2,
+                        };
+                        times[slot] += start.elapsed().as_secs_f64() * 1e3;
+                        start = Instant::now();
+                    })
+                    .expect("a field");
+                for (best, time) in phases.iter_mut().zip(times) {
+                    *best = best.min(time);
+                }
+                method = field.certificate().method.name();
+                least = field.log10_u_min();
+            }
+            println!(
+                "{:<24} {k:>6} {method:<14} {:>9.3} {:>9.3} {:>9.3} {least:>9.1}",
+                format!("{kind:?}"),
+                phases[0],
+                phases[1],
+                phases[2]
+            );
+        }
+    }
+}
+
+fn update_table(quick: bool) {
+    println!("\nLocal updates: a 3 x 3 block put down and taken away at random, us");
+    println!(
+        "{:<24} {:>6} {:>9} {:>9} {:>9} {:>9}  verdicts",
+        "map", "N", "least", "p50", "p90", "p99"
+    );
+    for n in if quick {
+        vec![256, 512]
+    } else {
+        vec![256, 512, 1024, 2048, 4096]
+    } {
+        for kind in [Kind::Drums, Kind::Office] {
+            let base = Map::generate(kind, n, n, 1).domain().expect("a valid map");
+            let mut solver = Solver::default();
+            let field = solver.solve(&base, &Cancellation::new()).expect("a field");
+            let mut random = Random::new(9);
+            let mut times = Vec::new();
+            let mut verdicts = std::collections::BTreeMap::new();
+            let (mut domain, mut live) = (base.clone(), field.clone());
+            while times.len() < 200 {
+                let (col, row) = (random.below(n - 8) + 2, random.below(n - 8) + 2);
+                let changes = block(&domain, col, row);
+                if changes.is_empty() || !live.is_reachable(Cell::new(col, row)) {
+                    continue;
+                }
+                let start = Instant::now();
+                let verdict = solver
+                    .update(&mut domain, &mut live, &changes, &Cancellation::new())
+                    .expect("an update");
+                times.push(start.elapsed().as_secs_f64() * 1e6);
+                *verdicts.entry(format!("{verdict:?}")).or_insert(0) += 1;
+                // As the full solve behind it would.
+                if times.len() % 3 == 0 {
+                    (domain, live) = (base.clone(), field.clone());
+                }
+            }
+            times.sort_by(f64::total_cmp);
+            let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+            println!(
+                "{:<24} {n:>6} {:>9.0} {:>9.0} {:>9.0} {:>9.0}  {verdicts:?}",
+                format!("{kind:?}"),
+                times[0],
+                at(0.5),
+                at(0.9),
+                at(0.99)
+            );
+        }
+    }
+}
+
+fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
+    (row..row + 3)
+        .flat_map(|row| (col..col + 3).map(move |col| Cell::new(col, row)))
+        .filter(|&cell| cell != domain.target() && !domain.is_blocked(cell))
+        .map(|cell| Change {
+            cell,
+            blocked: true,
+        })
+        .collect()
+}
