@@ -14,11 +14,30 @@
 //! the cell (c, r) covers c - 0.5 ..= c + 0.5. Directions are unit vectors (along growing columns, along growing rows).
 //!
 //! # Layout
-//! - [`Domain`]: the map, the target and the absorption, validated once.
-//! - [`Solver`]: a domain to a [`Field`]; keeps what it can reuse between solves.
-//! - [`Field`]: u of every cell, with the [`Certificate`] of its verification.
-//! - [`Guidance`]: the direction at any position, or the reason there is none.
+//! - [`Domain`] (`domain.rs`): the map, the target and the absorption, validated once.
+//! - [`Solver`] (`solver/`): a domain to a [`Field`], by multigrid where the map is wide and by elimination where it is
+//!   narrow; keeps what it can use again. Every field is verified cell by cell before it is handed out.
+//! - [`Field`] (`field.rs`): u of every cell, with the [`Certificate`] of its verification.
+//! - [`Solver::update`] (`repair/`): a field after a few cells changed, and a [`Verdict`] on how far to trust it.
+//! - [`Guidance`] (`guidance.rs`): the direction at any position, or the reason there is none.
 //! - `testing` (feature of that name): generated maps and the slow reference.
+//!
+//! # Example
+//! ```
+//! use planner::{Cancellation, Cell, Change, Domain, Guidance, Solver};
+//!
+//! // Twenty by ten free cells, the target near the right end.
+//! let mut domain = Domain::new(20, 10, vec![false; 200], Cell::new(17, 5))?;
+//! let mut solver = Solver::default();
+//! let mut field = solver.solve(&domain, &Cancellation::new())?;
+//! assert!(matches!(field.guidance(3.2, 5.0), Guidance::Along([x, _]) if x > 0.9));
+//!
+//! // A hazard appears; the field is brought up to date.
+//! let hazard = [Change { cell: Cell::new(10, 5), blocked: true }];
+//! let _verdict = solver.update(&mut domain, &mut field, &hazard, &Cancellation::new())?;
+//! assert!(field.is_blocked(Cell::new(10, 5)));
+//! # Ok::<(), planner::SolveError>(())
+//! ```
 
 pub mod beside;
 mod cancellation;

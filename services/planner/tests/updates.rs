@@ -238,3 +238,19 @@ fn an_update_that_changes_nothing_leaves_the_field_as_it_is() {
     );
     assert_eq!(case.field.direction(Cell::new(150, 150)), before);
 }
+
+#[test]
+fn changes_one_beside_the_other_are_repaired_together_without_a_full_solve_between() {
+    let mut map = Map::generate(Kind::Empty, 500, 400, 0);
+    map.aim((400, 200));
+    let mut case = Case::new(&map);
+    // A wall that grows cell by cell, as a sonar would see it.
+    for step in 0..40 {
+        let verdict = case.update(&case.square(200, 150 + 2 * step, 2, true));
+        assert_ne!(verdict, Verdict::PassageClosed, "step {step}");
+        assert_eq!(follow(&case.field), 1.0, "step {step}");
+    }
+    // And one elsewhere, in a window of its own.
+    let _ = case.update(&case.square(300, 80, 3, true));
+    assert_eq!(follow(&case.field), 1.0);
+}

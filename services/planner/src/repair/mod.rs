@@ -21,8 +21,11 @@ use crate::domain::{Cell, Change, Domain};
 use crate::field::{BLOCKED, Field};
 use crate::solver::Verdict;
 
-/// Sides of the windows, cells: the next is tried where the estimate asks for more.
-const SIDES: [usize; 3] = [49, 65, 97];
+/// Sides of the windows, cells. The larger ones are for changes that lie apart.
+const SIDES: [usize; 5] = [49, 65, 97, 145, 193];
+
+/// The largest window tried only because the estimate asks for more: a tick of the robot must not wait for a larger one.
+const LARGEST_GROWN: usize = 97;
 
 /// Cells between a change and the rim at least; the first window tried has about this much.
 const MARGIN: usize = 24;
@@ -85,8 +88,8 @@ impl Repair {
             };
             let patch = patches.swap_remove(near);
             patch.restore(field.store_mut(), width);
-            area = area.union(patch.rect());
-            rects.push(*patch.rect());
+            area = area.union(patch.changed());
+            rects.push(*patch.changed());
         };
         let small = domain.blocked().len() <= SMALL;
         if side != 0 && 2 * side * side > domain.blocked().len() {
@@ -115,7 +118,7 @@ impl Repair {
             return None;
         }
         let window = &self.windows[window];
-        let patch = window.write(domain, field.store_mut());
+        let patch = window.write(domain, field.store_mut(), area);
         field.patches_mut().push(patch);
         let closed = closed || !gets_ahead(field, judgement.doubtful, 16 * side);
         Some(if closed {
@@ -169,7 +172,7 @@ impl Repair {
             if done {
                 break;
             }
-            next = choose(domain, area, side + 1);
+            next = choose(domain, area, side + 1).filter(|&(side, _)| side <= LARGEST_GROWN);
         }
         found
     }

@@ -52,6 +52,8 @@ impl Rect {
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
     rect: Rect,
+    /// Around the cells that changed.
+    changed: Rect,
     /// Row-major over `rect`: the cells of it that were solved for.
     taken: Vec<bool>,
     /// Row-major over `rect`, as stored.
@@ -60,7 +62,13 @@ pub(crate) struct Patch {
 
 impl Patch {
     /// Remembers u of the cells of `rect` in a map of `map_width` columns.
-    pub(super) fn of(rect: Rect, taken: Vec<bool>, store: &Store, map_width: usize) -> Self {
+    pub(super) fn of(
+        rect: Rect,
+        changed: Rect,
+        taken: Vec<bool>,
+        store: &Store,
+        map_width: usize,
+    ) -> Self {
         let mut before = Vec::with_capacity(rect.width * rect.height);
         for row in rect.row..rect.row + rect.height {
             let start = row * map_width + rect.col;
@@ -68,6 +76,7 @@ impl Patch {
         }
         Self {
             rect,
+            changed,
             taken,
             before,
         }
@@ -75,6 +84,10 @@ impl Patch {
 
     pub(super) fn rect(&self) -> &Rect {
         &self.rect
+    }
+
+    pub(super) fn changed(&self) -> &Rect {
+        &self.changed
     }
 
     /// Undoes the update.

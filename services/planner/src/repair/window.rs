@@ -163,12 +163,12 @@ impl Window {
     }
 
     /// Writes u of the cells solved for to `store`; returns the patch that remembers what it was.
-    pub(super) fn write(&self, domain: &Domain, store: &mut Store) -> Patch {
+    pub(super) fn write(&self, domain: &Domain, store: &mut Store, changed: Rect) -> Patch {
         let mut taken = Vec::with_capacity(self.side * self.side);
         for row in 1..=self.side {
             taken.extend_from_slice(&self.taken[row * self.stride + 1..][..self.side]);
         }
-        let patch = Patch::of(self.rect, taken, store, domain.width());
+        let patch = Patch::of(self.rect, changed, taken, store, domain.width());
         for row in 0..self.side {
             let start = (row + 1) * self.stride + 1;
             let first = (self.rect.row + row) * domain.width() + self.rect.col;
