@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::domain::Cell;
+use crate::domain::{Cell, Domain};
 use crate::repair::Patch;
 use crate::scaled::{Scaled, pow2};
 
@@ -157,6 +157,16 @@ impl Store {
                     *to = clamp(mantissas[index] * pow2(shift));
                 }
             }
+        }
+    }
+
+    /// u of a run of cells in units of 2^`reference`, 0 where that is below what an `f64` holds.
+    pub(crate) fn read_row_wide(&self, cells: Range<usize>, reference: i32, into: &mut [f64]) {
+        for (to, index) in into.iter_mut().zip(cells) {
+            let (value, exponent) = self.raw(index);
+            let shift = exponent.saturating_sub(reference);
+            // In two steps: the factor may be out of range where the product is not.
+            *to = value.max(0.0) * pow2(shift / 2) * pow2(shift - shift / 2);
         }
     }
 
@@ -351,6 +361,11 @@ impl Field {
             own.mantissa * to_before.mantissa / from_before.mantissa,
             own.exponent + to_before.exponent - from_before.exponent,
         )
+    }
+
+    /// Whether this is a field of a map of the same size and the same target.
+    pub(crate) fn fits(&self, domain: &Domain) -> bool {
+        (self.width, self.height, self.target) == (domain.width(), domain.height(), domain.target())
     }
 
     pub(crate) fn store(&self) -> &Store {

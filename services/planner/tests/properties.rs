@@ -92,7 +92,9 @@ proptest! {
         let reference = Reference::solve(&domain);
         prop_assume!(reference.worst_residual < 1e-9);
         let (off, worst) = reference.compare(&field);
-        assert!(off <= 2e-3, "{off} of the directions are off");
+        // On a small map a single cell on a saddle point is more than its share.
+        let cells = off * field.certificate().reachable as f64;
+        assert!(off <= 1e-3 || cells < 2.5, "{cells} directions are off");
         assert!(worst <= 1.0, "a clear direction is {worst} degrees off");
     }
 }
@@ -168,4 +170,40 @@ fn more_threads_give_the_same_field_and_certificate() {
         (0..900 * 800)
             .all(|i| one.u(Cell::new(i % 900, i / 900)) == three.u(Cell::new(i % 900, i / 900)))
     );
+}
+
+#[test]
+fn starting_from_the_field_of_a_similar_map_gives_the_same_directions() {
+    for k in [0.0, 0.05] {
+        let mut map = Map::generate(Kind::Office, 200, 200, 2);
+        let domain = |map: &Map| {
+            let domain = map.domain().expect("a valid map");
+            domain
+                .with_absorption(Absorption::Uniform(k))
+                .expect("a valid absorption")
+        };
+        let mut solver = Solver::default();
+        let before = solver
+            .solve(&domain(&map), &Cancellation::new())
+            .expect("a field");
+        map.fill(90..96, 110..114, true);
+        map.fill(20..23, 150..156, false);
+        let domain = domain(&map);
+        let near = solver
+            .solve_near(&domain, &before, &Cancellation::new())
+            .expect("a field");
+        let fresh = Solver::default()
+            .solve(&domain, &Cancellation::new())
+            .expect("a field");
+        assert_sound(&domain, &near);
+        for index in 0..200 * 200 {
+            let cell = Cell::new(index % 200, index / 200);
+            if let (Some(a), Some(b)) = (near.direction(cell), fresh.direction(cell)) {
+                assert!(
+                    planner::testing::angle(a, b) < 2.0,
+                    "{cell:?}: {a:?}, {b:?}"
+                );
+            }
+        }
+    }
 }

@@ -17,12 +17,25 @@ const TOLERANCE: f64 = 5e-3;
 /// Cycles before the first check: the first ones have not reached every cell, and what is still zero settles at zero.
 const FIRST_CHECK: usize = 4;
 
+/// The same for a solve that starts from the field of a similar map.
+const FIRST_CHECK_NEAR: usize = 2;
+
 /// Cycles between a check that failed and the next.
 const BETWEEN_CHECKS: usize = 2;
 
 /// Cycles after which a precision is given up: its range of u at 1.4 orders of magnitude a cycle, and some.
 const SINGLE_CYCLES: usize = 60;
 const DOUBLE_CYCLES: usize = 450;
+
+/// What is asked of a full solve.
+#[derive(Clone, Copy)]
+pub(super) struct Task<'a> {
+    pub settings: &'a Settings,
+    pub domain: &'a Domain,
+    /// The field of a similar map, to start from.
+    pub near: Option<&'a Field>,
+    pub cancellation: &'a Cancellation,
+}
 
 /// What full solves keep between them.
 #[derive(Debug, Default)]
@@ -55,13 +68,17 @@ impl Full {
     /// As [`Solver::solve_observed`](super::Solver::solve_observed).
     pub(super) fn solve(
         &mut self,
-        settings: &Settings,
-        domain: &Domain,
-        cancellation: &Cancellation,
+        task: Task<'_>,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
+        let Task {
+            settings,
+            domain,
+            cancellation,
+            ..
+        } = task;
         cancellation.check()?;
-        let mut plan = pricing::plan(domain);
+        let mut plan = pricing::plan(domain, settings.memory_limit);
         let mut failed = Check::default();
         for method in plan.methods {
             let (store, check) = match method {
@@ -70,28 +87,14 @@ impl Full {
                         values,
                         exponent: -f32::TOP,
                     };
-                    self.single.solve(
-                        settings,
-                        domain,
-                        SINGLE_CYCLES,
-                        store,
-                        cancellation,
-                        observe,
-                    )?
+                    self.single.solve(task, SINGLE_CYCLES, store, observe)?
                 }
                 Method::MultigridDouble => {
                     let store = |values| Store::Double {
                         values,
                         exponent: -f64::TOP,
                     };
-                    self.double.solve(
-                        settings,
-                        domain,
-                        DOUBLE_CYCLES,
-                        store,
-                        cancellation,
-                        observe,
-                    )?
+                    self.double.solve(task, DOUBLE_CYCLES, store, observe)?
                 }
                 Method::MultigridBands => {
                     let store = bands::solve(domain, cancellation)?;
@@ -152,17 +155,35 @@ impl<R: Real> Prepared<R> {
     /// Cycles until every cell has settled and the check holds, or this precision is given up; returns what there is then.
     fn solve(
         &mut self,
-        settings: &Settings,
-        domain: &Domain,
+        task: Task<'_>,
         most_cycles: usize,
         store: impl Fn(Vec<R>) -> Store,
-        cancellation: &Cancellation,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<(Store, Check), SolveError> {
+        let Task {
+            settings,
+            domain,
+            near,
+            cancellation,
+        } = task;
         let levels = self.prepare(domain);
         observe(Phase::SetUp);
-        levels.start(domain.target());
         let mut next_check = FIRST_CHECK;
+        match near {
+            Some(near) if near.fits(domain) => {
+                let width = domain.width();
+                let mut plain = vec![0.0; width];
+                levels.start_near(domain.target(), |row, guess| {
+                    near.store()
+                        .read_row_wide(row * width..(row + 1) * width, -R::TOP, &mut plain);
+                    for (guess, &u) in guess.iter_mut().zip(&plain) {
+                        *guess = R::of(u);
+                    }
+                });
+                next_check = FIRST_CHECK_NEAR;
+            }
+            _ => levels.start(domain.target()),
+        }
         for cycle in 1.. {
             cancellation.check()?;
             let settled = levels.cycle(TOLERANCE).unsettled == 0;

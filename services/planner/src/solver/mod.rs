@@ -99,6 +99,28 @@ impl Solver {
         self.solve_observed(domain, cancellation, &mut |_| {})
     }
 
+    /// [`solve`](Self::solve), starting from the field of a similar map with the same size and target, which saves most of
+    /// the cycles of multigrid. The result is verified as ever, and depends on nothing but the arguments.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_near(
+        &mut self,
+        domain: &Domain,
+        near: &Field,
+        cancellation: &Cancellation,
+    ) -> Result<Field, SolveError> {
+        self.full.solve(
+            full::Task {
+                settings: &self.settings,
+                domain,
+                near: Some(near),
+                cancellation,
+            },
+            &mut |_| {},
+        )
+    }
+
     /// [`solve`](Self::solve), calling `observe` at the end of each phase: the library has no clock of its own.
     ///
     /// # Errors
@@ -109,8 +131,15 @@ impl Solver {
         cancellation: &Cancellation,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
-        self.full
-            .solve(&self.settings, domain, cancellation, observe)
+        self.full.solve(
+            full::Task {
+                settings: &self.settings,
+                domain,
+                near: None,
+                cancellation,
+            },
+            observe,
+        )
     }
 
     /// Applies `changes` to `domain` and brings its `field` up to date.
@@ -125,9 +154,7 @@ impl Solver {
         changes: &[Change],
         cancellation: &Cancellation,
     ) -> Result<Verdict, SolveError> {
-        if (field.width(), field.height(), field.target())
-            != (domain.width(), domain.height(), domain.target())
-        {
+        if !field.fits(domain) {
             return Err(SolveError::ForeignField);
         }
         domain.apply(changes)?;
@@ -143,7 +170,7 @@ impl Solver {
         if let Some(verdict) = self.repair.update(domain, field, &news) {
             return Ok(verdict);
         }
-        *field = self.solve(domain, cancellation)?;
+        *field = self.solve_near(domain, field, cancellation)?;
         Ok(Verdict::Repaired)
     }
 }

@@ -11,13 +11,14 @@ use crate::domain::{Absorption, Domain};
 use crate::field::Method;
 
 /// Free space of this mean width, cells, is left to multigrid without a further look.
-const WIDE: f64 = 24.0;
+const WIDE: f64 = 32.0;
 
 /// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
 const SINGLE_DECADES: f64 = 62.0;
 
 /// The same of double precision.
 const DOUBLE_DECADES: f64 = 570.0;
+const TWICE_DOUBLE_DECADES: f64 = 2.0 * DOUBLE_DECADES;
 
 /// Measured on one machine; only their ratios matter. Nanoseconds.
 const SET_UP_PER_CELL: f64 = 3.0;
@@ -39,8 +40,8 @@ pub(super) struct Plan {
     pub elimination: Option<(Pass, Tree)>,
 }
 
-/// The plan for `domain`.
-pub(super) fn plan(domain: &Domain) -> Plan {
+/// The plan for `domain`; elimination may take `memory_limit` bytes.
+pub(super) fn plan(domain: &Domain, memory_limit: u64) -> Plan {
     use Method::{Elimination, MultigridBands, MultigridDouble, MultigridSingle};
     let width = mean_width(domain);
     // Absorption makes u fall by this much a cell on its own: cosh(1 / lambda) = 1 + 2 k.
@@ -64,37 +65,31 @@ pub(super) fn plan(domain: &Domain) -> Plan {
     // mazes that makes it about 1.7 times too large.
     let confined = 1.7 * std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
     let decades = pass.levels.len() as f64 * confined.hypot(absorbed);
-    let multigrid = if decades < SINGLE_DECADES {
-        Some((MultigridSingle, SINGLE_CYCLE_PER_CELL))
-    } else if decades < DOUBLE_DECADES {
-        Some((MultigridDouble, DOUBLE_CYCLE_PER_CELL))
-    } else {
-        None
+    let (method, per_cycle) = match decades {
+        ..SINGLE_DECADES => (MultigridSingle, SINGLE_CYCLE_PER_CELL),
+        // The estimate is rather too large than too small, so doubles get a chance beyond their range.
+        ..TWICE_DOUBLE_DECADES => (MultigridDouble, DOUBLE_CYCLE_PER_CELL),
+        _ => (MultigridBands, DOUBLE_CYCLE_PER_CELL),
     };
-    let price = |per_cycle: f64| {
-        (domain.blocked().len() as f64) * (SET_UP_PER_CELL + per_cycle * cycles(decades))
-    };
-    match multigrid {
-        // Elimination costs more than this on any map: no need to build its tree.
-        Some((method, cycle)) if price(cycle) < 0.5 * ELIMINATION_PER_CELL * cells => Plan {
-            methods: costlier(method, &[MultigridDouble, Elimination]),
+    let multigrid = costlier(method, &[MultigridDouble, MultigridBands, Elimination]);
+    let price = domain.blocked().len() as f64 * (SET_UP_PER_CELL + per_cycle * cycles(decades));
+    // Elimination costs more than this on any map: no need to build its tree.
+    if price < 0.5 * ELIMINATION_PER_CELL * cells {
+        return Plan {
+            methods: multigrid,
             elimination: None,
-        },
-        _ => {
-            let tree = Tree::of(&pass);
-            let exact =
-                ELIMINATION_PER_CELL * cells + ELIMINATION_PER_OPERATION * tree.price.operations;
-            let methods = match multigrid {
-                Some((method, cycle)) if price(cycle) < exact => {
-                    costlier(method, &[MultigridDouble, Elimination])
-                }
-                _ => vec![Elimination],
-            };
-            Plan {
-                methods,
-                elimination: Some((pass, tree)),
-            }
-        }
+        };
+    }
+    let tree = Tree::of(&pass);
+    let exact = ELIMINATION_PER_CELL * cells + ELIMINATION_PER_OPERATION * tree.price.operations;
+    let methods = if tree.price.bytes <= memory_limit && exact <= price {
+        vec![Elimination]
+    } else {
+        multigrid
+    };
+    Plan {
+        methods,
+        elimination: Some((pass, tree)),
     }
 }
 

@@ -134,6 +134,39 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
+    /// Makes `target` the only inflow and starts from a first guess, given row by row with 2^TOP at the target.
+    pub(crate) fn start_near(&mut self, target: Cell, mut guess: impl FnMut(usize, &mut [R])) {
+        let finest = &mut self.finest;
+        let grid = finest.grid;
+        let mut buffer = vec![R::default(); 2 * grid.columns];
+        for row in 0..grid.height {
+            guess(row, &mut buffer[..grid.width]);
+            grid::split_row(&grid, &mut finest.u, row, &buffer);
+        }
+        // The inflow that satisfies the target's own equation; the sweeps see to those of the others.
+        let u = |col: Option<usize>, row: Option<usize>| match (col, row) {
+            (Some(col), Some(row)) if col < grid.width && row < grid.height => {
+                let (plane, at) = grid.locate(col, row);
+                finest.inverse[plane][at].is_active() * finest.u[plane][at]
+            }
+            _ => R::default(),
+        };
+        let (col, row) = (target.col, target.row);
+        let around = u(col.checked_sub(1), Some(row)) + u(Some(col + 1), Some(row));
+        let around = around + u(Some(col), row.checked_sub(1)) + u(Some(col), Some(row + 1));
+        let (plane, at) = grid.locate(col, row);
+        let value = finest.inverse[plane][at].inverse() * finest.u[plane][at] - around;
+        finest.sources = vec![Source {
+            plane,
+            row: row / 2,
+            at,
+            value,
+        }];
+        for plane in &mut self.coarse[0].u {
+            plane.fill(R::default());
+        }
+    }
+
     /// Starts from the coarsest level's answer to what flows in.
     pub(crate) fn start_from_sources(&mut self) {
         for plane in &mut self.finest.u {
