@@ -101,7 +101,7 @@ fn full_table(quick: bool) {
         for kind in kinds {
             let narrow = matches!(kind, Kind::Maze { .. } | Kind::Serpentine { .. });
             // Seconds and gigabytes each, for nothing new.
-            if n > 1024 && narrow {
+            if n > 512 && narrow {
                 continue;
             }
             let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");

@@ -16,7 +16,7 @@ use crate::field::Store;
 use crate::scaled::Scaled;
 
 /// Largest componentwise relative residual of a published field.
-pub(crate) const RESIDUAL_LIMIT: f64 = 5e-4;
+pub(crate) const RESIDUAL_LIMIT: f64 = 2e-4;
 
 /// A thread of its own takes some ten microseconds to start: cells it must be given to be worth that.
 const CELLS_PER_THREAD: usize = 1 << 18;

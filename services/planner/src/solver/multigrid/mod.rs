@@ -31,6 +31,9 @@ use std::ops::Range;
 
 use crate::domain::{Absorption, Cell, Domain};
 
+/// Sweeps after the last correction.
+const SMOOTHING: usize = 2;
+
 /// Levels end when neither side is longer.
 const COARSEST_SIDE: usize = 5;
 
@@ -248,11 +251,15 @@ impl<R: Real> Multigrid<R> {
         progress
     }
 
-    /// Brings the last coarse correction to the finest level, for u to be read. Cycles may follow.
+    /// Brings the last coarse correction to the finest level, for u to be read, and smoothes what that leaves from cell to
+    /// cell: near a saddle point the direction hangs on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
         self.pass(false, 0.0);
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
+        }
+        for _ in 0..SMOOTHING {
+            self.pass(false, 0.0);
         }
     }
 
