@@ -54,7 +54,7 @@ pub enum Phase {
     SetUp,
     /// A field was computed.
     Solved,
-    /// The field was checked; if it failed, a costlier method follows with phases of its own.
+    /// The field was checked. If it failed, more cycles or a costlier method follow, with phases of their own.
     Verified,
 }
 
@@ -142,11 +142,17 @@ impl Solver {
         )
     }
 
-    /// Applies `changes` to `domain` and brings its `field` up to date.
+    /// Applies `changes` to `domain` and brings its `field` up to date: in a window around them, or by a full solve where
+    /// the map is small or the window would be half of it.
+    ///
+    /// `field` may lag behind `domain`: what counts is whether it knows a changed cell as blocked or free. So when a field
+    /// solved in the background is swapped in, update it with all changes since that solve began. Every local update is
+    /// provisional, whatever its verdict: follow it by a full solve ([`solve_near`](Self::solve_near)) beside the live field.
     ///
     /// # Errors
     /// [`SolveError::Outside`], [`SolveError::TargetBlocked`] and [`SolveError::ForeignField`], with neither domain nor
-    /// field changed; the errors of [`solve`](Self::solve), with the changes made to the domain alone.
+    /// field changed; the errors of [`solve`](Self::solve), with the changes made to the domain and the field not to be
+    /// followed before a full solve.
     pub fn update(
         &mut self,
         domain: &mut Domain,

@@ -109,7 +109,7 @@ impl<R: Real> Coarse<R> {
             for x in 0..n {
                 let around =
                     (west[x] * b[x] + east[x] * b_west[x]) + (north[x] * h[x] + south[x] * a[x]);
-                out[x] = active[x].is_active() * own[x] + around;
+                out[x] = (active[x].is_active() * own[x] + around).flushed();
             }
             split_row(&next.grid, &mut next.f, y, restricted);
         }
@@ -326,7 +326,7 @@ fn relax<R: Real, const COUNT: usize>(
     terms: &[(&[R], &[R]); COUNT],
 ) {
     for x in 0..out.len() {
-        out[x] = (f[x] + sum_at(terms, x)) * inverse[x];
+        out[x] = ((f[x] + sum_at(terms, x)) * inverse[x]).flushed();
     }
 }
 

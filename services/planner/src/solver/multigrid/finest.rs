@@ -215,8 +215,9 @@ impl<R: Real> Finest<R> {
                 let (h, a) = (&here[m..][..n], &above[m..][..n]);
                 let out = &mut restricted[..n];
                 for x in 0..n {
-                    out[x] = (west[x] * b[x] + east[x] * b_west[x])
+                    let sum = (west[x] * b[x] + east[x] * b_west[x])
                         + (north[x] * h[x] + south[x] * a[x]);
+                    out[x] = sum.flushed();
                 }
                 split_row(&next.grid, &mut next.f, y, restricted);
             }
@@ -392,7 +393,7 @@ fn relax<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4]) {
     let n = u.len();
     let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
     for x in 0..n {
-        u[x] = inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]));
+        u[x] = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
     }
 }
 
@@ -402,7 +403,7 @@ fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], ch
     let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
     let change = &mut change[super::grid::MARGIN..][..n];
     for x in 0..n {
-        let new = inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]));
+        let new = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
         change[x] = new - u[x];
         u[x] = new;
     }

@@ -21,6 +21,9 @@ pub(crate) trait Real:
     /// Power of two at which the target's u is put, so that both ends of the exponent's range serve.
     const TOP: i32;
 
+    /// Below this, numbers are taken for zero.
+    const TINY: Self;
+
     fn of(value: f64) -> Self;
     fn wide(self) -> f64;
     fn size(self) -> Self;
@@ -30,6 +33,17 @@ pub(crate) trait Real:
     fn inverse(self) -> Self {
         if self > Self::default() {
             Self::ONE / self
+        } else {
+            Self::default()
+        }
+    }
+
+    /// The number, or 0 for one so small that it, or its product with a weight, would be subnormal: those cost a hundred
+    /// times as much as others, and the first cycles are full of them.
+    #[inline(always)]
+    fn flushed(self) -> Self {
+        if self.size() > Self::TINY {
+            self
         } else {
             Self::default()
         }
@@ -49,6 +63,7 @@ pub(crate) trait Real:
 impl Real for f32 {
     const ONE: Self = 1.0;
     const TOP: i32 = 100;
+    const TINY: Self = 1e-34;
 
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -69,6 +84,7 @@ impl Real for f32 {
 impl Real for f64 {
     const ONE: Self = 1.0;
     const TOP: i32 = 900;
+    const TINY: Self = 1e-300;
 
     #[inline(always)]
     fn of(value: f64) -> Self {
