@@ -107,7 +107,7 @@ fn full_table(quick: bool) {
             let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
             let cancellation = Cancellation::new();
             // Memory is kept, the set-up is not: the map before was another.
-            let other = Map::generate(Kind::Noise { density: 0.05 }, n, n, 2)
+            let other = Map::generate(Kind::Drums, n, n, 2)
                 .domain()
                 .expect("a valid map");
             let mut solver = Solver::default();
