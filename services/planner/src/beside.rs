@@ -21,13 +21,24 @@ pub struct Solved {
     pub result: Result<(Domain, Field), SolveError>,
 }
 
+/// What the thread is told.
+#[derive(Debug)]
+struct Order {
+    job: Job,
+    cancellation: Cancellation,
+    /// Do not start from the field before: whether that was finished is a matter of luck.
+    afresh: bool,
+}
+
 /// A solver on a thread of its own. Dropping it cancels what runs and waits for the thread.
 #[derive(Debug)]
 pub struct BesideSolver {
-    jobs: Option<Sender<(Job, Cancellation)>>,
+    jobs: Option<Sender<Order>>,
     results: Receiver<Solved>,
     done: UnixStream,
     running: Cancellation,
+    /// The job whose result was not taken yet.
+    untaken: Option<u64>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -37,20 +48,16 @@ impl BesideSolver {
     /// # Errors
     /// When the system has no thread or descriptor left.
     pub fn start() -> io::Result<Self> {
-        let (jobs, taken) = channel::<(Job, Cancellation)>();
+        let (jobs, taken) = channel::<Order>();
         let (give, results) = channel();
         let (done, mut ring) = UnixStream::pair()?;
         done.set_nonblocking(true)?;
         // A full pipe has rung already.
         ring.set_nonblocking(true)?;
         let work = move || {
-            let mut solver = Solver::default();
-            for (job, cancellation) in taken {
-                let Job { number, domain, .. } = job;
-                let result = solver
-                    .solve(&domain, &cancellation)
-                    .map(|field| (domain, field));
-                if give.send(Solved { number, result }).is_err() {
+            let mut worker = Worker::default();
+            for order in taken {
+                if give.send(worker.solve(order)).is_err() {
                     return;
                 }
                 let _ = ring.write(&[1]);
@@ -64,6 +71,7 @@ impl BesideSolver {
             results,
             done,
             running: Cancellation::new(),
+            untaken: None,
             thread: Some(thread),
         })
     }
@@ -72,22 +80,35 @@ impl BesideSolver {
     pub fn begin(&mut self, job: Job) {
         self.running.cancel();
         self.running = Cancellation::new();
+        let afresh = self.untaken.replace(job.number).is_some();
         if let Some(jobs) = &self.jobs {
             // The thread ends only when this is dropped.
-            let _ = jobs.send((job, self.running.clone()));
+            let _ = jobs.send(Order {
+                job,
+                cancellation: self.running.clone(),
+                afresh,
+            });
         }
     }
 
     /// The next result, if there is one.
     pub fn take(&mut self) -> Option<Solved> {
         self.silence();
-        self.results.try_recv().ok()
+        let solved = self.results.try_recv().ok();
+        self.taken(solved)
     }
 
     /// The next result; waits for it. None when the thread is gone.
     pub fn wait(&mut self) -> Option<Solved> {
         let solved = self.results.recv().ok();
         self.silence();
+        self.taken(solved)
+    }
+
+    fn taken(&mut self, solved: Option<Solved>) -> Option<Solved> {
+        if let Some(solved) = &solved {
+            self.untaken.take_if(|untaken| *untaken == solved.number);
+        }
         solved
     }
 
@@ -95,6 +116,35 @@ impl BesideSolver {
         use std::io::Read;
         let mut rung = [0; 64];
         while matches!((&self.done).read(&mut rung), Ok(read) if read > 0) {}
+    }
+}
+
+/// The thread's own: a set-up that is kept, and the field solved last, where the next one starts.
+#[derive(Default)]
+struct Worker {
+    solver: Solver,
+    last: Option<Field>,
+}
+
+impl Worker {
+    fn solve(&mut self, order: Order) -> Solved {
+        let Order {
+            job: Job { number, domain, .. },
+            cancellation,
+            afresh,
+        } = order;
+        let last = self.last.take().filter(|_| !afresh);
+        let solved = match &last {
+            Some(near) => self.solver.solve_near(&domain, near, &cancellation),
+            None => self.solver.solve(&domain, &cancellation),
+        };
+        if let Ok(field) = &solved {
+            self.last = Some(field.clone());
+        }
+        Solved {
+            number,
+            result: solved.map(|field| (domain, field)),
+        }
     }
 }
 

@@ -72,12 +72,16 @@ impl Field {
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
 
-    /// The direction at a cell's centre, or `None` where there is none to give (blocked, cut off, the target).
+    /// The direction at a cell's centre, or `None` where there is none to give (blocked, cut off, the target): what
+    /// [`guidance`](Self::guidance) answers there, where no wall is near enough to matter, for whole maps of cells.
     pub fn direction(&self, cell: Cell) -> Option<[f64; 2]> {
-        match self.guidance(cell.col as f64, cell.row as f64) {
-            Guidance::Along(direction) => Some(direction),
-            Guidance::AtTarget | Guidance::WayOut(_) | Guidance::Unreachable => None,
+        if cell == self.target() || !self.is_reachable(cell) {
+            return None;
         }
+        let here = (cell.col as i64, cell.row as i64);
+        let gradient = self.central_difference(here, here);
+        unit(gradient, SADDLE)
+            .or_else(|| self.toward_better_neighbour(here, [cell.col as f64, cell.row as f64]))
     }
 
     fn blocked_at(&self, col: i64, row: i64) -> bool {

@@ -157,3 +157,23 @@ fn every_position_gets_its_typed_answer() {
     assert!(matches!(field.guidance(-1e300, 3.0), Guidance::WayOut(d) if d[0] > 0.99));
     assert!(matches!(field.guidance(11.0, 11.0), Guidance::WayOut(d) if d[0] < 0.0));
 }
+
+#[test]
+fn the_direction_of_a_cell_is_the_guidance_at_its_centre() {
+    for kind in KINDS {
+        let domain = Map::generate(kind, 60, 45, 3)
+            .domain()
+            .expect("a valid map");
+        let field = solve(&domain);
+        for row in 0..45 {
+            for col in 0..60 {
+                let at_centre = match field.guidance(col as f64, row as f64) {
+                    Guidance::Along(direction) => Some(direction),
+                    _ => None,
+                };
+                let cell = Cell::new(col, row);
+                assert_eq!(field.direction(cell), at_centre, "{kind:?} {cell:?}");
+            }
+        }
+    }
+}
