@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand.
 
 mod check;
+mod field;
 mod missions;
 mod run;
 mod sim;
@@ -29,6 +30,7 @@ enum Command {
     Sim(sim::Arguments),
     Missions(missions::Arguments),
     Check(check::Arguments),
+    Field(field::Arguments),
     Status(status::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
@@ -62,6 +64,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Sim(arguments) => sim::main(&arguments),
         Command::Missions(arguments) => missions::main(&arguments),
         Command::Check(arguments) => check::main(&arguments),
+        Command::Field(arguments) => field::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),

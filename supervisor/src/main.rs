@@ -11,11 +11,13 @@
 //! | [`observer`] | what is heard on the bus |
 //! | [`supervisor`] | the loop |
 //! | [`report`], [`picture`] | how a run ended |
+//! | [`maps`] | maps as others keep them |
 //! | [`cli`] | the command line |
 
 mod cli;
 mod domain;
 mod fleet;
+mod maps;
 mod observer;
 mod picture;
 mod policy;

@@ -1,4 +1,4 @@
-//! The picture a run ends with: one SVG file that needs nothing but itself.
+//! The picture a run ends with: one SVG file that needs nothing but itself. And the picture of a field on a map.
 //!
 //! From the bottom of the page to its top, everything in the mission frame (metres, y up):
 //!
@@ -10,16 +10,21 @@
 //! | [`world`] | what is really there |
 //! | [`motion`] | trajectories, the robot at regular times, start, target |
 //! | [`margin`] | title, axes, legend, captions |
-//! | [`page`] | the sheet all of them draw on |
+//! | [`page`], [`lattice`] | the sheet all of them draw on, and how cells lie on it |
+//!
+//! [`map`] draws the field of a bare map with the same bands and lines, [`raster`] makes it a PNG.
 //!
 //! A picture is made of what came in until the end, however the end came: every layer but the frame
 //! may be missing, and no input makes a file that cannot be read.
 
 mod bands;
 mod cells;
+mod lattice;
+mod map;
 mod margin;
 mod motion;
 mod page;
+mod raster;
 mod streamlines;
 #[cfg(test)]
 mod tests;
@@ -32,9 +37,15 @@ use common::{
     samples::FieldCell,
 };
 
+pub(crate) use self::{
+    map::{FieldOnMap, map_svg},
+    raster::png,
+};
+
 use self::{
     bands::Bands,
     cells::BelievedHazard,
+    lattice::Lattice,
     margin::Legend,
     motion::Motion,
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
@@ -102,9 +113,11 @@ pub(crate) fn svg(scene: &Scene<'_>) -> String {
         .grid
         .filter(|(frame, cells)| cells.len() == frame.area());
 
-    let bands = field.and_then(|(frame, cells)| Bands::of(&frame, cells));
-    let lines = field.map(|(frame, cells)| streamlines::layer(&view, &frame, cells));
-    let hazard = grid.map(|(frame, cells)| BelievedHazard::of(&view, &frame, cells));
+    let lattice = |frame| Lattice::of_mission(&frame, &view);
+    let bands = field.and_then(|(frame, cells)| Bands::of(&lattice(frame), cells, &bands::MISSION));
+    let lines = field
+        .map(|(frame, cells)| streamlines::layer(&lattice(frame), cells, &streamlines::MISSION));
+    let hazard = grid.map(|(frame, cells)| BelievedHazard::of(&lattice(frame), cells));
     let motion = Motion::of(scene);
     let legend = Legend {
         view: &view,
@@ -117,7 +130,7 @@ pub(crate) fn svg(scene: &Scene<'_>) -> String {
     };
 
     let layers = [
-        bands.as_ref().map(|bands| bands.layer(&view)),
+        bands.as_ref().map(Bands::layer),
         lines,
         hazard.as_ref().map(BelievedHazard::layer),
         Some(world::layer(&view, &scene.mission.world)),

@@ -1,28 +1,46 @@
 //! log2 u behind everything: pale bands between level sets, the same factor of u from each to the
 //! next.
 
-use common::{grid::GridFrame, samples::FieldCell};
+use common::samples::FieldCell;
 use glam::DVec2;
 
-use super::page::{Path, View, metres, round_up};
+use super::{
+    lattice::Lattice,
+    page::{Path, round_up},
+};
 
-/// Bytes this layer may take: a field in shreds is drawn coarser, not larger.
-const BUDGET: usize = 130_000;
-/// Samples along a side: more than this is finer than the bands are wide.
-const FINEST: usize = 160;
-/// About as many bands as the eye still tells apart.
-const BANDS: f64 = 12.0;
+/// How the bands look.
+#[derive(Debug)]
+pub(super) struct Style {
+    /// Bytes this layer may take: a field in shreds is drawn coarser, not larger.
+    pub(super) budget: usize,
+    /// Samples along the longer side: more than this is finer than the bands are wide.
+    pub(super) finest: usize,
+    /// About so many bands.
+    pub(super) bands: f64,
+    /// Colours from the target outwards.
+    pub(super) ramp: &'static [[f64; 3]],
+    /// Attributes of the level sets.
+    pub(super) stroke: &'static str,
+}
+
+/// The bands behind a mission: pale, as many as the eye still tells apart.
+pub(super) const MISSION: Style = Style {
+    budget: 130_000,
+    finest: 160,
+    bands: 12.0,
+    ramp: &[
+        [255.0, 250.0, 219.0],
+        [226.0, 240.0, 214.0],
+        [194.0, 224.0, 222.0],
+        [173.0, 203.0, 226.0],
+        [172.0, 182.0, 217.0],
+    ],
+    stroke: "stroke=\"#fff\" stroke-width=\"0.9\" stroke-opacity=\"0.75\"",
+};
+
 /// Share of the map that may lie below the last level: close to hazards u has no floor.
 const BELOW: f64 = 0.02;
-
-/// From the target outwards.
-const RAMP: [[f64; 3]; 5] = [
-    [255.0, 250.0, 219.0],
-    [226.0, 240.0, 214.0],
-    [194.0, 224.0, 222.0],
-    [173.0, 203.0, 226.0],
-    [172.0, 182.0, 217.0],
-];
 
 /// Where the level sets lie: at -step, -2 step, ..., -count step of log2 u.
 #[derive(Clone, Copy, Debug)]
@@ -31,16 +49,24 @@ pub(super) struct Levels {
     pub(super) step: f64,
     /// How many.
     pub(super) count: u32,
+    /// Colours from the target outwards, at least two.
+    ramp: &'static [[f64; 3]],
 }
 
 impl Levels {
+    /// How many levels lie above `log2_u`, or as many as there are.
+    pub(super) fn band(&self, log2_u: f32) -> u32 {
+        // Saturating: above the target's own level there is none.
+        ((-f64::from(log2_u) / self.step) as u32).min(self.count)
+    }
+
     /// The colour of the band below `nth` levels: 0 holds the target, `count` is the last.
     pub(super) fn colour(&self, nth: u32) -> String {
-        let along = f64::from(nth) / f64::from(self.count.max(1)) * (RAMP.len() - 1) as f64;
-        let from = (along as usize).min(RAMP.len() - 2);
+        let along = f64::from(nth) / f64::from(self.count.max(1)) * (self.ramp.len() - 1) as f64;
+        let from = (along as usize).min(self.ramp.len() - 2);
         let part = along - from as f64;
         let [red, green, blue] = [0, 1, 2].map(|channel| {
-            let (a, b) = (RAMP[from][channel], RAMP[from + 1][channel]);
+            let (a, b) = (self.ramp[from][channel], self.ramp[from + 1][channel]);
             (a + (b - a) * part).round() as u8
         });
         format!("#{red:02x}{green:02x}{blue:02x}")
@@ -49,14 +75,19 @@ impl Levels {
 
 /// log2 u of a field, sampled.
 pub(super) struct Bands<'a> {
-    frame: GridFrame,
+    lattice: Lattice,
     cells: &'a [FieldCell],
+    style: &'static Style,
     levels: Levels,
 }
 
 impl<'a> Bands<'a> {
     /// The bands of a field; none if the target can be reached from nowhere.
-    pub(super) fn of(frame: &GridFrame, cells: &'a [FieldCell]) -> Option<Self> {
+    pub(super) fn of(
+        lattice: &Lattice,
+        cells: &'a [FieldCell],
+        style: &'static Style,
+    ) -> Option<Self> {
         let mut values: Vec<f32> = cells
             .iter()
             .map(|cell| cell.log2_u.min(0.0))
@@ -68,13 +99,15 @@ impl<'a> Bands<'a> {
         }
         let (_, quantile, _) = values.select_nth_unstable_by(low, f32::total_cmp);
         let span = -f64::from(*quantile);
-        let step = round_up(span / BANDS);
+        let step = round_up(span / style.bands);
         Some(Self {
-            frame: *frame,
+            lattice: *lattice,
             cells,
+            style,
             levels: Levels {
                 step,
-                count: (span / step).ceil().clamp(1.0, 2.0 * BANDS) as u32,
+                count: (span / step).ceil().clamp(1.0, 2.0 * style.bands) as u32,
+                ramp: style.ramp,
             },
         })
     }
@@ -85,11 +118,11 @@ impl<'a> Bands<'a> {
     }
 
     /// The layer.
-    pub(super) fn layer(&self, view: &View) -> String {
-        let mut finest = FINEST;
+    pub(super) fn layer(&self) -> String {
+        let mut finest = self.style.finest;
         loop {
-            let areas = self.areas(view, finest);
-            if areas.iter().map(Path::len).sum::<usize>() <= BUDGET || finest < 8 {
+            let areas = self.areas(finest);
+            if areas.iter().map(Path::len).sum::<usize>() <= self.style.budget || finest < 8 {
                 return self.paint(&areas);
             }
             finest /= 2;
@@ -97,11 +130,11 @@ impl<'a> Bands<'a> {
     }
 
     /// The areas above each level, the lowest first, from at most `finest` samples a side.
-    fn areas(&self, view: &View, finest: usize) -> Vec<Path> {
-        let samples = Samples::of(&self.frame, self.cells, finest, self.levels);
+    fn areas(&self, finest: usize) -> Vec<Path> {
+        let samples = Samples::of(&self.lattice, self.cells, finest, self.levels);
         (1..=self.levels.count + 1)
             .rev()
-            .map(|nth| samples.above(view, &self.frame, -self.levels.step * f64::from(nth)))
+            .map(|nth| samples.above(&self.lattice, -self.levels.step * f64::from(nth)))
             .collect()
     }
 
@@ -113,8 +146,8 @@ impl<'a> Bands<'a> {
             .map(|(nth, area)| area.element(&format!("fill=\"{}\"", self.levels.colour(nth))))
             .collect();
         format!(
-            "<g fill-rule=\"evenodd\" stroke=\"#fff\" stroke-width=\"0.9\" stroke-opacity=\"0.75\" \
-             stroke-linejoin=\"round\">\n{painted}</g>\n"
+            "<g fill-rule=\"evenodd\" {} stroke-linejoin=\"round\">\n{painted}</g>\n",
+            self.style.stroke
         )
     }
 }
@@ -125,8 +158,10 @@ const AROUND: usize = 2;
 
 /// log2 u at the middles of square blocks of cells, and [`AROUND`] them.
 struct Samples {
-    /// Samples along a side, those around the map included.
+    /// Samples along a row, those around the map included.
     across: usize,
+    /// Samples along a column, likewise.
+    down: usize,
     /// Cells along the side of a block.
     block: usize,
     /// Row-major, all finite.
@@ -143,12 +178,12 @@ enum Side {
 }
 
 impl Samples {
-    fn of(frame: &GridFrame, cells: &[FieldCell], finest: usize, levels: Levels) -> Self {
-        let along = frame.cells as usize;
-        let block = along.div_ceil(finest).max(1);
-        let across = along.div_ceil(block) + 2 * AROUND;
-        let mut sums = vec![(0.0, 0_u32); across * across];
-        for (row, line) in cells.chunks(along.max(1)).enumerate() {
+    fn of(lattice: &Lattice, cells: &[FieldCell], finest: usize, levels: Levels) -> Self {
+        let block = lattice.longest().div_ceil(finest).max(1);
+        let across = lattice.cols.div_ceil(block) + 2 * AROUND;
+        let down = lattice.rows.div_ceil(block) + 2 * AROUND;
+        let mut sums = vec![(0.0, 0_u32); across * down];
+        for (row, line) in cells.chunks(lattice.cols.max(1)).enumerate() {
             for (col, cell) in line.iter().enumerate() {
                 if cell.log2_u.is_finite() {
                     let sum = &mut sums[(row / block + AROUND) * across + col / block + AROUND];
@@ -165,7 +200,7 @@ impl Samples {
             |&(sum, count): &(f64, u32)| (count > 0).then(|| (sum / f64::from(count)).max(floor));
         let is_outermost = |at: usize| {
             let (col, row) = (at % across, at / across);
-            col.min(row) == 0 || col.max(row) == across - 1
+            col.min(row) == 0 || col == across - 1 || row == down - 1
         };
         let values = (0..sums.len())
             .map(|at| match mean(&sums[at]) {
@@ -176,16 +211,17 @@ impl Samples {
             .collect();
         Self {
             across,
+            down,
             block,
             values,
         }
     }
 
     /// The area where log2 u is above `level`.
-    fn above(&self, view: &View, frame: &GridFrame, level: f64) -> Path {
+    fn above(&self, lattice: &Lattice, level: f64) -> Path {
         // For each crossing the one that comes next, the area kept to the left: marching squares.
         let mut next = vec![usize::MAX; 2 * self.values.len()];
-        for row in 0..self.across - 1 {
+        for row in 0..self.down - 1 {
             for col in 0..self.across - 1 {
                 for (from, to) in self.passages(col, row, level) {
                     next[self.crossing(col, row, *from)] = self.crossing(col, row, *to);
@@ -197,7 +233,7 @@ impl Samples {
             let mut ring = Vec::new();
             let mut at = start;
             while next[at] != usize::MAX {
-                ring.push(view.place(self.position(frame, at, level)));
+                ring.push(self.position(lattice, at, level));
                 at = std::mem::replace(&mut next[at], usize::MAX);
             }
             if ring.len() > 2 {
@@ -247,8 +283,8 @@ impl Samples {
         }
     }
 
-    /// Where `level` crosses that side, metres.
-    fn position(&self, frame: &GridFrame, crossing: usize, level: f64) -> DVec2 {
+    /// Where `level` crosses that side, on the sheet.
+    fn position(&self, lattice: &Lattice, crossing: usize, level: f64) -> DVec2 {
         let from = crossing / 2;
         let (col, row) = (from % self.across, from / self.across);
         let (to, end) = if crossing.is_multiple_of(2) {
@@ -263,7 +299,7 @@ impl Samples {
             let centre = |index: usize| (index as f64 - AROUND as f64 + 0.5) * block - 0.5;
             DVec2::new(centre(col), centre(row))
         };
-        metres(frame, middle((col, row)).lerp(middle(end), part))
+        lattice.place(middle((col, row)).lerp(middle(end), part))
     }
 }
 
@@ -279,7 +315,9 @@ fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use common::grid::GridFrame;
+
+    use super::{super::page::View, *};
 
     #[test]
     fn level_sets_close_around_the_whole_map_whatever_the_blocks() {
@@ -289,22 +327,22 @@ mod tests {
                 resolution_m: 8.0 / f64::from(cells),
                 centre: DVec2::ZERO,
             };
-            let view = View::of(&frame);
+            let lattice = Lattice::of_mission(&frame, &View::of(&frame));
             let field: Vec<FieldCell> = (0..frame.area())
                 .map(|at| FieldCell {
                     log2_u: -((at % 7) as f32),
                     ..FieldCell::default()
                 })
                 .collect();
-            let bands = Bands::of(&frame, &field).unwrap();
-            let lowest = bands.areas(&view, FINEST).swap_remove(0).element("");
+            let bands = Bands::of(&lattice, &field, &MISSION).unwrap();
+            let lowest = bands.areas(MISSION.finest).swap_remove(0).element("");
             assert_eq!(lowest.matches('M').count(), 1, "one ring for N = {cells}");
             let corners = lowest
                 .split(['M', 'L', 'Z', '"'])
                 .filter_map(|point| point.split_once(' '))
                 .filter_map(|(x, y)| Some(DVec2::new(x.parse().ok()?, y.parse().ok()?)))
                 .collect::<Vec<_>>();
-            let middle = view.place(metres(&frame, DVec2::splat(f64::from(cells) / 2.0 - 0.5)));
+            let middle = lattice.place(DVec2::splat(f64::from(cells) / 2.0 - 0.5));
             assert!(corners.len() > 3);
             for corner in corners {
                 let beyond = (corner - middle).abs().max_element();

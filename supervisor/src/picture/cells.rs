@@ -1,9 +1,12 @@
 //! What was believed hazardous at the end, by where the belief came from.
 
-use common::grid::{CellState, GridFrame};
+use common::grid::CellState;
 use glam::DVec2;
 
-use super::page::{Path, View, ink, metres};
+use super::{
+    lattice::Lattice,
+    page::{Path, ink},
+};
 
 /// Bytes this layer may take: a belief in shreds is drawn coarser, not larger.
 const BUDGET: usize = 90_000;
@@ -16,28 +19,28 @@ pub(super) struct BelievedHazard {
 }
 
 impl BelievedHazard {
-    /// The hazard in `cells`, one byte a cell of `frame`, row-major.
-    pub(super) fn of(view: &View, frame: &GridFrame, cells: &[u8]) -> Self {
+    /// The hazard in `cells`, one byte a cell of `lattice`, row-major.
+    pub(super) fn of(lattice: &Lattice, cells: &[u8]) -> Self {
         let mut block = 1;
         loop {
-            let hazard = Self::in_blocks(view, frame, cells, block);
-            if hazard.len() <= BUDGET || block >= frame.cells {
+            let hazard = Self::in_blocks(lattice, cells, block);
+            if hazard.len() <= BUDGET || block >= lattice.longest() {
                 return hazard;
             }
             block *= 2;
         }
     }
 
-    fn in_blocks(view: &View, frame: &GridFrame, cells: &[u8], block: u32) -> Self {
+    fn in_blocks(lattice: &Lattice, cells: &[u8], block: usize) -> Self {
         let blocks = Blocks {
-            frame,
+            lattice,
             side: block,
-            states: coarsened(frame, cells, block),
+            kinds: coarsened(lattice, cells, block),
         };
         Self {
-            sensed: blocks.area(view, CellState::Sensed),
-            known: blocks.area(view, CellState::Known),
-            perimeter: blocks.area(view, CellState::Perimeter),
+            sensed: blocks.area(CellState::Sensed),
+            known: blocks.area(CellState::Known),
+            perimeter: blocks.area(CellState::Perimeter),
         }
     }
 
@@ -72,20 +75,23 @@ impl BelievedHazard {
     }
 }
 
-/// A belief in square blocks of `side` cells.
-struct Blocks<'a> {
-    frame: &'a GridFrame,
-    side: u32,
-    states: Vec<CellState>,
+/// Cells of several kinds in square blocks of `side` cells.
+pub(super) struct Blocks<'a, Kind> {
+    /// Where the cells lie.
+    pub(super) lattice: &'a Lattice,
+    /// Cells along the side of a block.
+    pub(super) side: usize,
+    /// The kind of each block, row-major.
+    pub(super) kinds: Vec<Kind>,
 }
 
 /// The state of each block: hazard if any of its cells is, of the kind most of them are.
-fn coarsened(frame: &GridFrame, cells: &[u8], block: u32) -> Vec<CellState> {
-    let across = frame.cells.div_ceil(block) as usize;
-    let mut tally = vec![[0_u32; 4]; across * across];
-    for (row, line) in cells.chunks(frame.cells.max(1) as usize).enumerate() {
+fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
+    let across = lattice.cols.div_ceil(block);
+    let mut tally = vec![[0_u32; 4]; across * lattice.rows.div_ceil(block)];
+    for (row, line) in cells.chunks(lattice.cols.max(1)).enumerate() {
         for (col, &byte) in line.iter().enumerate() {
-            let at = row / block as usize * across + col / block as usize;
+            let at = row / block * across + col / block;
             tally[at][CellState::from_byte(byte) as usize] += 1;
         }
     }
@@ -102,53 +108,52 @@ fn coarsened(frame: &GridFrame, cells: &[u8], block: u32) -> Vec<CellState> {
         .collect()
 }
 
-impl Blocks<'_> {
+impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
     /// Everything of one kind: runs along x, joined along y where they are alike.
-    fn area(&self, view: &View, kind: CellState) -> Path {
-        let across = self.frame.cells.div_ceil(self.side);
+    pub(super) fn area(&self, kind: Kind) -> Path {
+        let across = self.lattice.cols.div_ceil(self.side);
         let mut path = Path::default();
         let mut open: Vec<Run> = Vec::new();
-        for (row, line) in (0..).zip(self.states.chunks(across.max(1) as usize)) {
+        for (row, line) in self.kinds.chunks(across.max(1)).enumerate() {
             let (grown, ended) = continued(open, runs(line, kind), row);
             for run in ended {
-                self.draw(view, &mut path, run, row);
+                self.draw(&mut path, run, row);
             }
             open = grown;
         }
         for run in open {
-            self.draw(view, &mut path, run, across);
+            self.draw(&mut path, run, self.lattice.rows.div_ceil(self.side));
         }
         path
     }
 
-    fn draw(&self, view: &View, path: &mut Path, run: Run, end_row: u32) {
-        // The last block of a row may be cut short by the map's edge.
-        let edge = |block: u32| f64::from((block * self.side).min(self.frame.cells)) - 0.5;
-        let corner = |col: u32, row: u32| {
-            let at = metres(self.frame, DVec2::new(edge(col), edge(row)));
-            view.place(at)
+    fn draw(&self, path: &mut Path, run: Run, end_row: usize) {
+        // The last block of a row or column may be cut short by the map's edge.
+        let edge = |block: usize, cells: usize| (block * self.side).min(cells) as f64 - 0.5;
+        let corner = |col: usize, row: usize| {
+            let (col, row) = (edge(col, self.lattice.cols), edge(row, self.lattice.rows));
+            self.lattice.place(DVec2::new(col, row))
         };
-        let (low, high) = (corner(run.from, run.since), corner(run.until, end_row));
-        path.rectangle(
-            DVec2::new(low.x, high.y),
-            DVec2::new(high.x - low.x, low.y - high.y),
-        );
+        let (one, other) = (corner(run.from, run.since), corner(run.until, end_row));
+        // The first row may lie at the top of the sheet or at its bottom.
+        let low = one.min(other);
+        path.rectangle(low, one.max(other) - low);
     }
 }
 
 /// Blocks `from..until` of one kind, alike in every row from `since` on.
 #[derive(Clone, Copy)]
 struct Run {
-    from: u32,
-    until: u32,
-    since: u32,
+    from: usize,
+    until: usize,
+    since: usize,
 }
 
 /// The runs of `kind` in one row, as (from, until).
-fn runs(line: &[CellState], kind: CellState) -> Vec<(u32, u32)> {
-    let mut found: Vec<(u32, u32)> = Vec::new();
-    for (col, state) in (0..).zip(line) {
-        if *state != kind {
+fn runs<Kind: Copy + PartialEq>(line: &[Kind], kind: Kind) -> Vec<(usize, usize)> {
+    let mut found: Vec<(usize, usize)> = Vec::new();
+    for (col, &found_kind) in line.iter().enumerate() {
+        if found_kind != kind {
             continue;
         }
         match found.last_mut() {
@@ -160,7 +165,7 @@ fn runs(line: &[CellState], kind: CellState) -> Vec<(u32, u32)> {
 }
 
 /// The runs that are open after `row`, and those that ended before it.
-fn continued(open: Vec<Run>, row_runs: Vec<(u32, u32)>, row: u32) -> (Vec<Run>, Vec<Run>) {
+fn continued(open: Vec<Run>, row_runs: Vec<(usize, usize)>, row: usize) -> (Vec<Run>, Vec<Run>) {
     let grown: Vec<Run> = row_runs
         .into_iter()
         .map(|(from, until)| Run {
@@ -187,24 +192,27 @@ fn continued(open: Vec<Run>, row_runs: Vec<(u32, u32)>, row: u32) -> (Vec<Run>, 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use common::grid::GridFrame;
 
-    fn frame(cells: u32) -> GridFrame {
-        GridFrame {
+    use super::{super::page::View, *};
+
+    fn lattice(cells: u32) -> Lattice {
+        let frame = GridFrame {
             cells,
             resolution_m: 8.0 / f64::from(cells),
             centre: DVec2::ZERO,
-        }
+        };
+        Lattice::of_mission(&frame, &View::of(&frame))
     }
 
     #[test]
     fn alike_runs_become_one_rectangle_where_the_cells_lie() {
-        let frame = frame(8);
+        let lattice = lattice(8);
         let mut cells = [0_u8; 64];
         for at in [2 * 8 + 1, 2 * 8 + 2, 3 * 8 + 1, 3 * 8 + 2, 4 * 8 + 1] {
             cells[at] = 1;
         }
-        let hazard = BelievedHazard::of(&View::of(&frame), &frame, &cells);
+        let hazard = BelievedHazard::of(&lattice, &cells);
         let two = "M162 492h200v200h-200z";
         let one = "M162 392h100v100h-100z";
         assert!(hazard.sensed.element("").contains(&format!("{two}{one}")));
@@ -213,11 +221,11 @@ mod tests {
 
     #[test]
     fn a_belief_in_shreds_stays_within_its_budget() {
-        let frame = frame(1024);
-        let cells: Vec<u8> = (0..frame.area())
+        let lattice = lattice(1024);
+        let cells: Vec<u8> = (0..1024 * 1024)
             .map(|at| ((at / 1024 + at % 1024) % 2) as u8)
             .collect();
-        let hazard = BelievedHazard::of(&View::of(&frame), &frame, &cells);
+        let hazard = BelievedHazard::of(&lattice, &cells);
         assert!(hazard.has_sensed() && hazard.len() <= BUDGET);
     }
 }

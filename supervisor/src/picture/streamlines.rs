@@ -1,18 +1,38 @@
 //! Lines of the guidance field E, evenly spaced whatever the grid: B. Jobard, W. Lefer, "Creating
 //! evenly-spaced streamlines of arbitrary density" (1997).
 
-use common::{
-    grid::{Cell, GridFrame},
-    samples::FieldCell,
-};
+use common::samples::FieldCell;
 use glam::DVec2;
 
-use super::page::{PLOT_SIDE, Path, View, ink, metres};
+use super::{
+    lattice::Lattice,
+    page::{Path, ink},
+};
 
-/// Bytes the lines may take: a field in shreds is drawn sparser, not larger.
-const BUDGET: usize = 100_000;
-/// Between a line and where the next one is begun, on the sheet.
-const SPACING: f64 = 23.0;
+/// How the lines look.
+#[derive(Debug)]
+pub(super) struct Style {
+    /// Bytes the lines may take: a field in shreds is drawn sparser, not larger.
+    pub(super) budget: usize,
+    /// Between a line and where the next one is begun, on the sheet.
+    pub(super) spacing: f64,
+    /// Never nearer than this, in cells: between two cells there is nothing new to see.
+    pub(super) least_cells: f64,
+    /// Colour of lines and arrowheads.
+    pub(super) colour: &'static str,
+    /// Width of the lines, on the sheet, and the opacity of lines and arrowheads.
+    pub(super) stroke: (f64, f64, f64),
+}
+
+/// The lines of a mission.
+pub(super) const MISSION: Style = Style {
+    budget: 100_000,
+    spacing: 23.0,
+    least_cells: 0.0,
+    colour: ink::GUIDANCE,
+    stroke: (0.8, 0.6, 0.75),
+};
+
 /// Lines end where they come this near to another, in spacings.
 const MERGED: f64 = 0.5;
 /// Shorter lines are left out, in spacings.
@@ -25,45 +45,46 @@ const STRAIGHT: f64 = 0.9985;
 const ARROWHEAD: (f64, f64) = (2.3, 3.4);
 
 /// The layer.
-pub(super) fn layer(view: &View, frame: &GridFrame, cells: &[FieldCell]) -> String {
-    let mut spacing = SPACING;
+pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> String {
+    let cell = lattice.width / lattice.cols.max(1) as f64;
+    let mut spacing = style.spacing.max(style.least_cells * cell);
     loop {
-        let (lines, arrowheads) = drawn(view, frame, cells, spacing);
-        if lines.len() + arrowheads.len() <= BUDGET || spacing > PLOT_SIDE {
-            return paint(&lines, &arrowheads);
+        let (lines, arrowheads) = drawn(lattice, cells, style.spacing, spacing);
+        let whole = lattice.width.max(lattice.height);
+        if lines.len() + arrowheads.len() <= style.budget || spacing > whole {
+            return paint(&lines, &arrowheads, style);
         }
         spacing *= 1.5;
     }
 }
 
-fn drawn(view: &View, frame: &GridFrame, cells: &[FieldCell], spacing: f64) -> (Path, Path) {
+/// Lines `spacing` apart, with arrowheads as they are at the `usual` spacing.
+fn drawn(lattice: &Lattice, cells: &[FieldCell], usual: f64, spacing: f64) -> (Path, Path) {
     let (mut lines, mut arrowheads) = (Path::default(), Path::default());
-    for line in evenly_spaced(frame, cells, spacing) {
-        let on_sheet: Vec<DVec2> = line
-            .iter()
-            .map(|&at| view.place(metres(frame, at)))
-            .collect();
-        draw(&on_sheet, &mut lines, &mut arrowheads);
+    for line in evenly_spaced(lattice, cells, spacing) {
+        let on_sheet: Vec<DVec2> = line.iter().map(|&at| lattice.place(at)).collect();
+        draw(&on_sheet, usual, &mut lines, &mut arrowheads);
     }
     (lines, arrowheads)
 }
 
-fn paint(lines: &Path, arrowheads: &Path) -> String {
-    let colour = ink::GUIDANCE;
+fn paint(lines: &Path, arrowheads: &Path, style: &Style) -> String {
+    let colour = style.colour;
+    let (width, line_opacity, head_opacity) = style.stroke;
     lines.element(&format!(
-        "fill=\"none\" stroke=\"{colour}\" stroke-width=\"0.8\" stroke-opacity=\"0.6\" \
+        "fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-opacity=\"{line_opacity}\" \
          stroke-linecap=\"round\" stroke-linejoin=\"round\""
-    )) + &arrowheads.element(&format!("fill=\"{colour}\" fill-opacity=\"0.75\""))
+    )) + &arrowheads.element(&format!("fill=\"{colour}\" fill-opacity=\"{head_opacity}\""))
 }
 
 /// One line, its points only where it bends, and its arrowheads.
-fn draw(line: &[DVec2], lines: &mut Path, arrowheads: &mut Path) {
+fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
     let Some((&first, rest)) = line.split_first() else {
         return;
     };
     lines.move_to(first);
     let mut heading = DVec2::ZERO;
-    let mut since_arrow = SPACING * ARROWS_APART / 2.0;
+    let mut since_arrow = spacing * ARROWS_APART / 2.0;
     let mut from = first;
     for (nth, &to) in rest.iter().enumerate() {
         let step = (to - from).normalize_or_zero();
@@ -78,7 +99,7 @@ fn draw(line: &[DVec2], lines: &mut Path, arrowheads: &mut Path) {
             lines.line_to(to);
         }
         since_arrow += from.distance(to);
-        if since_arrow >= SPACING * ARROWS_APART {
+        if since_arrow >= spacing * ARROWS_APART {
             since_arrow = 0.0;
             arrowheads.polygon(arrowhead(to, step));
         }
@@ -94,23 +115,21 @@ pub(super) fn arrowhead(at: DVec2, heading: DVec2) -> [DVec2; 3] {
 }
 
 /// The lines, in cells (cell centres at whole numbers), each along E.
-fn evenly_spaced(frame: &GridFrame, cells: &[FieldCell], spacing: f64) -> Vec<Vec<DVec2>> {
+fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Vec<DVec2>> {
+    let bins = [lattice.width, lattice.height].map(|side| (side / spacing) as usize + 2);
     let mut tracer = Tracer {
-        frame,
+        lattice,
         cells,
-        spacing: f64::from(frame.cells) * spacing / PLOT_SIDE,
-        drawn: Vec::new(),
-        per_side: (PLOT_SIDE / spacing) as usize + 2,
+        spacing: lattice.cols as f64 * spacing / lattice.width,
+        drawn: vec![Vec::new(); bins[0] * bins[1]],
+        bins,
     };
-    tracer.drawn = vec![Vec::new(); tracer.per_side * tracer.per_side];
 
     let mut lines: Vec<Vec<DVec2>> = Vec::new();
     // Seeds all over the map come last: they find the regions no line led into.
-    let lattice = (0..tracer.per_side * tracer.per_side).map(|at| {
-        let (col, row) = (at % tracer.per_side, at / tracer.per_side);
-        DVec2::new(col as f64, row as f64) * tracer.spacing
-    });
-    for seed in lattice.collect::<Vec<_>>() {
+    for at in 0..bins[0] * bins[1] {
+        let (col, row) = (at % bins[0], at / bins[0]);
+        let seed = DVec2::new(col as f64, row as f64) * tracer.spacing;
         let mut seeded_from = lines.len();
         lines.extend(tracer.line_through(seed));
         // Beside a line that was drawn the next ones are begun.
@@ -126,28 +145,27 @@ fn evenly_spaced(frame: &GridFrame, cells: &[FieldCell], spacing: f64) -> Vec<Ve
 }
 
 struct Tracer<'a> {
-    frame: &'a GridFrame,
+    lattice: &'a Lattice,
     cells: &'a [FieldCell],
     /// Between two lines, in cells.
     spacing: f64,
     /// Points of the lines so far, in square bins of one spacing.
     drawn: Vec<Vec<DVec2>>,
-    /// Bins along a side.
-    per_side: usize,
+    /// Bins along a row and along a column.
+    bins: [usize; 2],
 }
 
 impl Tracer<'_> {
     /// E between the cell centres, a unit vector; none in a hazard and where there is no guidance.
     fn direction(&self, at: DVec2) -> Option<DVec2> {
         let e_at = |col: f64, row: f64| {
-            let last = f64::from(self.frame.cells.saturating_sub(1));
-            if !(0.0..=last).contains(&col) || !(0.0..=last).contains(&row) {
+            let last = |cells: usize| cells.saturating_sub(1) as f64;
+            if !(0.0..=last(self.lattice.cols)).contains(&col)
+                || !(0.0..=last(self.lattice.rows)).contains(&row)
+            {
                 return DVec2::ZERO;
             }
-            let index = self.frame.index(Cell {
-                col: col as u32,
-                row: row as u32,
-            });
+            let index = row as usize * self.lattice.cols + col as usize;
             self.cells.get(index).map_or(DVec2::ZERO, |cell| {
                 let e = DVec2::new(cell.ex.into(), cell.ey.into());
                 if e.is_finite() { e } else { DVec2::ZERO }
@@ -185,7 +203,7 @@ impl Tracer<'_> {
             }
             kept = Some(point);
             let bin = self.bin(point);
-            if let Some(points) = self.drawn.get_mut(bin.1 * self.per_side + bin.0) {
+            if let Some(points) = self.drawn.get_mut(bin.1 * self.bins[0] + bin.0) {
                 points.push(point);
             }
         }
@@ -196,7 +214,7 @@ impl Tracer<'_> {
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
         // Not longer than a cell, so that a wall of one cell is not stepped over.
         let step = (0.2 * self.spacing).min(0.9) * sense;
-        let most = (3.0 * f64::from(self.frame.cells) / step.abs()) as usize;
+        let most = (3.0 * self.lattice.longest() as f64 / step.abs()) as usize;
         let mut points = Vec::new();
         let mut at = seed;
         while points.len() < most {
@@ -241,10 +259,10 @@ impl Tracer<'_> {
     fn is_crowded(&self, at: DVec2, share: f64) -> bool {
         let (col, row) = self.bin(at);
         let limit = share * self.spacing;
-        let rows = row.saturating_sub(1)..=(row + 1).min(self.per_side - 1);
+        let rows = row.saturating_sub(1)..=(row + 1).min(self.bins[1] - 1);
         rows.flat_map(|row| {
-            (col.saturating_sub(1)..=(col + 1).min(self.per_side - 1))
-                .map(move |col| row * self.per_side + col)
+            (col.saturating_sub(1)..=(col + 1).min(self.bins[0] - 1))
+                .map(move |col| row * self.bins[0] + col)
         })
         .filter_map(|bin| self.drawn.get(bin))
         .flatten()

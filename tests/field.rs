@@ -1,0 +1,270 @@
+//! `firsthand field`: what comes out of a map, and what is said of one that is none.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use support::output;
+
+/// A room of 24 x 16 cells in its rim, a wall across it with one doorway, and a closet nobody can leave.
+fn rooms() -> Vec<String> {
+    (0..16)
+        .map(|row| {
+            (0..24)
+                .map(|col| {
+                    let rim = col == 0 || row == 0 || col == 23 || row == 15;
+                    let wall = col == 12 && row != 4;
+                    let closet = (18..=20).contains(&col)
+                        && (8..=10).contains(&row)
+                        && (col, row) != (19, 9);
+                    if rim || wall || closet { '@' } else { '.' }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn write_map(directory: &Path) -> PathBuf {
+    let file = directory.join("rooms.map");
+    let text = format!(
+        "type octile\nheight 16\nwidth 24\nmap\n{}\n",
+        rooms().join("\n")
+    );
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+/// The same rooms as an image, light where free.
+fn write_image(directory: &Path) -> PathBuf {
+    let file = directory.join("rooms.pgm");
+    let pixels: Vec<u8> = rooms()
+        .concat()
+        .bytes()
+        .map(|cell| if cell == b'.' { 254 } else { 0 })
+        .collect();
+    std::fs::write(&file, [b"P5\n24 16\n255\n".as_slice(), &pixels].concat()).unwrap();
+    file
+}
+
+/// The JSON of a solve that must succeed.
+fn report(map: &Path, arguments: &[&str]) -> Value {
+    let mut all = vec!["field", map.to_str().unwrap(), "--json"];
+    all.extend(arguments);
+    let output = output(&all);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    serde_json::from_str(text.lines().last().unwrap()).unwrap()
+}
+
+/// The sentence on standard error of a solve that must fail.
+fn refusal(map: &Path, arguments: &[&str]) -> String {
+    let mut all = vec!["field", map.to_str().unwrap()];
+    all.extend(arguments);
+    let output = output(&all);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success(), "{arguments:?} succeeded");
+    assert!(!text.contains("panicked"), "{text}");
+    text
+}
+
+/// The bytes of an array in an .npz whose members are stored: after its name, its own header and 20 x 24 x 16 bytes.
+fn array(npz: &[u8], name: &str, bytes_each: usize) -> Vec<u8> {
+    let find = |from: usize, what: &[u8]| {
+        let at = npz[from..]
+            .windows(what.len())
+            .position(|window| window == what);
+        from + at.unwrap_or_else(|| panic!("no {what:?} in the archive"))
+    };
+    let magic = find(find(0, format!("{name}.npy").as_bytes()), b"\x93NUMPY");
+    let header = usize::from(u16::from_le_bytes([npz[magic + 8], npz[magic + 9]]));
+    let text = String::from_utf8_lossy(&npz[magic + 10..magic + 10 + header]).into_owned();
+    assert!(text.contains("(16, 24"), "{name} has the header {text}");
+    assert!(text.contains("'fortran_order': False"), "{text}");
+    let data = magic + 10 + header;
+    npz[data..data + 24 * 16 * bytes_each].to_vec()
+}
+
+/// u and guidance of the rooms as they are in the file, (u, ex, ey) a cell.
+fn solved(absorption: &str) -> Vec<(f64, f64, f64)> {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("rooms.npz");
+    report(
+        &write_map(directory.path()),
+        &[
+            "--target-cell",
+            "3,12",
+            "--absorption",
+            absorption,
+            "--out",
+            out.to_str().unwrap(),
+        ],
+    );
+    let npz = std::fs::read(out).unwrap();
+    let mantissas = array(&npz, "mantissa", 8);
+    let exponents = array(&npz, "exponent", 4);
+    let (ex, ey) = (array(&npz, "ex", 4), array(&npz, "ey", 4));
+    let four =
+        |bytes: &[u8], at: usize| -> [u8; 4] { bytes[4 * at..4 * at + 4].try_into().unwrap() };
+    (0..24 * 16)
+        .map(|at| {
+            let mantissa = f64::from_le_bytes(mantissas[8 * at..8 * at + 8].try_into().unwrap());
+            let exponent = i32::from_le_bytes(four(&exponents, at));
+            (
+                mantissa * f64::from(exponent).exp2(),
+                f64::from(f32::from_le_bytes(four(&ex, at))),
+                f64::from(f32::from_le_bytes(four(&ey, at))),
+            )
+        })
+        .collect()
+}
+
+const TARGET: usize = 12 * 24 + 3;
+const CLOSET: usize = 9 * 24 + 19;
+
+#[test]
+fn u_in_the_file_is_the_mean_of_its_neighbours_over_1_plus_k() {
+    for (absorption, k) in [("0", 0.0), ("0.02", 0.02)] {
+        let cells = solved(absorption);
+        let free: Vec<bool> = rooms().concat().bytes().map(|cell| cell == b'.').collect();
+        for (at, &(u, ..)) in cells.iter().enumerate() {
+            if !free[at] || at == CLOSET {
+                assert_eq!(u, 0.0, "cell {at}");
+            } else if at == TARGET {
+                assert_eq!(u, 1.0);
+            } else {
+                let around = [at - 1, at + 1, at - 24, at + 24].map(|near| cells[near].0);
+                let mean = around.iter().sum::<f64>() / 4.0 / (1.0 + k);
+                assert!((mean / u - 1.0).abs() < 1e-3, "cell {at}: {u}, mean {mean}");
+            }
+        }
+    }
+}
+
+#[test]
+fn guidance_in_the_file_is_uphill_with_y_down_and_of_unit_length() {
+    let cells = solved("0");
+    for (at, &(u, ex, ey)) in cells.iter().enumerate() {
+        if u == 0.0 || at == TARGET {
+            assert_eq!((ex, ey), (0.0, 0.0), "cell {at}");
+            continue;
+        }
+        assert!((ex.hypot(ey) - 1.0).abs() < 1e-5, "cell {at}");
+        let rise =
+            (cells[at + 1].0 - cells[at - 1].0) * ex + (cells[at + 24].0 - cells[at - 24].0) * ey;
+        assert!(rise > 0.0, "cell {at} leads downhill");
+    }
+}
+
+#[test]
+fn the_report_tells_size_reach_method_and_times() {
+    let directory = tempfile::tempdir().unwrap();
+    let map = write_map(directory.path());
+    let report = report(
+        &map,
+        &["--target-cell", "3,12", "--repeat", "3", "--threads", "2"],
+    );
+    let free = rooms().concat().matches('.').count() as u64;
+    assert_eq!(report["rows"], 16);
+    assert_eq!(report["cols"], 24);
+    assert_eq!(report["reachable"], free - 1, "all but the closet");
+    assert_eq!(report["target"], serde_json::json!([3, 12]));
+    assert!(!report["method"].as_str().unwrap().is_empty());
+    for phase in ["setup_ms", "solve_ms", "verify_ms"] {
+        let least = report[phase].as_f64().unwrap();
+        let median = report[format!("{phase}_median")].as_f64().unwrap();
+        assert!(
+            0.0 <= least && least <= median,
+            "{phase}: {least}, {median}"
+        );
+    }
+    assert!(report["worst_residual"].as_f64().unwrap() < 1e-2);
+    assert!(report["log10_u_min"].as_f64().unwrap() < 0.0);
+    assert!(report["peak_memory_bytes"].as_u64().unwrap() > 100_000);
+}
+
+#[test]
+fn every_format_of_one_map_gives_one_field() {
+    let directory = tempfile::tempdir().unwrap();
+    let image = write_image(directory.path());
+    let yaml = directory.path().join("rooms.yaml");
+    std::fs::write(
+        &yaml,
+        "image: rooms.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+    )
+    .unwrap();
+    let archives = [write_map(directory.path()), image, yaml].map(|map| {
+        let out = directory.path().join("out.npz");
+        report(
+            &map,
+            &["--target-cell", "3,12", "--out", out.to_str().unwrap()],
+        );
+        let npz = std::fs::read(&out).unwrap();
+        ["mantissa", "exponent", "ex", "ey"].map(|name| array(&npz, name, 4))
+    });
+    assert_eq!(archives[0], archives[1]);
+    assert_eq!(archives[0], archives[2]);
+}
+
+#[test]
+fn the_picture_is_a_png_of_a_size_to_look_at() {
+    let directory = tempfile::tempdir().unwrap();
+    let picture = directory.path().join("rooms.png");
+    report(
+        &write_map(directory.path()),
+        &[
+            "--target-cell",
+            "3,12",
+            "--picture",
+            picture.to_str().unwrap(),
+        ],
+    );
+    let bytes = std::fs::read(picture).unwrap();
+    assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"));
+    let width = u32::from_be_bytes(bytes[16..20].try_into().unwrap());
+    assert!((900..=2500).contains(&width), "{width} pixels wide");
+}
+
+#[test]
+fn a_target_that_is_none_is_answered_with_the_nearest_that_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let map = write_map(directory.path());
+    for (target, nearest) in [("12,12", "11,12"), ("99999,3", "22,3"), ("0,0", "1,1")] {
+        let text = refusal(&map, &["--target-cell", target]);
+        assert!(
+            text.contains("rooms.map") && text.contains(&format!("--target-cell {nearest}")),
+            "{target} gave {text}"
+        );
+    }
+    assert!(refusal(&map, &["--target-cell", "3;4"]).contains("column"));
+    assert!(refusal(&map, &["--target-cell", "3,12", "--absorption", "-1"]).contains("absorption"));
+    assert!(refusal(&map, &["--target-cell", "3,12", "--absorption", "nan"]).contains("NaN"));
+}
+
+#[test]
+fn a_file_that_is_no_map_or_cannot_be_written_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, bytes) in [
+        ("short.pgm", b"P5 24 16 255\nabc".as_slice()),
+        ("huge.pgm", b"P5 100000 100000 255\n"),
+        ("noise.png", &[7; 300]),
+        ("noise.yaml", b"\xff\xfe\x00"),
+        ("nothing.map", b""),
+        ("black.pgm", b"P5 3 3 255\n\0\0\0\0\0\0\0\0\0"),
+        ("rooms.txt", b"@@@"),
+    ] {
+        let file = directory.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let text = refusal(&file, &["--target-cell", "1,1"]);
+        assert!(text.contains(name) && text.lines().count() == 1, "{text}");
+    }
+    let map = write_map(directory.path());
+    let out = directory.path().join("no/such/folder.npz");
+    let text = refusal(
+        &map,
+        &["--target-cell", "3,12", "--out", out.to_str().unwrap()],
+    );
+    assert!(text.contains("folder.npz"), "{text}");
+}
