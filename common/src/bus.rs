@@ -24,6 +24,9 @@ use std::{
     time::Duration,
 };
 
+mod error;
+
+pub use error::BusError;
 pub use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::{
     config::Config,
@@ -39,88 +42,13 @@ use iceoryx2::{
         port_factory::{PortFactory as _, event, publish_subscribe},
     },
 };
-use thiserror::Error;
 
 use crate::{
     clock::MissionTime,
     domain::Domain,
     samples::Stamped,
-    topics::{EVERY_STAGE, Rate, Spec},
+    topics::{EVERY_STAGE, Limits, Rate, Spec},
 };
-
-/// How much a topic holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Samples a reader that falls behind still gets; then the oldest give way.
-    pub buffer: usize,
-    /// Samples a reader may hold at once.
-    pub borrowed: usize,
-    /// Readers at once, dashboards and loggers among them.
-    pub readers: usize,
-}
-
-impl Limits {
-    /// For topics of one small struct.
-    pub const SMALL: Self = Self {
-        buffer: 128,
-        borrowed: 2,
-        readers: 16,
-    };
-    /// For slices of a whole map.
-    pub const MAP: Self = Self {
-        buffer: 4,
-        borrowed: 2,
-        readers: 12,
-    };
-    /// Writers at once. One is meant; a kill while starting can leak a place for good.
-    const WRITERS: usize = 16;
-    /// Processes at once on one topic.
-    const NODES: usize = 64;
-}
-
-/// What can go wrong between a process and shared memory.
-#[derive(Debug, Error)]
-pub enum BusError {
-    /// The robot has no bus.
-    #[error(
-        "robot {robot:?} is not running here ({detail}); start it with `firsthand run`, or name another with --robot"
-    )]
-    NotRunning {
-        /// The robot.
-        robot: String,
-        /// What was missing.
-        detail: String,
-    },
-    /// Two builds that do not agree on a payload.
-    #[error(
-        "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
-    )]
-    Incompatible {
-        /// The topic.
-        topic: &'static str,
-    },
-    /// The middleware refused.
-    #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, or the topic's last place taken?", shm = crate::domain::SHARED_MEMORY)]
-    Refused {
-        /// What was tried.
-        action: &'static str,
-        /// The topic.
-        topic: &'static str,
-        /// The middleware's word.
-        detail: String,
-    },
-    /// The process could not join the domain.
-    #[error("cannot join the bus of robot {robot:?}: {detail}; if it runs, is it this user's, and is {shm} writable and not full?", shm = crate::domain::SHARED_MEMORY)]
-    Join {
-        /// The robot.
-        robot: String,
-        /// The middleware's word.
-        detail: String,
-    },
-    /// Waiting failed.
-    #[error("cannot wait for samples: {0}")]
-    Wait(#[source] std::io::Error),
-}
 
 fn refused<E: Debug>(action: &'static str, topic: &'static str) -> impl FnOnce(E) -> BusError {
     move |detail| BusError::Refused {

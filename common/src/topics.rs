@@ -5,12 +5,9 @@
 
 use std::time::Duration;
 
-use crate::{
-    bus::Limits,
-    samples::{
-        CommandSample, DirectiveSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        HealthSample, LinkSample, PoseSample, RangeSample, RosterEntry, RosterHeader, WheelSample,
-    },
+use crate::samples::{
+    CommandSample, DirectiveSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
+    HealthSample, LinkSample, PoseSample, RangeSample, RosterEntry, RosterHeader, WheelSample,
 };
 
 pub use crate::bus::{AnyTopic, SliceTopic, Topic};
@@ -39,6 +36,36 @@ pub struct Spec {
     pub limits: Limits,
     /// What it means.
     pub meaning: &'static str,
+}
+
+/// How much a topic holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Samples a reader that falls behind still gets; then the oldest give way.
+    pub buffer: usize,
+    /// Samples a reader may hold at once.
+    pub borrowed: usize,
+    /// Readers at once, dashboards and loggers among them.
+    pub readers: usize,
+}
+
+impl Limits {
+    /// For topics of one small struct.
+    pub const SMALL: Self = Self {
+        buffer: 128,
+        borrowed: 2,
+        readers: 16,
+    };
+    /// For slices of a whole map.
+    pub const MAP: Self = Self {
+        buffer: 4,
+        borrowed: 2,
+        readers: 12,
+    };
+    /// Writers at once. One is meant; a kill while starting can leak a place for good.
+    pub(crate) const WRITERS: usize = 16;
+    /// Processes at once on one topic.
+    pub(crate) const NODES: usize = 64;
 }
 
 /// A tick is late after this: one and three quarters of a period at 7 Hz.

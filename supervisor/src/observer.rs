@@ -53,6 +53,10 @@ pub(crate) struct Record {
     latencies: BTreeMap<u32, LinkSample>,
     /// The newest counts of each life of the planner: full solves, local updates.
     planners: BTreeMap<u32, (u64, u64)>,
+    /// How long full solves took.
+    pub(crate) full_solves: Histogram,
+    /// How long local updates took.
+    pub(crate) local_updates: Histogram,
     /// The newest belief.
     pub(crate) grid: Replica<u8>,
     /// The newest policy.
@@ -128,7 +132,15 @@ impl Observer {
 impl Record {
     fn take_guidance(&mut self, guidance: GuidanceSample) {
         let counts = (guidance.full_solves, guidance.local_updates);
-        self.planners.insert(guidance.stamp.generation, counts);
+        let before = self.planners.insert(guidance.stamp.generation, counts);
+        let (full, local) = before.unwrap_or_default();
+        // Several in one tick are counted as the last of them.
+        if counts.0 > full {
+            self.full_solves.record(guidance.full_solve_ns);
+        }
+        if counts.1 > local {
+            self.local_updates.record(guidance.local_update_ns);
+        }
         if self.guidance.len() == GUIDANCE_KEPT {
             self.guidance.pop_front();
         }

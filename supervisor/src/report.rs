@@ -2,7 +2,9 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use common::{clock::MissionTime, kinematics::Pose2, mission::Mission, truth::TruthTick};
+use common::{
+    clock::MissionTime, kinematics::Pose2, latency::Histogram, mission::Mission, truth::TruthTick,
+};
 use serde::Serialize;
 
 use crate::observer::Record;
@@ -47,12 +49,22 @@ pub(crate) struct Ending {
     pub(crate) asked_for: bool,
 }
 
-/// Microseconds from the datagram in to the datagram out.
+/// Quantiles of a duration, microseconds; none of nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct TickLatency {
+pub(crate) struct Quantiles {
     p50: Option<f64>,
     p99: Option<f64>,
     max: Option<f64>,
+}
+
+impl From<&Histogram> for Quantiles {
+    fn from(histogram: &Histogram) -> Self {
+        Self {
+            p50: histogram.quantile_us(0.5),
+            p99: histogram.quantile_us(0.99),
+            max: histogram.quantile_us(1.0),
+        }
+    }
 }
 
 /// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the
@@ -72,7 +84,10 @@ pub(crate) struct Summary {
     pub(crate) local_updates: u64,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
-    pub(crate) tick_latency_us: TickLatency,
+    /// From the datagram in to the datagram out.
+    pub(crate) tick_latency_us: Quantiles,
+    pub(crate) full_solve_us: Quantiles,
+    pub(crate) local_update_us: Quantiles,
 }
 
 impl Summary {
@@ -100,7 +115,6 @@ impl Summary {
             arrival.is_some(),
         );
         let (full_solves, local_updates) = record.solves(guidance);
-        let latency = record.latency();
         let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
         let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
@@ -123,11 +137,9 @@ impl Summary {
             local_updates,
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: restarts.collect(),
-            tick_latency_us: TickLatency {
-                p50: latency.quantile_us(0.5),
-                p99: latency.quantile_us(0.99),
-                max: latency.quantile_us(1.0),
-            },
+            tick_latency_us: (&record.latency()).into(),
+            full_solve_us: (&record.full_solves).into(),
+            local_update_us: (&record.local_updates).into(),
         }
     }
 
@@ -145,7 +157,7 @@ impl Summary {
                 self.local_updates,
             ),
             format!(
-                "{} · {} ticks · {}",
+                "tick latency {} · {} ticks · {}",
                 self.tick_latency_us,
                 self.ticks,
                 self.restarted()
@@ -168,16 +180,16 @@ impl Summary {
     }
 }
 
-impl fmt::Display for TickLatency {
+impl fmt::Display for Quantiles {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.p50, self.p99, self.max) {
             (Some(p50), Some(p99), Some(max)) => {
                 write!(
                     f,
-                    "tick latency {p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)"
+                    "{p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)"
                 )
             }
-            _ => f.write_str("no tick was answered"),
+            _ => f.write_str("unknown"),
         }
     }
 }

@@ -8,6 +8,7 @@ use std::{
     },
     sync::mpsc::{Receiver, Sender, channel},
     thread::JoinHandle,
+    time::Instant,
 };
 
 use crate::{Cancellation, Domain, Field, SolveError, Solver, step::Job};
@@ -19,6 +20,8 @@ pub struct Solved {
     pub number: u64,
     /// Its map, and the field of it.
     pub result: Result<(Domain, Field), SolveError>,
+    /// How long it took, nanoseconds of wall-clock.
+    pub took_ns: u64,
 }
 
 /// What the thread is told.
@@ -133,6 +136,7 @@ impl Worker {
             cancellation,
             afresh,
         } = order;
+        let began = Instant::now();
         let last = self.last.take().filter(|_| !afresh);
         let solved = match &last {
             Some(near) => self.solver.solve_near(&domain, near, &cancellation),
@@ -144,6 +148,7 @@ impl Worker {
         Solved {
             number,
             result: solved.map(|field| (domain, field)),
+            took_ns: began.elapsed().as_nanos() as u64,
         }
     }
 }

@@ -143,14 +143,21 @@ impl Shell {
     }
 
     fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
-        let Solved { number, result } = solved;
+        let Solved {
+            number,
+            result,
+            took_ns,
+        } = solved;
         match result {
             Ok((domain, field)) => {
                 let swapped = self
                     .planner
                     .swap_in(number, domain, field)
                     .map_err(no_field)?;
-                self.field_changed |= swapped;
+                if swapped {
+                    self.field_changed = true;
+                    self.full_solve_ns = took_ns;
+                }
                 Ok(swapped)
             }
             Err(SolveError::Cancelled) => Ok(false),
