@@ -22,16 +22,23 @@ use crate::field::{BLOCKED, Field};
 use crate::solver::Verdict;
 
 /// Sides of the windows, cells. The larger ones are for changes that lie apart.
-const SIDES: [usize; 5] = [49, 65, 97, 145, 193];
+const SIDES: [usize; 5] = [48, 64, 96, 128, 192];
 
 /// The largest window tried only because the estimate asks for more: a tick of the robot must not wait for a larger one.
-const LARGEST_GROWN: usize = 97;
+const LARGEST_GROWN: usize = 96;
 
 /// Cells between a change and the rim at least; the first window tried has about this much.
 const MARGIN: usize = 24;
 
 /// Estimates of the directions beyond the rim above this, in radians, make the window grow.
 const ANGLE: f64 = 0.0175;
+
+/// Beyond this many times that, a window half as wide again falls short more often than not: a full solve is advised at
+/// once, if what flows in is known to within [`ROUGH`].
+const HOPELESS: f64 = 4.0;
+
+/// Estimates of the directions upstream above this, in radians, spoil the window itself.
+const ROUGH: f64 = 0.3;
 
 /// Beyond these ratios of u in the wake, after to before, a passage was closed or opened.
 const WAKE: (f64, f64) = (0.02, 50.0);
@@ -166,6 +173,7 @@ impl Repair {
             // A wider window does not open a closed passage, and where the wake fills a hall it does not help either.
             let done = judgement.angle <= ANGLE
                 || judgement.wake.0 < WAKE.0
+                || (judgement.angle > HOPELESS * ANGLE && judgement.upstream < ROUGH)
                 || judgement.angle > 0.7 * angle;
             angle = judgement.angle;
             found = Grown::Solved(index, judgement);

@@ -63,6 +63,8 @@ pub(super) struct Window {
 pub(super) struct Judgement {
     /// Estimate of the angle, in radians, by which directions beyond the rim are off.
     pub angle: f64,
+    /// The same of where u flows in alone. What it is wrong by there it is wrong by in the window, too.
+    pub upstream: f64,
     /// The smallest and the largest ratio of u after to u before on the outflow rim.
     pub wake: (f64, f64),
     /// Cells outside that lead into the window at a place now lower than they are: whether walks from there still get
@@ -143,14 +145,10 @@ impl Window {
             |row| (&self.inverse[inside(row)], &self.after[inside(row)]),
             self.inflow.iter().copied(),
         );
-        let mut settled = false;
-        for cycle in 0..CYCLES {
-            settled = self.levels.cycle(TOLERANCE).unsettled == 0;
-            if settled && cycle > 0 {
-                break;
-            }
-        }
-        self.levels.finish();
+        // The first cycle has no correction yet that could be judged.
+        self.levels.cycle(TOLERANCE);
+        let settled = (1..CYCLES).any(|_| self.levels.settle(TOLERANCE));
+        self.levels.smooth();
         self.levels
             .unload(|row, values| self.after[inside(row)].copy_from_slice(values));
         self.frame(target);
@@ -398,11 +396,12 @@ impl Window {
     fn judge(&self) -> Judgement {
         let mut found = Judgement {
             angle: 0.0,
+            upstream: 0.0,
             wake: (f64::INFINITY, 0.0),
             doubtful: Vec::new(),
         };
         // The largest tangent of an angle; its arc is taken once, at the end.
-        let mut slope = 0.0_f64;
+        let (mut slope, mut upstream) = (0.0_f64, 0.0_f64);
         for &f in &self.rim {
             if self.before[f] <= 0.0 {
                 continue;
@@ -423,11 +422,12 @@ impl Window {
                         found.doubtful.push(self.map_cell(o));
                     }
                 } else {
-                    slope = slope.max((1.0 - ratio).abs() * scale);
+                    upstream = upstream.max((1.0 - ratio).abs() * scale);
                 }
             }
         }
-        found.angle = slope.atan();
+        found.angle = slope.max(upstream).atan();
+        found.upstream = upstream.atan();
         found
     }
 

@@ -26,6 +26,9 @@ const SW: (isize, isize) = (-1, 1);
 const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
+/// Places of a plane up to which it is gone through as one row.
+const SMALL: usize = 1 << 11;
+
 /// Cells of one coarse level.
 #[derive(Debug)]
 pub(super) struct Coarse<R> {
@@ -61,6 +64,19 @@ impl<R: Real> Coarse<R> {
         }
     }
 
+    /// Cells of a plane from its first to its last, margins between rows included: on small levels a plane is gone through
+    /// as if it were one row, because what is done once a row would cost more than the margins do. They stay zero, as
+    /// their diagonals and weights are. The results are the same either way.
+    fn span(&self) -> Option<usize> {
+        let Grid {
+            columns,
+            rows,
+            stride,
+            ..
+        } = self.grid;
+        (rows * stride <= SMALL).then(|| rows.saturating_sub(1) * stride + columns)
+    }
+
     /// Relaxes from a zero guess and restricts the residual to `next`.
     #[inline(always)]
     pub(super) fn descend(&mut self, next: &mut Self) {
@@ -71,6 +87,36 @@ impl<R: Real> Coarse<R> {
             ..
         } = self.grid;
         let mut scratch = std::mem::take(&mut self.scratch);
+        let Scratch {
+            left,
+            beside,
+            own,
+            restricted,
+            ..
+        } = &mut scratch;
+        if let Some(span) = self.span() {
+            let o = self.grid.start(0);
+            self.relax(EE, o, span, []);
+            self.relax(OE, o, span, [W, E]);
+            self.relax(EO, o, span, [N, S, NW, NE, SW, SE]);
+            self.relax(OO, o, span, ALL);
+            let [_, here] = left;
+            for buffer in [&mut *own, &mut *beside, &mut *here] {
+                buffer.resize(self.grid.len(), R::default());
+            }
+            restricted.resize(2 * next.grid.columns, R::default());
+            self.gather(EE, o, ALL, &mut own[o..][..span]);
+            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut beside[o..][..span]);
+            self.gather(EO, o, [W, E], &mut here[o..][..span]);
+            for y in 0..rows {
+                let o = self.grid.start(y);
+                let above = &here[o - stride..][..n];
+                self.restrict_row(y, own, beside, (above, &here[o..][..n]), o, restricted);
+                split_row(&next.grid, &mut next.f, y, restricted);
+            }
+            self.scratch = scratch;
+            return;
+        }
         scratch.reset(&self.grid, &next.grid);
         let Scratch {
             left,
@@ -81,39 +127,57 @@ impl<R: Real> Coarse<R> {
         } = &mut scratch;
         for y in 0..=rows {
             if y < rows {
-                self.relax_row(EE, y, []);
-                self.relax_row(OE, y, [W, E]);
+                let o = self.grid.start(y);
+                self.relax(EE, o, n, []);
+                self.relax(OE, o, n, [W, E]);
             }
             if y == 0 {
                 continue;
             }
             let y = y - 1;
-            self.relax_row(EO, y, [N, S, NW, NE, SW, SE]);
-            self.relax_row(OO, y, ALL);
+            let o = self.grid.start(y);
+            self.relax(EO, o, n, [N, S, NW, NE, SW, SE]);
+            self.relax(OO, o, n, ALL);
 
             left.swap(0, 1);
-            self.gather_row(EE, y, ALL, own);
-            self.gather_row(OE, y, [N, S, NW, NE, SW, SE], beside);
-            self.gather_row(EO, y, [W, E], &mut left[1]);
-            let o = self.grid.start(y);
-            let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
-            let (north, south) = (&self.north[o..][..n], &self.south[o - stride..][..n]);
-            let (b, b_west) = (&beside[MARGIN..][..n], &beside[MARGIN - 1..][..n]);
-            let (h, a, own) = (
-                &left[1][MARGIN..][..n],
-                &left[0][MARGIN..][..n],
-                &own[MARGIN..][..n],
-            );
-            let active = &self.inverse[EE][o..][..n];
-            let out = &mut restricted[..n];
-            for x in 0..n {
-                let around =
-                    (west[x] * b[x] + east[x] * b_west[x]) + (north[x] * h[x] + south[x] * a[x]);
-                out[x] = (active[x].is_active() * own[x] + around).flushed();
-            }
+            self.gather(EE, o, ALL, &mut own[MARGIN..][..n]);
+            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut beside[MARGIN..][..n]);
+            self.gather(EO, o, [W, E], &mut left[1][MARGIN..][..n]);
+            let left = (&left[0][MARGIN..][..n], &left[1][MARGIN..][..n]);
+            self.restrict_row(y, own, beside, left, MARGIN, restricted);
             split_row(&next.grid, &mut next.f, y, restricted);
         }
         self.scratch = scratch;
+    }
+
+    /// What is left on row `y` and around it, as the next level's right-hand side; `at` is where the row starts in `own`
+    /// and `beside`.
+    #[inline(always)]
+    fn restrict_row(
+        &self,
+        y: usize,
+        own: &[R],
+        beside: &[R],
+        (above, here): (&[R], &[R]),
+        at: usize,
+        out: &mut [R],
+    ) {
+        let n = self.grid.columns;
+        let o = self.grid.start(y);
+        let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
+        let (north, south) = (
+            &self.north[o..][..n],
+            &self.south[o - self.grid.stride..][..n],
+        );
+        let (b, b_west) = (&beside[at..][..n], &beside[at - 1..][..n]);
+        let (h, a, own) = (&here[..n], &above[..n], &own[at..][..n]);
+        let active = &self.inverse[EE][o..][..n];
+        let out = &mut out[..n];
+        for x in 0..n {
+            let around =
+                (west[x] * b[x] + east[x] * b_west[x]) + (north[x] * h[x] + south[x] * a[x]);
+            out[x] = (active[x].is_active() * own[x] + around).flushed();
+        }
     }
 
     /// Adds the correction from `next` and relaxes.
@@ -122,9 +186,13 @@ impl<R: Real> Coarse<R> {
         let Grid {
             columns: n, rows, ..
         } = self.grid;
+        let span = self.span();
         let mut scratch = std::mem::take(&mut self.scratch);
-        scratch.reset(&self.grid, &next.grid);
         let Scratch { upper, lower, .. } = &mut scratch;
+        for row in [&mut *upper, &mut *lower] {
+            row.clear();
+            row.resize(2 * next.grid.columns + 2, R::default());
+        }
         join_row(&next.grid, &next.u, 0, upper);
         for y in 0..=rows {
             if y < rows {
@@ -148,67 +216,70 @@ impl<R: Real> Coarse<R> {
                 }
                 std::mem::swap(upper, lower);
             }
-            if y > 0 {
-                self.relax_row(OO, y - 1, ALL);
-                self.relax_row(EO, y - 1, ALL);
-                self.relax_row(OE, y - 1, ALL);
-                self.relax_row(EE, y - 1, ALL);
+            if y > 0 && span.is_none() {
+                let o = self.grid.start(y - 1);
+                for plane in [OO, EO, OE, EE] {
+                    self.relax(plane, o, n, ALL);
+                }
+            }
+        }
+        if let Some(span) = span {
+            for plane in [OO, EO, OE, EE] {
+                self.relax(plane, self.grid.start(0), span, ALL);
             }
         }
         self.scratch = scratch;
     }
 
-    /// u = (f + couplings times u of the neighbours at `steps`) / diagonal, for one row of a plane.
+    /// u = (f + couplings times u of the neighbours at `steps`) / diagonal, for the `n` places of a plane from `o` on.
     #[inline(always)]
-    fn relax_row<const COUNT: usize>(
+    fn relax<const COUNT: usize>(
         &mut self,
         plane: usize,
-        y: usize,
+        o: usize,
+        n: usize,
         steps: [(isize, isize); COUNT],
     ) {
-        let n = self.grid.columns;
-        let o = self.grid.start(y);
         let mut row = std::mem::take(&mut self.u[plane]);
-        let terms = self.terms(plane, o, steps);
+        let terms = self.terms(plane, o, n, steps);
         let f = &self.f[plane][o..][..n];
         let inverse = &self.inverse[plane][o..][..n];
         relax(&mut row[o..][..n], f, inverse, &terms);
         self.u[plane] = row;
     }
 
-    /// The sum of couplings times u over the neighbours at `steps`, for one row of a plane.
+    /// The sum of couplings times u over the neighbours at `steps`, for as many places of a plane from `o` on as `into` has.
     #[inline(always)]
-    fn gather_row<const COUNT: usize>(
+    fn gather<const COUNT: usize>(
         &self,
         plane: usize,
-        y: usize,
+        o: usize,
         steps: [(isize, isize); COUNT],
         into: &mut [R],
     ) {
-        let n = self.grid.columns;
-        let terms = self.terms(plane, self.grid.start(y), steps);
-        gather(&mut into[MARGIN..][..n], &terms);
+        let terms = self.terms(plane, o, into.len(), steps);
+        gather(into, &terms);
     }
 
-    /// For each step, the row of couplings and the row of u of the neighbours there.
+    /// For each step, the couplings and u of the neighbours there.
     #[inline(always)]
     fn terms<const COUNT: usize>(
         &self,
         plane: usize,
         o: usize,
+        n: usize,
         steps: [(isize, isize); COUNT],
     ) -> [(&[R], &[R]); COUNT] {
         // A plain loop: `map` is not always inlined, and this runs for every row.
         let mut terms: [(&[R], &[R]); COUNT] = [(&[], &[]); COUNT];
         for (term, &step) in terms.iter_mut().zip(&steps) {
-            *term = self.term(plane, o, step);
+            *term = self.term(plane, o, n, step);
         }
         terms
     }
 
     #[inline(always)]
-    fn term(&self, plane: usize, o: usize, step: (isize, isize)) -> (&[R], &[R]) {
-        let n = self.grid.columns;
+    fn term(&self, plane: usize, o: usize, n: usize, step: (isize, isize)) -> (&[R], &[R]) {
         let (there, at) = neighbour(&self.grid, plane, o, step);
         let coupling = match step {
             E => &self.coupling[EAST][plane][o..][..n],

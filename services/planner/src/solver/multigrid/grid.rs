@@ -15,7 +15,7 @@ pub(super) const EO: usize = 2;
 /// Odd column, odd row.
 pub(super) const OO: usize = 3;
 
-/// Zeros before each row; one would do, eight keep the rows aligned.
+/// Zeros before the first row; one would do, eight keep the rows aligned.
 pub(super) const MARGIN: usize = 8;
 
 /// One value a cell, by plane.
@@ -44,7 +44,8 @@ impl Grid {
             height,
             columns,
             rows,
-            stride: (columns + 1).next_multiple_of(8) + MARGIN,
+            // At least one zero between rows.
+            stride: (columns + 1).next_multiple_of(8),
         }
     }
 

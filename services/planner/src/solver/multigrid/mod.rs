@@ -235,6 +235,22 @@ impl<R: Real> Multigrid<R> {
     /// One cycle; corrections above `tolerance` times u count as unsettled.
     pub(crate) fn cycle(&mut self, tolerance: f64) -> Progress {
         let progress = self.pass(true, tolerance);
+        self.correct();
+        progress
+    }
+
+    /// As [`cycle`](Self::cycle), and says whether all was settled, in which case nothing more is corrected: for small maps,
+    /// whose coarser levels cost more than the finest. [`smooth`](Self::smooth) instead of [`finish`](Self::finish) ends it.
+    pub(crate) fn settle(&mut self, tolerance: f64) -> bool {
+        let settled = self.pass(true, tolerance).unsettled == 0;
+        if !settled {
+            self.correct();
+        }
+        settled
+    }
+
+    /// Solves on the coarser levels for what the finest one left.
+    fn correct(&mut self) {
         let last = self.coarse.len() - 1;
         for level in 0..last {
             let (fine, next) = self.coarse.split_at_mut(level + 1);
@@ -248,13 +264,17 @@ impl<R: Real> Multigrid<R> {
         for level in (0..last).rev() {
             self.ascend(level);
         }
-        progress
     }
 
     /// Brings the last coarse correction to the finest level, for u to be read, and smoothes what that leaves from cell to
     /// cell: near a saddle point the direction hangs on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
         self.pass(false, 0.0);
+        self.smooth();
+    }
+
+    /// Relaxes without a correction.
+    pub(crate) fn smooth(&mut self) {
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
         }
