@@ -21,7 +21,8 @@ use crate::domain::{Cell, Change, Domain};
 use crate::field::{BLOCKED, Field};
 use crate::solver::Verdict;
 
-/// Sides of the windows, cells. The larger ones are for changes that lie apart.
+/// Widths and heights of the windows, cells. The larger ones are for changes that lie apart.
+/// Halved again and again they keep whole vectors and end in few cells.
 const SIDES: [usize; 5] = [48, 64, 96, 128, 192];
 
 /// The largest window tried only because the estimate asks for more: a tick of the robot must not wait for a larger one.
@@ -75,23 +76,16 @@ impl Repair {
         let mut rects = vec![changed];
         // Patches near the change are undone and solved again together with it; that may bring others near.
         let mut area = changed;
-        let (side, at) = loop {
-            let choice = choose(domain, &area, 0);
-            let Some((side, at)) = choice else {
-                break (0, (0, 0));
-            };
-            let reach = Rect {
-                col: at.0,
-                row: at.1,
-                width: side,
-                height: side,
+        let reach = loop {
+            let Some(reach) = choose(domain, &area, 0) else {
+                break None;
             };
             let patches = field.patches_mut();
             let Some(near) = patches
                 .iter()
                 .position(|patch| patch.rect().touches(&reach))
             else {
-                break (side, at);
+                break Some(reach);
             };
             let patch = patches.swap_remove(near);
             patch.restore(field.store_mut(), width);
@@ -99,14 +93,12 @@ impl Repair {
             rects.push(*patch.changed());
         };
         let small = domain.blocked().len() <= SMALL;
-        if side != 0 && 2 * side * side > domain.blocked().len() {
+        if reach.is_some_and(|reach| too_wide(domain, &reach)) {
             return None;
         }
-        let grown = if side == 0 {
-            Grown::Failed
-        } else {
-            self.grow(domain, field, &area, side, at)
-        };
+        let grown = reach.map_or(Grown::Failed, |reach| {
+            self.grow(domain, field, &area, reach)
+        });
         let (window, judgement) = match grown {
             Grown::Solved(window, judgement) => (window, judgement),
             Grown::TooWide => return None,
@@ -127,7 +119,8 @@ impl Repair {
         let window = &self.windows[window];
         let patch = window.write(domain, field.store_mut(), area);
         field.patches_mut().push(patch);
-        let closed = closed || !gets_ahead(field, judgement.doubtful, 16 * side);
+        let (wide, high) = window.size();
+        let closed = closed || !gets_ahead(field, judgement.doubtful, 16 * wide.max(high));
         Some(if closed {
             Verdict::PassageClosed
         } else if judgement.angle > ANGLE {
@@ -138,27 +131,14 @@ impl Repair {
     }
 
     /// Solves windows of growing side until the estimate is small, or nothing wider can be solved.
-    fn grow(
-        &mut self,
-        domain: &Domain,
-        field: &Field,
-        area: &Rect,
-        side: usize,
-        at: (usize, usize),
-    ) -> Grown {
-        let mut next = Some((side, at));
+    fn grow(&mut self, domain: &Domain, field: &Field, area: &Rect, reach: Rect) -> Grown {
+        let mut next = Some(reach);
         let mut found = Grown::Failed;
         let mut angle = f64::INFINITY;
-        while let Some((side, at)) = next {
-            if 2 * side * side > domain.blocked().len() {
+        while let Some(reach) = next {
+            if too_wide(domain, &reach) {
                 return Grown::TooWide;
             }
-            let reach = Rect {
-                col: at.0,
-                row: at.1,
-                width: side,
-                height: side,
-            };
             if field
                 .patches()
                 .iter()
@@ -166,8 +146,10 @@ impl Repair {
             {
                 break;
             }
-            let index = self.window(side);
-            let Some(judgement) = self.windows[index].solve(domain, field.store(), at, area) else {
+            let index = self.window((reach.width, reach.height));
+            let Some(judgement) =
+                self.windows[index].solve(domain, field.store(), (reach.col, reach.row), area)
+            else {
                 break;
             };
             // A wider window does not open a closed passage, and where the wake fills a hall it does not help either.
@@ -180,16 +162,17 @@ impl Repair {
             if done {
                 break;
             }
-            next = choose(domain, area, side + 1).filter(|&(side, _)| side <= LARGEST_GROWN);
+            next = choose(domain, area, reach.width.min(reach.height) + 1)
+                .filter(|reach| reach.width.max(reach.height) <= LARGEST_GROWN);
         }
         found
     }
 
-    fn window(&mut self, side: usize) -> usize {
-        if let Some(index) = self.windows.iter().position(|window| window.side() == side) {
+    fn window(&mut self, size: (usize, usize)) -> usize {
+        if let Some(index) = self.windows.iter().position(|window| window.size() == size) {
             return index;
         }
-        self.windows.push(Window::new(side));
+        self.windows.push(Window::new(size));
         self.windows.len() - 1
     }
 }
@@ -233,20 +216,29 @@ fn gets_ahead(field: &Field, mut cells: Vec<Cell>, most_steps: usize) -> bool {
     true
 }
 
-/// The smallest window of at least `least` cells that leaves a margin around `area`, and its first cell.
-fn choose(domain: &Domain, area: &Rect, least: usize) -> Option<(usize, (usize, usize))> {
-    let wanted = (area.width.max(area.height) + 2 * MARGIN).max(least);
-    let side = SIDES.into_iter().find(|&side| side >= wanted)?;
+/// Whether a window is more than half of the map.
+fn too_wide(domain: &Domain, reach: &Rect) -> bool {
+    2 * reach.width * reach.height > domain.blocked().len()
+}
+
+/// The smallest window of at least `least` cells either way that leaves a margin around `area`.
+fn choose(domain: &Domain, area: &Rect, least: usize) -> Option<Rect> {
     let place = |start: usize, len: usize, end: usize| {
-        (side <= end).then(|| (start + len / 2).saturating_sub(side / 2).min(end - side))
+        let wanted = (len + 2 * MARGIN).max(least);
+        let side = SIDES.into_iter().find(|&side| side >= wanted)?;
+        (side <= end).then(|| {
+            let first = (start + len / 2).saturating_sub(side / 2).min(end - side);
+            (first, side)
+        })
     };
-    Some((
-        side,
-        (
-            place(area.col, area.width, domain.width())?,
-            place(area.row, area.height, domain.height())?,
-        ),
-    ))
+    let (col, width) = place(area.col, area.width, domain.width())?;
+    let (row, height) = place(area.row, area.height, domain.height())?;
+    Some(Rect {
+        col,
+        row,
+        width,
+        height,
+    })
 }
 
 /// The rectangle around all changes.

@@ -29,10 +29,12 @@ const EXACT: std::ops::RangeInclusive<f32> = 1e-35..=1e35;
 /// The largest relative residual of a repaired window. It holds only until the next full solve.
 const RESIDUAL_LIMIT: f64 = 1e-3;
 
-/// Arrays and levels for windows of one side, kept between updates.
+/// Arrays and levels for windows of one size, kept between updates.
 #[derive(Debug)]
 pub(super) struct Window {
-    side: usize,
+    /// Columns and rows, without the frame.
+    width: usize,
+    height: usize,
     /// Cells of a row, frame included.
     stride: usize,
     levels: Multigrid<f32>,
@@ -73,14 +75,15 @@ pub(super) struct Judgement {
 }
 
 impl Window {
-    pub(super) fn new(side: usize) -> Self {
-        let stride = side + 2;
-        let values = || vec![0.0; stride * stride];
-        let flags = || vec![false; stride * stride];
+    pub(super) fn new((width, height): (usize, usize)) -> Self {
+        let stride = width + 2;
+        let values = || vec![0.0; stride * (height + 2)];
+        let flags = || vec![false; stride * (height + 2)];
         Self {
-            side,
+            width,
+            height,
             stride,
-            levels: Multigrid::new(side, side),
+            levels: Multigrid::new(width, height),
             before: values(),
             after: values(),
             inverse: values(),
@@ -95,14 +98,14 @@ impl Window {
             rect: Rect {
                 col: 0,
                 row: 0,
-                width: side,
-                height: side,
+                width,
+                height,
             },
         }
     }
 
-    pub(super) fn side(&self) -> usize {
-        self.side
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
     }
 
     /// Solves the window at (`col`, `row`) for the map as it is now, `store` holding u as it was and `changed` having
@@ -117,8 +120,8 @@ impl Window {
         self.rect = Rect {
             col,
             row,
-            width: self.side,
-            height: self.side,
+            width: self.width,
+            height: self.height,
         };
         self.read(domain, store, changed);
         self.take();
@@ -139,8 +142,8 @@ impl Window {
             return None;
         }
         self.set_equations(domain, target);
-        let (stride, side) = (self.stride, self.side);
-        let inside = |row: usize| (row + 1) * stride + 1..(row + 1) * stride + 1 + side;
+        let (stride, width) = (self.stride, self.width);
+        let inside = |row: usize| (row + 1) * stride + 1..(row + 1) * stride + 1 + width;
         self.levels.load(
             |row| (&self.inverse[inside(row)], &self.after[inside(row)]),
             self.inflow.iter().copied(),
@@ -152,7 +155,7 @@ impl Window {
         self.levels
             .unload(|row, values| self.after[inside(row)].copy_from_slice(values));
         self.frame(target);
-        let check = check_framed(side, &self.after, &self.shares);
+        let check = check_framed(width, &self.after, &self.shares);
         let right = settled
             && check.stalled == 0
             && check.lost == 0
@@ -162,17 +165,17 @@ impl Window {
 
     /// Writes u of the cells solved for to `store`; returns the patch that remembers what it was.
     pub(super) fn write(&self, domain: &Domain, store: &mut Store, changed: Rect) -> Patch {
-        let mut taken = Vec::with_capacity(self.side * self.side);
-        for row in 1..=self.side {
-            taken.extend_from_slice(&self.taken[row * self.stride + 1..][..self.side]);
+        let mut taken = Vec::with_capacity(self.width * self.height);
+        for row in 1..=self.height {
+            taken.extend_from_slice(&self.taken[row * self.stride + 1..][..self.width]);
         }
         let patch = Patch::of(self.rect, changed, taken, store, domain.width());
-        for row in 0..self.side {
+        for row in 0..self.height {
             let start = (row + 1) * self.stride + 1;
             let first = (self.rect.row + row) * domain.width() + self.rect.col;
             store.set_row(
                 first,
-                &self.after[start..][..self.side],
+                &self.after[start..][..self.width],
                 self.reference,
                 &self.taken[start..],
             );
@@ -211,9 +214,9 @@ impl Window {
 
         // The frame may lie one cell outside the map.
         let first = self.rect.col.saturating_sub(1);
-        let end = (self.rect.col + self.side + 1).min(width);
+        let end = (self.rect.col + self.width + 1).min(width);
         let at = first + 1 - self.rect.col;
-        for framed_row in 0..self.stride {
+        for framed_row in 0..self.height + 2 {
             let start = framed_row * self.stride;
             let before = &mut self.before[start..][..self.stride];
             let blocked = &mut self.blocked[start..][..self.stride];
@@ -230,12 +233,12 @@ impl Window {
 
     /// Decides which cells to solve for, and finds the rim.
     fn take(&mut self) {
-        let (side, stride) = (self.side, self.stride);
+        let (width, height, stride) = (self.width, self.height, self.stride);
         self.taken.fill(false);
         let mut whole = true;
-        for row in 1..=side {
+        for row in 1..=height {
             let start = row * stride + 1;
-            for (taken, &u) in self.taken[start..start + side]
+            for (taken, &u) in self.taken[start..start + width]
                 .iter_mut()
                 .zip(&self.before[start..])
             {
@@ -244,14 +247,14 @@ impl Window {
             }
         }
         self.rim.clear();
-        for row in 1..=side {
+        for row in 1..=height {
             // Where all of the window is solved for, the rim is its border.
-            let step = if whole && row > 1 && row < side {
-                side - 1
+            let step = if whole && row > 1 && row < height {
+                width - 1
             } else {
                 1
             };
-            for col in (1..=side).step_by(step.max(1)) {
+            for col in (1..=width).step_by(step.max(1)) {
                 let f = row * stride + col;
                 if self.taken[f] && !self.blocked[f] && self.outside(f).next().is_some() {
                     self.rim.push(f);
@@ -305,10 +308,10 @@ impl Window {
     }
 
     fn set_equations(&mut self, domain: &Domain, target: Option<usize>) {
-        let (side, stride) = (self.side, self.stride);
-        for row in 0..side {
+        let (width, stride) = (self.width, self.stride);
+        for row in 0..self.height {
             let start = (row + 1) * stride + 1;
-            let shares = &mut self.shares[start..][..side];
+            let shares = &mut self.shares[start..][..width];
             match domain.absorption() {
                 Absorption::Uniform(k) => shares.fill((0.25 / (1.0 + k)) as f32),
                 Absorption::PerCell(cells) => {
@@ -319,11 +322,11 @@ impl Window {
                 }
             }
             let (inverse, guess) = (
-                &mut self.inverse[start..][..side],
-                &mut self.after[start..][..side],
+                &mut self.inverse[start..][..width],
+                &mut self.after[start..][..width],
             );
-            let (before, fed) = (&self.before[start..][..side], &self.fed[start..][..side]);
-            for x in 0..side {
+            let (before, fed) = (&self.before[start..][..width], &self.fed[start..][..width]);
+            for x in 0..width {
                 inverse[x] = if fed[x] { shares[x] } else { 0.0 };
                 guess[x] = if fed[x] { before[x] } else { 0.0 };
             }
