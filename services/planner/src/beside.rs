@@ -13,6 +13,9 @@ use std::{
 
 use crate::{Cancellation, Domain, Field, SolveError, Solver, step::Job};
 
+/// How much the thread gives way.
+const NICE: i32 = 10;
+
 /// What became of a job.
 #[derive(Debug)]
 pub struct Solved {
@@ -58,6 +61,8 @@ impl BesideSolver {
         // A full pipe has rung already.
         ring.set_nonblocking(true)?;
         let work = move || {
+            // The stages that answer the robot's ticks go first. Where that is refused they share.
+            let _ = rustix::process::nice(NICE);
             let mut worker = Worker::default();
             for order in taken {
                 if give.send(worker.solve(order)).is_err() {

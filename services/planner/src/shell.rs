@@ -91,10 +91,12 @@ impl Process for Shell {
                 time: grid.stamp.time(),
             };
         }
-        let swapped = self.tend_beside()?;
+        let swapped = self.swap_in_what_is_due()?;
         if grid.is_some() || swapped && !self.in_ticks {
             self.answer()?;
         }
+        // The robot has its guidance; the rest can wait for it.
+        self.begin_beside();
         self.tell_field()?;
         Ok(self.progress)
     }
@@ -106,8 +108,8 @@ fn no_field(error: SolveError) -> StageError {
 }
 
 impl Shell {
-    /// Begin and swap in full solves beside the live field. Says whether one was swapped in.
-    fn tend_beside(&mut self) -> Result<bool, StageError> {
+    /// Swap in the full solves that ran beside the live field. Says whether there was one.
+    fn swap_in_what_is_due(&mut self) -> Result<bool, StageError> {
         let tick = self.progress.tick;
         let mut swapped = false;
         if self.planner.beside().is_none() {
@@ -128,18 +130,23 @@ impl Shell {
                 }
             }
         }
-        if let Some(job) = self.planner.begin_beside() {
-            tracing::debug!(
-                number = job.number,
-                urgent = job.urgent,
-                "full solve begins"
-            );
-            // A robot that waits for it waits no longer than it must.
-            let after = if job.urgent { 1 } else { SWAP_AFTER_TICKS };
-            self.swap_at = Some(tick + after);
-            self.beside.begin(job);
-        }
         Ok(swapped)
+    }
+
+    /// Begin the full solve that is called for, if one is.
+    fn begin_beside(&mut self) {
+        let Some(job) = self.planner.begin_beside() else {
+            return;
+        };
+        tracing::debug!(
+            number = job.number,
+            urgent = job.urgent,
+            "full solve begins"
+        );
+        // A robot that waits for it waits no longer than it must.
+        let after = if job.urgent { 1 } else { SWAP_AFTER_TICKS };
+        self.swap_at = Some(self.progress.tick + after);
+        self.beside.begin(job);
     }
 
     fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
