@@ -324,13 +324,25 @@ mod tests {
     use std::path::Path;
 
     fn mission() -> Mission {
-        let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }";
-        Mission::parse(text, Path::new("test.toml")).unwrap()
+        mission_of(40)
+    }
+
+    /// A perimeter of 4 m in so many cells a side.
+    fn mission_of(cells: u32) -> Mission {
+        let text = format!("target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = {cells} }}");
+        Mission::parse(&text, Path::new("test.toml")).unwrap()
     }
 
     /// A keyframe with the perimeter, and `hazard` where it says so.
     fn keyframe(version: u64, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
-        let frame = mission().grid_frame();
+        keyframe_of(mission().grid_frame(), version, hazard)
+    }
+
+    fn keyframe_of(
+        frame: GridFrame,
+        version: u64,
+        hazard: impl Fn(DVec2) -> bool,
+    ) -> (GridHeader, Vec<u8>) {
         let cells = (0..frame.area() as u32).map(|index| {
             let cell = common::grid::Cell {
                 col: index % frame.cells,
@@ -440,31 +452,14 @@ mod tests {
 
     /// A room of 200 x 200 cells with a wall across it and a door in the wall.
     fn large_room(version: u64, door_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
-        let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 200 }";
-        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
-        let frame = mission.grid_frame();
-        let cells = (0..frame.area() as u32).map(|index| {
-            let cell = common::grid::Cell {
-                col: index % frame.cells,
-                row: index / frame.cells,
-            };
-            let at = frame.centre_of(cell);
+        let mission = mission_of(200);
+        let hazard = |at: DVec2| {
             let wall = (at.x - 0.8).abs() < 0.03;
             let far_door = (1.0..1.4).contains(&at.y);
             let near_door = !door_closed && at.y.abs() < 0.2;
-            u8::from(frame.is_rim(cell) || wall && !far_door && !near_door)
-        });
-        let header = GridHeader {
-            part: Revision {
-                frame,
-                window: frame.whole(),
-                version,
-                keyframe: true,
-            }
-            .into(),
-            ..GridHeader::default()
+            wall && !far_door && !near_door
         };
-        let cells = cells.collect();
+        let (header, cells) = keyframe_of(mission.grid_frame(), version, hazard);
         (mission, header, cells)
     }
 
