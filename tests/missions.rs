@@ -99,7 +99,7 @@ fn a_target_behind_closed_walls_is_called_unreachable() {
         "--set",
         "timeout_s=900",
         "--set",
-        "mapper.margin_cells=3",
+        "mapper.margin_m=0.35",
     ];
     let (code, summary) = run("walled", "open-room", &arguments);
     assert_eq!(

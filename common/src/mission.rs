@@ -125,8 +125,8 @@ pub enum Integration {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mapper {
-    /// Im of (19): cells around a hit that are marked with it.
-    pub margin_cells: u32,
+    /// How far around a hit cells are marked with it, metres: [`Mission::margin_cells`] is Im of (19).
+    pub margin_m: f64,
     /// Hits farther than this are no safety event yet, metres.
     pub map_within_m: f64,
 }
@@ -135,8 +135,10 @@ pub struct Mapper {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
-    /// k: u = mean of the neighbours / (1 + k). 0 is exactly (11).
-    pub absorption: f64,
+    /// How far a random walk gets before it dies, metres: lambda of laplacian u = u / lambda^2. Without
+    /// it no walk dies, which is exactly (11).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub screening_m: Option<f64>,
 }
 
 /// How guidance becomes wheel speeds, (14)-(17).
@@ -180,7 +182,7 @@ impl Default for Perimeter {
 impl Default for Mapper {
     fn default() -> Self {
         Self {
-            margin_cells: 2,
+            margin_m: 0.25,
             map_within_m: 1.0,
         }
     }
@@ -229,6 +231,24 @@ impl Mission {
         }
     }
 
+    /// Im of (19): the least number of cells around a hit's own that covers the margin, however fine the
+    /// grid is.
+    #[must_use]
+    pub fn margin_cells(&self) -> u32 {
+        // The hit's own cell covers half a cell; what rounding adds is no further cell.
+        let cells = self.mapper.margin_m / self.grid_frame().resolution_m - 0.5;
+        (cells - 1e-6).ceil().max(0.0) as u32
+    }
+
+    /// k of u = mean of the neighbours / (1 + k): what `planner.screening_m` comes to on this grid, from
+    /// the five-point Laplacian; 0 is exactly (11).
+    #[must_use]
+    pub fn absorption(&self) -> f64 {
+        let resolution = self.grid_frame().resolution_m;
+        let per_cell = |lambda: f64| (resolution / (2.0 * lambda)).powi(2);
+        self.planner.screening_m.map_or(0.0, per_cell)
+    }
+
     /// The pose at mission time 0.
     #[must_use]
     pub fn start_pose(&self) -> Pose2 {
@@ -257,4 +277,40 @@ fn read_bounded(path: &Path) -> io::Result<String> {
         return Err(io::Error::other(format!("it is {MAX_BYTES} bytes or more")));
     }
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_cells(cells: u32) -> Mission {
+        let text = format!(
+            "target = [1, 0]\nperimeter = {{ width_m = 10, cells = {cells} }}\n\
+             mapper = {{ margin_m = 0.25 }}\nplanner = {{ screening_m = 0.5 }}"
+        );
+        Mission::parse(&text, Path::new("test.toml")).unwrap()
+    }
+
+    #[test]
+    fn a_margin_in_metres_is_covered_on_any_grid_and_by_no_cell_more() {
+        for (cells, margin) in [(10, 0), (100, 2), (200, 5), (1000, 25)] {
+            assert_eq!(with_cells(cells).margin_cells(), margin, "{cells} cells");
+        }
+    }
+
+    #[test]
+    fn a_walk_dies_after_the_same_metres_on_any_grid() {
+        // u falls by exp(-1) in a length of lambda: 1 + 2 k = cosh(delta / lambda), nearly.
+        for cells in [200, 1000] {
+            let delta = 10.0 / f64::from(cells);
+            let decay = (1.0 + 2.0 * with_cells(cells).absorption()).acosh() / delta;
+            assert!((decay * 0.5 - 1.0).abs() < 1e-3, "{decay} a metre");
+        }
+        assert_eq!(
+            Mission::parse("target = [1, 0]", Path::new("test.toml"))
+                .unwrap()
+                .absorption(),
+            0.0
+        );
+    }
 }

@@ -384,22 +384,17 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         0.04..=2.54,
         "m",
     )?;
+    let perimeter = &mission.perimeter;
     within(
-        "planner.absorption",
-        mission.planner.absorption,
-        0.0..=10.0,
-        "",
+        "mapper.margin_m",
+        mission.mapper.margin_m,
+        0.0..=perimeter.width_m / 4.0,
+        "m",
     )?;
-    let margin = mission.mapper.margin_cells;
-    if margin > mission.perimeter.cells / 4 {
-        return Err(objection(
-            "mapper.margin_cells",
-            format!(
-                "a margin of {margin} cells fills a map of {}",
-                mission.perimeter.cells
-            ),
-            format!("give 0 to {}", mission.perimeter.cells / 4),
-        ));
+    if let Some(screening) = mission.planner.screening_m {
+        // Shorter than that it would not be resolved by the grid.
+        let least = mission.grid_frame().resolution_m / 2.0;
+        within("planner.screening_m", screening, least..=1e6, "m")?;
     }
     Ok(())
 }

@@ -77,7 +77,7 @@ impl Mapper {
         let mut mapper = Self {
             frame,
             target: frame.cell_at(mission.target),
-            margin: i64::from(mission.mapper.margin_cells),
+            margin: i64::from(mission.margin_cells()),
             map_within: mission.mapper.map_within_m,
             sensor_forward: mission.sonar.forward_m,
             sensor_bearing: mission.sonar.bearing_deg.to_radians(),
@@ -232,7 +232,7 @@ mod tests {
     fn mapper(extra: &str) -> Mapper {
         let text = format!(
             "target = [1.5, 0.0]\nperimeter = {{ width_m = 5, cells = 50 }}\n\
-             sonar = {{ forward_m = 0.2 }}\nmapper = {{ margin_cells = 1, map_within_m = 2.0 }}\n{extra}"
+             sonar = {{ forward_m = 0.2 }}\nmapper = {{ margin_m = 0.15, map_within_m = 2.0 }}\n{extra}"
         );
         Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
     }

@@ -83,7 +83,7 @@ impl Planner {
     pub fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
-            absorption: mission.planner.absorption,
+            absorption: mission.absorption(),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),

@@ -56,7 +56,7 @@ fn mission(cells: u32) -> Mission {
         "name = 'three-drums'
         target = [4.4, 1.2]
         [mapper]
-        margin_cells = 0
+        margin_m = 0
         [perimeter]
         width_m = 9
         cells = {cells}
