@@ -157,7 +157,10 @@ impl Checkpoint {
     }
 }
 
-fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> CheckpointError {
+pub(crate) fn failed(
+    action: &'static str,
+    path: &Path,
+) -> impl FnOnce(io::Error) -> CheckpointError {
     let file = path.to_path_buf();
     move |source| CheckpointError::File {
         action,

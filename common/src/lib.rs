@@ -27,6 +27,7 @@ pub mod clock;
 pub mod domain;
 pub mod geometry;
 pub mod grid;
+pub mod journal;
 pub mod kinematics;
 pub mod latency;
 pub mod mission;

@@ -11,6 +11,7 @@
 
 use crate::bus::ZeroCopySend;
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     clock::MissionTime,
@@ -20,7 +21,7 @@ use crate::{
 };
 
 /// Which sample this is, who wrote it and when: the first field of every payload and header.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.Stamp")]
 #[repr(C)]
 pub struct Stamp {
@@ -118,7 +119,7 @@ wire_enum! {
 }
 
 /// Topic `range`: the front sonar.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.Range")]
 #[repr(C)]
 pub struct RangeSample {
@@ -150,7 +151,7 @@ pub struct WheelSample {
 }
 
 /// Topic `pose`: where dead reckoning believes the robot is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.Pose")]
 #[repr(C)]
 pub struct PoseSample {

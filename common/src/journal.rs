@@ -1,0 +1,287 @@
+//! A large state that outlives a SIGKILL: a snapshot now and then, and what happened since.
+//!
+//! The state is the fold of its entries. An entry is appended when it happens, which takes the time of a
+//! small write however large the state is; a life that begins takes the snapshot and folds into it what
+//! came after. An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an
+//! append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
+//! leaves entries that the snapshot holds already, which their numbers tell.
+
+use std::{
+    fs::{File, OpenOptions},
+    os::unix::fs::FileExt,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::checkpoint::{Checkpoint, CheckpointError, failed};
+
+/// Entries after which a snapshot is due: folding so many takes a new life a few milliseconds.
+const SNAPSHOT_AFTER: u64 = 512;
+/// number u64, length u32, crc32 u32.
+const HEADER: usize = 16;
+/// No entry is longer, bytes.
+const LONGEST: usize = 4096;
+/// What a snapshot takes besides the state.
+const NUMBER: usize = 10;
+
+/// The snapshot and the journal of one stage.
+#[derive(Debug)]
+pub struct Journal {
+    snapshots: Checkpoint,
+    file: File,
+    path: PathBuf,
+    /// Where the next entry goes.
+    end: u64,
+    /// The next entry's number.
+    number: u64,
+    /// The number of the first entry that the snapshot does not hold.
+    first: u64,
+}
+
+/// What an earlier life left.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Kept<S, E> {
+    /// The last snapshot.
+    pub state: Option<S>,
+    /// What happened after it, oldest first.
+    pub entries: Vec<E>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Snapshot<S> {
+    /// The number of the first entry it does not hold.
+    next: u64,
+    state: S,
+}
+
+impl Journal {
+    /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the
+    /// journal beside it.
+    ///
+    /// # Errors
+    /// When a file can be neither read nor made.
+    pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
+        path: &Path,
+        capacity: usize,
+    ) -> Result<(Self, Kept<S, E>), CheckpointError> {
+        let (snapshots, snapshot) = Checkpoint::open::<Snapshot<S>>(path, capacity + NUMBER)?;
+        let path = path.with_extension("journal");
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(failed("open", &path))?;
+        let (first, state) = match snapshot {
+            Some(Snapshot { next, state }) => (next, Some(state)),
+            None => (0, None),
+        };
+        let mut journal = Self {
+            snapshots,
+            file,
+            path,
+            end: 0,
+            number: first,
+            first,
+        };
+        let entries = journal.read()?;
+        Ok((journal, Kept { state, entries }))
+    }
+
+    /// The entries after the snapshot; whatever follows the last whole one is cut off.
+    fn read<E: DeserializeOwned>(&mut self) -> Result<Vec<E>, CheckpointError> {
+        let bytes = std::fs::read(&self.path).map_err(failed("read", &self.path))?;
+        let mut entries = Vec::new();
+        let mut rest = &bytes[..];
+        while let Some((number, body, after)) = entry(rest) {
+            // The snapshot holds those before; after a gap nothing can be folded.
+            if number == self.number {
+                let Ok(entry) = postcard::from_bytes(body) else {
+                    break;
+                };
+                entries.push(entry);
+                self.number += 1;
+            } else if number > self.number {
+                break;
+            }
+            rest = after;
+        }
+        self.end = (bytes.len() - rest.len()) as u64;
+        self.cut()?;
+        Ok(entries)
+    }
+
+    fn cut(&self) -> Result<(), CheckpointError> {
+        let cut = self.file.set_len(self.end);
+        cut.map_err(failed("shorten", &self.path))
+    }
+
+    /// Note what happened.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
+        let header = vec![0; HEADER];
+        let mut bytes =
+            postcard::to_extend(entry, header).map_err(|source| CheckpointError::Encode {
+                file: self.path.clone(),
+                source,
+            })?;
+        let length = bytes.len() - HEADER;
+        if length > LONGEST {
+            return Err(CheckpointError::TooLarge {
+                file: self.path.clone(),
+                capacity: LONGEST,
+                length,
+            });
+        }
+        bytes[..8].copy_from_slice(&self.number.to_le_bytes());
+        bytes[8..12].copy_from_slice(&(length as u32).to_le_bytes());
+        let crc = checksum(&bytes);
+        bytes[12..16].copy_from_slice(&crc.to_le_bytes());
+        self.file
+            .write_all_at(&bytes, self.end)
+            .map_err(failed("write", &self.path))?;
+        self.end += bytes.len() as u64;
+        self.number += 1;
+        Ok(())
+    }
+
+    /// Whether so much happened since the last snapshot that one is due. It takes the time of writing the
+    /// whole state: at a moment when nobody waits.
+    #[must_use]
+    pub const fn is_long(&self) -> bool {
+        self.number - self.first >= SNAPSHOT_AFTER
+    }
+
+    /// Keep `state`, into which every entry so far is folded, and forget the entries.
+    ///
+    /// # Errors
+    /// When the file system refuses, or the state is larger than was said at opening.
+    pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
+        self.snapshots.save(&Snapshot {
+            next: self.number,
+            state,
+        })?;
+        self.first = self.number;
+        self.end = 0;
+        self.cut()
+    }
+}
+
+/// The first entry of `bytes`: its number, its body, and what comes after. None when it is not whole.
+fn entry(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
+    let number = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
+    let length = u32::from_le_bytes(bytes.get(8..12)?.try_into().ok()?) as usize;
+    let crc = u32::from_le_bytes(bytes.get(12..16)?.try_into().ok()?);
+    if length > LONGEST {
+        return None;
+    }
+    let (whole, after) = bytes.split_at_checked(HEADER + length)?;
+    (checksum(whole) == crc).then(|| (number, &whole[HEADER..], after))
+}
+
+/// Over everything but the checksum itself.
+fn checksum(bytes: &[u8]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&bytes[..12]);
+    hasher.update(&bytes[HEADER..]);
+    hasher.finalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Sum = u64;
+
+    fn open(path: &Path) -> (Journal, Kept<Sum, u64>) {
+        Journal::open(path, 64).unwrap()
+    }
+
+    /// The state as a new life sees it.
+    fn folded(path: &Path) -> Sum {
+        let kept = open(path).1;
+        kept.state.unwrap_or_default() + kept.entries.iter().sum::<u64>()
+    }
+
+    #[test]
+    fn a_new_life_folds_what_happened_into_the_snapshot() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        let mut sum = 0;
+        for life in 0..5 {
+            let (mut journal, _) = open(&path);
+            for entry in 1..=3 {
+                journal.append(&entry).unwrap();
+                sum += entry;
+                if life == 2 && entry == 2 {
+                    journal.snapshot(&sum).unwrap();
+                }
+            }
+            assert_eq!(folded(&path), sum, "life {life}");
+        }
+    }
+
+    #[test]
+    fn an_append_cut_after_any_byte_loses_that_entry_at_most() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        let file = path.with_extension("journal");
+        let (mut journal, _) = open(&path);
+        journal.append(&100_u64).unwrap();
+        let before = std::fs::read(&file).unwrap().len();
+        journal.append(&200_u64).unwrap();
+        let whole = std::fs::read(&file).unwrap();
+        for cut in before..=whole.len() {
+            std::fs::write(&file, &whole[..cut]).unwrap();
+            let mut sum = if cut == whole.len() { 300 } else { 100 };
+            assert_eq!(folded(&path), sum, "cut at {cut}");
+            // The next life writes over the torn tail.
+            open(&path).0.append(&7_u64).unwrap();
+            sum += 7;
+            assert_eq!(folded(&path), sum, "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn entries_the_snapshot_holds_are_not_folded_twice() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        let file = path.with_extension("journal");
+        let (mut journal, _) = open(&path);
+        for entry in 1..=4_u64 {
+            journal.append(&entry).unwrap();
+        }
+        let full = std::fs::read(&file).unwrap();
+        journal.snapshot(&10_u64).unwrap();
+        // Killed before the journal was emptied.
+        std::fs::write(&file, &full).unwrap();
+        assert_eq!(folded(&path), 10);
+        open(&path).0.append(&5_u64).unwrap();
+        assert_eq!(folded(&path), 15);
+    }
+
+    #[test]
+    fn a_snapshot_is_due_after_so_many_entries_and_not_before() {
+        let directory = tempfile::tempdir().unwrap();
+        let (mut journal, _) = open(&directory.path().join("map.checkpoint"));
+        for entry in 0..SNAPSHOT_AFTER {
+            assert!(!journal.is_long(), "after {entry}");
+            journal.append(&entry).unwrap();
+        }
+        assert!(journal.is_long());
+        journal.snapshot(&0_u64).unwrap();
+        assert!(!journal.is_long());
+    }
+
+    #[test]
+    fn a_journal_of_noise_is_no_entry() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        std::fs::write(path.with_extension("journal"), [0xA5; 300]).unwrap();
+        assert_eq!(folded(&path), 0);
+    }
+}
