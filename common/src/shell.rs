@@ -9,7 +9,7 @@ use thiserror::Error;
 use crate::{
     bus::{Bus, BusError, Writer},
     checkpoint::CheckpointError,
-    clock::{MissionTime, monotonic_ns},
+    clock::{MissionClock, MissionTime, monotonic_ns},
     domain::Domain,
     run::{Run, RunError},
     samples::{HealthSample, HealthState, name},
@@ -21,6 +21,9 @@ use crate::{
 /// How often a stage beats, and the longest it waits: a tenth of the tightest deadline set on beats,
 /// and a hundredth of a percent of a core.
 pub const BEAT: Duration = Duration::from_millis(20);
+
+/// On a wall clock, quiet of this length means that the tick is over: it takes a tenth of that.
+const LULL: Duration = Duration::from_millis(5);
 
 /// Which life of which stage this process is.
 #[derive(Clone, Debug)]
@@ -108,6 +111,16 @@ pub trait Process: Sized {
     /// When the stage cannot go on; it will be restarted.
     fn turn(&mut self) -> Result<Progress, StageError>;
 
+    /// Do what nobody waits for: a map told whole again, a snapshot. The scheduler may let a stage that
+    /// goes on computing keep the processor from the one it has just woken, so on a wall clock this waits
+    /// for a lull; on a clock of ticks, where ticks follow each other without one, it comes after each turn.
+    ///
+    /// # Errors
+    /// When the stage cannot go on; it will be restarted.
+    fn idle(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+
     /// Say goodbye.
     ///
     /// # Errors
@@ -141,9 +154,8 @@ pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
         waiter,
     };
     let mut process = P::open(&mut context)?;
-    let waiter = &context.waiter;
     tracing::info!(generation = life.generation, "ready");
-    let worked = work(&mut process, &mut heart, waiter, &mut terminated);
+    let worked = work(&mut process, &mut heart, &context, &mut terminated);
     // Whatever went wrong, goodbye is said: the link's stops the robot.
     let stopped = process.stop();
     tracing::info!("stopped");
@@ -153,14 +165,20 @@ pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
 fn work(
     process: &mut impl Process,
     heart: &mut Heart,
-    waiter: &Waiter,
+    context: &Context,
     terminated: &mut Signals,
 ) -> Result<(), StageError> {
+    let without_lulls = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
+    let mut busy = true;
     while !terminated.came() {
-        waiter.wait(BEAT)?;
+        let came = context.waiter.wait(if busy { LULL } else { BEAT })?;
         progress = process.turn()?;
+        if without_lulls || busy && !came {
+            process.idle()?;
+        }
+        busy = came;
         heart.beat_if_due(progress)?;
     }
     heart.beat(HealthState::Stopping, progress)

@@ -35,11 +35,12 @@ impl Waiter {
         Ok(())
     }
 
-    /// Wait until something rings, is readable, or `timeout` has passed; silences the alarms.
+    /// Wait until something rings, is readable, or `timeout` has passed; silences the alarms. Says whether
+    /// anything came.
     ///
     /// # Errors
     /// When the system refuses to wait.
-    pub fn wait(&self, timeout: Duration) -> Result<(), BusError> {
+    pub fn wait(&self, timeout: Duration) -> Result<bool, BusError> {
         self.wait_also_for(&[], timeout)
     }
 
@@ -51,7 +52,7 @@ impl Waiter {
         &self,
         others: &[BorrowedFd<'_>],
         timeout: Duration,
-    ) -> Result<(), BusError> {
+    ) -> Result<bool, BusError> {
         let alarms = self.alarms.iter().map(AsFd::as_fd);
         let own = self.descriptors.iter().map(AsFd::as_fd);
         let mut polled: Vec<PollFd<'_>> = alarms
@@ -60,11 +61,12 @@ impl Waiter {
             .map(|descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
             .collect();
         let timeout = Timespec::try_from(timeout).ok();
-        match poll(&mut polled, timeout.as_ref()) {
+        let came = match poll(&mut polled, timeout.as_ref()) {
+            Ok(ready) => ready > 0,
             // A signal that interrupts has also written to the signal pipe.
-            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            Err(rustix::io::Errno::INTR) => true,
             Err(error) => return Err(BusError::Wait(error.into())),
-        }
+        };
         let rang: Vec<bool> = polled
             .iter()
             .take(self.alarms.len())
@@ -75,6 +77,6 @@ impl Waiter {
                 alarm.silence()?;
             }
         }
-        Ok(())
+        Ok(came)
     }
 }

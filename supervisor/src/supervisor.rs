@@ -254,7 +254,7 @@ impl<'a> Supervisor<'a> {
         {
             return Ok(Some(fault("the simulated robot ended; see x80-sim.log")));
         }
-        if self.order == Order::Hold && self.fleet.all_running() && self.robot_answers() {
+        if self.order == Order::Hold && self.fleet.all_running() && self.can_drive() {
             tracing::info!("all stages ready: drive");
             self.order = Order::Drive;
             self.progressed = (None, Instant::now());
@@ -263,6 +263,11 @@ impl<'a> Supervisor<'a> {
             self.restate()?;
         }
         self.judge()
+    }
+
+    /// Whether the robot answers, and there is a field to follow: the first tick should not wait for it.
+    fn can_drive(&self) -> bool {
+        self.robot_answers() && self.observer.record.field.frame().is_some()
     }
 
     fn robot_answers(&self) -> bool {
@@ -307,7 +312,7 @@ impl<'a> Supervisor<'a> {
             }));
         }
         if self.makes_no_progress() {
-            let reason = if self.order == Order::Hold && self.fleet.all_running() {
+            let reason = if self.order == Order::Hold && !self.robot_answers() {
                 let address = self.address;
                 format!("no robot answers at {address}; is it on, is robot.address right?")
             } else {

@@ -5,18 +5,37 @@ use std::time::Duration;
 
 use common::{
     bus::{Reader, SliceWriter},
-    checkpoint::Checkpoint,
     clock::MissionTime,
     grid::{Revision, Window},
+    journal::Journal,
     samples::{DirectiveSample, GridHeader, PoseSample, RangeSample},
     shell::{Context, Process, Progress, StageError},
     topics,
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::step::{Belief, Mapper};
 
 /// Mission time after which the whole map is said again.
 const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
+
+/// What a belief is made of; a new life makes it again.
+#[derive(Debug, Serialize, Deserialize)]
+enum Event {
+    /// A tick was mapped.
+    Tick {
+        /// Where the robot was.
+        pose: PoseSample,
+        /// What it heard.
+        range: Option<RangeSample>,
+    },
+    /// What was sensed was forgotten.
+    Forget {
+        /// The epoch that began.
+        epoch: u64,
+    },
+}
 
 /// The mapper process.
 #[derive(Debug)]
@@ -25,7 +44,7 @@ pub struct Shell {
     range: Reader<RangeSample>,
     directive: Reader<DirectiveSample>,
     grid: SliceWriter<GridHeader, u8>,
-    checkpoint: Checkpoint,
+    journal: Journal,
     mapper: Mapper,
     latest_range: Option<RangeSample>,
     last_keyframe: Option<MissionTime>,
@@ -36,14 +55,23 @@ impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let mut mapper = Mapper::new(&context.run.mission);
         let capacity = mapper.frame().area() + 64;
-        let (checkpoint, kept) = Checkpoint::open::<Belief>(&context.checkpoint_file(), capacity)?;
-        if let Some(belief) = kept {
-            let version = belief.version();
-            if mapper.restore(belief) {
-                tracing::info!(version, "belief restored");
-            } else {
-                tracing::warn!("the kept belief is of another map; starting from the perimeter");
+        let (journal, kept) = Journal::open::<Belief, Event>(&context.checkpoint_file(), capacity)?;
+        if kept.state.is_some_and(|belief| !mapper.restore(belief)) {
+            tracing::warn!("the kept belief is of another map; starting from the perimeter");
+        }
+        for event in &kept.entries {
+            match event {
+                Event::Tick { pose, range } => {
+                    mapper.step(pose, range.as_ref());
+                }
+                Event::Forget { epoch } => {
+                    mapper.forget(*epoch);
+                }
             }
+        }
+        let version = mapper.belief().version();
+        if version > 1 {
+            tracing::info!(version, "belief restored");
         }
         context.waiter.on(context.bus.alarm(&topics::POSE)?);
         context.waiter.on(context.bus.alarm(&topics::DIRECTIVE)?);
@@ -55,7 +83,7 @@ impl Process for Shell {
             grid: context
                 .bus
                 .slice_writer(&topics::GRID, generation, mapper.frame().area())?,
-            checkpoint,
+            journal,
             mapper,
             latest_range: None,
             last_keyframe: None,
@@ -65,7 +93,6 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        let mut told = false;
         while let Some(pose) = self.pose.take()? {
             let range = self.range_of(pose.stamp.tick)?;
             let changed = self.mapper.step(&pose, range.as_ref());
@@ -73,22 +100,33 @@ impl Process for Shell {
                 tick: pose.stamp.tick,
                 time: pose.stamp.time(),
             };
-            if changed.area() > 0 {
-                self.checkpoint.save(self.mapper.belief())?;
-            }
-            self.publish(changed)?;
-            told = true;
+            self.journal.append(&Event::Tick { pose, range })?;
+            self.send(changed, false)?;
         }
         if let Some(directive) = self.directive.newest()?
             && self.mapper.forget(directive.epoch)
         {
             tracing::warn!(epoch = directive.epoch, "sensed belief reset");
-            self.checkpoint.save(self.mapper.belief())?;
-            self.publish_keyframe()?;
-        } else if !told && self.grid.has_new_reader() {
-            self.publish_keyframe()?;
+            let epoch = directive.epoch;
+            self.journal.append(&Event::Forget { epoch })?;
+            self.tell_whole()?;
+        }
+        if self.grid.has_new_reader() {
+            self.tell_whole()?;
         }
         Ok(self.progress)
+    }
+
+    /// What takes the time of the whole map.
+    fn idle(&mut self) -> Result<(), StageError> {
+        let due = |last| self.progress.time.since(last) >= KEYFRAME_EVERY;
+        if self.last_keyframe.is_none_or(due) {
+            self.tell_whole()?;
+        }
+        if self.journal.is_long() {
+            self.journal.snapshot(self.mapper.belief())?;
+        }
+        Ok(())
     }
 }
 
@@ -107,17 +145,7 @@ impl Shell {
         Ok(self.latest_range.filter(|range| range.stamp.tick == tick))
     }
 
-    fn publish(&mut self, changed: Window) -> Result<(), StageError> {
-        let due = self
-            .last_keyframe
-            .is_none_or(|last| self.progress.time.since(last) >= KEYFRAME_EVERY);
-        if due || self.grid.has_new_reader() {
-            return self.publish_keyframe();
-        }
-        self.send(changed, false)
-    }
-
-    fn publish_keyframe(&mut self) -> Result<(), StageError> {
+    fn tell_whole(&mut self) -> Result<(), StageError> {
         self.last_keyframe = Some(self.progress.time);
         self.send(self.mapper.frame().whole(), true)
     }

@@ -39,6 +39,8 @@ pub struct Shell {
     swap_at: Option<u64>,
     in_ticks: bool,
     latest_pose: Option<PoseSample>,
+    /// The tick last answered.
+    answered: Option<u64>,
     full_solve_ns: u64,
     local_update_ns: u64,
     field_version: u64,
@@ -72,6 +74,7 @@ impl Process for Shell {
             swap_at: None,
             in_ticks: matches!(context.run.clock, MissionClock::Ticks { .. }),
             latest_pose: None,
+            answered: None,
             full_solve_ns: 0,
             local_update_ns: 0,
             field_version: 0,
@@ -84,21 +87,17 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        let grid = self.follow_grid()?;
-        if let Some(grid) = &grid {
-            self.progress = Progress {
-                tick: grid.stamp.tick,
-                time: grid.stamp.time(),
-            };
-        }
+        let asked = self.follow_grid()?;
         let swapped = self.swap_in_what_is_due()?;
-        if grid.is_some() || swapped && !self.in_ticks {
+        if asked || swapped && !self.in_ticks {
             self.answer()?;
         }
-        // The robot has its guidance; the rest can wait for it.
-        self.begin_beside();
-        self.tell_field()?;
         Ok(self.progress)
+    }
+
+    fn idle(&mut self) -> Result<(), StageError> {
+        self.begin_beside();
+        self.tell_field()
     }
 }
 
@@ -172,9 +171,9 @@ impl Shell {
         }
     }
 
-    /// Follow every grid sample that came; the header of the newest that was followed.
-    fn follow_grid(&mut self) -> Result<Option<GridHeader>, StageError> {
-        let mut newest = None;
+    /// Follow every grid sample that came. Says whether an answer is due.
+    fn follow_grid(&mut self) -> Result<bool, StageError> {
+        let mut asked = false;
         while let Some(grid) = self.grid.take()? {
             let began = Instant::now();
             let work = self
@@ -201,9 +200,16 @@ impl Shell {
                     self.field_changed = true;
                 }
             }
-            newest = Some(*grid.header());
+            let GridHeader { stamp, part, .. } = *grid.header();
+            // The whole map, told again behind the tick it belongs to, asks for nothing; a tick that is
+            // given again was not answered to the end.
+            asked |= part.keyframe == 0 || self.answered != Some(stamp.tick) || work != Work::None;
+            self.progress = Progress {
+                tick: stamp.tick,
+                time: stamp.time(),
+            };
         }
-        Ok(newest)
+        Ok(asked)
     }
 
     /// Guidance for the pose of the tick, which was published before the grid was.
@@ -223,6 +229,7 @@ impl Shell {
         };
         let Progress { tick, time } = self.progress;
         self.guidance.publish(tick, time, guidance)?;
+        self.answered = Some(tick);
         Ok(())
     }
 
