@@ -164,3 +164,21 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
         assert!(!log.is_empty(), "{stage} logged nothing");
     }
 }
+
+#[test]
+fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
+    let arguments = ["latency", "--rounds", "1", "--json", "--robot", "hops"];
+    let output = support::output(&arguments);
+    assert!(output.status.success(), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for key in [
+        "tick_p50_us",
+        "tick_p99_us",
+        "hops_p50_us",
+        "hops_p99_us",
+        "ratio",
+    ] {
+        assert!(report[key].as_f64().unwrap() > 0.0, "{key}: {report}");
+    }
+    assert_nothing_left("hops");
+}

@@ -2,6 +2,7 @@
 
 mod check;
 mod field;
+mod latency;
 mod missions;
 mod run;
 mod sim;
@@ -31,6 +32,7 @@ enum Command {
     Missions(missions::Arguments),
     Check(check::Arguments),
     Field(field::Arguments),
+    Latency(latency::Arguments),
     Status(status::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
@@ -65,6 +67,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Missions(arguments) => missions::main(&arguments),
         Command::Check(arguments) => check::main(&arguments),
         Command::Field(arguments) => field::main(&arguments),
+        Command::Latency(arguments) => latency::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),

@@ -11,6 +11,7 @@
 //! | [`observer`] | what is heard on the bus |
 //! | [`supervisor`] | the loop |
 //! | [`report`], [`picture`] | how a run ended |
+//! | [`relay`] | bare hops, for comparison |
 //! | [`maps`] | maps as others keep them |
 //! | [`cli`] | the command line |
 
@@ -22,6 +23,7 @@ mod observer;
 mod picture;
 mod policy;
 mod process;
+mod relay;
 mod report;
 mod simulator;
 mod stages;
