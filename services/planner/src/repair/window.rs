@@ -407,6 +407,8 @@ impl Window {
         let (mut slope, mut upstream) = (0.0_f64, 0.0_f64);
         for &f in &self.rim {
             if self.before[f] <= 0.0 {
+                // A freed cell now leads where u was too far from that of the window to be solved for.
+                found.wake.1 = found.wake.1.max(self.opens_by(f));
                 continue;
             }
             let ratio = f64::from(self.after[f]) / f64::from(self.before[f]);
@@ -432,6 +434,13 @@ impl Window {
         found.angle = slope.max(upstream).atan();
         found.upstream = upstream.atan();
         found
+    }
+
+    /// How many times u before of the cells outside u of the freed cell `f` is now: what flows there had another way before.
+    fn opens_by(&self, f: usize) -> f64 {
+        let beyond = self.outside(f).map(|o| self.before[o]);
+        let least = beyond.filter(|&u| u > 0.0).reduce(f32::min);
+        least.map_or(0.0, |least| f64::from(self.after[f]) / f64::from(least))
     }
 
     /// The neighbours of `f` along the rim, across from `o` outside.
