@@ -12,7 +12,7 @@ mod patch;
 mod window;
 
 pub(crate) use patch::{Patch, Rect};
-use window::{Judgement, Window};
+use window::{Fault, Judgement, Window};
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -23,7 +23,7 @@ use crate::solver::Verdict;
 
 /// Widths and heights of the windows, cells. The larger ones are for changes that lie apart.
 /// Halved again and again they keep whole vectors and end in few cells.
-const SIDES: [usize; 5] = [48, 64, 96, 128, 192];
+const SIDES: [usize; 7] = [48, 64, 96, 128, 192, 256, 384];
 
 /// The largest window tried only because the estimate asks for more: a tick of the robot must not wait for a larger one.
 const LARGEST_GROWN: usize = 96;
@@ -35,7 +35,7 @@ const MARGIN: usize = 24;
 const ANGLE: f64 = 0.0175;
 
 /// Beyond this many times that, a window half as wide again falls short more often than not: a full solve is advised at
-/// once, if what flows in is known to within [`ROUGH`].
+/// once, if what flows in is known to within [`ROUGH`], or is so far off that the next window's seldom is.
 const HOPELESS: f64 = 4.0;
 
 /// Estimates of the directions upstream above this, in radians, spoil the window itself.
@@ -53,8 +53,48 @@ enum Grown {
     Solved(usize, Judgement),
     /// The estimate asks for more than half of the map: a full solve costs no more.
     TooWide,
+    /// The window's solution does not pass its check.
+    Unsettled,
     /// No window could be solved.
     Failed,
+}
+
+/// What an update has to solve for.
+struct Work {
+    /// Around all of it: the changes, and those of the patches that were undone.
+    area: Rect,
+    /// Each on its own.
+    rects: Vec<Rect>,
+}
+
+impl Work {
+    /// A window of at least `least` cells either way, once no patch is near it: those that were are undone, to be solved
+    /// again together with the change, which may bring others near. `None` if that is more than the largest window takes.
+    fn gather(&mut self, domain: &Domain, field: &mut Field, least: usize) -> Option<Rect> {
+        loop {
+            let reach = choose(domain, &self.area, least)?;
+            let patches = field.patches_mut();
+            let near = |patch: &Patch| patch.rect().touches(&reach);
+            let Some(near) = patches.iter().position(near) else {
+                return Some(reach);
+            };
+            let patch = patches.swap_remove(near);
+            patch.restore(field.store_mut(), domain.width());
+            self.area = self.area.union(patch.changed());
+            self.rects.push(*patch.changed());
+        }
+    }
+}
+
+/// Whether a window half as wide again would not be worth its time, `before` being the angle of the one before: it does not
+/// open a closed passage, and where the wake fills a hall it does not help either.
+fn is_final(judgement: &Judgement, before: f64) -> bool {
+    let hopeless =
+        judgement.angle > HOPELESS * ANGLE && !(ROUGH..2.0 * ROUGH).contains(&judgement.upstream);
+    judgement.angle <= ANGLE
+        || judgement.wake.0 < WAKE.0
+        || hopeless
+        || judgement.angle > 0.7 * before
 }
 
 /// Windows kept between updates.
@@ -71,63 +111,56 @@ impl Repair {
         field: &mut Field,
         changes: &[Change],
     ) -> Option<Verdict> {
-        let width = domain.width();
-        let changed = bounds(changes)?;
-        let mut rects = vec![changed];
-        // Patches near the change are undone and solved again together with it; that may bring others near.
-        let mut area = changed;
-        let reach = loop {
-            let Some(reach) = choose(domain, &area, 0) else {
-                break None;
-            };
-            let patches = field.patches_mut();
-            let Some(near) = patches
-                .iter()
-                .position(|patch| patch.rect().touches(&reach))
-            else {
-                break Some(reach);
-            };
-            let patch = patches.swap_remove(near);
-            patch.restore(field.store_mut(), width);
-            area = area.union(patch.changed());
-            rects.push(*patch.changed());
+        let mut work = Work {
+            area: bounds(changes)?,
+            rects: vec![bounds(changes)?],
         };
         let small = domain.blocked().len() <= SMALL;
-        if reach.is_some_and(|reach| too_wide(domain, &reach)) {
-            return None;
-        }
-        let grown = reach.map_or(Grown::Failed, |reach| {
-            self.grow(domain, field, &area, reach)
-        });
-        let (window, judgement) = match grown {
-            Grown::Solved(window, judgement) => (window, judgement),
-            Grown::TooWide => return None,
-            Grown::Failed if small => return None,
-            Grown::Failed => {
-                // No window can tell. What is known must still hold: blocked cells are blocked.
-                for rect in rects {
-                    mark(domain, field, &rect);
-                }
+        let mut least = 0;
+        // What a window cannot tell, a larger one may.
+        while let Some(reach) = work.gather(domain, field, least) {
+            if too_wide(domain, &reach) {
+                return None;
+            }
+            least = reach.width.min(reach.height) + 1;
+            let (window, judgement) = match self.grow(domain, field, &work.area, reach) {
+                Grown::Solved(window, judgement) => (window, judgement),
+                Grown::TooWide => return None,
+                Grown::Unsettled => continue,
+                Grown::Failed => break,
+            };
+            let closed = judgement.wake.0 < WAKE.0 || judgement.wake.1 > WAKE.1;
+            if closed && small {
+                return None;
+            }
+            let window = &self.windows[window];
+            let (wide, high) = window.size();
+            least = wide.min(high) + 1;
+            let patch = window.write(domain, field.store_mut(), work.area);
+            field.patches_mut().push(patch);
+            if closed {
                 return Some(Verdict::PassageClosed);
             }
-        };
-        let (least, most) = judgement.wake;
-        let closed = least < WAKE.0 || most > WAKE.1;
-        if closed && small {
+            if gets_ahead(field, judgement.doubtful, 16 * wide.max(high)) {
+                return Some(if judgement.angle > ANGLE {
+                    Verdict::RepairedAdviseFull
+                } else {
+                    Verdict::Repaired
+                });
+            }
+            if choose(domain, &work.area, least).is_none() {
+                return (!small).then_some(Verdict::PassageClosed);
+            }
+            // Undone again: the larger window touches it.
+        }
+        if small {
             return None;
         }
-        let window = &self.windows[window];
-        let patch = window.write(domain, field.store_mut(), area);
-        field.patches_mut().push(patch);
-        let (wide, high) = window.size();
-        let closed = closed || !gets_ahead(field, judgement.doubtful, 16 * wide.max(high));
-        Some(if closed {
-            Verdict::PassageClosed
-        } else if judgement.angle > ANGLE {
-            Verdict::RepairedAdviseFull
-        } else {
-            Verdict::Repaired
-        })
+        // No window can tell. What is known must still hold: blocked cells are blocked.
+        for rect in work.rects {
+            mark(domain, field, &rect);
+        }
+        Some(Verdict::PassageClosed)
     }
 
     /// Solves windows of growing side until the estimate is small, or nothing wider can be solved.
@@ -147,16 +180,13 @@ impl Repair {
                 break;
             }
             let index = self.window((reach.width, reach.height));
-            let Some(judgement) =
-                self.windows[index].solve(domain, field.store(), (reach.col, reach.row), area)
-            else {
-                break;
+            let at = (reach.col, reach.row);
+            let judgement = match self.windows[index].solve(domain, field.store(), at, area) {
+                Ok(judgement) => judgement,
+                Err(Fault::Unsettled) if matches!(found, Grown::Failed) => return Grown::Unsettled,
+                Err(_) => break,
             };
-            // A wider window does not open a closed passage, and where the wake fills a hall it does not help either.
-            let done = judgement.angle <= ANGLE
-                || judgement.wake.0 < WAKE.0
-                || (judgement.angle > HOPELESS * ANGLE && judgement.upstream < ROUGH)
-                || judgement.angle > 0.7 * angle;
+            let done = is_final(&judgement, angle);
             angle = judgement.angle;
             found = Grown::Solved(index, judgement);
             if done {

@@ -19,6 +19,9 @@ const TOLERANCE: f64 = 1e-3;
 /// Cycles before a window is given up.
 const CYCLES: usize = 24;
 
+/// Cycles added where the check asks for more.
+const CYCLES_MORE: usize = 3;
+
 /// u this far above and below u at the change is taken in. Cells beyond are left outside as if they lay beyond the rim: the
 /// next corridor of a maze may be 1e-45 of this one.
 const SPAN: std::ops::RangeInclusive<f32> = 1e-24..=1e24;
@@ -74,6 +77,15 @@ pub(super) struct Judgement {
     pub doubtful: Vec<Cell>,
 }
 
+/// Why a window has no solution.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Fault {
+    /// The change joins, cuts or spans what the window's numbers do not hold together: no window does.
+    Beyond,
+    /// The solution does not settle or fails its check.
+    Unsettled,
+}
+
 impl Window {
     pub(super) fn new((width, height): (usize, usize)) -> Self {
         let stride = width + 2;
@@ -109,14 +121,14 @@ impl Window {
     }
 
     /// Solves the window at (`col`, `row`) for the map as it is now, `store` holding u as it was and `changed` having
-    /// changed. `None` if the solution does not settle or fails its check.
+    /// changed.
     pub(super) fn solve(
         &mut self,
         domain: &Domain,
         store: &Store,
         (col, row): (usize, usize),
         changed: &Rect,
-    ) -> Option<Judgement> {
+    ) -> Result<Judgement, Fault> {
         self.rect = Rect {
             col,
             row,
@@ -139,7 +151,7 @@ impl Window {
                 .any(|o| self.before[o] > 0.0 && !EXACT.contains(&self.before[o]))
         });
         if missed || beyond || self.feed(target) {
-            return None;
+            return Err(Fault::Beyond);
         }
         self.set_equations(domain, target);
         let (stride, width) = (self.stride, self.width);
@@ -150,17 +162,31 @@ impl Window {
         );
         // The first cycle has no correction yet that could be judged.
         self.levels.cycle(TOLERANCE);
-        let settled = (1..CYCLES).any(|_| self.levels.settle(TOLERANCE));
-        self.levels.smooth();
-        self.levels
-            .unload(|row, values| self.after[inside(row)].copy_from_slice(values));
+        let mut cycles = 1;
+        while cycles < CYCLES {
+            let settled = (cycles..CYCLES).find(|_| self.levels.settle(TOLERANCE));
+            cycles = settled.ok_or(Fault::Unsettled)? + CYCLES_MORE;
+            self.levels.smooth();
+            if self.is_right(target) {
+                return Ok(self.judge());
+            }
+            // The correction settled before the residual did.
+            for _ in 0..CYCLES_MORE {
+                self.levels.cycle(TOLERANCE);
+            }
+        }
+        Err(Fault::Unsettled)
+    }
+
+    /// Takes the solution over; whether it passes its check.
+    fn is_right(&mut self, target: Option<usize>) -> bool {
+        let (stride, width) = (self.stride, self.width);
+        self.levels.unload(|row, values| {
+            self.after[(row + 1) * stride + 1..][..width].copy_from_slice(values);
+        });
         self.frame(target);
         let check = check_framed(width, &self.after, &self.shares);
-        let right = settled
-            && check.stalled == 0
-            && check.lost == 0
-            && check.worst_residual <= RESIDUAL_LIMIT;
-        right.then(|| self.judge())
+        check.stalled == 0 && check.lost == 0 && check.worst_residual <= RESIDUAL_LIMIT
     }
 
     /// Writes u of the cells solved for to `store`; returns the patch that remembers what it was.
