@@ -1,7 +1,7 @@
 //! `cargo bench -p planner`: the table of the solver's times, beside what the machine can do and what else there is.
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
-//! is the least of several runs. `cargo bench -p planner -- quick` leaves out the large maps.
+//! is the least of several runs. `cargo bench -p planner -- quick` leaves out the large maps, `-- updates` all but the local updates.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -15,7 +15,7 @@ mod others;
 use std::time::Instant;
 
 use planner::testing::{Kind, Map, Random};
-use planner::{Cancellation, Cell, Change, Domain, Phase, Solver};
+use planner::{Cancellation, Cell, Change, Domain, Phase, Solver, Verdict};
 
 /// Milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
@@ -34,7 +34,11 @@ fn runs(cells: usize) -> usize {
 }
 
 fn main() {
-    let quick = std::env::args().any(|argument| argument == "quick");
+    let asked = |word: &str| std::env::args().any(|argument| argument == word);
+    let quick = asked("quick");
+    if asked("updates") {
+        return update_table(quick);
+    }
     machine_table(quick);
     full_table(quick);
     absorption_table();
@@ -189,53 +193,100 @@ fn absorption_table() {
 }
 
 fn update_table(quick: bool) {
-    println!("\nLocal updates: a 3 x 3 block put down and taken away at random, us");
     println!(
-        "{:<24} {:>6} {:>9} {:>9} {:>9} {:>9}  verdicts",
-        "map", "N", "least", "p50", "p90", "p99"
+        "\nLocal updates: 3 x 3 blocks put down at random, up to three between full solves, us"
     );
-    for n in if quick {
-        vec![256, 512]
+    println!(
+        "{:<28} {:>5} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7}  verdicts",
+        "map", "N", "least", "p50", "p90", "p99", "x least", "x p50", "radius"
+    );
+    let sides: &[usize] = if quick {
+        &[256, 512]
     } else {
-        vec![256, 512, 1024, 2048, 4096]
-    } {
-        for kind in [Kind::Drums, Kind::Office] {
-            let base = Map::generate(kind, n, n, 1).domain().expect("a valid map");
-            let mut solver = Solver::default();
-            let field = solver.solve(&base, &Cancellation::new()).expect("a field");
-            let mut random = Random::new(9);
-            let mut times = Vec::new();
-            let mut verdicts = std::collections::BTreeMap::new();
-            let (mut domain, mut live) = (base.clone(), field.clone());
-            while times.len() < 200 {
-                let (col, row) = (random.below(n - 8) + 2, random.below(n - 8) + 2);
-                let changes = block(&domain, col, row);
-                if changes.is_empty() || !live.is_reachable(Cell::new(col, row)) {
-                    continue;
-                }
-                let start = Instant::now();
-                let verdict = solver
-                    .update(&mut domain, &mut live, &changes, &Cancellation::new())
-                    .expect("an update");
-                times.push(start.elapsed().as_secs_f64() * 1e6);
-                *verdicts.entry(format!("{verdict:?}")).or_insert(0) += 1;
-                // As the full solve behind it would.
-                if times.len() % 3 == 0 {
-                    (domain, live) = (base.clone(), field.clone());
-                }
-            }
+        &[256, 512, 1024, 2048, 4096]
+    };
+    for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
+        let mut first = None;
+        for &n in sides {
+            let updates = random_updates(kind, n, 200);
+            let mut times: Vec<f64> = updates.iter().map(|update| update.time).collect();
             times.sort_by(f64::total_cmp);
             let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+            let (least, middle) = *first.get_or_insert((at(0.0), at(0.5)));
+            let mut radii: Vec<usize> = updates.iter().map(|update| update.radius).collect();
+            radii.sort_unstable();
+            let count = |verdict| updates.iter().filter(|u| u.verdict == verdict).count();
             println!(
-                "{:<24} {n:>6} {:>9.0} {:>9.0} {:>9.0} {:>9.0}  {verdicts:?}",
+                "{:<28} {n:>5} {:>7.0} {:>7.0} {:>7.0} {:>7.0} {:>7.2} {:>7.2} {:>7}  {} repaired, {} advise, {} closed",
                 format!("{kind:?}"),
-                times[0],
+                at(0.0),
                 at(0.5),
                 at(0.9),
-                at(0.99)
+                at(0.99),
+                at(0.0) / least,
+                at(0.5) / middle,
+                radii[radii.len() / 2],
+                count(Verdict::Repaired),
+                count(Verdict::RepairedAdviseFull),
+                count(Verdict::PassageClosed),
             );
         }
     }
+}
+
+/// One timed update.
+struct Update {
+    /// Microseconds.
+    time: f64,
+    /// Cells from the block to the farthest one beside it whose u changed, at most [`FARTHEST`].
+    radius: usize,
+    verdict: Verdict,
+}
+
+/// Where the search for changed cells ends.
+const FARTHEST: usize = 128;
+
+fn random_updates(kind: Kind, n: usize, count: usize) -> Vec<Update> {
+    let base = Map::generate(kind, n, n, 1).domain().expect("a valid map");
+    let mut solver = Solver::default();
+    let field = solver.solve(&base, &Cancellation::new()).expect("a field");
+    let mut random = Random::new(9);
+    let mut updates = Vec::new();
+    let (mut domain, mut live) = (base.clone(), field.clone());
+    while updates.len() < count {
+        let (col, row) = (random.below(n - 8) + 2, random.below(n - 8) + 2);
+        let changes = block(&domain, col, row);
+        if changes.is_empty() || !live.is_reachable(Cell::new(col, row)) {
+            continue;
+        }
+        let start = Instant::now();
+        let verdict = solver
+            .update(&mut domain, &mut live, &changes, &Cancellation::new())
+            .expect("an update");
+        let time = start.elapsed().as_secs_f64() * 1e6;
+        let changed = |distance: &usize| {
+            // Beyond the map u is zero, before and after.
+            [
+                Cell::new(col.wrapping_sub(*distance), row),
+                Cell::new(col + distance, row),
+                Cell::new(col, row.wrapping_sub(*distance)),
+                Cell::new(col, row + distance),
+            ]
+            .into_iter()
+            .any(|cell| live.u(cell) != field.u(cell))
+        };
+        let radius = (0..FARTHEST).rev().find(changed).unwrap_or(0);
+        updates.push(Update {
+            time,
+            radius,
+            verdict,
+        });
+        // As the full solve behind it would.
+        if updates.len() % 3 == 0 {
+            (domain, live) = (base.clone(), field.clone());
+        }
+    }
+    updates
 }
 
 fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
