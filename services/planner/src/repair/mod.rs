@@ -4,20 +4,19 @@
 //! right near the change, it keeps every cell leading to the target, and it knows when that is not enough:
 //! - [`window`] solves the window for u between what flows in and what flows out, and estimates from the rim how far off
 //!   the directions beyond it are; the window grows until that is small.
+//! - [`walks`] tries whether walks through the window still get ahead, where that is in doubt.
 //! - [`patch`] keeps u as it was in each window. Across the outflow rim the ratios stay what they were, and windows that
 //!   would touch are solved anew as one, from u as it was before any of them. So a walk outside all windows always climbs
 //!   u of the last full solve, and each window is left higher, by that measure, than it is entered: the walk arrives.
 
 mod patch;
+mod walks;
 mod window;
 
 pub(crate) use patch::{Patch, Rect};
 use window::{Fault, Judgement, Window};
 
-use std::cmp::Ordering;
-use std::collections::HashSet;
-
-use crate::domain::{Cell, Change, Domain};
+use crate::domain::{Change, Domain};
 use crate::field::{BLOCKED, Field};
 use crate::solver::Verdict;
 
@@ -133,7 +132,7 @@ impl Repair {
             if closed && small {
                 return None;
             }
-            let window = &self.windows[window];
+            let window = &mut self.windows[window];
             let (wide, high) = window.size();
             least = wide.min(high) + 1;
             let patch = window.write(domain, field.store_mut(), work.area);
@@ -141,7 +140,7 @@ impl Repair {
             if closed {
                 return Some(Verdict::PassageClosed);
             }
-            if gets_ahead(field, judgement.doubtful, 16 * wide.max(high)) {
+            if walks::get_ahead(field, window, judgement.doubtful) {
                 return Some(if judgement.angle > ANGLE {
                     Verdict::RepairedAdviseFull
                 } else {
@@ -205,45 +204,6 @@ impl Repair {
         self.windows.push(Window::new(size));
         self.windows.len() - 1
     }
-}
-
-/// Whether walks from `cells`, all outside patches, come out of the patches higher than they went in: above u of the cell
-/// they started from, which no patch changed. Then no walk can return to where it was. Tried one by one, from the highest
-/// down, so a walk that meets an earlier one is done.
-fn gets_ahead(field: &Field, mut cells: Vec<Cell>, most_steps: usize) -> bool {
-    let outside = |cell: Cell| {
-        !field
-            .patches()
-            .iter()
-            .any(|patch| patch.contains((cell.col as i64, cell.row as i64)))
-    };
-    cells.sort_by(|&a, &b| {
-        field
-            .u(b)
-            .partial_cmp(&field.u(a))
-            .unwrap_or(Ordering::Equal)
-    });
-    let mut proven = HashSet::new();
-    for start in cells {
-        let from = field.u(start);
-        let mut here = start;
-        let mut path = Vec::new();
-        loop {
-            if here == field.target()
-                || proven.contains(&here)
-                || (outside(here) && field.u(here) > from)
-            {
-                break;
-            }
-            path.push(here);
-            match field.ascent(here) {
-                Some(next) if path.len() < most_steps => here = next,
-                _ => return false,
-            }
-        }
-        proven.extend(path);
-    }
-    true
 }
 
 /// Whether a window is more than half of the map.

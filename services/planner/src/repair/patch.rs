@@ -1,7 +1,9 @@
 //! A rectangle of cells whose u was computed anew, with what it was before.
 
+use std::ops::Range;
+
 use crate::field::Store;
-use crate::scaled::Scaled;
+use crate::scaled::{Scaled, pow2};
 
 /// A rectangle of cells, inside the map.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -72,7 +74,7 @@ impl Patch {
         let mut before = Vec::with_capacity(rect.width * rect.height);
         for row in rect.row..rect.row + rect.height {
             let start = row * map_width + rect.col;
-            before.extend((start..start + rect.width).map(|index| store.raw(index)));
+            remember(store, start..start + rect.width, &mut before);
         }
         Self {
             rect,
@@ -94,9 +96,7 @@ impl Patch {
     pub(super) fn restore(&self, store: &mut Store, map_width: usize) {
         for (row, cells) in self.before.chunks_exact(self.rect.width).enumerate() {
             let start = (self.rect.row + row) * map_width + self.rect.col;
-            for (at, &(value, exponent)) in cells.iter().enumerate() {
-                store.set(start + at, value, exponent);
-            }
+            bring_back(store, start, cells);
         }
     }
 
@@ -113,4 +113,56 @@ impl Patch {
     fn index(&self, (col, row): (i64, i64)) -> usize {
         (row as usize - self.rect.row) * self.rect.width + col as usize - self.rect.col
     }
+}
+
+// The store's own accessors ask for its kind at every cell; most stores are single, and a window has thousands.
+
+/// Appends a run of cells, as stored.
+fn remember(store: &Store, cells: Range<usize>, into: &mut Vec<(f64, i32)>) {
+    match store {
+        Store::Single { values, exponent } => {
+            into.extend(values[cells].iter().map(|&u| (f64::from(u), *exponent)));
+        }
+        _ => into.extend(cells.map(|index| store.raw(index))),
+    }
+}
+
+/// Writes a run of cells from `first` on, as they were remembered.
+fn bring_back(store: &mut Store, first: usize, cells: &[(f64, i32)]) {
+    if let Store::Single { values, exponent } = store
+        && cells.iter().all(|cell| cell.1 == *exponent)
+    {
+        for (to, cell) in values[first..].iter_mut().zip(cells) {
+            *to = cell.0 as f32;
+        }
+        return;
+    }
+    // The store may have been extended since.
+    for (at, &(value, exponent)) in cells.iter().enumerate() {
+        store.set(first + at, value, exponent);
+    }
+}
+
+/// Sets the cells from `first` on for which `wanted` holds to u in units of 2^`reference`; negative is blocked.
+pub(super) fn set_row(store: &mut Store, first: usize, u: &[f32], reference: i32, wanted: &[bool]) {
+    if let Store::Single { values, exponent } = store {
+        // Zero and what blocks stay what they are; a power of two rounds nothing while the numbers stay normal.
+        let scale = pow2(reference.saturating_sub(*exponent));
+        let scaled = |u: f32| {
+            if u > 0.0 {
+                f64::from(u) * scale
+            } else {
+                f64::from(u)
+            }
+        };
+        let normal = f64::from(f32::MIN_POSITIVE)..=f64::from(f32::MAX);
+        let fits = |u: f32| u <= 0.0 || normal.contains(&scaled(u));
+        if u.iter().zip(wanted).all(|(&u, &wanted)| !wanted | fits(u)) {
+            for ((to, &u), &wanted) in values[first..].iter_mut().zip(u).zip(wanted) {
+                *to = if wanted { scaled(u) as f32 } else { *to };
+            }
+            return;
+        }
+    }
+    store.set_row(first, u, reference, wanted);
 }

@@ -7,7 +7,7 @@
 //!
 //! All arrays have a frame of one cell around the window, so a cell's neighbours are one or one row away.
 
-use super::patch::{Patch, Rect};
+use super::patch::{Patch, Rect, set_row};
 use crate::domain::{Absorption, Cell, Domain};
 use crate::field::Store;
 use crate::solver::certificate::check_framed;
@@ -57,6 +57,8 @@ pub(super) struct Window {
     fed: Vec<bool>,
     /// Free cells of the window with a neighbour it is not solved for.
     rim: Vec<usize>,
+    /// The walk that last came by, from 1; 0 for none.
+    walked: Vec<u32>,
     stack: Vec<usize>,
     inflow: Vec<(Cell, f32)>,
     reference: i32,
@@ -75,6 +77,21 @@ pub(super) struct Judgement {
     /// Cells outside that lead into the window at a place now lower than they are: whether walks from there still get
     /// ahead must be tried.
     pub doubtful: Vec<Cell>,
+}
+
+/// What a walk finds at a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Step {
+    /// An earlier walk came by here, and they are tried only until one fails.
+    Proven,
+    /// This walk was here before.
+    Again,
+    /// The cell with the largest u beside it.
+    To(Cell),
+    /// A cell the window is solved for, with one beside it that it is not.
+    Inside,
+    /// A cell the window is not solved for.
+    Beyond,
 }
 
 /// Why a window has no solution.
@@ -104,6 +121,7 @@ impl Window {
             taken: flags(),
             fed: flags(),
             rim: Vec::new(),
+            walked: vec![0; stride * (height + 2)],
             stack: Vec::new(),
             inflow: Vec::new(),
             reference: 0,
@@ -199,7 +217,8 @@ impl Window {
         for row in 0..self.height {
             let start = (row + 1) * self.stride + 1;
             let first = (self.rect.row + row) * domain.width() + self.rect.col;
-            store.set_row(
+            set_row(
+                store,
                 first,
                 &self.after[start..][..self.width],
                 self.reference,
@@ -211,6 +230,38 @@ impl Window {
             store.set(domain.index(target), 1.0, 0);
         }
         patch
+    }
+
+    pub(super) fn forget_walks(&mut self) {
+        self.walked.fill(0);
+    }
+
+    /// Where walk `number`, from 1, goes from `cell`, as far as the window's own u tells.
+    pub(super) fn step(&mut self, cell: Cell, number: u32) -> Step {
+        if !self.rect.contains((cell.col as i64, cell.row as i64)) {
+            return Step::Beyond;
+        }
+        let f = (cell.row - self.rect.row + 1) * self.stride + cell.col - self.rect.col + 1;
+        match std::mem::replace(&mut self.walked[f], number) {
+            0 => {}
+            last if last == number => return Step::Again,
+            _ => return Step::Proven,
+        }
+        if !self.taken[f] {
+            return Step::Beyond;
+        }
+        if self.outside(f).next().is_some() {
+            return Step::Inside;
+        }
+        // East before west before south before north, as the field has it where two are equal.
+        let [west, east, north, south] = self.around(f);
+        let mut best = east;
+        for next in [west, south, north] {
+            if self.after[next] > self.after[best] {
+                best = next;
+            }
+        }
+        Step::To(self.map_cell(best))
     }
 
     /// Reads u as it was and the map as it is, window and frame.
