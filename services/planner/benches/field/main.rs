@@ -1,7 +1,8 @@
 //! `cargo bench -p planner`: the table of the solver's times, beside what the machine can do and what else there is.
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
-//! is the least of several runs. `cargo bench -p planner -- quick` leaves out the large maps, `-- updates` all but the local updates.
+//! is the least of several runs. `cargo bench -p planner -- quick` leaves out the large maps, `-- updates` all but the
+//! local updates.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
