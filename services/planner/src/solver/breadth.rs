@@ -7,8 +7,8 @@ pub(super) const ABSENT: u32 = u32::MAX;
 
 /// The reachable cells in order of their distance from the target.
 pub(super) struct Pass {
-    /// Row-major indices of the reachable cells, the target first, by distance.
-    pub order: Vec<u32>,
+    /// Indices into the padded map of the reachable cells, the target first, by distance.
+    order: Vec<u32>,
     /// Place in `order` of each cell of the padded map, or [`ABSENT`].
     place: Vec<u32>,
     /// Places at which a new distance starts: distance d takes `level[d] .. level[d + 1]`.
@@ -24,15 +24,18 @@ impl Pass {
         const UNSEEN: u32 = u32::MAX - 1;
         let stride = width + 2;
         let mut place = vec![ABSENT; stride * (height + 2)];
+        let mut free = 0;
         for (row, cells) in domain.blocked().chunks_exact(width).enumerate() {
             let start = (row + 1) * stride + 1;
             for (slot, &blocked) in place[start..start + width].iter_mut().zip(cells) {
                 *slot = if blocked { ABSENT } else { UNSEEN };
+                free += usize::from(!blocked);
             }
         }
 
         let target = (domain.target().row + 1) * stride + domain.target().col + 1;
-        let mut order = vec![target as u32];
+        let mut order = Vec::with_capacity(free);
+        order.push(target as u32);
         place[target] = 0;
         let mut levels = vec![0, 1];
         let mut next = 0;
@@ -52,14 +55,12 @@ impl Pass {
                 levels.push(order.len() as u32);
             }
         }
-        for slot in &mut place {
-            if *slot == UNSEEN {
-                *slot = ABSENT;
+        if order.len() < free {
+            for slot in &mut place {
+                if *slot == UNSEEN {
+                    *slot = ABSENT;
+                }
             }
-        }
-        for cell in &mut order {
-            let (row, col) = (*cell as usize / stride - 1, *cell as usize % stride - 1);
-            *cell = (row * width + col) as u32;
         }
         Self {
             order,
@@ -69,12 +70,45 @@ impl Pass {
         }
     }
 
-    /// Places in the order of the four neighbours of the cell with row-major `index`: west, east, north, south.
-    pub(super) fn neighbours(&self, index: u32) -> [u32; 4] {
-        let (row, col) = (index as usize / self.width, index as usize % self.width);
+    /// Cells with a place.
+    pub(super) fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Row-major index of the cell at `place`.
+    pub(super) fn cell(&self, place: u32) -> usize {
+        let padded = self.order[place as usize];
+        let stride = self.width as u32 + 2;
+        let (row, col) = (padded / stride - 1, padded % stride - 1);
+        row as usize * self.width + col as usize
+    }
+
+    /// Places of the cells of one row of the map.
+    pub(super) fn row(&self, row: usize) -> &[u32] {
+        let start = (row + 1) * (self.width + 2) + 1;
+        &self.place[start..start + self.width]
+    }
+
+    /// Places of the four neighbours of the cell at `place`: west, east, north, south.
+    pub(super) fn neighbours(&self, place: u32) -> [u32; 4] {
+        let padded = self.order[place as usize] as usize;
         let stride = self.width + 2;
-        let padded = (row + 1) * stride + col + 1;
         [padded - 1, padded + 1, padded - stride, padded + stride]
             .map(|neighbour| self.place[neighbour])
+    }
+
+    /// Mean width of the passages, cells: between two walls each cell has 2 / width blocked neighbours. Of a sample.
+    pub(super) fn width(&self) -> f64 {
+        const EVERY: usize = 16;
+        let (mut cells, mut walls) = (0_usize, 0_usize);
+        for place in (0..self.len() as u32).step_by(EVERY) {
+            cells += 1;
+            walls += self
+                .neighbours(place)
+                .into_iter()
+                .filter(|&neighbour| neighbour == ABSENT)
+                .count();
+        }
+        2.0 * cells as f64 / walls.max(1) as f64
     }
 }

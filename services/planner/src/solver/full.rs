@@ -42,6 +42,7 @@ pub(super) struct Task<'a> {
 pub(super) struct Full {
     single: Prepared<f32>,
     double: Prepared<f64>,
+    elimination: elimination::Memory,
 }
 
 /// The levels of one precision, and the map they were set up for.
@@ -115,6 +116,7 @@ impl Full {
                         &pass,
                         &tree,
                         settings.memory_limit,
+                        &mut self.elimination,
                         cancellation,
                     )?;
                     observe(Phase::Solved);

@@ -24,8 +24,8 @@ const TWICE_DOUBLE_DECADES: f64 = 2.0 * DOUBLE_DECADES;
 const SET_UP_PER_CELL: f64 = 3.0;
 const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
 const DOUBLE_CYCLE_PER_CELL: f64 = 2.5;
-const ELIMINATION_PER_CELL: f64 = 80.0;
-const ELIMINATION_PER_OPERATION: f64 = 0.18;
+const ELIMINATION_PER_CELL: f64 = 65.0;
+const ELIMINATION_PER_OPERATION: f64 = 0.17;
 
 /// Cycles multigrid takes for a range of u: in narrow passages one settles three to four orders of magnitude.
 fn cycles(decades: f64) -> f64 {
@@ -60,7 +60,7 @@ pub(super) fn plan(domain: &Domain, memory_limit: u64) -> Plan {
         };
     }
     let pass = Pass::from_target(domain);
-    let cells = pass.order.len() as f64;
+    let cells = pass.len() as f64;
     // Along a passage of width w, u falls like exp(-pi x / w). The runs along a passage count into the mean width too; on
     // mazes that makes it about 1.7 times too large.
     let confined = 1.7 * std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;

@@ -14,9 +14,10 @@ mod tree;
 
 use super::breadth::Pass;
 use crate::cancellation::Cancellation;
-use crate::domain::Domain;
+use crate::domain::{Absorption, Domain};
 use crate::error::SolveError;
 use crate::field::Store;
+use crate::scaled::Scaled;
 pub(super) use polish::polish;
 pub(super) use tree::Tree;
 
@@ -26,6 +27,7 @@ pub(super) fn solve(
     pass: &Pass,
     tree: &Tree,
     memory_limit: u64,
+    memory: &mut Memory,
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
     if tree.price.bytes > memory_limit {
@@ -34,23 +36,52 @@ pub(super) fn solve(
             allowed: memory_limit,
         });
     }
-    let weights = factor(domain, pass, tree, cancellation)?;
-    Ok(substitution::outwards(domain, pass, tree, &weights))
+    factor(domain, pass, tree, memory, cancellation)?;
+    cancellation.check()?;
+    Ok(substitution::outwards(domain, pass, tree, memory))
 }
 
-/// The weights of every eliminated cell on the later cells of its front, front after front, row after row.
+/// Memory kept between solves: to be given fresh pages costs as much as to fill them.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    weights: Weights,
+    /// Slot in the front at hand of each place; all `NOWHERE` between fronts.
+    slot: Vec<u32>,
+    /// u by place.
+    u: Vec<Scaled>,
+}
+
+/// What the substitution needs of the factors.
+#[derive(Debug, Default)]
+struct Weights {
+    /// Of every eliminated cell, the weights of the cells after it in its front, up to the last that is not zero.
+    rows: Vec<f64>,
+    /// How many those are.
+    lengths: Vec<u32>,
+}
+
+/// The cell is not part of the front.
+const NOWHERE: u32 = u32::MAX;
+
+/// The weights of all fronts.
 fn factor(
     domain: &Domain,
     pass: &Pass,
     tree: &Tree,
+    memory: &mut Memory,
     cancellation: &Cancellation,
-) -> Result<Vec<f64>, SolveError> {
-    const NOWHERE: u32 = u32::MAX;
-    let mut weights = Vec::with_capacity(tree.price.weights);
+) -> Result<(), SolveError> {
+    let Memory { weights, slot, .. } = memory;
+    weights.rows.clear();
+    weights.rows.reserve(tree.price.weights);
+    weights.lengths.clear();
+    weights.lengths.reserve(pass.len());
+    slot.clear();
+    slot.resize(pass.len(), NOWHERE);
     // What each front leaves on its boundary, until its parent takes it in; spent buffers are used again.
     let mut left: Vec<Vec<f64>> = vec![Vec::new(); tree.fronts.len()];
     let mut spent: Vec<Vec<f64>> = Vec::new();
-    let mut slot = vec![NOWHERE; pass.order.len()];
+    let mut slots = Vec::new();
     let mut matrix = dense::Matrix::default();
 
     for (index, front) in tree.fronts.iter().enumerate() {
@@ -62,23 +93,22 @@ fn factor(
         for (at, &place) in cells.iter().enumerate() {
             slot[place as usize] = at as u32;
         }
-        matrix.reset(cells.len());
-        for child in tree.children(index) {
+        matrix.reset(cells.len(), own);
+        for child in tree.children(front) {
             let boundary = tree.boundary(&tree.fronts[child]);
+            slots.clear();
+            slots.extend(boundary.iter().map(|&place| slot[place as usize]));
             let update = std::mem::take(&mut left[child]);
-            let mut entries = update.iter();
-            for (at, &place) in boundary.iter().enumerate() {
-                let row = slot[place as usize] as usize;
-                for (&other, &value) in boundary[at..].iter().zip(&mut entries) {
-                    matrix.add(row, slot[other as usize] as usize, value);
-                }
-            }
+            matrix.add_update(&slots, &update);
             spent.push(update);
         }
         for (at, &place) in cells[..own].iter().enumerate() {
-            let cell = pass.order[place as usize];
-            matrix.add(at, at, 4.0 * (1.0 + domain.absorption_at(cell as usize)));
-            for neighbour in pass.neighbours(cell) {
+            let absorption = match domain.absorption() {
+                Absorption::Uniform(k) => *k,
+                Absorption::PerCell(_) => domain.absorption_at(pass.cell(place)),
+            };
+            matrix.add(at, at, 4.0 * (1.0 + absorption));
+            for neighbour in pass.neighbours(place) {
                 // Cells eliminated before, in a child, have no slot here; pairs within the front are met twice.
                 let other = slot.get(neighbour as usize).copied().unwrap_or(NOWHERE);
                 if other != NOWHERE && other as usize > at {
@@ -86,21 +116,22 @@ fn factor(
                 }
             }
         }
-        matrix.eliminate(own);
+        matrix.eliminate();
         for row in 0..own {
             let (pivot, rest) = matrix.row(row);
             let scale = -1.0 / pivot;
-            weights.extend(rest.iter().map(|&entry| entry * scale));
+            weights.rows.extend(rest.iter().map(|&entry| entry * scale));
+            weights.lengths.push(rest.len() as u32);
         }
-        let mut update = spent.pop().unwrap_or_default();
-        update.clear();
-        if front.parent.is_some() {
-            matrix.copy_upper(own, &mut update);
+        if front.has_parent {
+            let mut update = spent.pop().unwrap_or_default();
+            update.clear();
+            matrix.copy_rest(&mut update);
+            left[index] = update;
         }
-        left[index] = update;
         for &place in cells {
             slot[place as usize] = NOWHERE;
         }
     }
-    Ok(weights)
+    Ok(())
 }

@@ -16,26 +16,18 @@ const SWEEPS: usize = 200;
 /// Largest relative change of a sweep that ends them.
 const SETTLED: f64 = 1e-7;
 
-/// Relaxes `store`, which must be extended, from the farthest cell to the nearest and back, until it settles.
+/// Relaxes `store` from the farthest cell to the nearest and back, until it settles.
 pub(in super::super) fn polish(domain: &Domain, pass: &Pass, store: &mut Store) {
-    let Store::Extended {
-        mantissas,
-        exponents,
-    } = store
-    else {
-        return;
-    };
     for _ in 0..SWEEPS {
         let mut change = 0.0_f64;
-        let inwards = pass.order[1..].iter().rev();
-        for &cell in inwards.chain(&pass.order[1..]) {
+        let places = 1..pass.len() as u32;
+        for place in places.clone().rev().chain(places) {
             let mut largest = i32::MIN;
-            let around = pass.neighbours(cell).map(|place| {
+            let around = pass.neighbours(place).map(|place| {
                 let u = if place == ABSENT {
                     Scaled::ZERO
                 } else {
-                    let neighbour = pass.order[place as usize] as usize;
-                    Scaled::new(mantissas[neighbour], exponents[neighbour])
+                    store.u(pass.cell(place))
                 };
                 if !u.is_zero() {
                     largest = largest.max(u.exponent);
@@ -43,11 +35,11 @@ pub(in super::super) fn polish(domain: &Domain, pass: &Pass, store: &mut Store) 
                 u
             });
             let sum: f64 = around.iter().map(|u| u.relative_to(largest)).sum();
-            let index = cell as usize;
+            let index = pass.cell(place);
             let u = Scaled::new(0.25 * sum / (1.0 + domain.absorption_at(index)), largest);
-            let before = Scaled::new(mantissas[index], exponents[index]);
+            let before = store.u(index);
             change = change.max((before.relative_to(u.exponent) / u.mantissa - 1.0).abs());
-            (mantissas[index], exponents[index]) = (u.mantissa, u.exponent);
+            store.set(index, u.mantissa, u.exponent);
         }
         if change <= SETTLED {
             break;

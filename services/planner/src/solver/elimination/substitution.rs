@@ -1,6 +1,7 @@
 //! From the weights to u, outwards from u(target) = 1, in extended range.
 
 use super::super::breadth::Pass;
+use super::Memory;
 use super::tree::Tree;
 use crate::domain::Domain;
 use crate::field::{BLOCKED, Store};
@@ -12,34 +13,77 @@ const PLAIN_SPAN: i32 = 300;
 /// Below this, sums in plain `f64` may have lost terms to underflow.
 const PLAIN_LEAST: f64 = 1e-180;
 
+/// Exponent of the largest u in a plain store: so high that four of it can be added.
+const TOP: i32 = 1020;
+
+/// Exponent of the smallest: so low that it keeps all of its digits.
+const BOTTOM: i32 = -960;
+
 /// u of every cell of `domain`.
-pub(super) fn outwards(domain: &Domain, pass: &Pass, tree: &Tree, weights: &[f64]) -> Store {
+pub(super) fn outwards(domain: &Domain, pass: &Pass, tree: &Tree, memory: &mut Memory) -> Store {
+    let Memory { weights, u, .. } = memory;
     // By place: the cells of a front lie close together there.
-    let mut u = vec![Scaled::ZERO; pass.order.len()];
+    u.clear();
+    u.resize(pass.len(), Scaled::ZERO);
     u[0] = Scaled::ONE;
     let mut plain = Vec::new();
-    let mut end = weights.len();
+    let (mut rows, mut lengths) = (&weights.rows[..], &weights.lengths[..]);
     for front in tree.fronts.iter().rev() {
         let cells = tree.cells(front);
         let own = front.own as usize;
-        let size = cells.len();
-        let len = (0..own).map(|row| size - row - 1).sum::<usize>();
-        let rows = &weights[end - len..end];
-        end -= len;
-        if !in_plain_range(&mut u, cells, own, rows, &mut plain) {
-            in_extended_range(&mut u, cells, own, rows);
+        let (before, lengths_here) = lengths.split_at(lengths.len() - own);
+        lengths = before;
+        let taken: u32 = lengths_here.iter().sum();
+        let (before, rows_here) = rows.split_at(rows.len() - taken as usize);
+        rows = before;
+        let here = Rows {
+            rows: rows_here,
+            lengths: lengths_here,
+        };
+        if !in_plain_range(u, cells, here, &mut plain) {
+            in_extended_range(u, cells, here);
         }
     }
+    store(domain, pass, u)
+}
 
-    let mut mantissas: Vec<f64> = domain
-        .blocked()
-        .iter()
-        .map(|&blocked| if blocked { BLOCKED } else { 0.0 })
-        .collect();
-    let mut exponents = vec![0; mantissas.len()];
-    for (&cell, u) in pass.order.iter().zip(&u) {
-        mantissas[cell as usize] = u.mantissa;
-        exponents[cell as usize] = u.exponent;
+/// The store of `u`, given by place.
+fn store(domain: &Domain, pass: &Pass, u: &[Scaled]) -> Store {
+    let (width, height) = (domain.width(), domain.height());
+    let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();
+    let at = |place: u32| u.get(place as usize).copied().unwrap_or(Scaled::ZERO);
+    let raw = |u: Scaled, blocked: bool, value: f64| match (blocked, u.is_zero()) {
+        (true, _) => BLOCKED,
+        (false, true) => 0.0,
+        (false, false) => value,
+    };
+    let least = u.iter().filter(|u| !u.is_zero()).map(|u| u.exponent).min();
+    if least.is_some_and(|least| least >= BOTTOM - TOP) {
+        let mut values = Vec::with_capacity(width * height);
+        for row in 0..height {
+            values.extend(
+                pass.row(row)
+                    .iter()
+                    .zip(blocked(row))
+                    .map(|(&place, &blocked)| {
+                        let u = at(place);
+                        raw(u, blocked, u.relative_to(-TOP))
+                    }),
+            );
+        }
+        return Store::Double {
+            values,
+            exponent: -TOP,
+        };
+    }
+    let mut mantissas = Vec::with_capacity(width * height);
+    let mut exponents = Vec::with_capacity(width * height);
+    for row in 0..height {
+        for (&place, &blocked) in pass.row(row).iter().zip(blocked(row)) {
+            let u = at(place);
+            mantissas.push(raw(u, blocked, u.mantissa));
+            exponents.push(u.exponent);
+        }
     }
     Store::Extended {
         mantissas,
@@ -47,25 +91,32 @@ pub(super) fn outwards(domain: &Domain, pass: &Pass, tree: &Tree, weights: &[f64
     }
 }
 
-/// The rows of a front's weights, last eliminated first, each with its position.
-fn rows_backwards(own: usize, size: usize, rows: &[f64]) -> impl Iterator<Item = (usize, &[f64])> {
-    let mut end = rows.len();
-    (0..own).rev().map(move |row| {
-        let start = end - (size - row - 1);
-        let weights = &rows[start..end];
-        end = start;
-        (row, weights)
-    })
+/// The weights of a front.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    rows: &'a [f64],
+    lengths: &'a [u32],
+}
+
+impl<'a> Rows<'a> {
+    /// Last eliminated first, each with its position.
+    fn backwards(self) -> impl Iterator<Item = (usize, &'a [f64])> {
+        let mut rest = self.rows;
+        self.lengths
+            .iter()
+            .enumerate()
+            .rev()
+            .map(move |(row, &length)| {
+                let (before, weights) = rest.split_at(rest.len() - length as usize);
+                rest = before;
+                (row, weights)
+            })
+    }
 }
 
 /// Computes a front with one common exponent; false, with nothing written, if its range is too wide for that.
-fn in_plain_range(
-    u: &mut [Scaled],
-    cells: &[u32],
-    own: usize,
-    rows: &[f64],
-    plain: &mut Vec<f64>,
-) -> bool {
+fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut Vec<f64>) -> bool {
+    let own = rows.lengths.len();
     let boundary = cells[own..]
         .iter()
         .map(|&place| u[place as usize])
@@ -82,8 +133,8 @@ fn in_plain_range(
             .iter()
             .map(|&place| u[place as usize].relative_to(largest)),
     );
-    for (row, weights) in rows_backwards(own, cells.len(), rows) {
-        let sum = dot(weights, &plain[row + 1..]);
+    for (row, weights) in rows.backwards() {
+        let sum = dot(weights, &plain[row + 1..][..weights.len()]);
         if sum < PLAIN_LEAST {
             return false;
         }
@@ -96,8 +147,8 @@ fn in_plain_range(
 }
 
 /// Computes a front with an exponent for every term.
-fn in_extended_range(u: &mut [Scaled], cells: &[u32], own: usize, rows: &[f64]) {
-    for (row, weights) in rows_backwards(own, cells.len(), rows) {
+fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
+    for (row, weights) in rows.backwards() {
         let terms = || {
             weights
                 .iter()

@@ -1,30 +1,83 @@
 //! The tree of fronts: which cells are eliminated together, and what that will cost.
+//!
+//! Cells are eliminated stage by stage, from the farthest inwards. Where the free space is one passage, a stage is a few
+//! distances. Where many passages run side by side and loops join them, everything beyond a distance is one piece, and its
+//! fronts are as wide as all passages together; so there the space between two distances, a slab, is eliminated first,
+//! passage by passage, and only one distance in many, the separators, sees the wide fronts:
+//!
+//! ```text
+//! target ... separator | slab: stages inwards | separator | slab ...
+//!                8     <--7---6---5---4---3---      2
+//! ```
+//!
+//! Each separator is eliminated once both slabs beside it are, so what it then touches is the next separator inwards, a
+//! bounded number of cells nearer to the target: weights stay far above the smallest `f64` as they do without slabs.
 
-use super::super::breadth::{ABSENT, Pass};
+use std::cmp::Reverse;
+use std::ops::Range;
 
-/// Cells that are eliminated together, followed by their neighbours nearer to the target.
+use super::super::breadth::Pass;
+
+/// Cells that are eliminated together, followed by those it leaves an update on.
+#[derive(Clone, Copy)]
 pub(in super::super) struct Front {
     first: usize,
     /// Cells the front eliminates.
     pub own: u32,
-    /// Cells nearer to the target it leaves an update on.
+    /// Cells eliminated later on which it leaves an update.
     pub boundary: u32,
-    /// The front that eliminates its boundary; none if that is the target alone.
-    pub parent: Option<u32>,
-    first_child: Option<u32>,
-    next_sibling: Option<u32>,
+    /// Whether a later front eliminates its boundary; otherwise that is the target alone.
+    pub has_parent: bool,
+    first_child: u32,
+    next_sibling: u32,
 }
+
+/// No front.
+const NONE: u32 = u32::MAX;
 
 /// What an elimination takes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Price {
     /// Multiplications.
     pub operations: f64,
-    /// Weights kept for the substitution.
+    /// Weights kept for the substitution, at most.
     pub weights: usize,
     /// Bytes, of all that is allocated.
     pub bytes: u64,
 }
+
+/// How the distances are divided into stages.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    /// Distances a stage takes at once.
+    thickness: usize,
+    /// Distances from one separator to the next; none for no separators.
+    slab: Option<usize>,
+}
+
+impl Shape {
+    fn of(pass: &Pass) -> Self {
+        let passage = pass.width();
+        let frontier = pass.len() as f64 / pass.levels.len() as f64;
+        let many = frontier > MANY * passage;
+        let (thickness, slab) = match passage {
+            ..NARROW => (7, 8),
+            ..MIDDLING if !many => (2, 0),
+            _ => (1, 24),
+        };
+        Self {
+            thickness,
+            slab: many.then_some(slab),
+        }
+    }
+}
+
+/// Passages up to these widths, cells, are eliminated several distances at a time: their fronts would be too small.
+const NARROW: f64 = 1.5;
+const MIDDLING: f64 = 10.0;
+
+/// Passages side by side from which on slabs pay.
+const MANY: f64 = 6.0;
 
 /// Fronts in order of elimination, children before their parents.
 pub(in super::super) struct Tree {
@@ -36,125 +89,61 @@ pub(in super::super) struct Tree {
 impl Tree {
     /// The tree over all cells of `pass` but the target.
     pub(in super::super) fn of(pass: &Pass) -> Self {
-        let mut tree = Self {
-            fronts: Vec::new(),
-            places: Vec::new(),
-            price: Price::default(),
-        };
+        let shape = Shape::of(pass);
+        let mut builder = Builder::new(pass);
         let distances = pass.levels.len() - 1;
-        let thickness = DISTANCES_PER_FRONT;
-        let mut pieces = Pieces::default();
-        // Fronts of the chunk before, farther out, whose boundary lies in this one.
-        let mut waiting: Vec<u32> = Vec::new();
-        let mut chunk = (distances - 1) / thickness;
-        loop {
-            let nearest = (chunk * thickness).max(1);
-            let farthest = ((chunk + 1) * thickness).min(distances);
-            if nearest < farthest {
-                let places = pass.levels[nearest]..pass.levels[farthest];
-                waiting = tree.add_chunk(pass, places, &waiting, &mut pieces);
+        let slab = shape.slab.unwrap_or(distances);
+        let at = |distance: usize| pass.levels[distance.min(distances)];
+        // Distance 0, the target, stands in for the innermost separator.
+        for inner in (0..distances).step_by(slab).rev() {
+            let outer = at(inner + slab)..at(inner + slab + 1);
+            builder.begin_slab();
+            let mut end = (inner + slab).min(distances);
+            while end > inner + 1 {
+                let start = end.saturating_sub(shape.thickness).max(inner + 1);
+                let next = if start > inner + 1 {
+                    Next::Stage
+                } else {
+                    Next::Separator
+                };
+                builder.add_stage(&(at(start)..at(end)), &outer, end - start > 1, next);
+                end = start;
             }
-            if chunk == 0 {
-                break;
-            }
-            chunk -= 1;
+            builder.add_separator(&outer);
         }
+        let mut tree = builder.tree;
         tree.price.bytes = tree.bytes(pass);
         tree
     }
 
-    /// Places of the cells of a front: its own, farthest first, then its boundary.
+    /// Places of the cells of a front: its own, then its boundary.
     pub(in super::super) fn cells(&self, front: &Front) -> &[u32] {
         &self.places[front.first..front.first + (front.own + front.boundary) as usize]
     }
 
-    /// Places of the boundary of a front.
+    /// Places of the boundary of a front, those of the outer separator last.
     pub(in super::super) fn boundary(&self, front: &Front) -> &[u32] {
         &self.cells(front)[front.own as usize..]
     }
 
-    /// The fronts whose boundary front `index` eliminates.
-    pub(super) fn children(&self, index: usize) -> impl Iterator<Item = usize> {
-        std::iter::successors(self.fronts[index].first_child, |&child| {
-            self.fronts[child as usize].next_sibling
+    /// The fronts whose boundary `front` eliminates.
+    pub(super) fn children(&self, front: &Front) -> impl Iterator<Item = usize> {
+        let mut next = front.first_child;
+        std::iter::from_fn(move || {
+            let child = (next != NONE).then_some(next as usize)?;
+            next = self.fronts[child].next_sibling;
+            Some(child)
         })
-        .map(|child| child as usize)
-    }
-
-    /// Adds the fronts of one chunk of places; returns their indices.
-    fn add_chunk(
-        &mut self,
-        pass: &Pass,
-        chunk: std::ops::Range<u32>,
-        waiting: &[u32],
-        pieces: &mut Pieces,
-    ) -> Vec<u32> {
-        pieces.reset(chunk.len());
-        for place in chunk.clone() {
-            for neighbour in pass.neighbours(pass.order[place as usize]) {
-                if chunk.contains(&neighbour) && neighbour > place {
-                    pieces.join(place - chunk.start, neighbour - chunk.start);
-                }
-            }
-        }
-        for &child in waiting {
-            let boundary = self.boundary(&self.fronts[child as usize]);
-            for pair in boundary.windows(2) {
-                pieces.join(pair[0] - chunk.start, pair[1] - chunk.start);
-            }
-        }
-
-        let first_front = self.fronts.len() as u32;
-        let members = pieces.members(first_front);
-        for own in members {
-            let first = self.places.len();
-            self.places
-                .extend(own.iter().rev().map(|local| local + chunk.start));
-            let own = own.len();
-            for at in first..first + own {
-                let cell = pass.order[self.places[at] as usize];
-                for neighbour in pass.neighbours(cell) {
-                    if neighbour != ABSENT && neighbour < chunk.start {
-                        self.places.push(neighbour);
-                    }
-                }
-            }
-            // The nearest own cells alone touch the boundary, so this list is short.
-            let boundary = &mut self.places[first + own..];
-            boundary.sort_unstable();
-            let unique = dedup(boundary);
-            self.places.truncate(first + own + unique);
-            self.price.add_front(own, unique);
-            self.fronts.push(Front {
-                first,
-                own: own as u32,
-                boundary: unique as u32,
-                parent: None,
-                first_child: None,
-                next_sibling: None,
-            });
-        }
-        for &child in waiting {
-            // A boundary of the target alone has no parent: the target is never eliminated.
-            let Some(&place) = self.boundary(&self.fronts[child as usize]).first() else {
-                continue;
-            };
-            let parent = pieces.front_of(place - chunk.start);
-            let elder = self.fronts[parent as usize].first_child.replace(child);
-            let front = &mut self.fronts[child as usize];
-            front.parent = Some(parent);
-            front.next_sibling = elder;
-        }
-        (first_front..self.fronts.len() as u32).collect()
     }
 
     fn bytes(&self, pass: &Pass) -> u64 {
         // Places of the pass and slots, updates alive at once bounded by the largest few fronts.
-        let fixed = pass.order.len() * 12 + self.places.len() * 4 + self.fronts.len() * 64;
+        let fixed =
+            pass.len() * 12 + self.places.len() * 4 + self.fronts.len() * size_of::<Front>();
         let largest = self
             .fronts
             .iter()
-            .map(|front| (front.own + front.boundary) as u64)
+            .map(|front| u64::from(front.own + front.boundary))
             .max()
             .unwrap_or(0);
         fixed as u64 + 8 * self.price.weights as u64 + 16 * largest * largest
@@ -171,29 +160,184 @@ impl Price {
     }
 }
 
-/// Distances a front takes at once. Cells of one distance are never neighbours, so more of them only save the front's own
-/// cost, and where loops join many passages into one front the dense work of a thicker one outweighs that.
-const DISTANCES_PER_FRONT: usize = 1;
-
-/// Removes repeated values from a sorted slice; returns how many remain at its start.
-fn dedup(sorted: &mut [u32]) -> usize {
-    let mut kept = 0;
-    for at in 0..sorted.len() {
-        if kept == 0 || sorted[at] != sorted[kept - 1] {
-            sorted[kept] = sorted[at];
-            kept += 1;
-        }
-    }
-    kept
+/// What comes inwards of a stage.
+#[derive(Clone, Copy, Eq, PartialEq)]
+enum Next {
+    /// Another stage of the same slab.
+    Stage,
+    /// The inner separator, or the target.
+    Separator,
 }
 
-/// Connected pieces of one chunk, by union and find; kept between chunks for its memory.
+/// A tree under construction.
+struct Builder<'a> {
+    pass: &'a Pass,
+    tree: Tree,
+    pieces: Pieces,
+    /// The front on whose boundary a place was last put.
+    seen: Vec<u32>,
+    /// Fronts that wait for the next stage of this slab, for its outer separator, and for its inner one.
+    for_stage: Vec<u32>,
+    for_outer: Vec<u32>,
+    for_inner: Vec<u32>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(pass: &'a Pass) -> Self {
+        Self {
+            pass,
+            tree: Tree {
+                fronts: Vec::with_capacity(pass.len() / 4),
+                places: Vec::with_capacity(pass.len() * 3),
+                price: Price::default(),
+            },
+            pieces: Pieces::default(),
+            seen: vec![NONE; pass.len()],
+            for_stage: Vec::new(),
+            for_outer: Vec::new(),
+            for_inner: Vec::new(),
+        }
+    }
+
+    /// Moves on to the next slab inwards.
+    fn begin_slab(&mut self) {
+        self.for_outer.append(&mut self.for_inner);
+    }
+
+    /// Adds the fronts of a stage inside the slab whose outer separator takes the places `outer`.
+    fn add_stage(&mut self, stage: &Range<u32>, outer: &Range<u32>, thick: bool, next: Next) {
+        self.pieces.reset(stage.len());
+        if thick {
+            for place in stage.clone() {
+                for neighbour in self.pass.neighbours(place) {
+                    if neighbour > place && neighbour < stage.end {
+                        self.pieces
+                            .join(place - stage.start, neighbour - stage.start);
+                    }
+                }
+            }
+        }
+        let mut waiting = std::mem::take(&mut self.for_stage);
+        self.adopt(stage, &waiting);
+        waiting.clear();
+        self.for_stage = waiting;
+        for piece in 0..self.pieces.count() {
+            let (index, touches_outer) = self.add_front(piece, stage, Some(outer));
+            match next {
+                Next::Stage => self.for_stage.push(index),
+                Next::Separator if touches_outer => self.for_outer.push(index),
+                Next::Separator => self.for_inner.push(index),
+            }
+        }
+    }
+
+    /// Adds the fronts of a separator, the slabs on both sides of which are eliminated.
+    fn add_separator(&mut self, separator: &Range<u32>) {
+        self.pieces.reset(separator.len());
+        let mut waiting = std::mem::take(&mut self.for_outer);
+        self.adopt(separator, &waiting);
+        waiting.clear();
+        self.for_outer = waiting;
+        for piece in 0..self.pieces.count() {
+            let (index, _) = self.add_front(piece, separator, None);
+            self.for_inner.push(index);
+        }
+    }
+
+    /// Joins the pieces of a stage by the boundaries of the fronts that waited for it, and gives it those as children.
+    fn adopt(&mut self, stage: &Range<u32>, waiting: &[u32]) {
+        for &child in waiting {
+            let boundary = self.tree.boundary(&self.tree.fronts[child as usize]);
+            let mut here = boundary.iter().filter(|place| stage.contains(place));
+            if let Some(first) = here.next() {
+                for other in here {
+                    self.pieces.join(first - stage.start, other - stage.start);
+                }
+            }
+        }
+        self.pieces.number();
+        for &child in waiting {
+            let boundary = self.tree.boundary(&self.tree.fronts[child as usize]);
+            let Some(first) = boundary.iter().find(|place| stage.contains(place)) else {
+                continue;
+            };
+            let piece = self.pieces.piece[(first - stage.start) as usize] as usize;
+            let front = &mut self.tree.fronts[child as usize];
+            front.has_parent = true;
+            front.next_sibling = std::mem::replace(&mut self.pieces.first_child[piece], child);
+        }
+    }
+
+    /// Adds the front of one piece: of a separator, or of a stage of the slab inside the separator `outer`. Returns its
+    /// index and whether it touches that.
+    fn add_front(
+        &mut self,
+        piece: usize,
+        stage: &Range<u32>,
+        outer: Option<&Range<u32>>,
+    ) -> (u32, bool) {
+        // Of a separator's own neighbours none remains.
+        let (inwards, outer) = outer.map_or((0, 0..0), |outer| (stage.start, outer.clone()));
+        let tree = &mut self.tree;
+        let index = tree.fronts.len() as u32;
+        let first = tree.places.len();
+        let members = self.pieces.members(piece);
+        tree.places
+            .extend(members.iter().map(|local| local + stage.start));
+        let own = members.len();
+        for at in first..first + own {
+            for neighbour in self.pass.neighbours(tree.places[at]) {
+                // What else lies farther out is eliminated.
+                let remains = neighbour < inwards || outer.contains(&neighbour);
+                if remains && self.seen[neighbour as usize] != index {
+                    self.seen[neighbour as usize] = index;
+                    tree.places.push(neighbour);
+                }
+            }
+        }
+        let first_child = self.pieces.first_child[piece];
+        let mut child = first_child;
+        while child != NONE {
+            let front = tree.fronts[child as usize];
+            let boundary = front.first + front.own as usize;
+            for at in boundary..boundary + front.boundary as usize {
+                let place = tree.places[at];
+                if !stage.contains(&place) && self.seen[place as usize] != index {
+                    self.seen[place as usize] = index;
+                    tree.places.push(place);
+                }
+            }
+            child = front.next_sibling;
+        }
+        // The next stage first and the outer separator last: so the rows of an update mostly stay in order on their way
+        // up the tree.
+        let boundary = &mut tree.places[first + own..];
+        boundary.sort_unstable_by_key(|&place| (outer.contains(&place), Reverse(place)));
+        let touches_outer = boundary.last().is_some_and(|place| outer.contains(place));
+        let boundary = boundary.len();
+        tree.price.add_front(own, boundary);
+        tree.fronts.push(Front {
+            first,
+            own: own as u32,
+            boundary: boundary as u32,
+            has_parent: false,
+            first_child,
+            next_sibling: NONE,
+        });
+        (index, touches_outer)
+    }
+}
+
+/// Connected pieces of one stage, by union and find; kept between stages for its memory.
 #[derive(Default)]
 struct Pieces {
     parent: Vec<u32>,
+    /// Piece of each cell.
     piece: Vec<u32>,
-    members: Vec<Vec<u32>>,
-    first_front: u32,
+    /// Where the members of each piece end.
+    ends: Vec<u32>,
+    members: Vec<u32>,
+    first_child: Vec<u32>,
 }
 
 impl Pieces {
@@ -217,30 +361,46 @@ impl Pieces {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// The members of each piece in ascending order, pieces in order of their first member.
-    fn members(&mut self, first_front: u32) -> &[Vec<u32>] {
-        self.first_front = first_front;
+    /// Numbers the pieces and lists their members, once all are joined.
+    fn number(&mut self) {
+        let len = self.parent.len();
         self.piece.clear();
-        self.piece.resize(self.parent.len(), 0);
-        let mut count = 0;
-        for at in 0..self.parent.len() as u32 {
+        self.piece.resize(len, 0);
+        self.ends.clear();
+        for at in 0..len as u32 {
             let root = self.root(at);
             if root == at {
-                self.piece[at as usize] = count as u32;
-                if count == self.members.len() {
-                    self.members.push(Vec::new());
-                }
-                self.members[count].clear();
-                count += 1;
+                self.piece[at as usize] = self.ends.len() as u32;
+                self.ends.push(1);
             } else {
-                self.piece[at as usize] = self.piece[root as usize];
+                let piece = self.piece[root as usize];
+                self.piece[at as usize] = piece;
+                self.ends[piece as usize] += 1;
             }
-            self.members[self.piece[at as usize] as usize].push(at);
         }
-        &self.members[..count]
+        let mut sum = 0;
+        for end in &mut self.ends {
+            sum += std::mem::replace(end, sum);
+        }
+        // Each end counts up from the start of its piece as the members come in.
+        self.members.clear();
+        self.members.resize(len, 0);
+        for at in (0..len as u32).rev() {
+            let end = &mut self.ends[self.piece[at as usize] as usize];
+            self.members[*end as usize] = at;
+            *end += 1;
+        }
+        self.first_child.clear();
+        self.first_child.resize(self.ends.len(), NONE);
     }
 
-    fn front_of(&self, at: u32) -> u32 {
-        self.first_front + self.piece[at as usize]
+    fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The members of a piece in descending order.
+    fn members(&self, piece: usize) -> &[u32] {
+        let start = if piece == 0 { 0 } else { self.ends[piece - 1] };
+        &self.members[start as usize..self.ends[piece] as usize]
     }
 }
