@@ -1,9 +1,14 @@
 //! One breadth-first pass from the target over the free cells.
 
+use crate::cancellation::Cancellation;
 use crate::domain::Domain;
+use crate::error::SolveError;
 
 /// The cell has no place in the order: blocked, or cut off from the target.
 pub(super) const ABSENT: u32 = u32::MAX;
+
+/// Distances between two looks at the cancellation: at most some hundred microseconds on the largest maps.
+const CHECKED_EVERY: usize = 64;
 
 /// The reachable cells in order of their distance from the target.
 pub(super) struct Pass {
@@ -18,7 +23,13 @@ pub(super) struct Pass {
 
 impl Pass {
     /// Visits `domain` from its target.
-    pub(super) fn from_target(domain: &Domain) -> Self {
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`].
+    pub(super) fn from_target(
+        domain: &Domain,
+        cancellation: &Cancellation,
+    ) -> Result<Self, SolveError> {
         let (width, height) = (domain.width(), domain.height());
         // One absent cell all around spares every visit the question whether a neighbour exists.
         const UNSEEN: u32 = u32::MAX - 1;
@@ -40,6 +51,9 @@ impl Pass {
         let mut levels = vec![0, 1];
         let mut next = 0;
         while next < order.len() {
+            if levels.len() % CHECKED_EVERY == 0 {
+                cancellation.check()?;
+            }
             let end = order.len();
             while next < end {
                 let cell = order[next] as usize;
@@ -62,12 +76,12 @@ impl Pass {
                 }
             }
         }
-        Self {
+        Ok(Self {
             order,
             place,
             levels,
             width,
-        }
+        })
     }
 
     /// Cells with a place.

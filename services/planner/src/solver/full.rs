@@ -79,7 +79,7 @@ impl Full {
             ..
         } = task;
         cancellation.check()?;
-        let mut plan = pricing::plan(domain, settings.memory_limit);
+        let mut plan = pricing::plan(domain, settings.memory_limit, cancellation)?;
         let mut failed = Check::default();
         for method in plan.methods {
             let (store, check) = match method {
@@ -105,11 +105,13 @@ impl Full {
                     (store, check)
                 }
                 Method::Elimination => {
-                    let (pass, tree) = plan.elimination.take().unwrap_or_else(|| {
-                        let pass = breadth::Pass::from_target(domain);
-                        let tree = elimination::Tree::of(&pass);
+                    let (pass, tree) = if let Some(planned) = plan.elimination.take() {
+                        planned
+                    } else {
+                        let pass = breadth::Pass::from_target(domain, cancellation)?;
+                        let tree = elimination::Tree::of(&pass, cancellation)?;
                         (pass, tree)
-                    });
+                    };
                     observe(Phase::SetUp);
                     let mut store = elimination::solve(
                         domain,

@@ -7,7 +7,9 @@
 
 use super::breadth::Pass;
 use super::elimination::Tree;
+use crate::cancellation::Cancellation;
 use crate::domain::{Absorption, Domain};
+use crate::error::SolveError;
 use crate::field::Method;
 
 /// Free space of this mean width, cells, is left to multigrid without a further look.
@@ -25,7 +27,7 @@ const SET_UP_PER_CELL: f64 = 3.0;
 const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
 const DOUBLE_CYCLE_PER_CELL: f64 = 2.5;
 const ELIMINATION_PER_CELL: f64 = 65.0;
-const ELIMINATION_PER_OPERATION: f64 = 0.17;
+const ELIMINATION_PER_OPERATION: f64 = 0.15;
 
 /// Cycles multigrid takes for a range of u: in narrow passages one settles three to four orders of magnitude.
 fn cycles(decades: f64) -> f64 {
@@ -41,7 +43,14 @@ pub(super) struct Plan {
 }
 
 /// The plan for `domain`; elimination may take `memory_limit` bytes.
-pub(super) fn plan(domain: &Domain, memory_limit: u64) -> Plan {
+///
+/// # Errors
+/// [`SolveError::Cancelled`].
+pub(super) fn plan(
+    domain: &Domain,
+    memory_limit: u64,
+    cancellation: &Cancellation,
+) -> Result<Plan, SolveError> {
     use Method::{Elimination, MultigridBands, MultigridDouble, MultigridSingle};
     let width = mean_width(domain);
     // Absorption makes u fall by this much a cell on its own: cosh(1 / lambda) = 1 + 2 k.
@@ -54,12 +63,12 @@ pub(super) fn plan(domain: &Domain, memory_limit: u64) -> Plan {
             ..DOUBLE_DECADES => MultigridDouble,
             _ => MultigridBands,
         };
-        return Plan {
+        return Ok(Plan {
             methods: costlier(first, &[MultigridDouble, MultigridBands, Elimination]),
             elimination: None,
-        };
+        });
     }
-    let pass = Pass::from_target(domain);
+    let pass = Pass::from_target(domain, cancellation)?;
     let cells = pass.len() as f64;
     // Along a passage of width w, u falls like exp(-pi x / w). The runs along a passage count into the mean width too; on
     // mazes that makes it about 1.7 times too large.
@@ -75,22 +84,22 @@ pub(super) fn plan(domain: &Domain, memory_limit: u64) -> Plan {
     let price = domain.blocked().len() as f64 * (SET_UP_PER_CELL + per_cycle * cycles(decades));
     // Elimination costs more than this on any map: no need to build its tree.
     if price < 0.5 * ELIMINATION_PER_CELL * cells {
-        return Plan {
+        return Ok(Plan {
             methods: multigrid,
             elimination: None,
-        };
+        });
     }
-    let tree = Tree::of(&pass);
+    let tree = Tree::of(&pass, cancellation)?;
     let exact = ELIMINATION_PER_CELL * cells + ELIMINATION_PER_OPERATION * tree.price.operations;
     let methods = if tree.price.bytes <= memory_limit && exact <= price {
         vec![Elimination]
     } else {
         multigrid
     };
-    Plan {
+    Ok(Plan {
         methods,
         elimination: Some((pass, tree)),
-    }
+    })
 }
 
 /// The method `first` and those of `rest` that come after it.

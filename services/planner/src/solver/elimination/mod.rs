@@ -6,6 +6,11 @@
 //! right-hand side to carry inwards, and u follows outwards from u(target) = 1: each cell's u is a sum, with positive
 //! weights of moderate size, of the u of cells nearer to the target. Nothing is iterated, nothing cancels and nothing
 //! underflows, whatever the range of u. The cost is about the cube of the fronts' width: right for corridors, not halls.
+//!
+//! - [`tree`]: which cells go together, and in what order where many passages run side by side.
+//! - [`dense`]: the matrix of a front.
+//! - [`substitution`]: from the weights to u.
+//! - [`polish`]: what `f64` weights can lose.
 
 mod dense;
 mod polish;
@@ -37,8 +42,7 @@ pub(super) fn solve(
         });
     }
     factor(domain, pass, tree, memory, cancellation)?;
-    cancellation.check()?;
-    Ok(substitution::outwards(domain, pass, tree, memory))
+    substitution::outwards(domain, pass, tree, memory, cancellation)
 }
 
 /// Memory kept between solves: to be given fresh pages costs as much as to fill them.
@@ -85,9 +89,7 @@ fn factor(
     let mut matrix = dense::Matrix::default();
 
     for (index, front) in tree.fronts.iter().enumerate() {
-        if index % 64 == 0 {
-            cancellation.check()?;
-        }
+        cancellation.check()?;
         let cells = tree.cells(front);
         let own = front.own as usize;
         for (at, &place) in cells.iter().enumerate() {

@@ -3,7 +3,9 @@
 use super::super::breadth::Pass;
 use super::Memory;
 use super::tree::Tree;
+use crate::cancellation::Cancellation;
 use crate::domain::Domain;
+use crate::error::SolveError;
 use crate::field::{BLOCKED, Store};
 use crate::scaled::Scaled;
 
@@ -20,7 +22,16 @@ const TOP: i32 = 1020;
 const BOTTOM: i32 = -960;
 
 /// u of every cell of `domain`.
-pub(super) fn outwards(domain: &Domain, pass: &Pass, tree: &Tree, memory: &mut Memory) -> Store {
+///
+/// # Errors
+/// [`SolveError::Cancelled`].
+pub(super) fn outwards(
+    domain: &Domain,
+    pass: &Pass,
+    tree: &Tree,
+    memory: &mut Memory,
+    cancellation: &Cancellation,
+) -> Result<Store, SolveError> {
     let Memory { weights, u, .. } = memory;
     // By place: the cells of a front lie close together there.
     u.clear();
@@ -29,6 +40,7 @@ pub(super) fn outwards(domain: &Domain, pass: &Pass, tree: &Tree, memory: &mut M
     let mut plain = Vec::new();
     let (mut rows, mut lengths) = (&weights.rows[..], &weights.lengths[..]);
     for front in tree.fronts.iter().rev() {
+        cancellation.check()?;
         let cells = tree.cells(front);
         let own = front.own as usize;
         let (before, lengths_here) = lengths.split_at(lengths.len() - own);
@@ -44,7 +56,7 @@ pub(super) fn outwards(domain: &Domain, pass: &Pass, tree: &Tree, memory: &mut M
             in_extended_range(u, cells, here);
         }
     }
-    store(domain, pass, u)
+    Ok(store(domain, pass, u))
 }
 
 /// The store of `u`, given by place.
@@ -128,8 +140,9 @@ fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut V
         return false;
     }
     plain.clear();
+    plain.resize(own, 0.0);
     plain.extend(
-        cells
+        cells[own..]
             .iter()
             .map(|&place| u[place as usize].relative_to(largest)),
     );
@@ -175,20 +188,15 @@ fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     }
 }
 
-/// Scalar product in eight partial sums, which the compiler can keep in vector registers.
+/// Scalar product in four partial sums, which the compiler can keep in vector registers.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a8.zip(b8) {
+    let mut sums = [0.0; 4];
+    let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    for (x, y) in a4.iter().zip(b4) {
         for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
             *sum += x * y;
         }
     }
-    sums.iter().sum::<f64>() + rest
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }

@@ -17,6 +17,8 @@ use std::cmp::Reverse;
 use std::ops::Range;
 
 use super::super::breadth::Pass;
+use crate::cancellation::Cancellation;
+use crate::error::SolveError;
 
 /// Cells that are eliminated together, followed by those it leaves an update on.
 #[derive(Clone, Copy)]
@@ -79,6 +81,9 @@ const MIDDLING: f64 = 10.0;
 /// Passages side by side from which on slabs pay.
 const MANY: f64 = 6.0;
 
+/// Stages between two looks at the cancellation.
+const CHECKED_EVERY: usize = 16;
+
 /// Fronts in order of elimination, children before their parents.
 pub(in super::super) struct Tree {
     pub fronts: Vec<Front>,
@@ -88,9 +93,16 @@ pub(in super::super) struct Tree {
 
 impl Tree {
     /// The tree over all cells of `pass` but the target.
-    pub(in super::super) fn of(pass: &Pass) -> Self {
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`].
+    pub(in super::super) fn of(
+        pass: &Pass,
+        cancellation: &Cancellation,
+    ) -> Result<Self, SolveError> {
         let shape = Shape::of(pass);
         let mut builder = Builder::new(pass);
+        let mut stages = 0_usize;
         let distances = pass.levels.len() - 1;
         let slab = shape.slab.unwrap_or(distances);
         let at = |distance: usize| pass.levels[distance.min(distances)];
@@ -100,6 +112,10 @@ impl Tree {
             builder.begin_slab();
             let mut end = (inner + slab).min(distances);
             while end > inner + 1 {
+                if stages.is_multiple_of(CHECKED_EVERY) {
+                    cancellation.check()?;
+                }
+                stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
                 let next = if start > inner + 1 {
                     Next::Stage
@@ -113,7 +129,7 @@ impl Tree {
         }
         let mut tree = builder.tree;
         tree.price.bytes = tree.bytes(pass);
-        tree
+        Ok(tree)
     }
 
     /// Places of the cells of a front: its own, then its boundary.
