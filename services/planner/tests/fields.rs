@@ -62,6 +62,16 @@ fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
 }
 
 #[test]
+fn directions_are_within_a_degree_on_maps_large_enough_to_solve_coarse_levels_twice() {
+    for kind in [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap] {
+        assert_right(
+            &Map::generate(kind, 100, 260, 1),
+            &format!("{kind:?} of 260 rows"),
+        );
+    }
+}
+
+#[test]
 fn the_field_holds_down_to_ten_to_the_minus_twenty_thousand() {
     let map = Map::generate(Kind::Serpentine { corridor: 2 }, 40, 4200, 0);
     let field = solve(&map.domain().expect("a valid map"));

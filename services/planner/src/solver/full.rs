@@ -21,7 +21,7 @@ const FIRST_CHECK: usize = 4;
 const FIRST_CHECK_NEAR: usize = 2;
 
 /// Cycles between a check that failed and the next.
-const BETWEEN_CHECKS: usize = 2;
+const BETWEEN_CHECKS: usize = 1;
 
 /// Cycles after which a precision is given up: its range of u at 1.4 orders of magnitude a cycle, and some.
 const SINGLE_CYCLES: usize = 60;

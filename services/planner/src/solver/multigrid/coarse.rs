@@ -27,13 +27,15 @@ const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
 /// Places of a plane up to which it is gone through as one row.
-const SMALL: usize = 1 << 11;
+const SMALL: usize = 1 << 13;
 
 /// Cells of one coarse level.
 #[derive(Debug)]
 pub(super) struct Coarse<R> {
     pub grid: Grid,
     pub u: Planes<R>,
+    /// u of the cycle before, where a second one solves for what that left.
+    aside: Planes<R>,
     /// Right-hand side.
     pub f: Planes<R>,
     /// 1 / diagonal, 0 where the cell is inactive.
@@ -53,6 +55,7 @@ impl<R: Real> Coarse<R> {
         Self {
             grid,
             u: grid.planes(),
+            aside: grid.planes(),
             f: grid.planes(),
             inverse: grid.planes(),
             coupling: std::array::from_fn(|_| grid.planes()),
@@ -231,6 +234,35 @@ impl<R: Real> Coarse<R> {
         self.scratch = scratch;
     }
 
+    /// Puts u aside, and what it leaves of the equations in the place of their right-hand side.
+    #[inline(always)]
+    pub(super) fn set_aside(&mut self) {
+        let Grid {
+            columns: n, rows, ..
+        } = self.grid;
+        for plane in [EE, OE, EO, OO] {
+            for y in 0..rows {
+                let o = self.grid.start(y);
+                let mut f = std::mem::take(&mut self.f[plane]);
+                let terms = self.terms(plane, o, n, ALL);
+                let (u, inverse) = (&self.u[plane][o..][..n], &self.inverse[plane][o..][..n]);
+                subtract(&mut f[o..][..n], u, inverse, &terms);
+                self.f[plane] = f;
+            }
+        }
+        // The next descent starts from zero and overwrites all of u.
+        std::mem::swap(&mut self.aside, &mut self.u);
+    }
+
+    /// Adds u put aside to the correction of it that u has become.
+    pub(super) fn add_aside(&mut self) {
+        for (u, aside) in self.u.iter_mut().zip(&self.aside) {
+            for (u, &aside) in u.iter_mut().zip(aside) {
+                *u += aside;
+            }
+        }
+    }
+
     /// u = (f + couplings times u of the neighbours at `steps`) / diagonal, for the `n` places of a plane from `o` on.
     #[inline(always)]
     fn relax<const COUNT: usize>(
@@ -398,6 +430,21 @@ fn relax<R: Real, const COUNT: usize>(
 ) {
     for x in 0..out.len() {
         out[x] = ((f[x] + sum_at(terms, x)) * inverse[x]).flushed();
+    }
+}
+
+/// f less the equations' left side; 0 for inactive cells.
+#[inline(always)]
+fn subtract<R: Real, const COUNT: usize>(
+    f: &mut [R],
+    u: &[R],
+    inverse: &[R],
+    terms: &[(&[R], &[R]); COUNT],
+) {
+    for x in 0..f.len() {
+        let active = inverse[x].is_active();
+        let left = (f[x] + sum_at(terms, x)) - inverse[x].inverse() * u[x];
+        f[x] = (active * left).flushed();
     }
 }
 

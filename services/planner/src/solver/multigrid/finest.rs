@@ -10,9 +10,6 @@ use super::coarse::Coarse;
 use super::grid::{EE, EO, Grid, OE, OO, Planes, Scratch, join_row, split_row};
 use super::real::Real;
 
-/// Full sweeps a pass makes, besides the half sweep whose changes it restricts.
-const SWEEPS: usize = 1;
-
 /// An inflow at one cell: the right-hand side of its equation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source<R> {
@@ -148,9 +145,16 @@ impl<R: Real> Finest<R> {
         ]
     }
 
-    /// One pass: correction from `next`, relaxation, and if `descend` the restriction of the residual to `next`.
+    /// One pass: correction from `next`, so many full `sweeps`, and if `descend` a half sweep more, whose changes are
+    /// restricted to `next` as the residual.
     #[inline(always)]
-    pub(super) fn pass(&mut self, next: &mut Coarse<R>, descend: bool, tolerance: R) -> Progress {
+    pub(super) fn pass(
+        &mut self,
+        next: &mut Coarse<R>,
+        sweeps: usize,
+        descend: bool,
+        tolerance: R,
+    ) -> Progress {
         let Grid {
             columns: n,
             rows,
@@ -173,14 +177,14 @@ impl<R: Real> Finest<R> {
         } = &mut scratch;
         join_row(&next.grid, &next.u, 0, upper);
 
-        for y in 0..rows + SWEEPS + 2 {
+        for y in 0..rows + sweeps + 2 {
             if y < rows {
                 join_row(&next.grid, &next.u, y + 1, lower);
                 progress.unsettled += self.correct_black(y, upper, lower, tolerance);
                 std::mem::swap(upper, lower);
             }
             // Every sweep follows the one before at a distance of one row.
-            for sweep in 0..SWEEPS {
+            for sweep in 0..sweeps {
                 if (sweep..rows + sweep).contains(&y) {
                     self.relax_even_even(y - sweep);
                 }
@@ -189,10 +193,10 @@ impl<R: Real> Finest<R> {
                     self.relax_black(y - sweep - 1);
                 }
             }
-            if !descend || y < SWEEPS {
+            if !descend || y < sweeps {
                 continue;
             }
-            let y = y - SWEEPS;
+            let y = y - sweeps;
             // Beyond the last row the change is that of the margin: none.
             even.swap(0, 1);
             odd.swap(0, 1);

@@ -34,6 +34,22 @@ use crate::domain::{Absorption, Cell, Domain};
 /// Sweeps after the last correction.
 const SMOOTHING: usize = 2;
 
+/// The level solved twice in every cycle, counted from the first coarse one. A cycle through the levels below is not
+/// exact, and what it gets wrong reaches far beyond the rooms it belongs to, where u is so much smaller; here, on a
+/// sixteenth of the map's cells, that is cheap to mend, and saves up to every third cycle.
+const TWICE: usize = 1;
+
+/// On maps with no longer side than this a second cycle there and a second sweep save no cycles worth their cost.
+const SMALL_SIDE: usize = 128;
+
+/// Full sweeps in a pass over the finest level of a large map: the second reads no more from memory.
+const SWEEPS: usize = 2;
+
+/// The same where no more than one cell in `FEW` has not settled: those are left in dead ends a few cells wide, of which
+/// the coarser levels know little.
+const SWEEPS_FOR_FEW: usize = 6;
+const FEW: usize = 64;
+
 /// Levels end when neither side is longer.
 const COARSEST_SIDE: usize = 5;
 
@@ -43,6 +59,8 @@ pub(crate) struct Multigrid<R> {
     finest: Finest<R>,
     coarse: Vec<Coarse<R>>,
     coarsest: Coarsest,
+    /// Full sweeps in the next pass of a cycle; one in the first, so that no solve depends on the one before.
+    sweeps: usize,
     wide: Wide,
 }
 
@@ -63,6 +81,7 @@ impl<R: Real> Multigrid<R> {
             finest,
             coarse,
             coarsest: Coarsest::default(),
+            sweeps: 1,
             wide: Wide::default(),
         }
     }
@@ -139,6 +158,7 @@ impl<R: Real> Multigrid<R> {
 
     /// Makes `target` the only inflow and starts from a first guess, given row by row with 2^TOP at the target.
     pub(crate) fn start_near(&mut self, target: Cell, mut guess: impl FnMut(usize, &mut [R])) {
+        self.sweeps = 1;
         let finest = &mut self.finest;
         let grid = finest.grid;
         let mut buffer = vec![R::default(); 2 * grid.columns];
@@ -170,8 +190,9 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Starts from the coarsest level's answer to what flows in.
+    /// Starts from the coarser levels' answer to what flows in, each taken from the next and bettered by a cycle.
     pub(crate) fn start_from_sources(&mut self) {
+        self.sweeps = 1;
         for plane in &mut self.finest.u {
             plane.fill(R::default());
         }
@@ -183,7 +204,15 @@ impl<R: Real> Multigrid<R> {
                 plane.fill(R::default());
             }
             self.ascend(level);
+            if self.is_large() && level >= TWICE {
+                self.solve_rest(level);
+            }
         }
+    }
+
+    fn is_large(&self) -> bool {
+        let Grid { width, height, .. } = self.finest.grid;
+        width.max(height) > SMALL_SIDE
     }
 
     /// Takes over equations that are not a map's: for each row 1 / diagonal (0 for a cell that stays zero) and a first
@@ -193,6 +222,7 @@ impl<R: Real> Multigrid<R> {
         rows: impl Fn(usize) -> (&'a [R], &'a [R]),
         inflow: impl Iterator<Item = (Cell, R)>,
     ) {
+        self.sweeps = 1;
         let finest = &mut self.finest;
         let (grid, width, height) = (finest.grid, finest.grid.width, finest.grid.height);
         let mut buffer = vec![R::default(); 2 * grid.columns];
@@ -234,7 +264,12 @@ impl<R: Real> Multigrid<R> {
 
     /// One cycle; corrections above `tolerance` times u count as unsettled.
     pub(crate) fn cycle(&mut self, tolerance: f64) -> Progress {
-        let progress = self.pass(true, tolerance);
+        let progress = self.pass(self.sweeps, true, tolerance);
+        if self.is_large() {
+            let Grid { width, height, .. } = self.finest.grid;
+            let few = progress.unsettled <= width * height / FEW;
+            self.sweeps = if few { SWEEPS_FOR_FEW } else { SWEEPS };
+        }
         self.correct();
         progress
     }
@@ -242,7 +277,7 @@ impl<R: Real> Multigrid<R> {
     /// As [`cycle`](Self::cycle), and says whether all was settled, in which case nothing more is corrected: for small maps,
     /// whose coarser levels cost more than the finest. [`smooth`](Self::smooth) instead of [`finish`](Self::finish) ends it.
     pub(crate) fn settle(&mut self, tolerance: f64) -> bool {
-        let settled = self.pass(true, tolerance).unsettled == 0;
+        let settled = self.pass(1, true, tolerance).unsettled == 0;
         if !settled {
             self.correct();
         }
@@ -252,24 +287,52 @@ impl<R: Real> Multigrid<R> {
     /// Solves on the coarser levels for what the finest one left.
     fn correct(&mut self) {
         let last = self.coarse.len() - 1;
-        for level in 0..last {
-            let (fine, next) = self.coarse.split_at_mut(level + 1);
-            let fine = &mut fine[level];
-            self.wide.run(
-                #[inline(always)]
-                || fine.descend(&mut next[0]),
-            );
+        if self.is_large() && last > TWICE {
+            (0..TWICE).for_each(|level| self.descend(level));
+            self.solve_level(TWICE);
+            self.solve_rest(TWICE);
+            (0..TWICE).rev().for_each(|level| self.ascend(level));
+        } else {
+            self.solve_level(0);
+        }
+    }
+
+    /// Solves on a coarse level, from zero, by one cycle through it and those below.
+    fn solve_level(&mut self, level: usize) {
+        let last = self.coarse.len() - 1;
+        for level in level..last {
+            self.descend(level);
         }
         self.coarsest.solve(&mut self.coarse[last]);
-        for level in (0..last).rev() {
+        for level in (level..last).rev() {
             self.ascend(level);
         }
+    }
+
+    /// Solves on a coarse level, by one more cycle, for what the one before left. The right-hand side is used up.
+    fn solve_rest(&mut self, level: usize) {
+        let fine = &mut self.coarse[level];
+        self.wide.run(
+            #[inline(always)]
+            || fine.set_aside(),
+        );
+        self.solve_level(level);
+        self.coarse[level].add_aside();
+    }
+
+    fn descend(&mut self, level: usize) {
+        let (fine, next) = self.coarse.split_at_mut(level + 1);
+        let fine = &mut fine[level];
+        self.wide.run(
+            #[inline(always)]
+            || fine.descend(&mut next[0]),
+        );
     }
 
     /// Brings the last coarse correction to the finest level, for u to be read, and smoothes what that leaves from cell to
     /// cell: near a saddle point the direction hangs on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
-        self.pass(false, 0.0);
+        self.pass(1, false, 0.0);
         self.smooth();
     }
 
@@ -278,17 +341,15 @@ impl<R: Real> Multigrid<R> {
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
         }
-        for _ in 0..SMOOTHING {
-            self.pass(false, 0.0);
-        }
+        self.pass(SMOOTHING, false, 0.0);
     }
 
-    fn pass(&mut self, descend: bool, tolerance: f64) -> Progress {
+    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: f64) -> Progress {
         let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
         let tolerance = R::of(tolerance);
         self.wide.run(
             #[inline(always)]
-            || finest.pass(next, descend, tolerance),
+            || finest.pass(next, sweeps, descend, tolerance),
         )
     }
 

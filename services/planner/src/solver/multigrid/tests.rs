@@ -193,3 +193,22 @@ fn a_settled_solution_satisfies_every_equation() {
         }
     }
 }
+
+#[test]
+fn a_solve_on_a_large_map_leaves_nothing_behind_for_the_next() {
+    let blocked = (0..200 * 150).map(|i| i % 37 == 5).collect();
+    let domain = Domain::new(200, 150, blocked, Cell::new(20, 30)).unwrap();
+    let mut levels = Multigrid::<f64>::new(200, 150);
+    levels.set_up_rows(&domain, 0..150);
+    let mut solve = || {
+        levels.start(domain.target());
+        let settled = (0..60).any(|_| levels.cycle(1e-6).unsettled == 0);
+        levels.finish();
+        let mut u = Vec::new();
+        levels.read(domain.target(), -1.0, &mut u);
+        (settled, u)
+    };
+    let first = solve();
+    assert!(first.0);
+    assert_eq!(first, solve());
+}
