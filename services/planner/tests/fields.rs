@@ -72,6 +72,20 @@ fn directions_are_within_a_degree_on_maps_large_enough_to_solve_coarse_levels_tw
 }
 
 #[test]
+fn directions_are_within_a_degree_in_mazes_with_enough_passages_to_eliminate_in_slabs() {
+    for corridor in [1, 2, 4] {
+        let map = Map::generate(Kind::Maze { corridor }, 170, 150, 2);
+        assert_eq!(
+            solve(&map.domain().expect("a valid map"))
+                .certificate()
+                .method,
+            planner::Method::Elimination
+        );
+        assert_right(&map, &format!("a maze with corridors of {corridor}"));
+    }
+}
+
+#[test]
 fn the_field_holds_down_to_ten_to_the_minus_twenty_thousand() {
     let map = Map::generate(Kind::Serpentine { corridor: 2 }, 40, 4200, 0);
     let field = solve(&map.domain().expect("a valid map"));

@@ -41,8 +41,10 @@ pub(super) fn solve(
             allowed: memory_limit,
         });
     }
-    factor(domain, pass, tree, memory, cancellation)?;
-    substitution::outwards(domain, pass, tree, memory, cancellation)
+    let solved = factor(domain, pass, tree, memory, cancellation)
+        .and_then(|()| substitution::outwards(domain, pass, tree, memory, cancellation));
+    memory.give_back();
+    solved
 }
 
 /// Memory kept between solves: to be given fresh pages costs as much as to fill them.
@@ -53,6 +55,21 @@ pub(super) struct Memory {
     slot: Vec<u32>,
     /// u by place.
     u: Vec<Scaled>,
+}
+
+/// Memory that is kept at most, bytes: what a maze of half a million cells takes. A map that needs more takes so long
+/// that fresh pages no longer count.
+const KEPT: usize = 64 << 20;
+
+impl Memory {
+    fn give_back(&mut self) {
+        let bytes = size_of::<f64>() * self.weights.rows.capacity()
+            + size_of::<u32>() * (self.weights.lengths.capacity() + self.slot.capacity())
+            + size_of::<Scaled>() * self.u.capacity();
+        if bytes > KEPT {
+            *self = Self::default();
+        }
+    }
 }
 
 /// What the substitution needs of the factors.
