@@ -3,6 +3,7 @@
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
 //! is the least of several runs. `cargo bench -p planner -- quick` leaves out the large maps, `-- updates` all but the
 //! local updates.
+//! `-- --maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -12,8 +13,9 @@
 
 mod machine;
 mod others;
+mod real;
 
-use std::time::Instant;
+use std::{path::Path, time::Instant};
 
 use planner::testing::{Kind, Map, Random};
 use planner::{Cancellation, Cell, Change, Domain, Phase, Solver, Verdict};
@@ -42,6 +44,9 @@ fn main() {
     }
     machine_table(quick);
     full_table(quick);
+    if let Some(directory) = std::env::args().skip_while(|it| it != "--maps").nth(1) {
+        real_table(Path::new(&directory));
+    }
     absorption_table();
     update_table(quick);
 }
@@ -70,9 +75,9 @@ fn full_table(quick: bool) {
         "\nFull solves, k = 0: set-up + solve + verification, ms, and as sweeps of the same grid"
     );
     println!(
-        "{:<24} {:>5} {:<14} {:>9} {:>7} {:>9} {:>7} {:>9} {:>9} {:>8} {:>9}",
+        "{:<24} {:>9} {:<14} {:>9} {:>7} {:>9} {:>7} {:>9} {:>9} {:>8} {:>9}",
         "map",
-        "N",
+        "cells",
         "method",
         "scratch",
         "sweeps",
@@ -102,7 +107,6 @@ fn full_table(quick: bool) {
     } else {
         vec![50, 256, 512, 1024, 2048, 4096]
     } {
-        let sweep = machine::sweep(n);
         for kind in kinds {
             let narrow = matches!(kind, Kind::Maze { .. } | Kind::Serpentine { .. });
             // Seconds and gigabytes each, for nothing new.
@@ -110,39 +114,59 @@ fn full_table(quick: bool) {
                 continue;
             }
             let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
-            let cancellation = Cancellation::new();
-            // Memory is kept, the set-up is not: the map before was another.
-            let other = Map::generate(Kind::Drums, n, n, 2)
-                .domain()
-                .expect("a valid map");
-            let mut solver = Solver::default();
-            let mut scratch = f64::INFINITY;
-            for _ in 0..runs(n * n).min(12) {
-                solver.solve(&other, &cancellation).expect("a field");
-                scratch = scratch.min(fastest(1, || {
-                    solver.solve(&domain, &cancellation).expect("a field");
-                }));
-            }
-            let target = fastest(runs(n * n), || {
-                solver.solve(&domain, &cancellation).expect("a field");
-            });
-            let field = solver.solve(&domain, &cancellation).expect("a field");
-            let dijkstra = (n <= 1024).then(|| others::dijkstra(&domain));
-            let faer = (n <= 512).then(|| others::sparse_cholesky(&domain));
-            let show = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.2}"));
-            println!(
-                "{:<24} {n:>5} {:<14} {scratch:>9.3} {:>7.0} {target:>9.3} {:>7.0} {:>9} {:>9} {:>8} {:>9.1}",
-                format!("{kind:?}"),
-                field.certificate().method.name(),
-                scratch / sweep,
-                target / sweep,
-                show(dijkstra),
-                show(dijkstra.map(|time| scratch / time)),
-                show(faer),
-                field.log10_u_min(),
-            );
+            full_row(&format!("{kind:?}"), &domain, n <= 1024, n <= 512);
         }
     }
+}
+
+/// Public maps, where a directory of them is given: every PGM in it.
+fn real_table(directory: &Path) {
+    let entries = std::fs::read_dir(directory).expect("a directory of maps");
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "pgm"));
+    files.sort();
+    for file in files {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        full_row(&name, &real::load(&file), true, false);
+    }
+}
+
+/// One map: what it takes from scratch and with the set-up kept, beside what else there is.
+fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
+    let cells = domain.blocked().len();
+    let sweep = machine::sweep(cells.isqrt());
+    let cancellation = Cancellation::new();
+    // Memory is kept, the set-up is not: the map before was another.
+    let (width, height) = (domain.width(), domain.height());
+    let other = Map::generate(Kind::Drums, width, height, 2)
+        .domain()
+        .expect("a valid map");
+    let mut solver = Solver::default();
+    let mut scratch = f64::INFINITY;
+    for _ in 0..runs(cells).min(12) {
+        solver.solve(&other, &cancellation).expect("a field");
+        scratch = scratch.min(fastest(1, || {
+            solver.solve(domain, &cancellation).expect("a field");
+        }));
+    }
+    let target = fastest(runs(cells), || {
+        solver.solve(domain, &cancellation).expect("a field");
+    });
+    let field = solver.solve(domain, &cancellation).expect("a field");
+    let dijkstra = with_dijkstra.then(|| others::dijkstra(domain));
+    let faer = with_faer.then(|| others::sparse_cholesky(domain));
+    let show = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.2}"));
+    println!(
+        "{name:<24} {:>9} {:<14} {scratch:>9.3} {:>7.0} {target:>9.3} {:>7.0} {:>9} {:>9} {:>8} {:>9.1}",
+        format!("{width}x{height}"),
+        field.certificate().method.name(),
+        scratch / sweep,
+        target / sweep,
+        show(dijkstra),
+        show(dijkstra.map(|time| scratch / time)),
+        show(faer),
+        field.log10_u_min(),
+    );
 }
 
 fn absorption_table() {
