@@ -59,6 +59,8 @@ pub enum Phase {
 }
 
 /// What an update did, and whether its field may be followed.
+///
+/// It speaks of this update alone: what an earlier one advised, or closed, holds until a full solve.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[must_use]
 pub enum Verdict {
