@@ -39,6 +39,10 @@ pub struct TruthTick {
     pub right_counts: u16,
     /// The front ultrasonic byte of this tick's frame, centimetres; 255 is nothing.
     pub sonar_cm: u8,
+    /// The longest so far that a wheel turned after the last motion command the robot heard, seconds: how far
+    /// it goes on its own when the host falls silent. Slower than [`TruthTick::AT_REST_M_S`] is at rest.
+    #[serde(default)]
+    pub unattended_s: f64,
     /// What the radio has done so far; missing where it is perfect.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radio: Option<TruthRadio>,
@@ -58,6 +62,8 @@ pub struct TruthRadio {
 }
 
 impl TruthTick {
+    /// A wheel whose rim is slower than this is at rest, m/s.
+    pub const AT_REST_M_S: f64 = 0.01;
     /// Clearance where nothing stands, metres: JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
 }

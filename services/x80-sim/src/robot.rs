@@ -58,6 +58,9 @@ pub struct Robot {
     time: f64,
     tick: u64,
     heard_at: f64,
+    /// When the last motion command came.
+    ordered_at: f64,
+    unattended: f64,
     addressing: Addressing,
     least_clearance: f64,
     standard: StandardSensors,
@@ -113,6 +116,8 @@ impl Robot {
             time: 0.0,
             tick: 0,
             heard_at: 0.0,
+            ordered_at: 0.0,
+            unattended: 0.0,
             addressing: Addressing::default(),
             least_clearance: f64::INFINITY,
             standard: StandardSensors::default(),
@@ -201,6 +206,7 @@ impl Robot {
     }
 
     fn obey(&mut self, motion: &Motion) {
+        self.ordered_at = self.time;
         let until = motion
             .limit_ms
             .filter(|_| !self.ignores_time)
@@ -273,6 +279,21 @@ impl Robot {
         turn(channel.left, sign.left, turned.left);
         turn(channel.right, sign.right, turned.right);
         self.least_clearance = self.least_clearance.min(self.body.clearance());
+        if self
+            .rims()
+            .into_iter()
+            .any(|rim| rim.abs() > TruthTick::AT_REST_M_S)
+        {
+            self.unattended = self.unattended.max(now + dt - self.ordered_at);
+        }
+    }
+
+    /// Speeds of the left and the right rim, m/s, forward positive.
+    fn rims(&self) -> [f64; 2] {
+        let Wiring { channel, sign } = self.wiring;
+        let rim =
+            |channel: usize, sign: f64| sign * self.motors[channel].speed() * self.metres_per_count;
+        [rim(channel.left, sign.left), rim(channel.right, sign.right)]
     }
 
     /// Let mission time pass until the next tick and measure there.
@@ -323,12 +344,7 @@ impl Robot {
     pub fn truth(&mut self) -> TruthTick {
         let pose = self.body.pose();
         let Wiring { channel, sign } = self.wiring;
-        let speed =
-            |channel: usize, sign: f64| sign * self.motors[channel].speed() * self.metres_per_count;
-        let (left, right) = (
-            speed(channel.left, sign.left),
-            speed(channel.right, sign.right),
-        );
+        let [left, right] = self.rims();
         let counts = |channel: usize, sign: f64| {
             let position = self.motor.encoders[channel].position;
             if sign < 0.0 {
@@ -352,6 +368,7 @@ impl Robot {
             left_counts: counts(channel.left, sign.left),
             right_counts: counts(channel.right, sign.right),
             sonar_cm: self.ranging.front(&self.standard),
+            unattended_s: self.unattended,
             radio: None,
         }
     }

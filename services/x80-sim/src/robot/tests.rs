@@ -179,6 +179,29 @@ fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
 }
 
 #[test]
+fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
+    // A speed loop of 60 ms falls from 250 mm/s to the 10 mm/s that count as rest in 3.2 of them.
+    let coasting = 0.06 * 25_f64.ln();
+    let unattended = |text: &str| {
+        let mut robot = robot(text);
+        for _ in 0..5 {
+            tell(&mut robot, forward(562, 250));
+            robot.advance_to_next_tick();
+        }
+        for _ in 0..30 {
+            robot.advance_to_next_tick();
+        }
+        robot.truth().unattended_s
+    };
+    let obeyed = unattended("");
+    assert!((obeyed - 0.25 - coasting).abs() < 0.02, "{obeyed}");
+    let own_limit = "simulation = { ignores_time = true, stops_when_silent_s = 0.2 }";
+    let ignored = unattended(own_limit);
+    assert!((ignored - 0.2 - coasting).abs() < 0.02, "{ignored}");
+    assert!(unattended("simulation = { ignores_time = true }") > 4.0);
+}
+
+#[test]
 fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
     let speed = |text: &str| {
         let mut robot = robot(text);
@@ -251,8 +274,7 @@ fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
 fn a_line_of_truth_has_the_names_that_its_readers_know() {
     let line = serde_json::to_string(&robot("").truth()).unwrap();
     let names: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
-    let known =
-        "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm";
+    let known = "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm unattended_s";
     assert_eq!(names, known.split(' ').collect::<Vec<_>>());
 }
 
