@@ -5,31 +5,75 @@ mod support;
 
 use support::{assert_nothing_left, run};
 
+/// Reached, and nothing touched.
+fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) {
+    let (code, summary) = run(robot, mission, arguments);
+    assert_eq!(summary["outcome"], "reached", "{arguments:?}: {summary}");
+    assert_eq!(
+        (code, summary["collisions"].as_u64()),
+        (Some(0), Some(0)),
+        "{arguments:?}"
+    );
+}
+
+const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
+const MEASURED: [&str; 2] = ["--set", "simulation.realism=\"measured\""];
+
 #[test]
-fn the_default_mission_reaches_its_target_untouched_for_seeds_1_to_50() {
-    for seed in 1..=50 {
-        let (code, summary) = run("seeds", "obstacle-course", &["--seed", &seed.to_string()]);
-        assert_eq!(summary["outcome"], "reached", "seed {seed}: {summary}");
-        assert_eq!(
-            (code, summary["collisions"].as_u64()),
-            (Some(0), Some(0)),
-            "seed {seed}"
-        );
+fn the_default_mission_reaches_its_target_untouched_for_seeds_1_to_10() {
+    for seed in 1..=10 {
+        arrives_untouched("seeds", "obstacle-course", &["--seed", &seed.to_string()]);
     }
     assert_nothing_left("seeds");
 }
 
 #[test]
-fn the_trap_is_left_from_every_heading() {
+fn by_the_papers_method_it_does_for_seeds_1_to_20() {
+    for seed in 1..=20 {
+        let seed = seed.to_string();
+        let arguments = [&PAPER[..], &["--seed", &seed]].concat();
+        arrives_untouched("paper", "obstacle-course", &arguments);
+    }
+    assert_nothing_left("paper");
+}
+
+#[test]
+fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
+    let fading = [
+        "--set",
+        "simulation.radio.outage_share=0.2",
+        "--set",
+        "simulation.radio.outage_mean_s=0.5",
+    ];
+    for seed in 1..=8 {
+        let seed = seed.to_string();
+        let arguments = [&MEASURED[..], &fading, &["--seed", &seed]].concat();
+        arrives_untouched("faded", "obstacle-course", &arguments);
+    }
+}
+
+#[test]
+fn a_finer_grid_is_no_more_dangerous() {
+    for cells in ["100", "256", "512"] {
+        for seed in ["1", "2"] {
+            let cells = format!("perimeter.cells={cells}");
+            arrives_untouched(
+                "grids",
+                "obstacle-course",
+                &["--set", &cells, "--seed", seed],
+            );
+        }
+    }
+}
+
+#[test]
+fn the_trap_is_left_from_every_heading_by_either_method() {
     for heading in ["0", "90", "180"] {
         for seed in ["1", "2"] {
             let heading = format!("start.heading_deg={heading}");
-            let (_, summary) = run("trap", "trap", &["--set", &heading, "--seed", seed]);
-            assert_eq!(
-                summary["outcome"], "reached",
-                "{heading}, seed {seed}: {summary}"
-            );
-            assert_eq!(summary["collisions"], 0);
+            let arguments = ["--set", &heading, "--seed", seed];
+            arrives_untouched("trap", "trap", &arguments);
+            arrives_untouched("trap-p", "trap", &[&PAPER[..], &arguments].concat());
         }
     }
 }
@@ -57,11 +101,12 @@ fn a_turn_of_a_quarter_at_the_start_costs_little() {
 }
 
 #[test]
-fn a_known_course_is_crossed_faster_than_an_unknown_one() {
+fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
     let known = "known.drum=[{at=[1.7,0.2],radius_m=0.35},{at=[3.7,-0.7],radius_m=0.4},\
                  {at=[2.3,-1.7],radius_m=0.3},{at=[3.9,1.2],radius_m=0.3}]";
-    let (_, sensing) = run("sensing", "obstacle-course", &[]);
-    let (_, knowing) = run("knowing", "obstacle-course", &["--set", known]);
+    let (_, sensing) = run("sensing", "obstacle-course", &PAPER);
+    let knows = [&PAPER[..], &["--set", known]].concat();
+    let (_, knowing) = run("knowing", "obstacle-course", &knows);
     assert_eq!(knowing["outcome"], "reached", "{knowing}");
     let time = |summary: &serde_json::Value| summary["mission_time_s"].as_f64().unwrap();
     assert!(
@@ -93,20 +138,16 @@ fn the_same_seed_gives_the_same_run_to_the_bit() {
 fn a_target_behind_closed_walls_is_called_unreachable() {
     let walls = "world.wall=[{points=[[2.4,-3.4],[2.4,3.4]]},{points=[[-1.9,1.4],[2.6,1.4]]},\
                  {points=[[-1.9,-1.4],[2.6,-1.4]]},{points=[[-1.7,-1.6],[-1.7,1.6]]}]";
-    let arguments = [
-        "--set",
-        walls,
-        "--set",
-        "timeout_s=900",
-        "--set",
-        "mapper.margin_m=0.35",
-    ];
-    let (code, summary) = run("walled", "open-room", &arguments);
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(3), &"unreachable".into()),
-        "{summary}"
-    );
+    let careful = ["--set", walls, "--set", "timeout_s=900"];
+    let paper = [&careful[..], &PAPER, &["--set", "mapper.margin_m=0.35"]].concat();
+    for arguments in [&careful[..], &paper] {
+        let (code, summary) = run("walled", "open-room", arguments);
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(3), &"unreachable".into()),
+            "{summary}"
+        );
+    }
     assert_nothing_left("walled");
 }
 
@@ -126,7 +167,7 @@ fn a_touch_ends_the_mission_as_a_collision() {
     let (code, summary) = run(
         "blind",
         "obstacle-course",
-        &["--set", "mapper.map_within_m=0.05"],
+        &[&PAPER[..], &["--set", "mapper.map_within_m=0.05"]].concat(),
     );
     assert_eq!(
         (code, &summary["outcome"]),

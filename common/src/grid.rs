@@ -15,13 +15,23 @@ pub enum CellState {
     Known = 2,
     /// The perimeter of operation; never cleared.
     Perimeter = 3,
+    /// Possibly safe, and the sonar looked there: only the careful method tells it from [`Free`](Self::Free).
+    Swept = 4,
+    /// Hazard because the body would touch something sensed nearby; the sonar looked there and saw nothing.
+    Margin = 5,
 }
 
 impl CellState {
     /// Whether the harmonic field is 0 here.
     #[must_use]
     pub const fn is_hazard(self) -> bool {
-        !matches!(self, Self::Free)
+        !matches!(self, Self::Free | Self::Swept)
+    }
+
+    /// Whether the sonar looked here.
+    #[must_use]
+    pub const fn is_swept(self) -> bool {
+        matches!(self, Self::Swept | Self::Margin)
     }
 
     /// The state a byte of the `grid` topic stands for; anything unheard of is a hazard.
@@ -31,6 +41,8 @@ impl CellState {
             0 => Self::Free,
             1 => Self::Sensed,
             2 => Self::Known,
+            4 => Self::Swept,
+            5 => Self::Margin,
             _ => Self::Perimeter,
         }
     }

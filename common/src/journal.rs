@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use crate::checkpoint::{Checkpoint, CheckpointError, failed};
 
 /// Entries after which a snapshot is due: folding so many takes a new life a few milliseconds.
-const SNAPSHOT_AFTER: u64 = 512;
+const SNAPSHOT_AFTER: u64 = 128;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
 /// No entry is longer, bytes.

@@ -38,6 +38,9 @@ pub struct Mission {
     pub description: String,
     /// X_T: where to go, metres.
     pub target: DVec2,
+    /// How the robot is brought there.
+    #[serde(default)]
+    pub method: Method,
     /// How near the target counts as reached, metres.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
@@ -80,6 +83,19 @@ pub struct Mission {
     /// How the simulated robot behaves.
     #[serde(default)]
     pub simulation: Simulation,
+}
+
+/// How the robot is brought to its target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// It looks before it goes: evidence for and against hazard, ground that was swept, speed that fits
+    /// what is known of the way ahead.
+    #[default]
+    Careful,
+    /// As printed: every hit is a hazard with its margin, (19), the map only grows, (10), the robot goes
+    /// where the field points, (15), (16).
+    Paper,
 }
 
 /// How the robot stands at the start.
@@ -125,8 +141,11 @@ pub enum Integration {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mapper {
-    /// How far around a hit cells are marked with it, metres: [`Mission::margin_cells`] is Im of (19).
+    /// The paper's method: how far around a hit cells are marked with it, metres:
+    /// [`Mission::margin_cells`] is Im of (19).
     pub margin_m: f64,
+    /// The careful method: what is left free between the body and a hit, metres.
+    pub spare_m: f64,
     /// Hits farther than this are no safety event yet, metres.
     pub map_within_m: f64,
 }
@@ -136,9 +155,16 @@ pub struct Mapper {
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
     /// How far a random walk gets before it dies, metres: lambda of laplacian u = u / lambda^2. Without
-    /// it no walk dies, which is exactly (11).
+    /// it the paper's method lets no walk die, which is exactly (11), and the careful one takes
+    /// [`Planner::CAREFUL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
+}
+
+impl Planner {
+    /// What the careful method takes where a mission says nothing: short enough that the field keeps
+    /// heading for a gap that an echo narrows.
+    pub const CAREFUL_SCREENING_M: f64 = 0.35;
 }
 
 /// How guidance becomes wheel speeds, (14)-(17).
@@ -149,6 +175,9 @@ pub struct Controller {
     pub speed_m_s: f64,
     /// wd: the most turn rate asked for, rad/s.
     pub turn_rad_s: f64,
+    /// The careful method: the most turn rate on the spot, rad/s. A sonar of 7 Hz and 15 degrees of half cone still
+    /// hears everything twice at 1.4.
+    pub look_rad_s: f64,
     /// Rc: where slowing down before the target begins, metres.
     pub slow_radius_m: f64,
     /// |eta_c| below which an antipodal robot keeps its turning side.
@@ -183,6 +212,7 @@ impl Default for Mapper {
     fn default() -> Self {
         Self {
             margin_m: 0.25,
+            spare_m: 0.03,
             map_within_m: 1.0,
         }
     }
@@ -193,6 +223,7 @@ impl Default for Controller {
         Self {
             speed_m_s: 0.25,
             turn_rad_s: 0.8,
+            look_rad_s: 1.4,
             slow_radius_m: 0.4,
             dead_zone: 0.05,
             modulated: true,
@@ -246,7 +277,12 @@ impl Mission {
     pub fn absorption(&self) -> f64 {
         let resolution = self.grid_frame().resolution_m;
         let per_cell = |lambda: f64| (resolution / (2.0 * lambda)).powi(2);
-        self.planner.screening_m.map_or(0.0, per_cell)
+        let unsaid = match self.method {
+            // No shorter than the grid resolves.
+            Method::Careful => Some(Planner::CAREFUL_SCREENING_M.max(resolution / 2.0)),
+            Method::Paper => None,
+        };
+        self.planner.screening_m.or(unsaid).map_or(0.0, per_cell)
     }
 
     /// The pose at mission time 0.
@@ -307,7 +343,7 @@ mod tests {
             assert!((decay * 0.5 - 1.0).abs() < 1e-3, "{decay} a metre");
         }
         assert_eq!(
-            Mission::parse("target = [1, 0]", Path::new("test.toml"))
+            Mission::parse("target = [1, 0]\nmethod = 'paper'", Path::new("test.toml"))
                 .unwrap()
                 .absorption(),
             0.0

@@ -287,8 +287,10 @@ wire_enum! {
         AtTarget = 2,
         /// The robot stands in a hazard cell: (ex, ey) leads to the nearest free one.
         WayOut = 3,
-        /// The belief isolates the robot from the target.
+        /// The belief isolates the robot from the target; (ex, ey), unless 0, is where to look meanwhile.
         Unreachable = 4,
+        /// Nobody has looked where the way leads: turn on the spot until the robot faces (ex, ey).
+        Look = 5,
     }
 }
 
@@ -305,6 +307,8 @@ pub struct GuidanceSample {
     pub ey: f64,
     /// dst of (14): straight to the target, metres.
     pub distance_m: f64,
+    /// The most tangential speed that what is believed of the way ahead allows, m/s; infinite for no limit.
+    pub speed_limit_m_s: f64,
     /// A [`GuidanceStatus`].
     pub status: u8,
     /// The version of `grid` it was computed from.

@@ -2,11 +2,11 @@
 //!
 //! Rungs, in order: plan anew from the same belief; forget what was sensed and plan anew; give up.
 
-use std::time::Duration;
+use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     clock::MissionTime,
-    mission::Mission,
+    mission::{Method, Mission},
     samples::{GuidanceSample, GuidanceStatus, PoseSample},
 };
 
@@ -14,6 +14,8 @@ use common::{
 const STALLED_AFTER: Duration = Duration::from_secs(3);
 /// Mission time without a way to the target that is no passing false echo.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
+/// A careful robot that is cut off turns so often on the spot first, at half the speed it is told to.
+const LOOKS_AROUND: f64 = 1.2;
 /// Less than this is standing still, metres; less still for a robot that is to drive slower than that.
 const MOVED_M: f64 = 0.02;
 /// Less than this is not turning either, radians; likewise.
@@ -47,6 +49,7 @@ pub(crate) enum Rung {
 pub(crate) struct StallWatch {
     moved_m: f64,
     turned_rad: f64,
+    cut_off_after: Duration,
     anchor: Option<Anchor>,
     cut_off_since: Option<MissionTime>,
     replans: u32,
@@ -68,6 +71,13 @@ impl StallWatch {
         Self {
             moved_m: MOVED_M.min(mission.controller.speed_m_s * seconds * SHARE),
             turned_rad: TURNED_RAD.min(mission.controller.turn_rad_s * seconds * SHARE),
+            cut_off_after: match mission.method {
+                Method::Careful => {
+                    let turn = LOOKS_AROUND * TAU / mission.controller.look_rad_s;
+                    CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
+                }
+                Method::Paper => CUT_OFF_AFTER,
+            },
             anchor: None,
             cut_off_since: None,
             replans: 0,
@@ -96,7 +106,7 @@ impl StallWatch {
         let cut_off = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable;
         if !(cut_off && guidance.epoch == self.epoch) {
             self.cut_off_since = None;
-        } else if now.since(*self.cut_off_since.get_or_insert(now)) >= CUT_OFF_AFTER {
+        } else if now.since(*self.cut_off_since.get_or_insert(now)) >= self.cut_off_after {
             return Some(self.forget(
                 now,
                 "the belief isolates the robot from the target, again and again",
@@ -148,7 +158,7 @@ mod tests {
 
     fn watch() -> StallWatch {
         let path = std::path::Path::new("test.toml");
-        StallWatch::new(&Mission::parse("target = [3, 0]", path).unwrap())
+        StallWatch::new(&Mission::parse("target = [3, 0]\nmethod = 'paper'", path).unwrap())
     }
 
     fn pose(seconds: f64, travelled_m: f64) -> PoseSample {
@@ -228,6 +238,37 @@ mod tests {
         let epochs = [1, 2, 3].map(|epoch| Rung::Forget { epoch });
         assert_eq!([first, second, third], epochs);
         assert!(matches!(last, Rung::GiveUp { .. }));
+    }
+
+    #[test]
+    fn a_careful_robot_cut_off_looks_around_before_its_belief_is_blamed() {
+        let path = std::path::Path::new("test.toml");
+        let mission = Mission::parse("target = [3, 0]", path).unwrap();
+        let mut watch = StallWatch::new(&mission);
+        let cut_off = guidance(GuidanceStatus::Unreachable, 0);
+        let turning = |second: f64| PoseSample {
+            heading_rad: second,
+            ..pose(second, 0.0)
+        };
+        let turn = TAU / mission.controller.look_rad_s;
+        let first = (0..100)
+            .map(f64::from)
+            .find(|&second| watch.step(&turning(second), &cut_off, false).is_some());
+        assert!(first > Some(turn) && first < Some(5.0 * turn), "{first:?}");
+    }
+
+    #[test]
+    fn a_scan_is_no_stall() {
+        let mut watch = watch();
+        let look = guidance(GuidanceStatus::Look, 0);
+        for tick in 0..100 {
+            let seconds = f64::from(tick) * 0.2;
+            let scanning = PoseSample {
+                heading_rad: seconds.sin(),
+                ..pose(seconds, 0.0)
+            };
+            assert_eq!(watch.step(&scanning, &look, false), None);
+        }
     }
 
     #[test]

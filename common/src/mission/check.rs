@@ -372,6 +372,12 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         "rad/s",
     )?;
     within(
+        "controller.look_rad_s",
+        controller.look_rad_s,
+        0.01..=20.0,
+        "rad/s",
+    )?;
+    within(
         "controller.slow_radius_m",
         controller.slow_radius_m,
         0.001..=1000.0,
@@ -391,6 +397,7 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         0.0..=perimeter.width_m / 4.0,
         "m",
     )?;
+    within("mapper.spare_m", mission.mapper.spare_m, 0.0..=1.0, "m")?;
     if let Some(screening) = mission.planner.screening_m {
         // Shorter than that it would not be resolved by the grid.
         let least = mission.grid_frame().resolution_m / 2.0;

@@ -2,10 +2,20 @@
 
 use common::{
     kinematics::{DifferentialDrive, Pose2, Twist},
-    mission::Mission,
+    mission::{Method, Mission},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
 };
 use glam::DVec2;
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// Slower than this a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s), m/s.
+const LEAST_SPEED_M_S: f64 = 0.04;
+/// Likewise for turning on the spot, rad/s.
+const LEAST_TURN_RAD_S: f64 = 0.25;
+/// Turn rate on the spot per angle that is left, 1/s.
+const TURN_GAIN: f64 = 3.0;
+/// Cosine from which on a robot follows its guidance however little way it is given: it would stall for ever.
+const CREEPS: f64 = 0.98;
 
 /// How the robot stands to the guidance: (14), with the heading in place of the measured velocity, which
 /// is undefined at rest, where every mission starts.
@@ -52,9 +62,11 @@ pub struct Controller {
     tolerance: f64,
     speed: f64,
     turn: f64,
+    look: f64,
     slow_radius: f64,
     dead_zone: f64,
     modulated: bool,
+    careful: bool,
     side: Side,
     arrived: bool,
 }
@@ -72,9 +84,11 @@ impl Controller {
             tolerance: mission.arrival_tolerance_m,
             speed: settings.speed_m_s,
             turn: settings.turn_rad_s,
+            look: settings.look_rad_s,
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
             modulated: settings.modulated,
+            careful: mission.method == Method::Careful,
             side: Side::Left,
             arrived: false,
         }
@@ -89,18 +103,34 @@ impl Controller {
             return stand(CommandState::Arrived, distance);
         }
         let direction = DVec2::new(guidance.ex, guidance.ey);
-        let goes = matches!(
-            GuidanceStatus::from_byte(guidance.status),
-            GuidanceStatus::Along | GuidanceStatus::WayOut
-        );
+        let status = GuidanceStatus::from_byte(guidance.status);
+        let goes = matches!(status, GuidanceStatus::Along | GuidanceStatus::WayOut);
+        let looks = match status {
+            GuidanceStatus::Look => true,
+            // The paper's method gives no direction then.
+            GuidanceStatus::Unreachable => self.careful,
+            _ => false,
+        };
         // Shared memory is outside too: only a direction is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
-        if !(goes && unit && distance.is_finite() && pose.heading.is_finite()) {
+        if !((goes || looks) && unit && distance.is_finite() && pose.heading.is_finite()) {
             return stand(CommandState::Halt, distance);
         }
         let alignment = Alignment::of(pose.axis(), direction);
         let omega = self.angular(alignment);
-        let v = self.tangential(alignment, omega, distance);
+        let v = if looks {
+            0.0
+        } else if self.careful {
+            self.cautious(alignment, distance, guidance.speed_limit_m_s)
+        } else {
+            self.tangential(alignment, omega, distance)
+        };
+        let on_the_spot = looks || self.careful && v == 0.0;
+        let omega = if on_the_spot {
+            self.turn_to(alignment)
+        } else {
+            omega
+        };
         let wheels = self.drive.wheels(Twist { v, omega });
         CommandSample {
             left_rad_s: wheels.left,
@@ -124,6 +154,34 @@ impl Controller {
             self.side = if sine > 0.0 { Side::Left } else { Side::Right };
         }
         self.turn * self.side.sign()
+    }
+
+    /// The careful method's wc on the spot: to the guidance and no farther, and never so slowly that the
+    /// wheels stick.
+    fn turn_to(&mut self, alignment: Alignment) -> f64 {
+        let angle = alignment.sine.atan2(alignment.cosine).abs();
+        let side = self.angular(alignment).signum();
+        let least = LEAST_TURN_RAD_S.min(self.look);
+        side * (TURN_GAIN * angle).clamp(least, self.look)
+    }
+
+    /// The careful method's vc: none before the robot faces within 45 degrees of the guidance, never more than
+    /// `limit`, and never so little that the wheels stick.
+    fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
+        let sharp = (alignment.cosine - FRAC_1_SQRT_2) / (1.0 - FRAC_1_SQRT_2);
+        let slow = (distance / self.slow_radius).min(1.0);
+        let wanted = self.speed * sharp.max(0.0) * slow;
+        let least = LEAST_SPEED_M_S.min(self.speed);
+        // Written so that a limit that is no number stands.
+        if sharp <= 0.0 {
+            0.0
+        } else if limit >= least {
+            wanted.clamp(least, limit)
+        } else if alignment.cosine > CREEPS {
+            least
+        } else {
+            0.0
+        }
     }
 
     /// (16): vc. Slowing down for the target multiplies what alignment allows; printed as a case of its
@@ -159,7 +217,7 @@ mod tests {
     /// vd = 0.4, wd = 0.8, Rc = 0.5, target (3, 0), r = 0.1, W = 0.4.
     fn controller(extra: &str) -> Controller {
         let text = format!(
-            "target = [3, 0]\narrival_tolerance_m = 0.1\n\
+            "target = [3, 0]\nmethod = 'paper'\narrival_tolerance_m = 0.1\n\
              robot = {{ wheel_radius_m = 0.1, track_m = 0.4 }}\n\
              [controller]\nspeed_m_s = 0.4\nturn_rad_s = 0.8\nslow_radius_m = 0.5\ndead_zone = 0.05\n{extra}"
         );
@@ -177,6 +235,7 @@ mod tests {
     fn ahead() -> GuidanceSample {
         GuidanceSample {
             ex: 1.0,
+            speed_limit_m_s: f64::INFINITY,
             status: GuidanceStatus::Along.into(),
             ..GuidanceSample::default()
         }
@@ -266,6 +325,68 @@ mod tests {
         let command = controller("").step(facing(0.0), &ahead());
         close(command.left_rad_s, 4.0);
         close(command.right_rad_s, 4.0);
+    }
+
+    /// The same robot, careful.
+    fn careful() -> Controller {
+        let text = "target = [3, 0]\nrobot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
+                    controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4 }";
+        Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
+    }
+
+    fn limited(speed_limit_m_s: f64) -> GuidanceSample {
+        GuidanceSample {
+            speed_limit_m_s,
+            ..ahead()
+        }
+    }
+
+    #[test]
+    fn a_look_turns_on_the_spot_and_ends_where_it_should() {
+        let look = GuidanceSample {
+            status: GuidanceStatus::Look.into(),
+            speed_limit_m_s: 0.0,
+            ..ahead()
+        };
+        let far = careful().step(facing(-2.0), &look);
+        assert_eq!((far.v_m_s, far.omega_rad_s), (0.0, 1.4));
+        let near = careful().step(facing(0.2), &look);
+        assert!((-0.7..-0.5).contains(&near.omega_rad_s), "{near:?}");
+    }
+
+    #[test]
+    fn a_careful_robot_stands_until_it_faces_within_45_degrees_of_its_way() {
+        let guidance = ahead();
+        close(
+            careful().step(facing(FRAC_PI_4 + 0.01), &guidance).v_m_s,
+            0.0,
+        );
+        assert!(careful().step(facing(FRAC_PI_4 - 0.1), &guidance).v_m_s > 0.0);
+        close(careful().step(facing(0.0), &guidance).v_m_s, 0.4);
+    }
+
+    #[test]
+    fn a_careful_robot_goes_no_faster_than_its_guidance_allows() {
+        close(careful().step(facing(0.0), &limited(0.1)).v_m_s, 0.1);
+        close(careful().step(facing(0.4), &limited(0.0)).v_m_s, 0.0);
+        close(careful().step(facing(0.4), &limited(f64::NAN)).v_m_s, 0.0);
+    }
+
+    #[test]
+    fn no_careful_command_stands_in_the_dead_band_of_the_wheels() {
+        // 20 counts/s after a gain of 0.78, at 1200 counts a turn.
+        let dead = 20.0 / 0.78 / 1200.0 * std::f64::consts::TAU;
+        for degrees in -180..180 {
+            for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
+                let command =
+                    careful().step(facing(f64::from(degrees).to_radians()), &limited(limit));
+                let fastest = command.left_rad_s.abs().max(command.right_rad_s.abs());
+                assert!(
+                    fastest > dead,
+                    "{degrees} degrees, limit {limit}: {command:?}"
+                );
+            }
+        }
     }
 
     #[test]

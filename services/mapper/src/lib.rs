@@ -2,5 +2,8 @@
 //!
 //! [`step`] is the whole of it, pure; [`shell`] wires it to the topics `pose`, `range` and `grid`.
 
+mod careful;
+mod dilation;
+mod evidence;
 pub mod shell;
 pub mod step;

@@ -54,8 +54,8 @@ pub struct Shell {
 impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let mut mapper = Mapper::new(&context.run.mission);
-        let capacity = mapper.frame().area() + 64;
-        let (journal, kept) = Journal::open::<Belief, Event>(&context.checkpoint_file(), capacity)?;
+        let (journal, kept) =
+            Journal::open::<Belief, Event>(&context.checkpoint_file(), mapper.kept_bytes())?;
         if kept.state.is_some_and(|belief| !mapper.restore(belief)) {
             tracing::warn!("the kept belief is of another map; starting from the perimeter");
         }

@@ -1,21 +1,27 @@
 //! The belief: which cells are hazard.
 //!
 //! The paper's map only grows, (10); what it must never swallow is the target's cell, the cells under
-//! the robot, and nothing ever changes the perimeter, (18).
+//! the robot, and nothing ever changes the perimeter, (18). The careful method's map follows the evidence,
+//! both ways ([`Memory`]).
 
 use common::{
     grid::{Cell, CellState, GridFrame, Window},
-    mission::Mission,
+    mission::{Method, Mission},
     samples::{PoseSample, RangeSample, RangeStatus},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
+use crate::{
+    careful::{Memory, Reading, united},
+    evidence::Evidence,
+};
+
 /// "4 cm or nearer" is mapped at 4 cm.
 const CONTACT_M: f64 = 0.04;
 
 /// What must survive the process.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
     /// One [`CellState`] byte a cell, row-major.
     #[serde(with = "serde_bytes")]
@@ -28,6 +34,14 @@ pub struct Belief {
     epoch: u64,
     /// The last tick mapped.
     tick: Option<u64>,
+    /// Where the robot was then, metres.
+    robot: DVec2,
+    /// Where it faced, radians.
+    heading: f64,
+    /// What its wheels had rolled on average, turns on the spot included, metres.
+    rolled: f64,
+    /// What was heard; none in the paper's method.
+    evidence: Option<Evidence>,
 }
 
 impl Belief {
@@ -56,16 +70,21 @@ impl Belief {
     }
 }
 
-/// The mapper of (19).
+/// The mapper of (19), or of the careful method.
 #[derive(Clone, Debug)]
 pub struct Mapper {
     frame: GridFrame,
     target: Option<Cell>,
     margin: i64,
+    /// How far a surface blocks the cells around it, metres.
+    reach: f64,
+    /// What turns evidence into hazard; none in the paper's method.
+    memory: Option<Memory>,
     map_within: f64,
     sensor_forward: f64,
     sensor_bearing: f64,
     footprint: f64,
+    half_track: f64,
     belief: Belief,
 }
 
@@ -74,21 +93,32 @@ impl Mapper {
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
+        let margin = mission.margin_cells();
+        let memory = (mission.method == Method::Careful).then(|| Memory::new(mission));
+        // A known surface blocks what a hit on it would: its cell and the margin around.
+        let around_a_hit = (f64::from(margin) + 0.5) * frame.resolution_m;
         let mut mapper = Self {
             frame,
             target: frame.cell_at(mission.target),
-            margin: i64::from(mission.margin_cells()),
+            margin: i64::from(margin),
+            reach: memory.as_ref().map_or(around_a_hit, Memory::reach),
             map_within: mission.mapper.map_within_m,
             sensor_forward: mission.sonar.forward_m,
             sensor_bearing: mission.sonar.bearing_deg.to_radians(),
             footprint: mission.body().radius_m,
+            half_track: mission.body().track_m / 2.0,
             belief: Belief {
                 cells: vec![CellState::Free as u8; frame.area()],
                 version: 1,
                 safety_events: 0,
                 epoch: 0,
                 tick: None,
+                robot: DVec2::ZERO,
+                heading: mission.start_pose().heading,
+                rolled: 0.0,
+                evidence: memory.as_ref().map(Memory::unheard),
             },
+            memory,
         };
         mapper.lay_foundation(mission);
         mapper
@@ -96,8 +126,7 @@ impl Mapper {
 
     fn lay_foundation(&mut self, mission: &Mission) {
         let frame = self.frame;
-        // A known surface blocks what a hit on it would: its cell and the margin around.
-        let reach = (self.margin as f64 + 0.5) * frame.resolution_m;
+        let reach = self.reach;
         let last = f64::from(frame.cells) - 1.0;
         for piece in mission.known.pieces() {
             let (least, greatest) = piece.bounds();
@@ -136,11 +165,23 @@ impl Mapper {
 
     /// Go on from a belief that was kept; one of another map is refused.
     pub fn restore(&mut self, belief: Belief) -> bool {
-        let fits = belief.cells.len() == self.frame.area();
+        let evidence_fits = match (&mut self.memory, &belief.evidence) {
+            (Some(memory), Some(evidence)) => memory.restore(evidence),
+            (None, None) => true,
+            _ => false,
+        };
+        let fits = evidence_fits && belief.cells.len() == self.frame.area();
         if fits {
             self.belief = belief;
         }
         fits
+    }
+
+    /// Bytes that a belief to keep has at most.
+    #[must_use]
+    pub fn kept_bytes(&self) -> usize {
+        let evidence = self.memory.as_ref().map_or(0, Memory::kept_bytes);
+        self.frame.area() + evidence + 128
     }
 
     /// Map one reading taken at `pose`. Returns the window that changed, empty for none. A tick given
@@ -150,6 +191,14 @@ impl Mapper {
             return Window::default();
         }
         self.belief.tick = Some(pose.stamp.tick);
+        let (last, now) = (self.belief.robot, pose.pose());
+        let rolled = self.belief.rolled;
+        self.belief.rolled += last.distance(now.position)
+            + self.half_track * (now.heading - self.belief.heading).abs();
+        (self.belief.robot, self.belief.heading) = (now.position, now.heading);
+        if self.memory.is_some() {
+            return self.weigh(pose, range, rolled);
+        }
         let Some(distance) = range.and_then(safety_distance) else {
             return Window::default();
         };
@@ -163,6 +212,52 @@ impl Mapper {
         if changed.area() > 0 {
             self.belief.safety_events += 1;
             self.belief.version += 1;
+        }
+        changed
+    }
+
+    /// The careful method: what the reading says for and against hazard, and where it looked.
+    fn weigh(&mut self, pose: &PoseSample, range: Option<&RangeSample>, rolled: f64) -> Window {
+        let (Some(memory), Some(evidence)) = (&mut self.memory, &mut self.belief.evidence) else {
+            return Window::default();
+        };
+        let robot = pose.pose();
+        let echo = range.and_then(|range| match RangeStatus::from_byte(range.status) {
+            RangeStatus::Nothing => Some(None),
+            _ => safety_distance(range).map(Some),
+        });
+        let reading = echo.map(|echo| Reading {
+            origin: robot.position + robot.axis() * self.sensor_forward,
+            axis: DVec2::from_angle(robot.heading + self.sensor_bearing),
+            echo,
+        });
+        let stale = memory.roll(evidence, rolled, self.belief.rolled);
+        let news = memory.take(evidence, robot.position, reading);
+        let changed = self.redraw(united(stale, news.window));
+        self.belief.safety_events += u64::from(news.safety_event);
+        self.belief.version += u64::from(changed.area() > 0);
+        changed
+    }
+
+    /// Bring the cells of `window` up to date with the evidence; the window that changed.
+    fn redraw(&mut self, window: Window) -> Window {
+        let mut changed = Window::default();
+        let (Some(memory), Some(evidence)) = (&self.memory, &self.belief.evidence) else {
+            return changed;
+        };
+        for row in window.row..window.row + window.height {
+            for col in window.col..window.col + window.width {
+                let cell = Cell { col, row };
+                let index = self.frame.index(cell);
+                let state = match CellState::from_byte(self.belief.cells[index]) {
+                    fixed @ (CellState::Known | CellState::Perimeter) => fixed,
+                    _ => memory.state(evidence, cell, Some(cell) == self.target),
+                } as u8;
+                if self.belief.cells[index] != state {
+                    self.belief.cells[index] = state;
+                    changed = changed.including(cell);
+                }
+            }
         }
         changed
     }
@@ -197,14 +292,19 @@ impl Mapper {
     }
 
     /// Forget what was sensed, if `epoch` is newer than the belief's: back to the perimeter and what
-    /// was known beforehand. Says whether it did.
+    /// was known beforehand; the careful method keeps what was heard near the robot. Says whether it did.
     pub fn forget(&mut self, epoch: u64) -> bool {
         if epoch <= self.belief.epoch {
             return false;
         }
-        for cell in &mut self.belief.cells {
-            if *cell == CellState::Sensed as u8 {
-                *cell = CellState::Free as u8;
+        if let (Some(memory), Some(evidence)) = (&mut self.memory, &mut self.belief.evidence) {
+            memory.forget(evidence, self.belief.robot, epoch);
+            self.redraw(self.frame.whole());
+        } else {
+            for cell in &mut self.belief.cells {
+                if *cell == CellState::Sensed as u8 {
+                    *cell = CellState::Free as u8;
+                }
             }
         }
         self.belief.epoch = epoch;
@@ -231,7 +331,7 @@ mod tests {
     /// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). Sensor 0.2 m ahead.
     fn mapper(extra: &str) -> Mapper {
         let text = format!(
-            "target = [1.5, 0.0]\nperimeter = {{ width_m = 5, cells = 50 }}\n\
+            "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = 50 }}\n\
              sonar = {{ forward_m = 0.2 }}\nmapper = {{ margin_m = 0.15, map_within_m = 2.0 }}\n{extra}"
         );
         Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())

@@ -45,6 +45,7 @@ mod domain;
 mod error;
 mod field;
 mod guidance;
+mod lookout;
 mod repair;
 mod scaled;
 pub mod shell;

@@ -3,7 +3,7 @@
 use common::{
     grid::{Applied, CellState, GridFrame, Replica, Window},
     kinematics::Pose2,
-    mission::Mission,
+    mission::{Method, Mission},
     samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
 };
 use glam::DVec2;
@@ -11,11 +11,15 @@ use glam::DVec2;
 use crate::{
     Absorption, Cancellation, Cell, Change, Domain, Field, Guidance, Settings, SolveError, Solver,
     Verdict,
+    lookout::{Advice, Lookout, View},
 };
 
 /// Maps of at most this many cells are solved in full at once where a repair does not do: that takes less
 /// than a thread takes to begin.
 const SMALL: usize = 1 << 14;
+
+/// How fast a careful robot leaves a hazard it stands in, m/s: something is near.
+const WAY_OUT_M_S: f64 = 0.08;
 
 /// What taking a grid sample led to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +39,8 @@ pub enum Work {
 pub struct Planner {
     target: DVec2,
     absorption: f64,
+    /// None in the paper's method.
+    lookout: Option<Lookout>,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
@@ -84,6 +90,7 @@ impl Planner {
         Self {
             target: mission.target,
             absorption: mission.absorption(),
+            lookout: (mission.method == Method::Careful).then(|| Lookout::new(mission)),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
@@ -254,10 +261,12 @@ impl Planner {
                 }
             }
         };
+        let (status, direction, limit) = self.look_first(pose, status, direction);
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,
             distance_m: to_target.length(),
+            speed_limit_m_s: limit,
             status: status.into(),
             grid_version: self.grid.version(),
             safety_events: self.belief.safety_events,
@@ -265,6 +274,33 @@ impl Planner {
             full_solves: self.full_solves,
             local_updates: self.local_updates,
             ..GuidanceSample::default()
+        }
+    }
+
+    /// The careful method's word on a direction: status, direction and speed limit to give.
+    fn look_first(
+        &self,
+        pose: &Pose2,
+        status: GuidanceStatus,
+        direction: DVec2,
+    ) -> (GuidanceStatus, DVec2, f64) {
+        let (Some(lookout), Some(solved)) = (&self.lookout, &self.solved) else {
+            return (status, direction, f64::INFINITY);
+        };
+        let view = View {
+            frame: solved.frame,
+            cells: self.grid.cells(),
+            field: &solved.field,
+        };
+        match status {
+            GuidanceStatus::Along => match lookout.advise(&view, pose, direction) {
+                Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
+                Advice::Go(limit) => (status, direction, limit),
+            },
+            GuidanceStatus::WayOut => (status, direction, WAY_OUT_M_S),
+            // It may be an echo that was none: one look around before the belief is blamed.
+            GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),
+            _ => (status, direction, 0.0),
         }
     }
 
@@ -329,7 +365,9 @@ mod tests {
 
     /// A perimeter of 4 m in so many cells a side.
     fn mission_of(cells: u32) -> Mission {
-        let text = format!("target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = {cells} }}");
+        let text = format!(
+            "target = [1.5, 0]\nmethod = 'paper'\nperimeter = {{ width_m = 4, cells = {cells} }}"
+        );
         Mission::parse(&text, Path::new("test.toml")).unwrap()
     }
 
@@ -448,6 +486,58 @@ mod tests {
         planner.take_grid(&header, &cells).unwrap();
         let guidance = planner.guide(&at(1.48, 0.02));
         assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
+    }
+
+    /// A careful planner in a room where only what `swept` says was looked at.
+    fn careful(swept: impl Fn(DVec2) -> bool) -> Planner {
+        let mission = Mission {
+            method: Method::Careful,
+            ..mission()
+        };
+        let (header, mut cells) = keyframe(1, |_| false);
+        let frame = mission.grid_frame();
+        for (index, state) in cells.iter_mut().enumerate() {
+            let cell = common::grid::Cell {
+                col: index as u32 % frame.cells,
+                row: index as u32 / frame.cells,
+            };
+            if *state == CellState::Free as u8 && swept(frame.centre_of(cell)) {
+                *state = CellState::Swept as u8;
+            }
+        }
+        let mut planner = Planner::new(&mission);
+        planner.take_grid(&header, &cells).unwrap();
+        planner
+    }
+
+    #[test]
+    fn a_careful_robot_looks_where_nobody_looked_before_it_goes_there() {
+        // All but what lies to the left of the way ahead.
+        let planner = careful(|at| at.x < 0.2 || at.y < 0.1);
+        let guidance = planner.guide(&at(0.0, 0.0));
+        assert_eq!(status(&guidance), GuidanceStatus::Look);
+        assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
+        assert_eq!(guidance.speed_limit_m_s, 0.0);
+    }
+
+    #[test]
+    fn over_swept_ground_a_careful_robot_goes_at_full_speed() {
+        let guidance = careful(|_| true).guide(&at(0.0, 0.0));
+        assert_eq!(status(&guidance), GuidanceStatus::Along);
+        assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
+    }
+
+    #[test]
+    fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
+        let swept = |at: DVec2| at.x < 0.2 || at.y < 0.1;
+        let (one, other) = (careful(swept), careful(swept));
+        for heading in [0.0, 0.2, 0.4] {
+            let pose = Pose2 {
+                heading,
+                ..at(0.0, 0.0)
+            };
+            assert_eq!(one.guide(&pose), other.guide(&pose));
+        }
     }
 
     /// A room of 200 x 200 cells with a wall across it and a door in the wall.

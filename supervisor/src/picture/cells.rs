@@ -88,11 +88,15 @@ pub(super) struct Blocks<'a, Kind> {
 /// The state of each block: hazard if any of its cells is, of the kind most of them are.
 fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
     let across = lattice.cols.div_ceil(block);
-    let mut tally = vec![[0_u32; 4]; across * lattice.rows.div_ceil(block)];
+    let mut tally = vec![[0_u32; 6]; across * lattice.rows.div_ceil(block)];
     for (row, line) in cells.chunks(lattice.cols.max(1)).enumerate() {
         for (col, &byte) in line.iter().enumerate() {
             let at = row / block * across + col / block;
-            tally[at][CellState::from_byte(byte) as usize] += 1;
+            let kind = match CellState::from_byte(byte) {
+                CellState::Margin => CellState::Sensed,
+                kind => kind,
+            };
+            tally[at][kind as usize] += 1;
         }
     }
     let kinds = [CellState::Sensed, CellState::Known, CellState::Perimeter];
