@@ -5,6 +5,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`mission`] | the mission file, validated |
+//! | [`address`] | where a robot answers, and over what |
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
 //! | [`kinematics`] | (1)-(3) and their inverses |
 //! | [`clock`] | mission time, pace, the monotonic clock |
@@ -21,6 +22,7 @@
 //! | [`wire`] | the X80's protocol: frames and messages |
 //! | [`truth`] | what a simulated robot tells of itself |
 
+pub mod address;
 pub mod bus;
 pub mod checkpoint;
 pub mod clock;

@@ -1,14 +1,11 @@
 //! What the supervisor tells the stages of a run: one TOML file in the run directory.
 
-use std::{
-    net::SocketAddr,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{clock::MissionClock, domain::RobotName, mission::Mission};
+use crate::{address::Address, clock::MissionClock, domain::RobotName, mission::Mission};
 
 /// The file's name in the run directory.
 pub const FILE_NAME: &str = "run.toml";
@@ -18,8 +15,8 @@ pub const FILE_NAME: &str = "run.toml";
 pub struct Run {
     /// Whose bus to join.
     pub robot: RobotName,
-    /// Where the robot answers.
-    pub address: SocketAddr,
+    /// Where the robot answers, and over what.
+    pub address: Address,
     /// How samples are stamped.
     pub clock: MissionClock,
     /// What to do.

@@ -2,12 +2,12 @@
 
 use std::{
     fs, io,
-    net::{SocketAddr, ToSocketAddrs},
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use common::{
+    address::{Address, AddressError},
     bus::{Bus, BusError, SliceWriter, Writer},
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
     domain::{Domain, RobotName},
@@ -66,13 +66,8 @@ pub(crate) enum SupervisorError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The robot's address.
-    #[error("robot.address {address:?} is no host:port that resolves: {problem}")]
-    Address {
-        /// As the mission says it.
-        address: String,
-        /// What is wrong with it.
-        problem: String,
-    },
+    #[error("robot.address: {0}")]
+    Address(#[from] AddressError),
     /// The file system or the system.
     #[error("cannot {action}: {source}")]
     System {
@@ -147,7 +142,7 @@ struct Supervisor<'a> {
     restated: Option<Instant>,
     progressed: (Option<u64>, Instant),
     clock: MissionClock,
-    address: SocketAddr,
+    address: Address,
 }
 
 impl<'a> Supervisor<'a> {
@@ -156,10 +151,13 @@ impl<'a> Supervisor<'a> {
         let directory = &options.directory;
         let mission = &options.mission;
         let (simulator, address, clock) = match &mission.robot.address {
-            Some(address) => (None, resolve(address)?, wall_clock(1.0)),
+            Some(address) => {
+                let address = address.parse::<Address<String>>()?.resolve()?;
+                (None, address, wall_clock(1.0))
+            }
             None => {
                 let simulator = start_simulator(directory, mission, options.pace)?;
-                let address = simulator.address();
+                let address = Address::Udp(simulator.address());
                 let clock = match options.pace {
                     Pace::Max => MissionClock::Ticks {
                         period_ns: (1e9 / mission.robot.rate_hz) as u64,
@@ -171,7 +169,7 @@ impl<'a> Supervisor<'a> {
         };
         let run = Run {
             robot: options.robot.clone(),
-            address,
+            address: address.clone(),
             clock,
             mission: mission.clone(),
         };
@@ -313,7 +311,7 @@ impl<'a> Supervisor<'a> {
         }
         if self.makes_no_progress() {
             let reason = if self.order == Order::Hold && !self.robot_answers() {
-                let address = self.address;
+                let address = &self.address;
                 format!("no robot answers at {address}; is it on, is robot.address right?")
             } else {
                 "the pipeline makes no progress; see the stages' logs".to_owned()
@@ -466,17 +464,6 @@ fn wall_clock(rate: f64) -> MissionClock {
         epoch_ns: monotonic_ns(),
         rate,
     }
-}
-
-fn resolve(address: &str) -> Result<SocketAddr, SupervisorError> {
-    let failed = |problem: String| SupervisorError::Address {
-        address: address.to_owned(),
-        problem,
-    };
-    let mut found = address
-        .to_socket_addrs()
-        .map_err(|error| failed(error.to_string()))?;
-    found.next().ok_or_else(|| failed("no address".to_owned()))
 }
 
 /// A simulator of this very mission, overrides included.

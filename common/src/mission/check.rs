@@ -9,7 +9,10 @@ use thiserror::Error;
 use toml::de::{DeTable, DeValue};
 
 use super::Mission;
-use crate::grid::MAX_CELLS;
+use crate::{
+    address::{Address, AddressError, FORMS},
+    grid::MAX_CELLS,
+};
 
 /// Why a mission was refused.
 #[derive(Debug, Error)]
@@ -281,6 +284,13 @@ impl Checker {
 fn robot(mission: &Mission) -> Result<(), Objection> {
     let body = mission.body();
     let robot = &mission.robot;
+    if let Some(Err(error)) = robot.address.as_deref().map(str::parse::<Address<String>>) {
+        let problem = match error {
+            AddressError::Form { address, problem } => format!("{address:?} {problem}"),
+            AddressError::Host { .. } => error.to_string(),
+        };
+        return Err(objection("robot.address", problem, FORMS));
+    }
     within("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz")?;
     within(
         "robot.wheel_radius_m",
@@ -488,6 +498,10 @@ mod tests {
             (
                 "target = [3, 0]\n[robot]\nleft = { channel = 1, reversed = true }",
                 "m.toml:3: robot.left: ",
+            ),
+            (
+                "target = [3, 0]\n[robot]\naddress = 'http://x80:80'",
+                "m.toml:3: robot.address: ",
             ),
             (
                 "description = 'no target'",

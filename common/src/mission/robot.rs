@@ -29,7 +29,8 @@ pub struct Channel {
 pub struct RobotConfig {
     /// Preset that gives what is not said.
     pub model: Model,
-    /// `host:port` of a real robot; without it a simulated one is started.
+    /// Where a real robot answers, in one of the forms of [`crate::address::Address`]; without it a
+    /// simulated one is started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
     /// Ticks a second the robot's sensors come at.

@@ -138,6 +138,11 @@ impl Decoder {
         })
     }
 
+    /// Forget what is held: what comes next is not its continuation. The bytes count as noise.
+    pub fn forget(&mut self) {
+        self.skip(self.buffer.len() - self.start);
+    }
+
     /// What became of the bytes so far.
     #[must_use]
     pub fn tally(&self) -> DecoderTally {

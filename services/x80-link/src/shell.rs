@@ -1,4 +1,4 @@
-//! The socket, `command` and `directive` in; `range`, `wheels`, `link` and the socket out.
+//! The wire, `command` and `directive` in; `range`, `wheels`, `link` and the wire out.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use common::{
 
 use crate::{
     step::{Effect, Event, Link},
-    transport::Transport,
+    transport::{Transport, TransportError},
 };
 
 /// The `link` topic is restated this often while no ticks come.
@@ -37,12 +37,7 @@ pub struct Shell {
 
 impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        let address = context.run.address;
-        let transport = Transport::open(address).map_err(|error| {
-            StageError::Other(format!(
-                "cannot open a UDP socket towards {address}: {error}"
-            ))
-        })?;
+        let transport = Transport::open(&context.run.address).map_err(wire_broke)?;
         context.waiter.on_readable(&transport)?;
         context.waiter.on(context.bus.alarm(&topics::COMMAND)?);
         context.waiter.on(context.bus.alarm(&topics::DIRECTIVE)?);
@@ -64,6 +59,7 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
+        self.tend()?;
         if let Some(directive) = self.directive.newest()? {
             let order = Order::from_byte(directive.order);
             let effects = self.link.step(Event::Order(order), monotonic_ns());
@@ -73,10 +69,15 @@ impl Process for Shell {
             let effects = self.link.step(Event::Command(&command), monotonic_ns());
             self.carry_out(effects)?;
         }
-        while let Some(bytes) = self.transport.receive().map_err(wire_broke)? {
-            let effects = self.link.step(Event::Datagram(bytes), monotonic_ns());
+        loop {
+            let now_ns = monotonic_ns();
+            let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
+                break;
+            };
+            let effects = self.link.step(Event::Datagram(bytes), now_ns);
             self.carry_out(effects)?;
         }
+        self.tend()?;
         let effects = self.link.step(Event::Quiet, monotonic_ns());
         self.carry_out(effects)?;
         if monotonic_ns() - self.stated_ns >= RESTATE.as_nanos() as u64 {
@@ -95,11 +96,21 @@ impl Process for Shell {
 }
 
 #[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
-fn wire_broke(error: std::io::Error) -> StageError {
-    StageError::Other(format!("the wire to the robot broke: {error}"))
+fn wire_broke(error: TransportError) -> StageError {
+    StageError::Other(error.to_string())
 }
 
 impl Shell {
+    /// Keep the wire open, and let the link know whether it is.
+    fn tend(&mut self) -> Result<(), StageError> {
+        let now_ns = monotonic_ns();
+        if let Some(open) = self.transport.tend(now_ns).map_err(wire_broke)? {
+            let effects = self.link.step(Event::Wire(open), now_ns);
+            self.carry_out(effects)?;
+        }
+        Ok(())
+    }
+
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
         for effect in effects {
             match effect {
@@ -140,7 +151,7 @@ impl Shell {
             stopped: self.link.stopped().is_some().into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
-            strangers: self.transport.strangers(),
+            strangers: self.transport.tally().strangers,
             commands_out: tally.commands,
             repeated_ticks: tally.repeated_ticks,
             latency_ns: self.latency_ns,

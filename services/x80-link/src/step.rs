@@ -39,6 +39,9 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 pub enum Event<'a> {
     /// Bytes of the robot.
     Datagram(&'a [u8]),
+    /// Whether the wire is open now. One of datagrams always is, and it is taken for open until this says
+    /// otherwise.
+    Wire(bool),
     /// A command of the controller.
     Command(&'a CommandSample),
     /// The supervisor's word.
@@ -104,6 +107,7 @@ pub struct Link {
     order: Option<Order>,
     heard_ns: Option<u64>,
     pinged_ns: Option<u64>,
+    wire_open: bool,
     connected: bool,
     sonar: Option<u8>,
     next_tick: u64,
@@ -134,6 +138,7 @@ impl Link {
             order: None,
             heard_ns: None,
             pinged_ns: None,
+            wire_open: true,
             connected: false,
             sonar: None,
             next_tick: first_tick,
@@ -188,6 +193,7 @@ impl Link {
                 self.decoder.push(bytes);
                 self.take_frames(now_ns, &mut effects);
             }
+            Event::Wire(open) => self.take_wire(open, &mut effects),
             Event::Command(command) => self.take_command(command, now_ns, &mut effects),
             Event::Order(order) => self.take_order(order, now_ns, &mut effects),
             Event::Quiet => {}
@@ -206,6 +212,18 @@ impl Link {
 
     const fn in_ticks(&self) -> bool {
         matches!(self.clock, MissionClock::Ticks { .. })
+    }
+
+    fn take_wire(&mut self, open: bool, effects: &mut Vec<Effect>) {
+        self.wire_open = open;
+        // Whoever is there now is asked at once.
+        self.pinged_ns = None;
+        // Half a frame of one connection does not go on in the next.
+        self.decoder.forget();
+        if !open && self.connected {
+            self.connected = false;
+            effects.push(Effect::Connected(false));
+        }
     }
 
     fn take_frames(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -423,7 +441,7 @@ impl Link {
             effects.push(Effect::Connected(false));
         }
         let asks = !self.connected || self.in_ticks() && owes && silent;
-        if asks && passed(self.pinged_ns, now_ns, PING_EVERY) {
+        if asks && self.wire_open && passed(self.pinged_ns, now_ns, PING_EVERY) {
             if self.connected {
                 // What was due is lost.
                 self.due = 0;

@@ -1,133 +1,199 @@
-//! The socket: datagrams from the robot's address, and from nowhere else.
+//! How bytes reach the robot: datagrams, a connection or a serial line. Nothing here ever blocks, and
+//! what cannot be sent now is lost, as on a radio.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `udp` | datagrams from the robot's address, and from nowhere else |
+//! | `stream` | what a connection and a serial line have in common: opened for ever anew, never half a frame |
+//! | `tcp` | a connection |
+//! | `serial` | a serial line |
+
+mod serial;
+mod stream;
+mod tcp;
+mod udp;
 
 use std::{
     io,
-    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket},
     os::fd::{AsFd, BorrowedFd},
 };
 
-/// A UDP wire to one robot.
+use common::address::Address;
+use thiserror::Error;
+
+use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
+
+/// The wire cannot be had or kept: this process is short of something, the robot has no part in it.
+#[derive(Debug, Error)]
+#[error(
+    "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
+)]
+pub struct TransportError {
+    /// Where the robot is.
+    pub address: Address,
+    /// The system's word.
+    pub source: io::Error,
+}
+
+/// What a wire counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Datagrams from another address than the robot's, dropped.
+    pub strangers: u64,
+    /// Messages to the robot that the wire did not take, lost.
+    pub unsent: u64,
+}
+
+/// Attempts to open a wire that is down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Attempts {
+    /// So many since the robot was last heard on it.
+    pub made: u64,
+    /// Nanoseconds until the next one; 0 when one is under way.
+    pub next_ns: u64,
+}
+
+/// A wire to one robot.
 #[derive(Debug)]
 pub struct Transport {
-    socket: UdpSocket,
-    robot: SocketAddr,
-    strangers: u64,
+    address: Address,
+    wire: Wire,
+    /// Whether the wire was open when that was last told.
+    told: Option<bool>,
     buffer: Box<[u8]>,
 }
 
+#[derive(Debug)]
+enum Wire {
+    Udp(Udp),
+    Tcp(Stream<Tcp>),
+    Serial(Stream<Serial>),
+}
+
 impl Transport {
-    /// A wire to the robot at `robot`, from any free port.
+    /// A wire to the robot at `address`. One that must be opened first is opened by [`Transport::tend`].
     ///
     /// # Errors
-    /// When the system has no socket or port.
-    pub fn open(robot: SocketAddr) -> io::Result<Self> {
-        let any = match robot.ip() {
-            // On loopback bind to it: nothing from outside can even arrive.
-            IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
-            IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
-            IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
-            IpAddr::V6(_) => IpAddr::V6(Ipv6Addr::UNSPECIFIED),
+    /// When the system has no descriptor or port left.
+    pub fn open(address: &Address) -> Result<Self, TransportError> {
+        let wire = match address {
+            Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
+            Address::Tcp(robot) => Stream::new(Tcp::to(*robot)).map(Wire::Tcp),
+            Address::Serial(path) => Stream::new(Serial::on(path)).map(Wire::Serial),
         };
-        let socket = UdpSocket::bind((any, 0))?;
-        socket.set_nonblocking(true)?;
         Ok(Self {
-            socket,
-            robot,
-            strangers: 0,
+            wire: wire.map_err(|source| TransportError {
+                address: address.clone(),
+                source,
+            })?,
+            address: address.clone(),
+            told: None,
+            // The largest datagram.
             buffer: vec![0; 65_536].into_boxed_slice(),
         })
     }
 
-    /// The next datagram of the robot; none when all were taken. Others are dropped and counted.
+    /// Open what is down when that is due, send what is left of a message; at `now_ns` of the monotonic
+    /// clock. Says whether the wire is open, when that was not told yet. No opening hides a closing: both
+    /// are told, in turn.
     ///
     /// # Errors
-    /// When the socket broke.
-    pub fn receive(&mut self) -> io::Result<Option<&[u8]>> {
-        loop {
-            match self.socket.recv_from(&mut self.buffer) {
-                Ok((length, from)) if from == self.robot => {
-                    return Ok(Some(&self.buffer[..length]));
-                }
-                Ok(_) => self.strangers += 1,
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(None),
-                Err(error) if is_passing(&error) => {}
-                Err(error) => return Err(error),
-            }
+    /// When the system refuses to watch a descriptor.
+    pub fn tend(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
+        let closed_untold = self.told == Some(true) && !self.is_open();
+        if !closed_untold {
+            let tended = match &mut self.wire {
+                Wire::Udp(_) => Ok(()),
+                Wire::Tcp(stream) => stream.tend(now_ns),
+                Wire::Serial(stream) => stream.tend(now_ns),
+            };
+            tended.map_err(|source| self.broken(source))?;
         }
+        let open = Some(self.is_open());
+        if self.told == open {
+            return Ok(None);
+        }
+        self.told = open;
+        Ok(open)
     }
 
-    /// Send one datagram. What the network does not take now is lost, as on any radio.
-    ///
-    /// # Errors
-    /// When the socket broke.
-    pub fn send(&self, bytes: &[u8]) -> io::Result<()> {
-        match self.socket.send_to(bytes, self.robot) {
-            Ok(_) => Ok(()),
-            Err(error)
-                if rustix::io::Errno::from_io_error(&error) == Some(rustix::io::Errno::BADF) =>
-            {
-                Err(error)
-            }
-            // A full queue, a firewall, a network that is down: lost, as on any radio.
-            Err(_) => Ok(()),
-        }
-    }
-
-    /// Datagrams from another address than the robot's.
+    /// Whether the robot could hear.
     #[must_use]
-    pub const fn strangers(&self) -> u64 {
-        self.strangers
+    pub const fn is_open(&self) -> bool {
+        match &self.wire {
+            Wire::Udp(_) => true,
+            Wire::Tcp(stream) => stream.is_open(),
+            Wire::Serial(stream) => stream.is_open(),
+        }
+    }
+
+    /// The next bytes of the robot; none when all were taken.
+    ///
+    /// # Errors
+    /// When a socket broke that cannot be opened anew.
+    pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
+        let received = match &mut self.wire {
+            Wire::Udp(udp) => udp.receive(&mut self.buffer),
+            Wire::Tcp(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
+            Wire::Serial(stream) => Ok(stream.receive(&mut self.buffer, now_ns)),
+        };
+        match received {
+            Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),
+            Err(source) => Err(self.broken(source)),
+        }
+    }
+
+    /// Send one message, of one frame or more.
+    ///
+    /// # Errors
+    /// When a socket broke that cannot be opened anew.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        let sent = match &mut self.wire {
+            Wire::Udp(udp) => udp.send(bytes),
+            Wire::Tcp(stream) => stream.send(bytes),
+            Wire::Serial(stream) => stream.send(bytes),
+        };
+        sent.map_err(|source| self.broken(source))
+    }
+
+    /// What was counted.
+    #[must_use]
+    pub const fn tally(&self) -> Tally {
+        match &self.wire {
+            Wire::Udp(udp) => udp.tally(),
+            Wire::Tcp(stream) => stream.tally(),
+            Wire::Serial(stream) => stream.tally(),
+        }
+    }
+
+    /// Attempts to open it, of a wire that is not open; at `now_ns` of the monotonic clock.
+    #[must_use]
+    pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
+        match &self.wire {
+            Wire::Udp(_) => None,
+            Wire::Tcp(stream) => stream.attempts(now_ns),
+            Wire::Serial(stream) => stream.attempts(now_ns),
+        }
+    }
+
+    fn broken(&self, source: io::Error) -> TransportError {
+        TransportError {
+            address: self.address.clone(),
+            source,
+        }
     }
 }
 
-/// The robot is away, or a signal came: nothing is wrong with the socket.
-fn is_passing(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        io::ErrorKind::Interrupted
-            | io::ErrorKind::ConnectionRefused
-            | io::ErrorKind::HostUnreachable
-            | io::ErrorKind::NetworkUnreachable
-            | io::ErrorKind::NetworkDown
-    )
-}
-
+/// Readable when there is something to do; the same descriptor for as long as the transport lives.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+        match &self.wire {
+            Wire::Udp(udp) => udp.as_fd(),
+            Wire::Tcp(stream) => stream.as_fd(),
+            Wire::Serial(stream) => stream.as_fd(),
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn readable(transport: &Transport) {
-        use rustix::event::{PollFd, PollFlags, Timespec, poll};
-        let mut polled = [PollFd::new(transport, PollFlags::IN)];
-        let timeout = Timespec {
-            tv_sec: 10,
-            tv_nsec: 0,
-        };
-        assert_eq!(
-            poll(&mut polled, Some(&timeout)).unwrap(),
-            1,
-            "nothing came"
-        );
-    }
-
-    #[test]
-    fn a_datagram_from_a_stranger_is_dropped_and_counted() {
-        let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let stranger = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let mut transport = Transport::open(robot.local_addr().unwrap()).unwrap();
-        let link = transport.socket.local_addr().unwrap();
-        stranger.send_to(b"go left", link).unwrap();
-        readable(&transport);
-        assert_eq!(transport.receive().unwrap(), None);
-        assert_eq!(transport.strangers(), 1);
-        robot.send_to(b"hello", link).unwrap();
-        readable(&transport);
-        assert_eq!(transport.receive().unwrap(), Some(&b"hello"[..]));
-    }
-}
+mod tests;

@@ -114,6 +114,21 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
 }
 
 #[test]
+fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() {
+    let mut link = driving(on_the_wall());
+    let half = &datagram(80, 0, 0)[..20];
+    link.step(Event::Datagram(half), 10 * MS);
+    let effects = link.step(Event::Wire(false), 11 * MS);
+    assert!(effects.contains(&Effect::Connected(false)));
+    assert_eq!(link.step(Event::Quiet, 1000 * MS), []);
+    let effects = link.step(Event::Wire(true), 1001 * MS);
+    assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
+    let effects = link.step(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
+    assert!(effects.contains(&Effect::Connected(true)));
+    assert_eq!(ticks(&effects)[0].1.raw_cm, 80, "{effects:?}");
+}
+
+#[test]
 fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
     // The link before this one died; the robot ignores the time limit of its last command.
     let mut link = on_the_wall();

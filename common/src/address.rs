@@ -1,0 +1,198 @@
+//! Where a robot answers and over what: as a mission writes it, and as its link opens it.
+
+use std::{
+    fmt,
+    net::{SocketAddr, ToSocketAddrs},
+    path::PathBuf,
+    str::FromStr,
+};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use thiserror::Error;
+
+/// How an address may be written, as a remedy.
+pub const FORMS: &str =
+    "give \"host:port\", \"udp://host:port\", \"tcp://host:port\" or \"serial:///dev/ttyUSB0\"";
+
+/// Where a robot answers, and over what. `Host` is text in a mission and a number once it is resolved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address<Host = SocketAddr> {
+    /// Datagrams, the default: `host:port` or `udp://host:port`.
+    Udp(Host),
+    /// A connection: `tcp://host:port`.
+    Tcp(Host),
+    /// A serial line, 115200 8N1: `serial:///dev/ttyUSB0`.
+    Serial(PathBuf),
+}
+
+/// Why text is no address, or leads nowhere.
+#[derive(Debug, Error)]
+pub enum AddressError {
+    /// It is not written as an address.
+    #[error("{address:?} {problem}; {FORMS}")]
+    Form {
+        /// As it was given.
+        address: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// Its host is not known here.
+    #[error(
+        "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
+    )]
+    Host {
+        /// As it was given.
+        address: String,
+        /// The resolver's word.
+        source: std::io::Error,
+    },
+}
+
+impl<Host: fmt::Display> fmt::Display for Address<Host> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Udp(host) => write!(f, "udp://{host}"),
+            Self::Tcp(host) => write!(f, "tcp://{host}"),
+            Self::Serial(path) => write!(f, "serial://{}", path.display()),
+        }
+    }
+}
+
+impl FromStr for Address<String> {
+    type Err = AddressError;
+
+    fn from_str(address: &str) -> Result<Self, AddressError> {
+        let refused = |problem| AddressError::Form {
+            address: address.to_owned(),
+            problem,
+        };
+        let (over, rest) = address.split_once("://").unwrap_or(("udp", address));
+        if over == "serial" {
+            return if rest.starts_with('/') {
+                Ok(Self::Serial(rest.into()))
+            } else {
+                Err(refused("names no device by its whole path"))
+            };
+        }
+        let (host, port) = rest
+            .rsplit_once(':')
+            .ok_or_else(|| refused("has no port"))?;
+        if port.parse::<u16>().is_ok_and(|port| port > 0) {
+            let bracketed = host.starts_with('[') && host.ends_with(']');
+            let plain = |c: char| !c.is_whitespace() && c != '/' && (c != ':' || bracketed);
+            if host.is_empty() || !host.chars().all(plain) {
+                return Err(refused("has no host that could be one"));
+            }
+        } else {
+            return Err(refused("has no port from 1 to 65535"));
+        }
+        match over {
+            "udp" => Ok(Self::Udp(rest.to_owned())),
+            "tcp" => Ok(Self::Tcp(rest.to_owned())),
+            _ => Err(refused("begins with nothing a robot is spoken to over")),
+        }
+    }
+}
+
+impl Address<String> {
+    /// With the host as a number. This asks the resolver, which may take its time.
+    ///
+    /// # Errors
+    /// When the host is not known.
+    pub fn resolve(&self) -> Result<Address, AddressError> {
+        let number = |host: &String| {
+            let unknown = |source| AddressError::Host {
+                address: self.to_string(),
+                source,
+            };
+            let mut found = host.to_socket_addrs().map_err(unknown)?;
+            found.next().ok_or_else(|| {
+                unknown(std::io::Error::new(
+                    std::io::ErrorKind::NotFound,
+                    "it has no number",
+                ))
+            })
+        };
+        Ok(match self {
+            Self::Udp(host) => Address::Udp(number(host)?),
+            Self::Tcp(host) => Address::Tcp(number(host)?),
+            Self::Serial(path) => Address::Serial(path.clone()),
+        })
+    }
+}
+
+impl Serialize for Address {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Address {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let number = |host: String| host.parse().map_err(de::Error::custom);
+        match text.parse().map_err(de::Error::custom)? {
+            Address::Udp(host) => number(host).map(Self::Udp),
+            Address::Tcp(host) => number(host).map(Self::Tcp),
+            Address::Serial(path) => Ok(Self::Serial(path)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_form_is_read_and_datagrams_are_the_default() {
+        let read = |text: &str| text.parse::<Address<String>>().unwrap();
+        let host = || "192.168.0.201:10001".to_owned();
+        assert_eq!(read("192.168.0.201:10001"), Address::Udp(host()));
+        assert_eq!(read("udp://192.168.0.201:10001"), Address::Udp(host()));
+        assert_eq!(read("tcp://192.168.0.201:10001"), Address::Tcp(host()));
+        assert_eq!(read("tcp://[::1]:7"), Address::Tcp("[::1]:7".to_owned()));
+        assert_eq!(read("x80.local:7"), Address::Udp("x80.local:7".to_owned()));
+        assert_eq!(
+            read("serial:///dev/ttyUSB0"),
+            Address::Serial("/dev/ttyUSB0".into())
+        );
+    }
+
+    #[test]
+    fn what_is_no_address_is_named_with_the_forms_there_are() {
+        for bad in [
+            "",
+            "not an address",
+            "192.168.0.201",
+            "host:0",
+            "host:99999",
+            ":10001",
+            "two hosts:1",
+            "::1:7",
+            "http://host:80",
+            "udp://host",
+            "tcp://host:1/path",
+            "serial://ttyUSB0",
+            "serial://",
+        ] {
+            let error = bad.parse::<Address<String>>().unwrap_err().to_string();
+            let named = error.contains(&format!("{bad:?}")) && error.contains(FORMS);
+            assert!(named, "{bad:?} gave {error:?}");
+        }
+    }
+
+    #[test]
+    fn a_resolved_address_survives_the_run_file() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct File {
+            address: Address,
+        }
+        for text in ["udp://127.0.0.1:1", "tcp://[::1]:2", "serial:///dev/pts/3"] {
+            let address = text.parse::<Address<String>>().unwrap().resolve().unwrap();
+            let file = File { address };
+            let written = toml::to_string(&file).unwrap();
+            assert!(written.contains(text), "{written}");
+            assert_eq!(toml::from_str::<File>(&written).unwrap(), file);
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Pauses between attempts that double up to a longest one. The clock comes in as an argument.
+
+use std::time::Duration;
+
+/// Attempts at something that may never succeed: how many were made, and when the next one is due.
+#[derive(Clone, Debug)]
+pub struct Backoff {
+    first: Duration,
+    longest: Duration,
+    pause: Duration,
+    attempts: u64,
+    next_ns: Option<u64>,
+}
+
+impl Backoff {
+    /// The first attempt is due at once, the second a `first` pause later, and no pause is longer than
+    /// `longest`.
+    #[must_use]
+    pub const fn new(first: Duration, longest: Duration) -> Self {
+        Self {
+            first,
+            longest,
+            pause: first,
+            attempts: 0,
+            next_ns: None,
+        }
+    }
+
+    /// Whether to try now, at `now_ns` of the monotonic clock.
+    #[must_use]
+    pub fn is_due(&self, now_ns: u64) -> bool {
+        self.next_ns.is_none_or(|next| now_ns >= next)
+    }
+
+    /// An attempt was made.
+    pub fn attempted(&mut self, now_ns: u64) {
+        self.attempts += 1;
+        self.next_ns = Some(now_ns.saturating_add(self.pause.as_nanos() as u64));
+        self.pause = (self.pause * 2).min(self.longest);
+    }
+
+    /// It succeeded: the next loss begins anew.
+    pub const fn reset(&mut self) {
+        *self = Self::new(self.first, self.longest);
+    }
+
+    /// Attempts since the last success.
+    #[must_use]
+    pub const fn attempts(&self) -> u64 {
+        self.attempts
+    }
+
+    /// Nanoseconds until the next attempt; 0 when it is due.
+    #[must_use]
+    pub fn wait_ns(&self, now_ns: u64) -> u64 {
+        self.next_ns.map_or(0, |next| next.saturating_sub(now_ns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_double_to_the_longest_and_a_success_begins_anew() {
+        let mut backoff = Backoff::new(Duration::from_nanos(100), Duration::from_nanos(300));
+        let (mut now, mut pauses) = (1000, Vec::new());
+        for _ in 0..4 {
+            assert!(backoff.is_due(now));
+            backoff.attempted(now);
+            let wait = backoff.wait_ns(now);
+            assert!(!backoff.is_due(now + wait - 1));
+            pauses.push(wait);
+            now += wait;
+        }
+        assert_eq!(pauses, [100, 200, 300, 300]);
+        assert_eq!(backoff.attempts(), 4);
+        backoff.reset();
+        assert!(backoff.is_due(0) && backoff.attempts() == 0);
+    }
+}

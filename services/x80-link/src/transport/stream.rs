@@ -1,0 +1,298 @@
+//! A wire without datagrams: a connection or a serial line, opened for ever anew when it goes away.
+//!
+//! Frames go out whole or not at all: what the system takes only half of is finished before anything
+//! else is sent, for half a frame would garble the one behind it. What comes meanwhile is lost.
+//!
+//! Its descriptor changes with every opening, and a waiter wants one that stays: an epoll descriptor,
+//! readable when the one of the moment is ready.
+
+use std::{
+    fmt, io,
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    time::Duration,
+};
+
+use rustix::{
+    event::{
+        PollFd, PollFlags, Timespec,
+        epoll::{self, CreateFlags, EventData, EventFlags},
+        poll,
+    },
+    io::{Errno, read, write},
+};
+
+use super::{Attempts, Tally};
+use crate::backoff::Backoff;
+
+/// Between the first two attempts: a robot that restarts its network is back as soon as it can be.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Between attempts at most: nobody waits longer than this for a robot that is back.
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+/// An opening that takes longer is given up: no answer comes from a robot that is off.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// What a stream is opened over.
+pub(super) trait Dial: fmt::Display {
+    /// After how much silence an open stream is taken for dead; none where the system tells.
+    const SILENCE: Option<Duration>;
+
+    /// Begin to open it, without waiting.
+    fn dial(&self) -> io::Result<OwnedFd>;
+
+    /// See whether `descriptor`, which is writable now, leads to the robot.
+    fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
+
+    /// Forget what `descriptor` has not sent yet: closing it must not wait for that.
+    fn abandon(&self, descriptor: &OwnedFd);
+}
+
+#[derive(Debug)]
+enum State {
+    Closed,
+    Opening { descriptor: OwnedFd, since_ns: u64 },
+    Open { descriptor: OwnedFd, heard_ns: u64 },
+}
+
+/// A stream to one robot.
+#[derive(Debug)]
+pub(super) struct Stream<D> {
+    dial: D,
+    epoll: OwnedFd,
+    state: State,
+    /// The rest of a message that went out in part: at most one message.
+    tail: Vec<u8>,
+    backoff: Backoff,
+    unsent: u64,
+    /// What was last said to be wrong: the same again is no news.
+    told: Option<Errno>,
+}
+
+impl<D: Dial> Stream<D> {
+    pub(super) fn new(dial: D) -> io::Result<Self> {
+        Ok(Self {
+            dial,
+            epoll: epoll::create(CreateFlags::CLOEXEC)?,
+            state: State::Closed,
+            tail: Vec::new(),
+            backoff: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
+            unsent: 0,
+            told: None,
+        })
+    }
+
+    pub(super) const fn is_open(&self) -> bool {
+        matches!(self.state, State::Open { .. })
+    }
+
+    pub(super) const fn tally(&self) -> Tally {
+        Tally {
+            strangers: 0,
+            unsent: self.unsent,
+        }
+    }
+
+    pub(super) fn attempts(&self, now_ns: u64) -> Option<Attempts> {
+        let next_ns = match self.state {
+            State::Open { .. } => return None,
+            State::Opening { .. } => 0,
+            State::Closed => self.backoff.wait_ns(now_ns),
+        };
+        Some(Attempts {
+            made: self.backoff.attempts(),
+            next_ns,
+        })
+    }
+
+    /// Begin, finish or give up an opening; send what is left of a message.
+    pub(super) fn tend(&mut self, now_ns: u64) -> io::Result<()> {
+        if matches!(self.state, State::Closed) {
+            if !self.backoff.is_due(now_ns) {
+                return Ok(());
+            }
+            self.backoff.attempted(now_ns);
+            match self.dial.dial() {
+                Ok(descriptor) => {
+                    let events = EventFlags::IN | EventFlags::OUT;
+                    epoll::add(&self.epoll, &descriptor, EventData::new_u64(0), events)?;
+                    self.state = State::Opening {
+                        descriptor,
+                        since_ns: now_ns,
+                    };
+                }
+                Err(error) => self.tell(&error),
+            }
+        }
+        match &self.state {
+            State::Closed => {}
+            State::Opening {
+                descriptor,
+                since_ns,
+            } => {
+                if is_writable(descriptor)? {
+                    match self.dial.finish(descriptor) {
+                        Ok(()) => self.opened(now_ns)?,
+                        Err(error) => self.close(&error),
+                    }
+                } else if passed(*since_ns, now_ns, PATIENCE) {
+                    self.close(&Errno::TIMEDOUT.into());
+                }
+            }
+            State::Open { heard_ns, .. } => {
+                let heard_ns = *heard_ns;
+                if D::SILENCE.is_some_and(|silence| passed(heard_ns, now_ns, silence)) {
+                    self.close(&Errno::TIMEDOUT.into());
+                } else {
+                    self.flush()?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// How many bytes of the robot are in `buffer` now; none when there are none.
+    pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
+        let State::Open {
+            descriptor,
+            heard_ns,
+        } = &mut self.state
+        else {
+            return None;
+        };
+        match read(&*descriptor, buffer) {
+            Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
+            Ok(length) => {
+                *heard_ns = now_ns;
+                // Only now: a peer that hangs up at once must not be called ten times a second.
+                self.backoff.reset();
+                self.told = None;
+                return Some(length);
+            }
+            Err(Errno::AGAIN | Errno::INTR) => {}
+            Err(error) => self.close(&error.into()),
+        }
+        None
+    }
+
+    /// Send `bytes` if the wire takes them now.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.flush()?;
+        let State::Open { descriptor, .. } = &self.state else {
+            self.unsent += 1;
+            return Ok(());
+        };
+        if !self.tail.is_empty() {
+            self.unsent += 1;
+            return Ok(());
+        }
+        match write(descriptor, bytes) {
+            Ok(sent) if sent == bytes.len() => {}
+            Ok(sent) => {
+                self.tail.extend_from_slice(&bytes[sent..]);
+                self.watch(EventFlags::IN | EventFlags::OUT)?;
+            }
+            Err(Errno::AGAIN | Errno::INTR) => self.unsent += 1,
+            Err(error) => {
+                self.unsent += 1;
+                self.close(&error.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Send the rest of what went out in part.
+    fn flush(&mut self) -> io::Result<()> {
+        let State::Open { descriptor, .. } = &self.state else {
+            return Ok(());
+        };
+        if self.tail.is_empty() {
+            return Ok(());
+        }
+        match write(descriptor, &self.tail) {
+            Ok(sent) => {
+                self.tail.drain(..sent);
+                if self.tail.is_empty() {
+                    self.watch(EventFlags::IN)?;
+                }
+            }
+            Err(Errno::AGAIN | Errno::INTR) => {}
+            Err(error) => self.close(&error.into()),
+        }
+        Ok(())
+    }
+
+    fn opened(&mut self, now_ns: u64) -> io::Result<()> {
+        if let State::Opening { descriptor, .. } = std::mem::replace(&mut self.state, State::Closed)
+        {
+            self.state = State::Open {
+                descriptor,
+                heard_ns: now_ns,
+            };
+            self.watch(EventFlags::IN)?;
+            tracing::info!(robot = %self.dial, "the wire is open");
+        }
+        Ok(())
+    }
+
+    /// Wake the waiter for `events` of the open stream.
+    fn watch(&self, events: EventFlags) -> io::Result<()> {
+        if let State::Open { descriptor, .. } = &self.state {
+            epoll::modify(&self.epoll, descriptor, EventData::new_u64(0), events)?;
+        }
+        Ok(())
+    }
+
+    /// Down it is. The descriptor takes itself off the epoll when it is closed.
+    fn close(&mut self, error: &io::Error) {
+        self.tell(error);
+        if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
+            std::mem::replace(&mut self.state, State::Closed)
+        {
+            self.dial.abandon(&descriptor);
+        }
+        self.tail.clear();
+    }
+
+    fn tell(&mut self, error: &io::Error) {
+        // A stream that ends has no number of its own.
+        let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
+        if self.told.replace(errno) != Some(errno) {
+            let remedy = remedy(errno);
+            tracing::warn!(robot = %self.dial, %error, "the wire is down: {remedy}; it is tried for ever");
+        }
+    }
+}
+
+/// What a user can do about it.
+const fn remedy(errno: Errno) -> &'static str {
+    match errno {
+        Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::IO => "is the adapter plugged in",
+        Errno::ACCESS => "let this user's groups have the device, often `dialout`",
+        Errno::AGAIN => "another program holds the line: end it",
+        Errno::NOTTY => "robot.address names no serial line",
+        _ => "is the robot on, is robot.address right",
+    }
+}
+
+fn passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
+    now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
+}
+
+/// Whether `descriptor` is writable or broken at this moment.
+fn is_writable(descriptor: &OwnedFd) -> io::Result<bool> {
+    let mut polled = [PollFd::new(descriptor, PollFlags::OUT)];
+    let at_once = Timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
+    match poll(&mut polled, Some(&at_once)) {
+        Ok(ready) => Ok(ready > 0),
+        Err(Errno::INTR) => Ok(false),
+        Err(error) => Err(error.into()),
+    }
+}
+
+impl<D> AsFd for Stream<D> {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.epoll.as_fd()
+    }
+}

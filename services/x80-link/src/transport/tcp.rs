@@ -1,0 +1,67 @@
+//! A connection to the robot, or to the radio module before it.
+
+use std::{fmt, io, net::SocketAddr, os::fd::OwnedFd, time::Duration};
+
+use rustix::{
+    io::Errno,
+    net::{
+        AddressFamily, SocketFlags, SocketType, connect, getpeername, getsockname, ipproto,
+        socket_with, sockopt,
+    },
+};
+
+use super::stream::Dial;
+
+/// A connection whose other end was switched off is never told so. The slowest robot a mission allows
+/// speaks every 2 s, and pings are answered at once.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// How to connect.
+#[derive(Debug)]
+pub(super) struct Tcp {
+    robot: SocketAddr,
+}
+
+impl Tcp {
+    pub(super) const fn to(robot: SocketAddr) -> Self {
+        Self { robot }
+    }
+}
+
+impl fmt::Display for Tcp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "tcp://{}", self.robot)
+    }
+}
+
+impl Dial for Tcp {
+    const SILENCE: Option<Duration> = Some(SILENCE);
+
+    fn dial(&self) -> io::Result<OwnedFd> {
+        let family = if self.robot.is_ipv4() {
+            AddressFamily::INET
+        } else {
+            AddressFamily::INET6
+        };
+        let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
+        let socket = socket_with(family, SocketType::STREAM, flags, Some(ipproto::TCP))?;
+        match connect(&socket, &self.robot) {
+            Ok(()) | Err(Errno::INPROGRESS) => Ok(socket),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn finish(&self, socket: &OwnedFd) -> io::Result<()> {
+        sockopt::socket_error(socket)??;
+        // On a port that nobody listens on, of this very machine, a socket can connect to itself.
+        if getpeername(socket)? == Some(getsockname(socket)?) {
+            return Err(Errno::CONNREFUSED.into());
+        }
+        // A command must not wait for the next one.
+        sockopt::set_tcp_nodelay(socket, true)?;
+        Ok(())
+    }
+
+    /// The system closes connections in the background.
+    fn abandon(&self, _: &OwnedFd) {}
+}

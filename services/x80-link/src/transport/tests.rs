@@ -1,0 +1,313 @@
+use std::{
+    io::{Read, Write},
+    net::{SocketAddr, TcpListener, TcpStream, UdpSocket},
+    os::fd::OwnedFd,
+    path::{Path, PathBuf},
+};
+
+use common::wire::{Addressing, Command, Decoder};
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open},
+    io::{Errno, read, write},
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    termios::{ControlModes, LocalModes, tcgetattr},
+};
+use tempfile::TempDir;
+
+use super::*;
+
+const MS: u64 = 1_000_000;
+
+/// Wait until something is there to be done.
+fn ready(descriptor: impl AsFd) {
+    let mut polled = [PollFd::new(&descriptor, PollFlags::IN)];
+    let timeout = Timespec {
+        tv_sec: 10,
+        tv_nsec: 0,
+    };
+    let came = poll(&mut polled, Some(&timeout)).unwrap();
+    assert_eq!(came, 1, "nothing came");
+}
+
+/// Tend at `now_ns` until the wire says that it is open, or is not.
+fn tend_until(transport: &mut Transport, open: bool, now_ns: u64) {
+    while transport.tend(now_ns).unwrap() != Some(open) {
+        ready(&*transport);
+    }
+}
+
+/// Receive at `now_ns` until `wanted` has come.
+fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
+    let mut came = Vec::new();
+    while came.len() < wanted.len() {
+        match transport.receive(now_ns).unwrap() {
+            Some(bytes) => came.extend_from_slice(bytes),
+            None => ready(&*transport),
+        }
+    }
+    assert_eq!(came, wanted);
+}
+
+/// Receive at `now_ns` until the wire has closed.
+fn expect_closing(transport: &mut Transport, now_ns: u64) {
+    while transport.is_open() {
+        ready(&*transport);
+        assert_eq!(transport.receive(now_ns).unwrap(), None);
+    }
+    assert_eq!(transport.tend(now_ns).unwrap(), Some(false));
+}
+
+#[test]
+fn a_datagram_from_a_stranger_is_dropped_and_counted() {
+    let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let stranger = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let mut transport = Transport::open(&Address::Udp(robot.local_addr().unwrap())).unwrap();
+    transport.send(b"where?").unwrap();
+    let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
+    stranger.send_to(b"go left", link).unwrap();
+    ready(&transport);
+    assert_eq!(transport.receive(0).unwrap(), None);
+    assert_eq!(transport.tally().strangers, 1);
+    robot.send_to(b"hello", link).unwrap();
+    ready(&transport);
+    assert_eq!(transport.receive(0).unwrap(), Some(&b"hello"[..]));
+}
+
+fn listener() -> (TcpListener, SocketAddr) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    (listener, address)
+}
+
+fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> TcpStream {
+    tend_until(transport, true, now_ns);
+    listener.accept().unwrap().0
+}
+
+#[test]
+fn a_connection_carries_bytes_both_ways() {
+    let (listener, address) = listener();
+    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut robot = connected(&listener, &mut transport, 0);
+    transport.send(b"ping").unwrap();
+    let mut heard = [0; 4];
+    robot.read_exact(&mut heard).unwrap();
+    assert_eq!(&heard, b"ping");
+    robot.write_all(b"ack").unwrap();
+    expect(&mut transport, b"ack", 0);
+    assert_eq!(transport.attempts(0), None);
+}
+
+#[test]
+fn a_connection_that_ends_is_told_and_made_anew() {
+    let (listener, address) = listener();
+    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut robot = connected(&listener, &mut transport, 0);
+    robot.write_all(b"here").unwrap();
+    expect(&mut transport, b"here", 0);
+    drop(robot);
+    expect_closing(&mut transport, MS);
+    let mut robot = connected(&listener, &mut transport, 2 * MS);
+    robot.write_all(b"again").unwrap();
+    expect(&mut transport, b"again", 2 * MS);
+}
+
+#[test]
+fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
+    let (listener, address) = listener();
+    drop(listener);
+    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    assert_eq!(transport.tend(0).unwrap(), Some(false));
+    let (mut now, mut pauses) = (0, Vec::new());
+    for _ in 0..7 {
+        // Refused at once or in a moment; either way nothing is open.
+        while transport.attempts(now).unwrap().next_ns == 0 {
+            assert_eq!(transport.tend(now).unwrap(), None);
+        }
+        let wait = transport.attempts(now).unwrap().next_ns;
+        pauses.push(wait / MS);
+        now += wait;
+    }
+    assert_eq!(pauses, [100, 200, 400, 800, 1600, 2000, 2000]);
+    // It is switched on.
+    let listener = TcpListener::bind(address).unwrap();
+    connected(&listener, &mut transport, now);
+}
+
+#[test]
+fn a_connection_without_a_word_is_taken_for_dead() {
+    let (listener, address) = listener();
+    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let _robot = connected(&listener, &mut transport, 0);
+    assert_eq!(transport.tend(4999 * MS).unwrap(), None);
+    assert_eq!(transport.tend(5000 * MS).unwrap(), Some(false));
+    connected(&listener, &mut transport, 5000 * MS);
+}
+
+/// Send commands to a robot that does not read until some are lost, then let it read, and send more.
+/// What it reads must be whole frames.
+fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) -> Option<usize>) {
+    let mut message = Vec::new();
+    Command::velocity([Some(400), Some(-400)], 250).encode(Addressing::default(), &mut message);
+    let mut sent = 0_u64;
+    while transport.tally().unsent < 3 {
+        transport.send(&message).unwrap();
+        sent += 1;
+        assert!(sent < 10_000_000, "it takes everything");
+    }
+    let mut decoder = Decoder::default();
+    let mut frames = 0;
+    let mut buffer = vec![0; 65_536];
+    for _ in 0..2 {
+        while let Some(length) = robot_reads(&mut buffer) {
+            decoder.push(&buffer[..length]);
+            while decoder.next_frame().is_some() {
+                frames += 1;
+            }
+            transport.tend(0).unwrap();
+        }
+        transport.send(&message).unwrap();
+        sent += 1;
+    }
+    assert_eq!(decoder.tally().bad_crc, 0, "half a frame went out");
+    // The last one is still on its way.
+    assert_eq!(frames + 1, sent - transport.tally().unsent);
+}
+
+#[test]
+fn a_connection_that_takes_no_more_loses_whole_frames_only() {
+    let (listener, address) = listener();
+    let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
+    let mut robot = connected(&listener, &mut transport, 0);
+    robot
+        .set_read_timeout(Some(std::time::Duration::from_millis(200)))
+        .unwrap();
+    overfill(&mut transport, |buffer| robot.read(buffer).ok());
+}
+
+/// A serial port's other end, and a name for the port that outlives it.
+struct Line {
+    robot: OwnedFd,
+    name: PathBuf,
+    _directory: Option<TempDir>,
+}
+
+fn plug_in(name: &Path) -> OwnedFd {
+    let robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    grantpt(&robot).unwrap();
+    unlockpt(&robot).unwrap();
+    let path = ptsname(&robot, Vec::new()).unwrap();
+    let _ = std::fs::remove_file(name);
+    std::os::unix::fs::symlink(path.to_str().unwrap(), name).unwrap();
+    fcntl_setfl(&robot, fcntl_getfl(&robot).unwrap() | OFlags::NONBLOCK).unwrap();
+    robot
+}
+
+fn line() -> Line {
+    let directory = tempfile::tempdir().unwrap();
+    let name = directory.path().join("ttyUSB0");
+    Line {
+        robot: plug_in(&name),
+        name,
+        _directory: Some(directory),
+    }
+}
+
+fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {
+    let mut heard = Vec::new();
+    let mut buffer = [0; 256];
+    while heard.len() < length {
+        ready(robot);
+        match read(robot, &mut buffer) {
+            Ok(length) => heard.extend_from_slice(&buffer[..length]),
+            Err(Errno::AGAIN) => {}
+            Err(error) => panic!("{error}"),
+        }
+    }
+    heard
+}
+
+#[test]
+fn a_serial_line_carries_every_byte_as_it_is() {
+    let line = line();
+    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    tend_until(&mut transport, true, 0);
+    let bytes: Vec<u8> = (0..=255).collect();
+    transport.send(&bytes).unwrap();
+    assert_eq!(read_from(&line.robot, 256), bytes);
+    write(&line.robot, &bytes).unwrap();
+    expect(&mut transport, &bytes, 0);
+}
+
+#[test]
+fn a_serial_line_is_set_to_115200_8n1() {
+    let line = line();
+    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    tend_until(&mut transport, true, 0);
+    let settings = tcgetattr(&line.robot).unwrap();
+    assert_eq!(settings.output_speed(), 115_200);
+    let character = settings.control_modes
+        & (ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB);
+    assert_eq!(character, ControlModes::CS8);
+    assert!(!settings.local_modes.contains(LocalModes::ECHO));
+}
+
+#[test]
+fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
+    let mut line = line();
+    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    tend_until(&mut transport, true, 0);
+    write(&line.robot, b"here").unwrap();
+    expect(&mut transport, b"here", 0);
+    std::fs::remove_file(&line.name).unwrap();
+    // The last holder of the robot's end goes: the line hangs up.
+    line.robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    expect_closing(&mut transport, 0);
+    for now in [0, 100 * MS, 300 * MS] {
+        assert_eq!(transport.tend(now).unwrap(), None, "it is not there");
+    }
+    assert_eq!(transport.attempts(300 * MS).unwrap().next_ns, 400 * MS);
+    line.robot = plug_in(&line.name);
+    assert_eq!(transport.tend(699 * MS).unwrap(), None);
+    tend_until(&mut transport, true, 700 * MS);
+    transport.send(b"stand").unwrap();
+    assert_eq!(read_from(&line.robot, 5), b"stand");
+}
+
+#[test]
+fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
+    let line = line();
+    let mut first = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    tend_until(&mut first, true, 0);
+    let mut second = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    assert_eq!(second.tend(0).unwrap(), Some(false));
+    // Somebody else has the line open all the time, as a simulated robot has.
+    let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
+    drop(first);
+    tend_until(&mut second, true, 100 * MS);
+}
+
+#[test]
+fn a_line_that_takes_no_more_loses_whole_frames_only() {
+    let line = line();
+    let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
+    tend_until(&mut transport, true, 0);
+    overfill(&mut transport, |buffer| {
+        let mut polled = [PollFd::new(&line.robot, PollFlags::IN)];
+        let a_while = Timespec {
+            tv_sec: 0,
+            tv_nsec: 200_000_000,
+        };
+        let came = poll(&mut polled, Some(&a_while)).unwrap() > 0;
+        came.then(|| read(&line.robot, buffer).unwrap())
+    });
+}
+
+#[test]
+fn a_file_that_is_no_serial_line_is_never_written_to() {
+    let mut transport = Transport::open(&Address::Serial("/dev/null".into())).unwrap();
+    assert_eq!(transport.tend(0).unwrap(), Some(false));
+    transport.send(b"ping").unwrap();
+    assert_eq!(transport.tally().unsent, 1);
+}

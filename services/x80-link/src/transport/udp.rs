@@ -1,0 +1,88 @@
+//! Datagrams from the robot's address, and from nowhere else.
+
+use std::{
+    io,
+    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket},
+    os::fd::{AsFd, BorrowedFd},
+};
+
+use rustix::io::Errno;
+
+use super::Tally;
+
+/// A socket that speaks to one robot.
+#[derive(Debug)]
+pub(super) struct Udp {
+    socket: UdpSocket,
+    robot: SocketAddr,
+    tally: Tally,
+}
+
+impl Udp {
+    /// To the robot at `robot`, from any free port.
+    pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
+        let any = match robot.ip() {
+            // On loopback bind to it: nothing from outside can even arrive.
+            IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
+            IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
+            IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
+            IpAddr::V6(_) => IpAddr::V6(Ipv6Addr::UNSPECIFIED),
+        };
+        let socket = UdpSocket::bind((any, 0))?;
+        socket.set_nonblocking(true)?;
+        Ok(Self {
+            socket,
+            robot,
+            tally: Tally::default(),
+        })
+    }
+
+    /// How many bytes the next datagram of the robot has, in `buffer`; none when all were taken. Others
+    /// are dropped and counted.
+    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
+        loop {
+            match self.socket.recv_from(buffer) {
+                Ok((length, from)) if from == self.robot => return Ok(Some(length)),
+                Ok(_) => self.tally.strangers += 1,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(None),
+                Err(error) if is_passing(&error) => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Send one datagram. What the network does not take now is lost, as on any radio.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self.socket.send_to(bytes, self.robot) {
+            Ok(_) => Ok(()),
+            Err(error) if Errno::from_io_error(&error) == Some(Errno::BADF) => Err(error),
+            // A full queue, a firewall, a network that is down.
+            Err(_) => {
+                self.tally.unsent += 1;
+                Ok(())
+            }
+        }
+    }
+
+    pub(super) const fn tally(&self) -> Tally {
+        self.tally
+    }
+}
+
+/// The robot is away, or a signal came: nothing is wrong with the socket.
+fn is_passing(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::Interrupted
+            | io::ErrorKind::ConnectionRefused
+            | io::ErrorKind::HostUnreachable
+            | io::ErrorKind::NetworkUnreachable
+            | io::ErrorKind::NetworkDown
+    )
+}
+
+impl AsFd for Udp {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
