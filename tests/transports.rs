@@ -32,6 +32,8 @@ struct Robot {
     listening: String,
     /// Read as it comes: the robot waits for a reader that is slow.
     truth: Receiver<Value>,
+    /// How far from its start it was last seen, metres.
+    went: f64,
 }
 
 impl Robot {
@@ -61,6 +63,14 @@ impl Robot {
             process,
             listening: header["listening"].as_str().unwrap().to_owned(),
             truth,
+            went: 0.0,
+        }
+    }
+
+    /// Wait until it is `metres` from its start.
+    fn wait_until_driven(&mut self, metres: f64) {
+        while self.went < metres {
+            self.went = from_start(&self.truth.recv_timeout(support::PATIENCE).unwrap());
         }
     }
 
@@ -68,12 +78,14 @@ impl Robot {
     fn kill(mut self) -> f64 {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
-        let last = self.truth.iter().last().unwrap();
-        last["x"]
-            .as_f64()
-            .unwrap()
-            .hypot(last["y"].as_f64().unwrap())
+        let last = self.truth.iter().last();
+        last.map_or(self.went, |truth| from_start(&truth))
     }
+}
+
+fn from_start(truth: &Value) -> f64 {
+    let metres = |axis: &str| truth[axis].as_f64().unwrap();
+    metres("x").hypot(metres("y"))
 }
 
 impl Drop for Robot {
@@ -122,4 +134,57 @@ fn a_mission_arrives_over_a_connection() {
 #[test]
 fn a_mission_arrives_over_a_serial_line() {
     arrives_over("pty", "serial://");
+}
+
+/// The robot is killed halfway and comes back where it listened before, as one that was switched off and
+/// on: its counts begin anew, and so does the place it takes for its start.
+fn goes_away_and_comes_back(transport: &str) {
+    let (_directory, mission) = mission();
+    let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");
+    let listened = robot.listening.clone();
+    let name = format!("away-{transport}");
+    let mut run = drive(&name, &mission, &format!("{transport}://{listened}"));
+    robot.wait_until_driven(0.15);
+    let first_part = robot.kill();
+    let lost = run.wait_until("the robot is lost and looked for", |status| {
+        status["link"]["connected"] == false && status["link"]["attempts"].as_u64() >= Some(3)
+    });
+    assert_eq!(lost["link"]["stopped"], true, "{lost}");
+    let later = run.wait_until("it is still looked for", |status| {
+        status["link"]["attempts"].as_u64() >= Some(4)
+    });
+    assert_eq!(later["order"], "driving", "the mission pauses only");
+    assert_eq!(later["tick"], lost["tick"], "{later}");
+    assert!(later["link"]["lost_s"].as_f64() > lost["link"]["lost_s"].as_f64());
+
+    let robot = Robot::start(&mission, transport, &listened);
+    let back = run.wait_until("the robot is back and known to have restarted", |status| {
+        status["link"]["connected"] == true && status["link"]["reboots"] == 1
+    });
+    assert_eq!(back["link"]["losses"], 1, "{back}");
+    let directory = run.directory();
+    let (code, summary, kept) = run.finish_in();
+    assert_reached(code, &summary);
+    assert_eq!(summary["restarts"]["x80-link"], 0, "{summary}");
+    // Both robots began at their own start: what they went together is what the run believes.
+    let went = first_part + robot.kill();
+    let believed = summary["path_length_m"].as_f64().unwrap();
+    assert!((went - believed).abs() < 0.06, "{went} m: {summary}");
+    assert!((went - TARGET_M).abs() < TOLERANCE_M + 0.06, "{went} m");
+    let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
+    for words in ["robot lost", "robot answers", "the robot restarted"] {
+        assert!(log.contains(words), "no {words:?} in {log}");
+    }
+    drop(kept);
+    assert_nothing_left(&name);
+}
+
+#[test]
+fn a_robot_that_restarts_mid_mission_is_waited_for_and_arrives_over_datagrams() {
+    goes_away_and_comes_back("udp");
+}
+
+#[test]
+fn a_robot_that_restarts_mid_mission_is_waited_for_and_arrives_over_a_connection() {
+    goes_away_and_comes_back("tcp");
 }

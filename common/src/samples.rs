@@ -148,6 +148,9 @@ pub struct WheelSample {
     pub left_counts_per_s: i32,
     /// Right speed, counts a second, forward positive.
     pub right_counts_per_s: i32,
+    /// Times this life of the link noticed that the robot restarted its counts: the step from a sample with
+    /// a lower number is no motion.
+    pub restarts: u32,
 }
 
 /// Topic `pose`: where dead reckoning believes the robot is.
@@ -460,8 +463,22 @@ pub struct LinkSample {
     pub bytes_dropped: u64,
     /// Datagrams from another address than the robot's, dropped.
     pub strangers: u64,
+    /// Messages the wire did not take, lost.
+    pub unsent: u64,
+    /// Times the robot was lost.
+    pub losses: u64,
+    /// Times the robot was seen to have restarted its counts.
+    pub reboots: u64,
+    /// For how long the robot has not answered, nanoseconds of the machine's clock; 0 while it does.
+    pub lost_ns: u64,
+    /// Attempts to reach it since: pings, or openings of the wire.
+    pub attempts: u64,
+    /// Until the next attempt, nanoseconds of the machine's clock.
+    pub next_attempt_ns: u64,
     /// Commands sent.
     pub commands_out: u64,
+    /// Commands sent a second time, halfway to the next tick.
+    pub repeated_commands: u64,
     /// Ticks given to the stages a second time, because no command came.
     pub repeated_ticks: u64,
     /// From the datagram in to the datagram out, last tick, nanoseconds.
@@ -481,7 +498,14 @@ impl Default for LinkSample {
             frames_in: 0,
             bytes_dropped: 0,
             strangers: 0,
+            unsent: 0,
+            losses: 0,
+            reboots: 0,
+            lost_ns: 0,
+            attempts: 0,
+            next_attempt_ns: 0,
             commands_out: 0,
+            repeated_commands: 0,
             repeated_ticks: 0,
             latency_ns: 0,
             latency_max_ns: 0,

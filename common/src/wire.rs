@@ -53,6 +53,7 @@ pub use frame::{Addressing, Frame, MAX_FRAME_BYTES, MessageError, SystemSignal};
 pub use report::Report;
 pub use sensors::{
     COUNT_CYCLE, CustomSensors, Encoder, MotorSensors, StandardSensors, counts_between,
+    counts_restarted,
 };
 pub use units::{Echo, infrared_ad, infrared_m, volts};
 

@@ -47,6 +47,26 @@ pub fn counts_between(old: u16, new: u16) -> i32 {
     }
 }
 
+/// A robot that has just booted stands: its counts are this near to 0.
+const BOOTED_WITHIN: i32 = 4;
+/// A step to there that is no longer than this is not worth telling from motion: 14 mm of an X80.
+const NOT_WORTH_TELLING: i32 = 32;
+
+/// Whether the counts of both wheels look as if the robot booted between `old` and `new`: they stand where
+/// a robot begins, and stood elsewhere. One that drove back to its start looks the same, so this is for
+/// those who have not seen it on the way.
+#[must_use]
+pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
+    let at_start = new
+        .iter()
+        .all(|&count| counts_between(0, count).abs() <= BOOTED_WITHIN);
+    let steps = old.iter().zip(new);
+    let stood_elsewhere = steps
+        .map(|(&old, new)| counts_between(old, new).abs())
+        .any(|step| step > NOT_WORTH_TELLING);
+    at_start && stood_elsewhere
+}
+
 /// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {

@@ -49,7 +49,7 @@ impl Process for Shell {
             if self.reckoning.disbelieved() > disbelieved {
                 tracing::warn!(
                     tick = wheels.stamp.tick,
-                    "the encoder counts jumped: did the robot restart?"
+                    "the encoder counts began anew or jumped; the pose stays"
                 );
             }
             self.checkpoint.save(self.reckoning.state())?;

@@ -5,7 +5,7 @@ use common::{
     kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
     mission::{Body, Integration, Mission},
     samples::{PoseSample, WheelSample},
-    wire::counts_between,
+    wire::{counts_between, counts_restarted},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -32,6 +32,9 @@ struct Last {
     time: MissionTime,
     left: u16,
     right: u16,
+    /// The life of the link that gave it, and the robot's restarts it knew of.
+    generation: u32,
+    restarts: u32,
     v: f64,
     omega: f64,
 }
@@ -93,7 +96,7 @@ impl DeadReckoning {
                 return self.sample();
             }
             let elapsed = time.since(last.time).as_secs_f64();
-            let turned = self.turned(last, left, right, elapsed);
+            let turned = self.turned(last, wheels, elapsed);
             // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.
             let motion = self.drive.twist(turned);
             let pose = Pose2 {
@@ -116,6 +119,8 @@ impl DeadReckoning {
             time,
             left,
             right,
+            generation: wheels.stamp.generation,
+            restarts: wheels.restarts,
             v,
             omega,
         });
@@ -123,15 +128,15 @@ impl DeadReckoning {
     }
 
     /// Wheel angles since `last`, radians; none if the counts cannot have come from turning wheels.
-    fn turned(&mut self, last: Last, left: u16, right: u16, elapsed: f64) -> WheelSpeeds {
+    fn turned(&mut self, last: Last, wheels: &WheelSample, elapsed: f64) -> WheelSpeeds {
         let (left, right) = (
-            counts_between(last.left, left),
-            counts_between(last.right, right),
+            counts_between(last.left, wheels.left_counts),
+            counts_between(last.right, wheels.right_counts),
         );
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
-        if f64::from(left.abs().max(right.abs())) > limit {
+        if f64::from(left.abs().max(right.abs())) > limit || restarted(last, wheels) {
             self.disbelieved += 1;
             return WheelSpeeds::default();
         }
@@ -163,6 +168,18 @@ impl DeadReckoning {
             ..PoseSample::default()
         }
     }
+}
+
+/// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only
+/// what happened between two lives of it has to be told from the counts themselves.
+fn restarted(last: Last, wheels: &WheelSample) -> bool {
+    if last.generation == wheels.stamp.generation {
+        return last.restarts != wheels.restarts;
+    }
+    counts_restarted(
+        [last.left, last.right],
+        [wheels.left_counts, wheels.right_counts],
+    )
 }
 
 #[cfg(test)]
@@ -277,5 +294,37 @@ mod tests {
         assert_eq!(reckoning.disbelieved(), 1);
         let pose = reckoning.step(&wheels(2, 500, 500));
         close(pose.x_m, 0.1 * PI);
+    }
+
+    #[test]
+    fn a_robot_that_restarted_while_it_was_away_does_not_move() {
+        let mut reckoning = reckoning("");
+        reckoning.step(&wheels(0, 600, 700));
+        // In the 5 s since, wheels could have turned so far.
+        let after = WheelSample {
+            restarts: 1,
+            ..wheels(10, 0, 1)
+        };
+        close(reckoning.step(&after).x_m, 0.0);
+        assert_eq!(reckoning.disbelieved(), 1);
+        let on = WheelSample {
+            restarts: 1,
+            ..wheels(11, 500, 501)
+        };
+        close(reckoning.step(&on).x_m, 0.1 * PI);
+    }
+
+    #[test]
+    fn a_restart_between_two_lives_of_the_link_is_told_from_the_counts() {
+        let mut reckoning = reckoning("");
+        let by = |generation, mut sample: WheelSample| {
+            sample.stamp.generation = generation;
+            sample
+        };
+        reckoning.step(&by(1, wheels(0, 600, 700)));
+        let pose = reckoning.step(&by(2, wheels(1, 1100, 1200)));
+        close(pose.x_m, 0.1 * PI);
+        close(reckoning.step(&by(3, wheels(9, 0, 0))).x_m, pose.x_m);
+        assert_eq!(reckoning.disbelieved(), 1);
     }
 }

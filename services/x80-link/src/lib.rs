@@ -3,13 +3,19 @@
 //! | module | holds |
 //! |---|---|
 //! | [`step`] | the link itself, pure: bytes and commands in, samples and bytes out |
+//! | [`drive`] | the two wheels on the wire: channels and signs, counts in, timed commands out |
 //! | [`failsafe`] | whether a command may move the robot, and why not |
 //! | [`transport`] | datagrams, a connection or a serial line |
+//! | [`presence`] | whether the robot answers, and how it is looked for |
+//! | [`restart`] | whether the robot restarted its counts |
 //! | [`backoff`] | pauses between attempts |
 //! | [`shell`] | wires them to the topics |
 
 pub mod backoff;
+pub mod drive;
 pub mod failsafe;
+pub mod presence;
+pub mod restart;
 pub mod shell;
 pub mod step;
 pub mod transport;

@@ -134,8 +134,18 @@ impl Shell {
                     tracing::warn!(cause = cause.as_str(), "robot stopped");
                     self.state()?;
                 }
-                Effect::Connected(true) => tracing::info!("robot answers"),
-                Effect::Connected(false) => tracing::warn!("robot lost"),
+                Effect::Connected(true) => {
+                    tracing::info!("robot answers");
+                    self.state()?;
+                }
+                Effect::Connected(false) => {
+                    tracing::warn!("robot lost; it is looked for until it answers");
+                    self.state()?;
+                }
+                Effect::Restarted => {
+                    let restarts = self.link.restarts();
+                    tracing::warn!(restarts, "the robot restarted: its counts begin anew");
+                }
             }
         }
         Ok(())
@@ -143,16 +153,31 @@ impl Shell {
 
     /// Say how the wire is.
     fn state(&mut self) -> Result<(), StageError> {
-        self.stated_ns = monotonic_ns();
+        let now_ns = monotonic_ns();
+        self.stated_ns = now_ns;
         let wire = self.link.wire_tally();
         let tally = self.link.tally();
+        let absence = self.link.absence(now_ns);
+        // Of a wire that is not open, the openings; else the pings.
+        let (attempts, next_attempt_ns) = match self.transport.attempts(now_ns) {
+            Some(openings) => (openings.made, openings.next_ns),
+            None => (absence.pings, absence.next_ping_ns),
+        };
+        let carried = self.transport.tally();
         let sample = LinkSample {
             connected: self.link.connected().into(),
             stopped: self.link.stopped().is_some().into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
-            strangers: self.transport.tally().strangers,
+            strangers: carried.strangers,
+            unsent: carried.unsent,
+            losses: self.link.losses(),
+            reboots: self.link.restarts().into(),
+            lost_ns: absence.lost_ns,
+            attempts,
+            next_attempt_ns,
             commands_out: tally.commands,
+            repeated_commands: tally.repeated_commands,
             repeated_ticks: tally.repeated_ticks,
             latency_ns: self.latency_ns,
             latency_max_ns: self.latency.max_ns(),

@@ -5,86 +5,37 @@
 //! command, so a tick that gets none, because a stage died, is given again. On a wall clock the robot
 //! moves on, so an unanswered tick is abandoned for the next.
 
+mod event;
+
 use std::time::Duration;
 
 use common::{
     clock::{MissionClock, MissionTime},
-    mission::{Body, Mission, RobotConfig},
+    mission::Mission,
     samples::{CommandSample, CommandState, Order, RangeSample, RangeStatus, WheelSample},
-    wire::{
-        Addressing, COUNT_CYCLE, Command, Decoder, DecoderTally, Echo, Encoder, Feedback, Mode,
-        MotorSensors, Parameter, Report, Request, Stream, SystemSignal,
-    },
+    wire::{Command, Decoder, DecoderTally, Echo, MotorSensors, Report, SystemSignal},
 };
 
-use crate::failsafe::{self, Cause, Flags};
+use crate::{
+    drive::{Drive, encoded},
+    failsafe::{self, Cause, Flags},
+    presence::{Absence, Presence},
+    restart::RestartWatch,
+};
 
-/// A robot that said nothing for so many command limits is lost: longer than a radio's short fade, and
-/// the robot stands by then anyway.
-const SILENT_LIMITS: u32 = 3;
-/// However fast mission time runs, processes are late by so much now and then.
-const LEAST_SILENCE: Duration = Duration::from_millis(100);
-/// Between pings of a robot that does not answer.
+pub use event::{Effect, Event, Tally};
+
+/// Between pings of a robot that owes a tick.
 const PING_EVERY: Duration = Duration::from_millis(200);
 /// An open tick without a command is given again after this: ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
+/// The wire knows whole milliseconds, and to most robots none means no limit.
+const LEAST_LEFT: Duration = Duration::from_millis(1);
 /// A stop is sent so often: one datagram may be lost.
 const STOPS: u32 = 3;
 /// While the robot stands by our decision it is told again: all of them may be lost in a fade, and a
 /// robot may ignore the time limit of the command before.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
-
-/// What happened.
-#[derive(Clone, Copy, Debug)]
-pub enum Event<'a> {
-    /// Bytes of the robot.
-    Datagram(&'a [u8]),
-    /// Whether the wire is open now. One of datagrams always is, and it is taken for open until this says
-    /// otherwise.
-    Wire(bool),
-    /// A command of the controller.
-    Command(&'a CommandSample),
-    /// The supervisor's word.
-    Order(Order),
-    /// Nothing; time passed.
-    Quiet,
-}
-
-/// What to do about it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
-    /// Send these bytes to the robot.
-    Send(Vec<u8>),
-    /// Publish the tick: `range` first, since `wheels` wakes the pipeline.
-    Tick {
-        /// Its number.
-        tick: u64,
-        /// Its mission time.
-        time: MissionTime,
-        /// The newest sonar reading.
-        range: RangeSample,
-        /// The encoders.
-        wheels: WheelSample,
-    },
-    /// The command of the tick that began at this reading of the monotonic clock is on its way.
-    Answered {
-        /// Nanoseconds.
-        began_ns: u64,
-    },
-    /// The robot was stopped for this cause.
-    Stopped(Cause),
-    /// The robot answers again, or no longer.
-    Connected(bool),
-}
-
-/// Counts for the `link` topic.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// Velocity commands sent.
-    pub commands: u64,
-    /// Ticks given again.
-    pub repeated_ticks: u64,
-}
 
 /// A tick that waits for its command.
 #[derive(Clone, Copy, Debug)]
@@ -95,32 +46,40 @@ struct OpenTick {
     given_ns: u64,
 }
 
+/// A command that passed, to be sent once more: a datagram may be lost.
+#[derive(Clone, Copy, Debug)]
+struct Repeat {
+    counts: [i16; 2],
+    /// The tick it was computed from.
+    stamp: MissionTime,
+    /// Halfway to the next.
+    due: MissionTime,
+}
+
 /// The link to one robot.
 #[derive(Debug)]
 pub struct Link {
     clock: MissionClock,
-    robot: RobotConfig,
-    body: Body,
+    drive: Drive,
     sonar_index: usize,
-    command_limit: Duration,
+    half_period_ns: u64,
     decoder: Decoder,
     order: Option<Order>,
-    heard_ns: Option<u64>,
+    presence: Presence,
     pinged_ns: Option<u64>,
-    wire_open: bool,
-    connected: bool,
+    restart: RestartWatch,
     sonar: Option<u8>,
     next_tick: u64,
     time: MissionTime,
     open: Option<OpenTick>,
     newest_command: Option<CommandSample>,
+    repeat: Option<Repeat>,
     stopped: Option<Cause>,
     stop_sent_ns: Option<u64>,
     /// On a clock of ticks: motor frames that are due, one for each command and each ping since the order.
     due: u32,
     /// The mission's last command has passed: on a clock of ticks there is nothing to go on for.
     arrived: bool,
-    silence: Duration,
     tally: Tally,
 }
 
@@ -130,27 +89,25 @@ impl Link {
     pub fn new(mission: &Mission, clock: MissionClock, first_tick: u64) -> Self {
         Self {
             clock,
-            robot: mission.robot.clone(),
-            body: mission.body(),
+            drive: Drive::new(mission),
             sonar_index: usize::from(mission.sonar.index),
-            command_limit: Duration::from_secs_f64(mission.robot.command_limit_s),
+            half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             decoder: Decoder::default(),
             order: None,
-            heard_ns: None,
+            presence: Presence::new(mission, clock),
             pinged_ns: None,
-            wire_open: true,
-            connected: false,
+            restart: RestartWatch::new(mission),
             sonar: None,
             next_tick: first_tick,
             time: clock.at(first_tick, 0),
             open: None,
             newest_command: None,
+            repeat: None,
             // Nothing has moved yet: what holds it needs no stop of its own.
             stopped: Some(Cause::NotOrdered),
             stop_sent_ns: None,
             due: 0,
             arrived: false,
-            silence: silence(mission, clock),
             tally: Tally::default(),
         }
     }
@@ -158,7 +115,7 @@ impl Link {
     /// Whether the robot answers.
     #[must_use]
     pub const fn connected(&self) -> bool {
-        self.connected
+        self.presence.connected()
     }
 
     /// Why the robot stands by the link's own decision; none while commands pass.
@@ -179,6 +136,24 @@ impl Link {
         self.tally
     }
 
+    /// Times the robot was seen to have restarted its counts.
+    #[must_use]
+    pub const fn restarts(&self) -> u32 {
+        self.restart.restarts()
+    }
+
+    /// How long the robot has been away, at `now_ns` of the monotonic clock.
+    #[must_use]
+    pub fn absence(&self, now_ns: u64) -> Absence {
+        self.presence.absence(now_ns)
+    }
+
+    /// Times the robot was lost.
+    #[must_use]
+    pub const fn losses(&self) -> u64 {
+        self.presence.losses()
+    }
+
     /// The tick to come and the mission time of the last one.
     #[must_use]
     pub const fn progress(&self) -> (u64, MissionTime) {
@@ -193,13 +168,14 @@ impl Link {
                 self.decoder.push(bytes);
                 self.take_frames(now_ns, &mut effects);
             }
-            Event::Wire(open) => self.take_wire(open, &mut effects),
+            Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
             Event::Command(command) => self.take_command(command, now_ns, &mut effects),
             Event::Order(order) => self.take_order(order, now_ns, &mut effects),
             Event::Quiet => {}
         }
         self.keep_connected(now_ns, &mut effects);
         self.repeat_tick(now_ns, &mut effects);
+        self.repeat_command(now_ns, &mut effects);
         self.guard(now_ns, &mut effects);
         effects
     }
@@ -207,47 +183,52 @@ impl Link {
     /// The last words: the robot stands.
     #[must_use]
     pub fn farewell(&self) -> Vec<Vec<u8>> {
-        (0..STOPS).map(|_| self.velocity([0, 0])).collect()
+        (0..STOPS).map(|_| self.drive.stop()).collect()
     }
 
     const fn in_ticks(&self) -> bool {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
 
-    fn take_wire(&mut self, open: bool, effects: &mut Vec<Effect>) {
-        self.wire_open = open;
-        // Whoever is there now is asked at once.
-        self.pinged_ns = None;
+    fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
+        self.presence.wire(open);
         // Half a frame of one connection does not go on in the next.
         self.decoder.forget();
-        if !open && self.connected {
-            self.connected = false;
-            effects.push(Effect::Connected(false));
+        if !open {
+            self.lose(now_ns, effects);
         }
     }
 
     fn take_frames(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let mut motor = None;
-        let mut ping = false;
+        let (mut heard, mut ping) = (false, false);
         while let Some(frame) = self.decoder.next_frame() {
             match Report::parse(&frame) {
-                Ok(Report::Standard(standard)) => {
-                    self.sonar = standard.ultrasonic.get(self.sonar_index).copied();
+                Ok(Report::Standard(sensors)) => {
+                    self.sonar = sensors.ultrasonic.get(self.sonar_index).copied();
                 }
                 Ok(Report::Motor(sensors)) => motor = Some(sensors),
                 Ok(Report::System(SystemSignal::Ping)) => ping = true,
                 // An ACK only says that the robot is there; so does a frame nobody here needs.
                 Ok(Report::System(SystemSignal::Ack) | Report::Custom(_)) | Err(_) => {}
             }
-            self.heard_ns = Some(now_ns);
+            heard = true;
         }
         if ping {
             effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ack))));
         }
-        if self.heard_ns == Some(now_ns) && !self.connected {
-            self.connected = true;
+        if let Some(sensors) = &motor
+            && self.notice_restart(sensors, now_ns)
+        {
+            effects.push(Effect::Restarted);
+            if self.presence.connected() {
+                // It is as it was when it booted.
+                effects.push(Effect::Send(self.drive.greeting()));
+            }
+        }
+        if heard && self.presence.heard(now_ns) {
             effects.push(Effect::Connected(true));
-            effects.push(Effect::Send(self.greeting()));
+            effects.push(Effect::Send(self.drive.greeting()));
             // It may be driving still on the word of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
@@ -267,29 +248,12 @@ impl Link {
         }
     }
 
-    /// Encoders as feedback, velocity mode, motors enabled, sensors streaming.
-    fn greeting(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut say = |command: Command| command.encode(Addressing::default(), &mut bytes);
-        for channel in [self.robot.left.channel, self.robot.right.channel] {
-            for parameter in [
-                Parameter::Feedback(Feedback::Encoder),
-                Parameter::Mode(Mode::Velocity),
-            ] {
-                say(Command::Parameter { channel, parameter });
-            }
-            say(Command::Enable {
-                on: true,
-                channel: Some(channel),
-            });
-        }
-        for stream in [Stream::Motor, Stream::Standard] {
-            say(Command::Stream {
-                stream,
-                request: Request::Start,
-            });
-        }
-        bytes
+    /// Whether the counts began anew. On a clock of ticks the robot is a simulated one that lives as long as
+    /// its mission, and no time passes that could tell.
+    fn notice_restart(&mut self, sensors: &MotorSensors, now_ns: u64) -> bool {
+        let now = self.clock.at(self.next_tick, now_ns);
+        let counts = sensors.encoders.map(|encoder| encoder.position);
+        !self.in_ticks() && self.restart.step(counts, now)
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -309,14 +273,9 @@ impl Link {
             // The number is taken whether the tick is answered or not.
             self.next_tick += 1;
         }
-        let left = self.wheel(sensors, self.robot.left);
-        let right = self.wheel(sensors, self.robot.right);
         let wheels = WheelSample {
-            left_counts: left.position,
-            right_counts: right.position,
-            left_counts_per_s: left.velocity(),
-            right_counts_per_s: right.velocity(),
-            ..WheelSample::default()
+            restarts: self.restart.restarts(),
+            ..self.drive.wheels(sensors)
         };
         let open = OpenTick {
             range: reading(self.sonar.take()),
@@ -334,19 +293,6 @@ impl Link {
             time: self.time,
             range: open.range,
             wheels: open.wheels,
-        }
-    }
-
-    /// A channel's encoder, turned so that it grows forward.
-    fn wheel(&self, sensors: &MotorSensors, channel: common::mission::Channel) -> Encoder {
-        let encoder = sensors.encoders[usize::from(channel.channel.min(1))];
-        if !channel.reversed {
-            return encoder;
-        }
-        Encoder {
-            position: (COUNT_CYCLE - encoder.position % COUNT_CYCLE) % COUNT_CYCLE,
-            positive: !encoder.positive,
-            ..encoder
         }
     }
 
@@ -380,8 +326,16 @@ impl Link {
             CommandState::Driving => [command.left_rad_s, command.right_rad_s],
             CommandState::Halt | CommandState::Arrived => [0.0, 0.0],
         };
-        let counts = wheels.map(|speed| self.counts_per_second(speed));
-        effects.push(Effect::Send(self.velocity(counts)));
+        let counts = wheels.map(|speed| self.drive.counts_per_second(speed));
+        effects.push(Effect::Send(
+            self.drive.velocity(counts, self.drive.limit()),
+        ));
+        let stamp = command.stamp.time();
+        self.repeat = Some(Repeat {
+            counts,
+            stamp,
+            due: MissionTime(stamp.0.saturating_add(self.half_period_ns)),
+        });
         self.tally.commands += 1;
         self.due += 1;
         self.arrived |= CommandState::from_byte(command.state) == CommandState::Arrived;
@@ -395,26 +349,6 @@ impl Link {
         }
     }
 
-    /// rad/s to counts/s, limited to what the wheel can do; what is no number stands.
-    fn counts_per_second(&self, speed: f64) -> i16 {
-        let per_radian = self.body.counts_per_turn / std::f64::consts::TAU;
-        let top = self.body.top_speed_m_s / self.body.metres_per_count();
-        let counts = (speed * per_radian).clamp(-top, top).round();
-        // -32768 and -32767 mean "leave alone".
-        counts.clamp(-32_766.0, 32_766.0) as i16
-    }
-
-    /// A timed velocity command: a robot that obeys the time stops by itself when we fall silent.
-    fn velocity(&self, [left, right]: [i16; 2]) -> Vec<u8> {
-        let mut channels = [None; 2];
-        for (channel, counts) in [(self.robot.left, left), (self.robot.right, right)] {
-            let signed = if channel.reversed { -counts } else { counts };
-            channels[usize::from(channel.channel.min(1))] = Some(signed);
-        }
-        let limit_ms = self.command_limit.as_millis().min(u128::from(u16::MAX)) as u16;
-        encoded(Command::velocity(channels, limit_ms))
-    }
-
     fn take_order(&mut self, order: Order, now_ns: u64, effects: &mut Vec<Effect>) {
         let drives = order == Order::Drive && self.order != Some(Order::Drive);
         self.order = Some(order);
@@ -426,6 +360,7 @@ impl Link {
 
     fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.pinged_ns = Some(now_ns);
+        self.presence.pinged(now_ns);
         if self.order == Some(Order::Drive) {
             self.due += 1;
         }
@@ -433,21 +368,28 @@ impl Link {
     }
 
     fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let silent = passed(self.heard_ns, now_ns, self.silence);
+        let silent = self.presence.is_silent(now_ns);
         // A robot that waits for a command is not lost; at most a datagram is, if it owes us a tick.
         let owes = self.order == Some(Order::Drive) && self.open.is_none();
-        if self.connected && silent && !self.in_ticks() {
-            self.connected = false;
-            effects.push(Effect::Connected(false));
+        if silent && !self.in_ticks() {
+            self.lose(now_ns, effects);
         }
-        let asks = !self.connected || self.in_ticks() && owes && silent;
-        if asks && self.wire_open && passed(self.pinged_ns, now_ns, PING_EVERY) {
-            if self.connected {
-                // What was due is lost.
-                self.due = 0;
-            }
+        let owing = self.in_ticks() && owes && silent && self.presence.connected();
+        if self.presence.wants_ping(now_ns) {
+            self.ping(now_ns, effects);
+        } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
+            // What was due is lost.
+            self.due = 0;
             self.ping(now_ns, effects);
         }
+    }
+
+    fn lose(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+        if !self.presence.lose(now_ns) {
+            return;
+        }
+        self.restart.lost();
+        effects.push(Effect::Connected(false));
     }
 
     fn repeat_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -462,6 +404,27 @@ impl Link {
             self.tally.repeated_ticks += 1;
             effects.push(self.tick_effect(self.next_tick, &open));
         }
+    }
+
+    /// Send the newest command once more, halfway to the next tick and with what remains of its time: the
+    /// robot still stands when that has passed since the tick. On a clock of ticks each command draws a
+    /// frame, and none is lost unnoticed.
+    fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+        if self.in_ticks() {
+            return;
+        }
+        let now = self.clock.at(self.next_tick, now_ns);
+        let Some(repeat) = self.repeat.take_if(|repeat| repeat.due <= now) else {
+            return;
+        };
+        let left = self.drive.limit().saturating_sub(now.since(repeat.stamp));
+        // With a tick open, the next command is on its way.
+        let superseded = self.open.is_some();
+        if superseded || left < LEAST_LEFT || self.stop_cause(now_ns).is_some() {
+            return;
+        }
+        effects.push(Effect::Send(self.drive.velocity(repeat.counts, left)));
+        self.tally.repeated_commands += 1;
     }
 
     fn stop_cause(&self, now_ns: u64) -> Option<Cause> {
@@ -482,9 +445,9 @@ impl Link {
         let flags = Flags {
             order: self.order,
             command_age: self.newest_command.as_ref().map(age),
-            connected: self.connected,
+            connected: self.presence.connected(),
         };
-        failsafe::stop_cause(&flags, self.command_limit)
+        failsafe::stop_cause(&flags, self.drive.limit())
     }
 
     /// Stop the robot when it must not move.
@@ -492,14 +455,15 @@ impl Link {
         let Some(cause) = self.stop_cause(now_ns) else {
             return;
         };
+        self.repeat = None;
         if self.stopped.is_none() {
             effects.extend(self.farewell().into_iter().map(Effect::Send));
             effects.push(Effect::Stopped(cause));
         } else if !self.in_ticks()
-            && self.connected
+            && self.presence.connected()
             && passed(self.stop_sent_ns, now_ns, STOP_AGAIN)
         {
-            effects.push(Effect::Send(self.velocity([0, 0])));
+            effects.push(Effect::Send(self.drive.stop()));
         } else {
             return;
         }
@@ -508,24 +472,9 @@ impl Link {
     }
 }
 
-/// How long a robot may say nothing, on the machine's clock, before it is lost.
-fn silence(mission: &Mission, clock: MissionClock) -> Duration {
-    let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
-    match clock {
-        MissionClock::Wall { rate, .. } if rate > 0.0 => limit.div_f64(rate).max(LEAST_SILENCE),
-        _ => limit,
-    }
-}
-
 /// Whether `span` has passed since; it has if there is no since.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
-}
-
-fn encoded(command: Command) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    command.encode(Addressing::default(), &mut bytes);
-    bytes
 }
 
 /// A sonar byte as the pipeline takes it.

@@ -1,4 +1,4 @@
-//! `firsthand status`: what runs.
+//! `firsthand status`: what runs, and how the robot is.
 
 use std::{
     fmt,
@@ -10,7 +10,7 @@ use clap::Args;
 use common::{
     bus::Bus,
     domain::{Domain, RobotName},
-    samples::{Order, RosterEntry, StageState, name_str},
+    samples::{LinkSample, Order, RosterEntry, StageState, name_str},
     topics,
     waiter::Waiter,
 };
@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use super::Failure;
 
-/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages.
+/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its wire.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Whose.
@@ -38,7 +38,25 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
+    /// None while no link speaks.
+    link: Option<LinkStatus>,
     stages: Vec<StageStatus<'a>>,
+}
+
+/// The wire to the robot.
+#[derive(Serialize)]
+struct LinkStatus {
+    connected: bool,
+    /// Whether the link holds the robot still.
+    stopped: bool,
+    /// For how long it has not answered; none while it does.
+    lost_s: Option<f64>,
+    attempts: u64,
+    next_attempt_s: Option<f64>,
+    losses: u64,
+    reboots: u64,
+    unsent: u64,
+    strangers: u64,
 }
 
 /// One stage of it.
@@ -56,16 +74,25 @@ struct StageStatus<'a> {
 
 /// The roster comes five times a second.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// The link speaks ten times a second.
+const WIRE_PATIENCE: Duration = Duration::from_millis(400);
 
 #[allow(clippy::print_stdout)]
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut roster = bus.slice_reader(&topics::ROSTER)?;
+    let mut links = bus.reader(&topics::LINK)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.alarm(&topics::ROSTER)?);
+    waiter.on(bus.alarm(&topics::LINK)?);
     let began = Instant::now();
+    let (mut entries, mut link) = (None, None);
     let entries = loop {
-        if let Some(entries) = roster.take()? {
+        entries = roster.take()?.or(entries);
+        link = links.newest()?.or(link);
+        if (link.is_some() || began.elapsed() >= WIRE_PATIENCE)
+            && let Some(entries) = entries.take()
+        {
             break entries;
         }
         if began.elapsed() >= PATIENCE {
@@ -75,7 +102,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             )
             .into());
         }
-        waiter.wait(PATIENCE)?;
+        waiter.wait(WIRE_PATIENCE)?;
     };
     let header = entries.header();
     let status = Status {
@@ -84,6 +111,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         order: order(Order::from_byte(header.order)),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
+        link: link.as_ref().map(link_status),
         stages: entries.iter().map(stage_status).collect(),
     };
     if arguments.json {
@@ -104,6 +132,22 @@ fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
         uptime_s: seconds(entry.uptime_ns),
         beat_age_s: seconds(entry.beat_age_ns),
         output_age_s: seconds(entry.output_age_ns),
+    }
+}
+
+fn link_status(link: &LinkSample) -> LinkStatus {
+    let connected = link.connected == 1;
+    let while_lost = |nanoseconds: u64| (!connected).then_some(nanoseconds as f64 * 1e-9);
+    LinkStatus {
+        connected,
+        stopped: link.stopped == 1,
+        lost_s: while_lost(link.lost_ns),
+        attempts: link.attempts,
+        next_attempt_s: while_lost(link.next_attempt_ns),
+        losses: link.losses,
+        reboots: link.reboots,
+        unsent: link.unsent,
+        strangers: link.strangers,
     }
 }
 
@@ -132,6 +176,9 @@ impl fmt::Display for Status<'_> {
             "robot {}: supervisor {}, {}, {:.1} s into the mission",
             self.robot, self.supervisor_pid, self.order, self.mission_time_s
         )?;
+        if let Some(link) = &self.link {
+            writeln!(f, "{link}")?;
+        }
         writeln!(
             f,
             "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
@@ -152,6 +199,28 @@ impl fmt::Display for Status<'_> {
             )?;
         }
         Ok(())
+    }
+}
+
+impl fmt::Display for LinkStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.lost_s, self.next_attempt_s) {
+            (Some(lost), Some(next)) => write!(
+                f,
+                "ROBOT LOST for {}: {} attempts to reach it, the next in {}",
+                age(Some(lost)),
+                self.attempts,
+                age(Some(next))
+            )?,
+            _ => write!(f, "the robot answers")?,
+        }
+        if self.losses > 0 {
+            write!(f, "; times it was lost: {}", self.losses)?;
+        }
+        match self.reboots {
+            0 => Ok(()),
+            reboots => write!(f, "; times it restarted: {reboots}"),
+        }
     }
 }
 

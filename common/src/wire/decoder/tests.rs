@@ -1,7 +1,7 @@
 //! Promises of the decoder, by example and by property.
 
 use super::*;
-use crate::wire::MAX_FRAME_BYTES;
+use crate::wire::{Addressing, Command, MAX_FRAME_BYTES, SystemSignal};
 use proptest::prelude::*;
 
 type Owned = (u8, u8, u8, Vec<u8>);
@@ -39,6 +39,20 @@ fn encoded(did: u8, data: &[u8]) -> Vec<u8> {
 const PING: [u8; 10] = [0x5e, 0x02, 0x01, 0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d];
 fn ping() -> Owned {
     (1, 0, 255, vec![0])
+}
+
+#[test]
+fn what_is_forgotten_does_not_swallow_the_frame_behind_it() {
+    let mut bytes = Vec::new();
+    Command::System(SystemSignal::Ping).encode(Addressing::default(), &mut bytes);
+    let mut decoder = Decoder::default();
+    // The beginning of a frame of 64 data bytes; its rest never comes.
+    decoder.push(&[0x5e, 0x02, 0x00, 0x00, 0x7d, 64, 1, 2, 3]);
+    assert!(decoder.next_frame().is_none());
+    decoder.forget();
+    decoder.push(&bytes);
+    assert!(decoder.next_frame().is_some());
+    assert_eq!(decoder.tally().noise_bytes, 9);
 }
 
 #[test]

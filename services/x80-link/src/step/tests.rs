@@ -1,5 +1,8 @@
 use super::*;
-use common::{samples::Stamp, wire::StandardSensors};
+use common::{
+    samples::Stamp,
+    wire::{Addressing, Mode, Parameter, StandardSensors},
+};
 use std::path::Path;
 
 const MS: u64 = 1_000_000;
@@ -126,6 +129,130 @@ fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() 
     let effects = link.step(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(ticks(&effects)[0].1.raw_cm, 80, "{effects:?}");
+}
+
+#[test]
+fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
+    let mut link = on_the_wall();
+    let ping = Command::System(SystemSignal::Ping);
+    let mut pings = Vec::new();
+    for now in (0..8000).step_by(20) {
+        if sent(&link.step(Event::Quiet, now * MS)).contains(&ping) {
+            pings.push(now);
+        }
+    }
+    assert_eq!(pings, [0, 200, 600, 1400, 3000, 5000, 7000]);
+    let absence = link.absence(7900 * MS);
+    let expected = Absence {
+        lost_ns: 7900 * MS,
+        pings: 7,
+        next_ping_ns: 1100 * MS,
+    };
+    assert_eq!(absence, expected);
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
+    assert!(effects.contains(&Effect::Connected(true)));
+    assert_eq!(link.absence(7960 * MS), Absence::default());
+    // Lost again, it is asked at once and often.
+    let effects = link.step(Event::Quiet, 8700 * MS);
+    assert!(effects.contains(&Effect::Connected(false)) && sent(&effects).contains(&ping));
+    assert!(sent(&link.step(Event::Quiet, 8900 * MS)).contains(&ping));
+    assert_eq!(link.losses(), 1);
+}
+
+#[test]
+fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
+    let mut link = driving(on_the_wall());
+    let effects = link.step(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
+    assert_eq!(ticks(&effects)[0].2.restarts, 0);
+    link.step(Event::Quiet, 1000 * MS);
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 3000 * MS);
+    assert!(effects.contains(&Effect::Restarted));
+    assert_eq!(ticks(&effects)[0].2.restarts, 1);
+    assert_eq!(link.restarts(), 1);
+    // Even one that was not missed.
+    link.step(Event::Datagram(&datagram(255, 31_168, 1600)), 3500 * MS);
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 3600 * MS);
+    assert!(effects.contains(&Effect::Restarted));
+    let mode = |command: &Command| {
+        let velocity = Parameter::Mode(Mode::Velocity);
+        matches!(command, Command::Parameter { parameter, .. } if *parameter == velocity)
+    };
+    let setup = sent(&effects);
+    assert_eq!(setup.iter().filter(|command| mode(command)).count(), 2);
+}
+
+#[test]
+fn a_robot_that_comes_back_with_its_counts_has_not_restarted() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
+    link.step(Event::Quiet, 1000 * MS);
+    let effects = link.step(Event::Datagram(&datagram(255, 32_100, 668)), 3000 * MS);
+    assert!(effects.contains(&Effect::Connected(true)));
+    assert_eq!(ticks(&effects)[0].2.restarts, 0);
+}
+
+/// Target of channel 1 and time limit of each velocity command.
+fn timed(effects: &[Effect]) -> Vec<(Option<i16>, Option<u16>)> {
+    let motion = |command: Command| match command {
+        Command::Motion(motion) => Some((motion.targets.of(1), motion.limit_ms)),
+        _ => None,
+    };
+    sent(effects).into_iter().filter_map(motion).collect()
+}
+
+#[test]
+fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_its_time() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    let turn = std::f64::consts::TAU;
+    let effects = link.step(Event::Command(&command(0, 10 * MS, turn, turn)), 12 * MS);
+    assert_eq!(timed(&effects), [(Some(1200), Some(250))]);
+    // Half of 142.9 ms after the tick.
+    assert_eq!(timed(&link.step(Event::Quiet, 81 * MS)), []);
+    let effects = link.step(Event::Quiet, 90 * MS);
+    assert_eq!(timed(&effects), [(Some(1200), Some(170))]);
+    assert_eq!(timed(&link.step(Event::Quiet, 140 * MS)), [], "once");
+    assert_eq!(
+        (link.tally().commands, link.tally().repeated_commands),
+        (1, 1)
+    );
+}
+
+#[test]
+fn a_command_whose_successor_is_due_is_not_sent_again() {
+    let mut link = driving(on_the_wall());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 75 * MS);
+    assert_eq!(timed(&link.step(Event::Quiet, 90 * MS)), []);
+}
+
+#[test]
+fn a_command_that_no_longer_holds_is_not_sent_again() {
+    for (event, at) in [
+        (Event::Order(Order::Hold), 20),
+        (Event::Wire(false), 20),
+        (Event::Quiet, 270),
+    ] {
+        let mut link = driving(on_the_wall());
+        link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+        link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
+        link.step(event, at * MS);
+        let effects = link.step(Event::Quiet, (at + 70) * MS);
+        let moves = |(target, _): &(Option<i16>, _)| *target != Some(0);
+        assert!(!timed(&effects).iter().any(moves), "{event:?}");
+    }
+}
+
+#[test]
+fn on_a_clock_of_ticks_no_command_is_sent_again() {
+    let mut link = driving(in_ticks());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.step(Event::Command(&command(0, 0, 1.0, 1.0)), 2);
+    for now in (0..90).step_by(10) {
+        assert_eq!(timed(&link.step(Event::Quiet, now * MS)), []);
+    }
+    assert_eq!(link.tally().repeated_commands, 0);
 }
 
 #[test]
@@ -259,6 +386,8 @@ fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
     let mut link = driving(on_the_wall());
     link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    let again = velocities(&link.step(Event::Quiet, 200 * MS));
+    assert_eq!(again.len(), 1, "the command once more");
     assert!(
         link.step(Event::Quiet, 260 * MS).is_empty(),
         "not yet over 250 ms"
