@@ -117,7 +117,7 @@ pub trait AnyTopic: Sync {
     /// How often its writer says it again when nothing changes; zero for topics of each tick.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
-            Rate::EachTick => Duration::ZERO,
+            Rate::EachTick | Rate::EachFrame => Duration::ZERO,
             Rate::OnChange(at_least_every) => at_least_every,
         }
     }

@@ -18,7 +18,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use check::MissionError;
-pub use robot::{Body, Channel, Model, RobotConfig, SonarConfig};
+pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig};
 pub use simulation::{
     BatteryPhysics, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
     SonarPhysics, Thing, WheelPhysics,

@@ -73,6 +73,9 @@ stamped!(
     CommandSample,
     HealthSample,
     LinkSample,
+    InfraredSample,
+    PowerSample,
+    SurroundingsSample,
     DirectiveSample,
     RosterHeader,
 );
@@ -512,6 +515,70 @@ impl Default for LinkSample {
             latency_histogram: [0; latency::BUCKETS],
         }
     }
+}
+
+/// Topic `infrared`: the seven infrared rangers, which look straight ahead of themselves. Which one looks
+/// where differs from robot to robot; no source numbers them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Infrared")]
+#[repr(C)]
+pub struct InfraredSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
+    pub range_m: [f64; 7],
+    /// As the robot sent them, AD counts.
+    pub raw_ad: [u16; 7],
+}
+
+/// Topic `power`: what the batteries give and the motors draw.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Power")]
+#[repr(C)]
+pub struct PowerSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The boards' battery, volts.
+    pub board_v: f64,
+    /// The motors' battery, volts.
+    pub motor_v: f64,
+    /// The servos' battery, volts.
+    pub servo_v: f64,
+    /// The two motor drivers, degrees Celsius by the vendor's formula.
+    pub driver_c: [f64; 2],
+    /// What the motors of the six channels draw, AD counts: no source says how many are an ampere.
+    pub current_ad: [u16; 6],
+    /// 1: the boards' battery is low by the mission's `robot.low_battery_v`.
+    pub board_low: u8,
+    /// 1: the motors' battery is low.
+    pub motor_low: u8,
+    /// 1: the servos' battery is low.
+    pub servo_low: u8,
+}
+
+impl PowerSample {
+    /// Whether any battery is low.
+    #[must_use]
+    pub const fn is_low(&self) -> bool {
+        self.board_low == 1 || self.motor_low == 1 || self.servo_low == 1
+    }
+}
+
+/// Topic `surroundings`: what else the robot feels of where it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Surroundings")]
+#[repr(C)]
+pub struct SurroundingsSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// At the board, degrees Celsius by the vendor's formula.
+    pub temperature_c: f64,
+    /// The two human sensors: presence, AD counts.
+    pub human_alarm_ad: [u16; 2],
+    /// The two human sensors: motion, AD counts around the middle of their scale.
+    pub human_motion_ad: [u16; 2],
+    /// Tilt along x and y, AD counts.
+    pub tilt_ad: [u16; 2],
 }
 
 wire_enum! {

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use crate::samples::{
     CommandSample, DirectiveSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-    HealthSample, LinkSample, PoseSample, RangeSample, RosterEntry, RosterHeader, WheelSample,
+    HealthSample, InfraredSample, LinkSample, PoseSample, PowerSample, RangeSample, RosterEntry,
+    RosterHeader, SurroundingsSample, WheelSample,
 };
 
 pub use crate::bus::{AnyTopic, SliceTopic, Topic};
@@ -17,6 +18,8 @@ pub use crate::bus::{AnyTopic, SliceTopic, Topic};
 pub enum Rate {
     /// Once a tick.
     EachTick,
+    /// Whenever the robot sends the frame it is read from, driving or not: about once a tick.
+    EachFrame,
     /// At every change, and at least this often.
     OnChange(Duration),
 }
@@ -134,6 +137,18 @@ topics! {
     /// The wire to the robot: connection, counts, tick latency.
     LINK: Topic<LinkSample> {
         name: "link", writer: "x80-link", rate: Rate::EachTick, max_age: None, limits: Limits::SMALL,
+    }
+    /// The seven infrared rangers, metres.
+    INFRARED: Topic<InfraredSample> {
+        name: "infrared", writer: "x80-link", rate: Rate::EachFrame, max_age: None, limits: Limits::SMALL,
+    }
+    /// Battery volts and whether they are low, motor currents, heat of the drivers.
+    POWER: Topic<PowerSample> {
+        name: "power", writer: "x80-link", rate: Rate::EachFrame, max_age: None, limits: Limits::SMALL,
+    }
+    /// Human sensors, tilt, temperature.
+    SURROUNDINGS: Topic<SurroundingsSample> {
+        name: "surroundings", writer: "x80-link", rate: Rate::EachFrame, max_age: None, limits: Limits::SMALL,
     }
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {

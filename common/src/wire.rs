@@ -55,7 +55,10 @@ pub use sensors::{
     COUNT_CYCLE, CustomSensors, Encoder, MotorSensors, StandardSensors, counts_between,
     counts_restarted,
 };
-pub use units::{Echo, infrared_ad, infrared_m, volts};
+pub use units::{
+    Echo, LOGIC_SCALE_V, MOTOR_SCALE_V, board_celsius, driver_celsius, infrared_ad, infrared_m,
+    volts,
+};
 
 #[cfg(test)]
 mod tests;

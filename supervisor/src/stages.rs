@@ -6,7 +6,10 @@ use std::time::Duration;
 
 use common::{
     shell::{Life, StageError, live},
-    topics::{AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, LINK, POSE, RANGE, WHEELS},
+    topics::{
+        AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
+        SURROUNDINGS, WHEELS,
+    },
 };
 
 /// A row of the table.
@@ -44,7 +47,7 @@ pub(crate) static TABLE: [Stage; 5] = [
         name: "x80-link",
         inputs: &[&DIRECTIVE],
         feedback: &[&COMMAND],
-        outputs: &[&RANGE, &WHEELS, &LINK],
+        outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
         startup: STARTUP,
         heartbeat: HEARTBEAT,
         while_down: "stands when its timed command ends",

@@ -12,6 +12,7 @@ use super::Mission;
 use crate::{
     address::{Address, AddressError, FORMS},
     grid::MAX_CELLS,
+    wire::MOTOR_SCALE_V,
 };
 
 /// Why a mission was refused.
@@ -318,6 +319,10 @@ fn robot(mission: &Mission) -> Result<(), Objection> {
         0.02..=5.0,
         "s",
     )?;
+    let limits = robot.low_battery_v;
+    for limit in [limits.board, limits.motor, limits.servo] {
+        within("robot.low_battery_v", limit, 0.0..=MOTOR_SCALE_V, "V")?;
+    }
     if robot.command_limit_s * robot.rate_hz <= 1.0 {
         return Err(objection(
             "robot.command_limit_s",

@@ -56,6 +56,31 @@ pub struct RobotConfig {
     pub right: Channel,
     /// Age at which a command no longer moves the robot, seconds.
     pub command_limit_s: f64,
+    /// Below what a battery is low.
+    pub low_battery_v: BatteryLimits,
+}
+
+/// The voltages below which the batteries are low, volts; 0 is never. The X80's packs are six NiMH cells,
+/// 7.2 V: at 1.1 V a cell nine tenths of the charge are gone, and what follows goes within minutes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BatteryLimits {
+    /// Of the boards' battery.
+    pub board: f64,
+    /// Of the motors' battery.
+    pub motor: f64,
+    /// Of the servos' battery.
+    pub servo: f64,
+}
+
+impl Default for BatteryLimits {
+    fn default() -> Self {
+        Self {
+            board: 6.6,
+            motor: 6.6,
+            servo: 6.6,
+        }
+    }
 }
 
 impl Default for RobotConfig {
@@ -78,6 +103,7 @@ impl Default for RobotConfig {
                 reversed: false,
             },
             command_limit_s: 0.25,
+            low_battery_v: BatteryLimits::default(),
         }
     }
 }

@@ -60,11 +60,29 @@ pub fn infrared_ad(range: f64) -> u16 {
     ((0.216 / range + 0.17) * 4028.0 / 3.0).round() as u16
 }
 
+/// Full scale of the board's and the servos' battery, volts, for [`volts`].
+pub const LOGIC_SCALE_V: f64 = 9.0;
+/// Full scale of the motors' battery, volts, for [`volts`].
+pub const MOTOR_SCALE_V: f64 = 24.0;
+
 /// Volts of a battery whose `ad` counts reach 4095 at `full_scale` volts (9 for board and servo, 24 for
 /// the motors).
 #[must_use]
 pub fn volts(ad: u16, full_scale: f64) -> f64 {
     f64::from(ad) / 4095.0 * full_scale
+}
+
+/// Degrees Celsius of the board's temperature sensor, as the vendor's manual gives the formula.
+#[must_use]
+pub fn board_celsius(ad: u16) -> f64 {
+    (f64::from(ad) - 1256.0) / 34.8
+}
+
+/// Degrees Celsius of a motor driver, as the vendor's manual gives the formula for its overheat sensors;
+/// at least one project doubts it.
+#[must_use]
+pub fn driver_celsius(ad: u16) -> f64 {
+    100.0 - (f64::from(ad) - 980.0) / 11.6
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ impl Drive {
                 channel: Some(channel),
             });
         }
-        for stream in [Stream::Motor, Stream::Standard] {
+        for stream in [Stream::Motor, Stream::Custom, Stream::Standard] {
             say(Command::Stream {
                 stream,
                 request: Request::Start,

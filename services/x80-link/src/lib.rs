@@ -8,6 +8,7 @@
 //! | [`transport`] | datagrams, a connection or a serial line |
 //! | [`presence`] | whether the robot answers, and how it is looked for |
 //! | [`restart`] | whether the robot restarted its counts |
+//! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
 //! | [`shell`] | wires them to the topics |
 
@@ -18,4 +19,5 @@ pub mod presence;
 pub mod restart;
 pub mod shell;
 pub mod step;
+pub mod telemetry;
 pub mod transport;

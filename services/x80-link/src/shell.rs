@@ -1,4 +1,4 @@
-//! The wire, `command` and `directive` in; `range`, `wheels`, `link` and the wire out.
+//! The wire, `command` and `directive` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
 use std::time::Duration;
 
@@ -6,18 +6,30 @@ use common::{
     bus::{Reader, Writer},
     clock::monotonic_ns,
     latency::Histogram,
-    samples::{CommandSample, DirectiveSample, LinkSample, Order, RangeSample, WheelSample},
+    samples::{
+        CommandSample, DirectiveSample, InfraredSample, LinkSample, Order, PowerSample,
+        RangeSample, SurroundingsSample, WheelSample,
+    },
     shell::{Context, Process, Progress, StageError},
     topics,
 };
 
 use crate::{
     step::{Effect, Event, Link},
+    telemetry::BatteryChange,
     transport::{Transport, TransportError},
 };
 
 /// The `link` topic is restated this often while no ticks come.
 const RESTATE: Duration = Duration::from_millis(100);
+
+/// The newest telemetry that is not published yet.
+#[derive(Debug, Default)]
+struct Pending {
+    infrared: Option<InfraredSample>,
+    power: Option<PowerSample>,
+    surroundings: Option<SurroundingsSample>,
+}
 
 /// The link process.
 #[derive(Debug)]
@@ -28,6 +40,11 @@ pub struct Shell {
     range: Writer<RangeSample>,
     wheels: Writer<WheelSample>,
     state: Writer<LinkSample>,
+    infrared: Writer<InfraredSample>,
+    power: Writer<PowerSample>,
+    surroundings: Writer<SurroundingsSample>,
+    /// What nobody in the pipeline waits for: published when it has a lull.
+    pending: Pending,
     link: Link,
     latency: Histogram,
     latency_ns: u64,
@@ -50,6 +67,10 @@ impl Process for Shell {
             range: context.bus.writer(&topics::RANGE, generation)?,
             wheels: context.bus.writer(&topics::WHEELS, generation)?,
             state: context.bus.writer(&topics::LINK, generation)?,
+            infrared: context.bus.writer(&topics::INFRARED, generation)?,
+            power: context.bus.writer(&topics::POWER, generation)?,
+            surroundings: context.bus.writer(&topics::SURROUNDINGS, generation)?,
+            pending: Pending::default(),
             link: Link::new(&run.mission, run.clock, context.life.first_tick),
             latency: Histogram::default(),
             latency_ns: 0,
@@ -86,6 +107,20 @@ impl Process for Shell {
         Ok(self.progress)
     }
 
+    fn idle(&mut self) -> Result<(), StageError> {
+        let Progress { tick, time } = self.progress;
+        if let Some(infrared) = self.pending.infrared.take() {
+            self.infrared.publish(tick, time, infrared)?;
+        }
+        if let Some(power) = self.pending.power.take() {
+            self.power.publish(tick, time, power)?;
+        }
+        if let Some(surroundings) = self.pending.surroundings.take() {
+            self.surroundings.publish(tick, time, surroundings)?;
+        }
+        Ok(())
+    }
+
     fn stop(&mut self) -> Result<(), StageError> {
         for bytes in self.link.farewell() {
             self.transport.send(&bytes).map_err(wire_broke)?;
@@ -98,6 +133,21 @@ impl Process for Shell {
 #[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
 fn wire_broke(error: TransportError) -> StageError {
     StageError::Other(error.to_string())
+}
+
+fn tell_battery(change: &BatteryChange) {
+    let BatteryChange { pack, volts, low } = *change;
+    let volts = format!("{volts:.1}");
+    let pack = pack.as_str();
+    if low {
+        tracing::warn!(
+            pack,
+            volts,
+            "battery low: charge it, or set robot.low_battery_v"
+        );
+    } else {
+        tracing::info!(pack, volts, "battery well again");
+    }
 }
 
 impl Shell {
@@ -146,6 +196,10 @@ impl Shell {
                     let restarts = self.link.restarts();
                     tracing::warn!(restarts, "the robot restarted: its counts begin anew");
                 }
+                Effect::Infrared(sample) => self.pending.infrared = Some(sample),
+                Effect::Power(sample) => self.pending.power = Some(sample),
+                Effect::Surroundings(sample) => self.pending.surroundings = Some(sample),
+                Effect::Battery(change) => tell_battery(&change),
             }
         }
         Ok(())

@@ -13,7 +13,10 @@ use common::{
     clock::{MissionClock, MissionTime},
     mission::Mission,
     samples::{CommandSample, CommandState, Order, RangeSample, RangeStatus, WheelSample},
-    wire::{Command, Decoder, DecoderTally, Echo, MotorSensors, Report, SystemSignal},
+    wire::{
+        Command, CustomSensors, Decoder, DecoderTally, Echo, MotorSensors, Report, StandardSensors,
+        SystemSignal,
+    },
 };
 
 use crate::{
@@ -21,6 +24,7 @@ use crate::{
     failsafe::{self, Cause, Flags},
     presence::{Absence, Presence},
     restart::RestartWatch,
+    telemetry::Telemetry,
 };
 
 pub use event::{Effect, Event, Tally};
@@ -68,6 +72,7 @@ pub struct Link {
     presence: Presence,
     pinged_ns: Option<u64>,
     restart: RestartWatch,
+    telemetry: Telemetry,
     sonar: Option<u8>,
     next_tick: u64,
     time: MissionTime,
@@ -97,6 +102,7 @@ impl Link {
             presence: Presence::new(mission, clock),
             pinged_ns: None,
             restart: RestartWatch::new(mission),
+            telemetry: Telemetry::new(mission.robot.low_battery_v),
             sonar: None,
             next_tick: first_tick,
             time: clock.at(first_tick, 0),
@@ -200,17 +206,19 @@ impl Link {
     }
 
     fn take_frames(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let mut motor = None;
+        let (mut motor, mut standard, mut custom) = (None, None, None);
         let (mut heard, mut ping) = (false, false);
         while let Some(frame) = self.decoder.next_frame() {
             match Report::parse(&frame) {
                 Ok(Report::Standard(sensors)) => {
                     self.sonar = sensors.ultrasonic.get(self.sonar_index).copied();
+                    standard = Some(sensors);
                 }
+                Ok(Report::Custom(sensors)) => custom = Some(sensors),
                 Ok(Report::Motor(sensors)) => motor = Some(sensors),
                 Ok(Report::System(SystemSignal::Ping)) => ping = true,
                 // An ACK only says that the robot is there; so does a frame nobody here needs.
-                Ok(Report::System(SystemSignal::Ack) | Report::Custom(_)) | Err(_) => {}
+                Ok(Report::System(SystemSignal::Ack)) | Err(_) => {}
             }
             heard = true;
         }
@@ -226,6 +234,7 @@ impl Link {
                 effects.push(Effect::Send(self.drive.greeting()));
             }
         }
+        self.tell_the_rest(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
         if heard && self.presence.heard(now_ns) {
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
@@ -254,6 +263,27 @@ impl Link {
         let now = self.clock.at(self.next_tick, now_ns);
         let counts = sensors.encoders.map(|encoder| encoder.position);
         !self.in_ticks() && self.restart.step(counts, now)
+    }
+
+    /// What the frames carry besides the tick.
+    fn tell_the_rest(
+        &mut self,
+        motor: Option<&MotorSensors>,
+        standard: Option<&StandardSensors>,
+        custom: Option<&CustomSensors>,
+        effects: &mut Vec<Effect>,
+    ) {
+        if let Some(motor) = motor {
+            self.telemetry.take_motor(motor);
+        }
+        if let Some(standard) = standard {
+            let (power, surroundings, changes) = self.telemetry.take_standard(standard);
+            effects.push(Effect::Power(power));
+            effects.push(Effect::Surroundings(surroundings));
+            effects.extend(changes.into_iter().map(Effect::Battery));
+        }
+        let infrared = custom.and_then(|custom| self.telemetry.take_custom(custom));
+        effects.extend(infrared.map(Effect::Infrared));
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {

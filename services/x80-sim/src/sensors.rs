@@ -2,7 +2,7 @@
 
 use common::{
     mission::{Mission, Physics},
-    wire::{COUNT_CYCLE, CustomSensors, Encoder, StandardSensors},
+    wire::{COUNT_CYCLE, CustomSensors, Encoder, LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors},
 };
 
 use crate::{
@@ -111,9 +111,9 @@ impl Ranging {
             temperature: MIDDLE,
             infrared: infrared[0],
             infrared_code: [0; 4],
-            board_battery: ad(volts, 9.0),
-            motor_battery: ad(volts, 24.0),
-            servo_battery: ad(volts, 9.0),
+            board_battery: ad(volts, LOGIC_SCALE_V),
+            motor_battery: ad(volts, MOTOR_SCALE_V),
+            servo_battery: ad(volts, LOGIC_SCALE_V),
             reference: REFERENCE,
         };
         let mut custom = CustomSensors::default();

@@ -10,7 +10,7 @@ use clap::Args;
 use common::{
     bus::Bus,
     domain::{Domain, RobotName},
-    samples::{LinkSample, Order, RosterEntry, StageState, name_str},
+    samples::{LinkSample, Order, PowerSample, RosterEntry, StageState, name_str},
     topics,
     waiter::Waiter,
 };
@@ -19,7 +19,8 @@ use serde::Serialize;
 
 use super::Failure;
 
-/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its wire.
+/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its wire and its
+/// batteries.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Whose.
@@ -40,6 +41,8 @@ struct Status<'a> {
     mission_time_s: f64,
     /// None while no link speaks.
     link: Option<LinkStatus>,
+    /// None while no robot tells.
+    power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
 }
 
@@ -59,6 +62,15 @@ struct LinkStatus {
     strangers: u64,
 }
 
+/// The robot's batteries.
+#[derive(Serialize)]
+struct PowerStatus {
+    board_v: f64,
+    motor_v: f64,
+    servo_v: f64,
+    low: bool,
+}
+
 /// One stage of it.
 #[derive(Serialize)]
 struct StageStatus<'a> {
@@ -74,7 +86,7 @@ struct StageStatus<'a> {
 
 /// The roster comes five times a second.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The link speaks ten times a second.
+/// The link speaks ten times a second, and a robot that answers several times.
 const WIRE_PATIENCE: Duration = Duration::from_millis(400);
 
 #[allow(clippy::print_stdout)]
@@ -82,15 +94,20 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut roster = bus.slice_reader(&topics::ROSTER)?;
     let mut links = bus.reader(&topics::LINK)?;
+    let mut powers = bus.reader(&topics::POWER)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.alarm(&topics::ROSTER)?);
     waiter.on(bus.alarm(&topics::LINK)?);
+    waiter.on(bus.alarm(&topics::POWER)?);
     let began = Instant::now();
-    let (mut entries, mut link) = (None, None);
+    let (mut entries, mut link, mut power) = (None, None, None);
     let entries = loop {
         entries = roster.take()?.or(entries);
         link = links.newest()?.or(link);
-        if (link.is_some() || began.elapsed() >= WIRE_PATIENCE)
+        power = powers.newest()?.or(power);
+        let lost = link.is_some_and(|link| link.connected == 0);
+        let all = link.is_some() && (power.is_some() || lost);
+        if (all || began.elapsed() >= WIRE_PATIENCE)
             && let Some(entries) = entries.take()
         {
             break entries;
@@ -112,6 +129,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
         link: link.as_ref().map(link_status),
+        power: power.as_ref().map(power_status),
         stages: entries.iter().map(stage_status).collect(),
     };
     if arguments.json {
@@ -151,6 +169,15 @@ fn link_status(link: &LinkSample) -> LinkStatus {
     }
 }
 
+const fn power_status(power: &PowerSample) -> PowerStatus {
+    PowerStatus {
+        board_v: power.board_v,
+        motor_v: power.motor_v,
+        servo_v: power.servo_v,
+        low: power.is_low(),
+    }
+}
+
 const fn order(order: Order) -> &'static str {
     match order {
         Order::Hold => "starting",
@@ -178,6 +205,9 @@ impl fmt::Display for Status<'_> {
         )?;
         if let Some(link) = &self.link {
             writeln!(f, "{link}")?;
+        }
+        if let Some(power) = &self.power {
+            writeln!(f, "{power}")?;
         }
         writeln!(
             f,
@@ -221,6 +251,17 @@ impl fmt::Display for LinkStatus {
             0 => Ok(()),
             reboots => write!(f, "; times it restarted: {reboots}"),
         }
+    }
+}
+
+impl fmt::Display for PowerStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = if self.low { "BATTERY LOW" } else { "batteries" };
+        write!(
+            f,
+            "{word}: board {:.1} V, motors {:.1} V, servos {:.1} V",
+            self.board_v, self.motor_v, self.servo_v
+        )
     }
 }
 

@@ -2,10 +2,13 @@
 
 use common::{
     clock::MissionTime,
-    samples::{CommandSample, Order, RangeSample, WheelSample},
+    samples::{
+        CommandSample, InfraredSample, Order, PowerSample, RangeSample, SurroundingsSample,
+        WheelSample,
+    },
 };
 
-use crate::failsafe::Cause;
+use crate::{failsafe::Cause, telemetry::BatteryChange};
 
 /// What happened.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +53,14 @@ pub enum Effect {
     Connected(bool),
     /// The robot restarted its encoder counts.
     Restarted,
+    /// Publish what an infrared frame said.
+    Infrared(InfraredSample),
+    /// Publish what the batteries and motors said.
+    Power(PowerSample),
+    /// Publish what the other sensors said.
+    Surroundings(SurroundingsSample),
+    /// A battery became low, or is no longer.
+    Battery(BatteryChange),
 }
 
 /// Counts for the `link` topic.

@@ -111,7 +111,7 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     assert!(effects.contains(&Effect::Connected(true)));
     let setup = sent(&effects);
     let zero = 1;
-    assert_eq!(setup.len(), 8 + zero, "{setup:?}");
+    assert_eq!(setup.len(), 9 + zero, "{setup:?}");
     let later = sent(&link.step(Event::Quiet, 400 * MS));
     assert!(!later.contains(&ping), "{later:?}");
 }
@@ -253,6 +253,23 @@ fn on_a_clock_of_ticks_no_command_is_sent_again() {
         assert_eq!(timed(&link.step(Event::Quiet, now * MS)), []);
     }
     assert_eq!(link.tally().repeated_commands, 0);
+}
+
+#[test]
+fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
+    let mut link = on_the_wall();
+    let mut bytes = datagram(255, 0, 0);
+    let custom = CustomSensors::default();
+    Report::Custom(custom).encode(Addressing::default(), &mut bytes);
+    let effects = link.step(Event::Datagram(&bytes), 0);
+    for told in [
+        |effect: &Effect| matches!(effect, Effect::Infrared(_)),
+        |effect: &Effect| matches!(effect, Effect::Power(_)),
+        |effect: &Effect| matches!(effect, Effect::Surroundings(_)),
+    ] {
+        assert_eq!(effects.iter().filter(|effect| told(effect)).count(), 1);
+    }
+    assert!(ticks(&effects).is_empty());
 }
 
 #[test]
