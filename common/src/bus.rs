@@ -47,7 +47,7 @@ use crate::{
     clock::MissionTime,
     domain::Domain,
     samples::Stamped,
-    topics::{EVERY_STAGE, Limits, Rate, Spec},
+    topics::{EVERY_STAGE, Limits, OPERATOR, Rate, Spec},
 };
 
 fn refused<E: Debug>(action: &'static str, topic: &'static str) -> impl FnOnce(E) -> BusError {
@@ -117,7 +117,7 @@ pub trait AnyTopic: Sync {
     /// How often its writer says it again when nothing changes; zero for topics of each tick.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
-            Rate::EachTick | Rate::EachFrame => Duration::ZERO,
+            Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
             Rate::OnChange(at_least_every) => at_least_every,
         }
     }
@@ -530,7 +530,7 @@ struct Authorship {
 impl Authorship {
     fn of(spec: &Spec) -> Self {
         Self {
-            newest: (spec.writer != EVERY_STAGE).then_some(0),
+            newest: (![EVERY_STAGE, OPERATOR].contains(&spec.writer)).then_some(0),
         }
     }
 

@@ -78,6 +78,8 @@ stamped!(
     SurroundingsSample,
     DirectiveSample,
     RosterHeader,
+    DeathSample,
+    RequestSample,
 );
 
 /// What a byte on the bus stands for.
@@ -619,6 +621,24 @@ wire_enum! {
         BackingOff = 3,
         /// Told to stop.
         Stopping = 4,
+        /// Died far too often: only an operator's word starts it again.
+        Held = 5,
+    }
+}
+
+wire_enum! {
+    /// Why the robot is not ordered to drive.
+    HoldReason, unknown = Starting {
+        /// Not all stages are ready, or the robot does not answer, or there is no field yet.
+        Starting = 0,
+        /// It may drive.
+        None = 1,
+        /// An operator said stop, and has not said resume.
+        Operator = 2,
+        /// A stage is held.
+        StageHeld = 3,
+        /// The mission ends.
+        Ending = 4,
     }
 }
 
@@ -633,6 +653,10 @@ pub struct RosterHeader {
     pub supervisor_pid: u32,
     /// The current [`Order`].
     pub order: u8,
+    /// A [`HoldReason`].
+    pub reason: u8,
+    /// The request that was taken last; 0 for none.
+    pub last_request: u64,
 }
 
 /// One stage, as the supervisor sees it.
@@ -656,6 +680,133 @@ pub struct RosterEntry {
     pub beat_age_ns: u64,
     /// Age of its last output on any topic, nanoseconds; u64::MAX for none yet.
     pub output_age_ns: u64,
+}
+
+wire_enum! {
+    /// How a stage's process ended.
+    DeathCause, unknown = Exited {
+        /// By itself; `code` is its exit code.
+        Exited = 0,
+        /// By a signal; `code` is its number.
+        Signalled = 1,
+        /// By a signal, and it left a core; `code` is its number.
+        SignalledWithCore = 2,
+    }
+}
+
+wire_enum! {
+    /// What the supervisor does about a death.
+    NextStep, unknown = Nothing {
+        /// Nothing: the run ends.
+        Nothing = 0,
+        /// A successor is started at once.
+        StartNow = 1,
+        /// A successor is started after `next_after_ns`.
+        StartLater = 2,
+        /// It died too often: an operator's word starts it.
+        Hold = 3,
+    }
+}
+
+/// Text in shared memory: UTF-8, filled up with zeros.
+#[derive(Clone, Copy, PartialEq, Eq, ZeroCopySend)]
+#[type_name("firsthand.Words")]
+#[repr(C)]
+pub struct Words {
+    bytes: [u8; 400],
+}
+
+impl Default for Words {
+    fn default() -> Self {
+        Self { bytes: [0; 400] }
+    }
+}
+
+impl std::fmt::Debug for Words {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(to, "{:?}", self.text())
+    }
+}
+
+/// `text` as [`Words`], cut at 400 bytes.
+#[must_use]
+pub fn words(text: &str) -> Words {
+    let mut words = Words::default();
+    for (slot, byte) in words.bytes.iter_mut().zip(text.bytes()) {
+        *slot = byte;
+    }
+    words
+}
+
+impl Words {
+    /// What they say; a character that was cut is replaced.
+    #[must_use]
+    pub fn text(&self) -> std::borrow::Cow<'_, str> {
+        let text = self.bytes.split(|&byte| byte == 0).next();
+        String::from_utf8_lossy(text.unwrap_or_default())
+    }
+}
+
+/// Topic `deaths`: a stage's process ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Death")]
+#[repr(C)]
+pub struct DeathSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The stage.
+    pub stage: Name,
+    /// Its process.
+    pub pid: u32,
+    /// Which life.
+    pub generation: u32,
+    /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
+    pub beat_age_ns: u64,
+    /// Length of its life, nanoseconds.
+    pub uptime_ns: u64,
+    /// Pause before its successor, nanoseconds.
+    pub next_after_ns: u64,
+    /// Exit code or signal number.
+    pub code: i32,
+    /// Deaths of this stage within the last ten seconds, this one among them.
+    pub deaths_in_window: u32,
+    /// A [`DeathCause`].
+    pub cause: u8,
+    /// A [`NextStep`].
+    pub next: u8,
+    /// 1: it hung, or was never ready, and the supervisor ended it.
+    pub hung: u8,
+    /// The end of its log.
+    pub last_words: Words,
+}
+
+wire_enum! {
+    /// What an operator asks of the supervisor.
+    RequestKind, unknown = Nothing {
+        /// Nothing.
+        Nothing = 0,
+        /// A fresh life of a stage; one that is held is released.
+        Restart = 1,
+        /// Let the robot stand.
+        Stop = 2,
+        /// Let it go on.
+        Resume = 3,
+    }
+}
+
+/// Topic `requests`: an operator's word to the supervisor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Request")]
+#[repr(C)]
+pub struct RequestSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Names the request: the roster's `last_request` says that it was taken. Never 0.
+    pub id: u64,
+    /// The stage it is about; empty for none.
+    pub stage: Name,
+    /// A [`RequestKind`].
+    pub kind: u8,
 }
 
 #[cfg(test)]

@@ -6,9 +6,9 @@
 use std::time::Duration;
 
 use crate::samples::{
-    CommandSample, DirectiveSample, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-    HealthSample, InfraredSample, LinkSample, PoseSample, PowerSample, RangeSample, RosterEntry,
-    RosterHeader, SurroundingsSample, WheelSample,
+    CommandSample, DeathSample, DirectiveSample, FieldCell, FieldHeader, GridHeader,
+    GuidanceSample, HealthSample, InfraredSample, LinkSample, PoseSample, PowerSample, RangeSample,
+    RequestSample, RosterEntry, RosterHeader, SurroundingsSample, WheelSample,
 };
 
 pub use crate::bus::{AnyTopic, SliceTopic, Topic};
@@ -22,6 +22,8 @@ pub enum Rate {
     EachFrame,
     /// At every change, and at least this often.
     OnChange(Duration),
+    /// When something happened, once.
+    WhenItHappens,
 }
 
 /// What the table says of a topic.
@@ -78,6 +80,8 @@ pub const RESTATE: Duration = Duration::from_millis(200);
 
 /// The writer named by topics that all stages write.
 pub const EVERY_STAGE: &str = "every stage";
+/// The writers that are no stage: whoever uses the command line, one process each time.
+pub const OPERATOR: &str = "operator";
 /// The writer that is no stage.
 pub const SUPERVISOR: &str = "supervisor";
 
@@ -157,6 +161,14 @@ topics! {
     /// What runs, as the supervisor sees it.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {
         name: "roster", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), max_age: None, limits: Limits::MAP,
+    }
+    /// A stage died: cause, ages, last words, what follows.
+    DEATHS: Topic<DeathSample> {
+        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+    }
+    /// What an operator asks: restart, stop, resume.
+    REQUESTS: Topic<RequestSample> {
+        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
     }
 }
 

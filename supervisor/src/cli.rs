@@ -4,6 +4,7 @@ mod check;
 mod field;
 mod latency;
 mod missions;
+mod operate;
 mod run;
 mod sim;
 mod stage;
@@ -34,6 +35,12 @@ enum Command {
     Field(field::Arguments),
     Latency(latency::Arguments),
     Status(status::Arguments),
+    Stop(operate::Stop),
+    Resume(operate::Resume),
+    Restart(operate::Restart),
+    Kill(operate::Kill),
+    Freeze(operate::Freeze),
+    Thaw(operate::Thaw),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
 }
@@ -69,6 +76,12 @@ pub(crate) fn main() -> ExitCode {
         Command::Field(arguments) => field::main(&arguments),
         Command::Latency(arguments) => latency::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
+        Command::Stop(arguments) => operate::stop(&arguments),
+        Command::Resume(arguments) => operate::resume(&arguments),
+        Command::Restart(arguments) => operate::restart(&arguments),
+        Command::Kill(arguments) => operate::kill(&arguments),
+        Command::Freeze(arguments) => operate::freeze(&arguments),
+        Command::Thaw(arguments) => operate::thaw(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),
     };

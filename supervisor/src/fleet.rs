@@ -4,7 +4,7 @@ use std::{
     fs::File,
     io,
     os::fd::{AsFd, BorrowedFd},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::Stdio,
     time::{Duration, Instant},
 };
@@ -14,6 +14,7 @@ use rustix::process::Signal;
 use thiserror::Error;
 
 use crate::{
+    death::{self, Cause, Death, Next},
     policy::{Action, Event, Now, Phase, Policy},
     process::{Process, firsthand},
     stages::{Stage, start_order},
@@ -40,6 +41,10 @@ struct Member {
     started: Now,
     beat: Option<Now>,
     output: Option<Now>,
+    /// Length of its log when this life began.
+    log_began: u64,
+    /// Whether the supervisor ended it for hanging.
+    hung: bool,
 }
 
 /// All stages, in start order.
@@ -61,6 +66,8 @@ impl Fleet {
             started: Now::ZERO,
             beat: None,
             output: None,
+            log_began: 0,
+            hung: false,
         };
         Self {
             members: start_order().into_iter().map(member).collect(),
@@ -156,37 +163,78 @@ impl Fleet {
         }
     }
 
-    /// Reap the dead, look at the clock, do what the policies say. New lives begin at `first_tick`.
-    /// Returns the names of the stages that ended.
-    pub(crate) fn tend(&mut self, first_tick: u64) -> Result<Vec<&'static str>, FleetError> {
-        let mut ended = Vec::new();
+    /// Reap what ended, meet the deadlines. `first_tick` is what a new life starts from. Returns the deaths.
+    pub(crate) fn tend(&mut self, first_tick: u64) -> Result<Vec<Death>, FleetError> {
+        let mut deaths = Vec::new();
         for index in 0..self.members.len() {
-            if let Some(reason) = self.reap(index)? {
-                let member = &self.members[index];
-                tracing::warn!(stage = member.stage.name, generation = member.generation, %reason, "stage ended");
-                ended.push(member.stage.name);
+            if let Some(status) = self.reap(index)? {
+                let mut death = self.record(index, Cause::of(status));
+                let member = &mut self.members[index];
+                (member.process, member.beat) = (None, None);
                 self.tell(index, Event::Exited, first_tick)?;
+                death.next = self.next(index);
+                death.deaths_in_window = self.members[index].policy.recent_deaths() as u32;
+                deaths.push(death);
             }
             self.tell(index, Event::Time, first_tick)?;
         }
-        Ok(ended)
+        Ok(deaths)
     }
 
+    /// What ended a stage's process, if it has ended.
     fn reap(&mut self, index: usize) -> Result<Option<std::process::ExitStatus>, FleetError> {
         let member = &mut self.members[index];
         let Some(process) = &mut member.process else {
             return Ok(None);
         };
-        let status = process.try_reap().map_err(|source| FleetError {
+        process.try_reap().map_err(|source| FleetError {
             action: "reap",
             stage: member.stage.name,
             source,
-        })?;
-        if status.is_some() {
-            member.process = None;
-            member.beat = None;
+        })
+    }
+
+    /// What is known of the life that has just ended, besides what follows.
+    fn record(&self, index: usize, cause: Cause) -> Death {
+        let member = &self.members[index];
+        let now = self.now();
+        let age = |then: Now| now.saturating_sub(then).as_secs_f64();
+        let log = log_file(&self.directory, member.stage.name);
+        Death {
+            stage: member.stage.name,
+            pid: member.process.as_ref().map_or(0, Process::id),
+            generation: member.generation,
+            cause,
+            hung: member.hung,
+            beat_age_s: member.beat.map(age),
+            uptime_s: age(member.started),
+            deaths_in_window: 0,
+            next: Next::Nothing,
+            last_words: death::last_words(&log, member.log_began),
         }
-        Ok(status)
+    }
+
+    /// What the policy has in mind for a stage that has just died.
+    fn next(&self, index: usize) -> Next {
+        match self.members[index].policy.phase() {
+            Phase::BackingOff { until } => Next::StartLater {
+                after_s: until.saturating_sub(self.now()).as_secs_f64(),
+            },
+            Phase::Held => Next::Hold,
+            Phase::Down | Phase::Stopping { .. } => Next::Nothing,
+            Phase::Starting { .. } | Phase::Running { .. } | Phase::Failing { .. } => {
+                Next::StartNow
+            }
+        }
+    }
+
+    /// The stages that only an operator's word starts again.
+    pub(crate) fn held(&self) -> impl Iterator<Item = &'static str> + '_ {
+        let held = |member: &&Member| member.policy.phase() == Phase::Held;
+        self.members
+            .iter()
+            .filter(held)
+            .map(|member| member.stage.name)
     }
 
     /// From now on a stage that ends stays down.
@@ -194,13 +242,17 @@ impl Fleet {
         self.ending = true;
     }
 
-    /// Give a stage a fresh life.
-    pub(crate) fn replace(&mut self, stage: &str) -> Result<(), FleetError> {
+    /// Give `stage` a fresh life, which begins at `first_tick`; one that is held is released. Says whether there is
+    /// such a stage.
+    pub(crate) fn replace(&mut self, stage: &str, first_tick: u64) -> Result<bool, FleetError> {
         let found = self
             .members
             .iter()
             .position(|member| member.stage.name == stage);
-        found.map_or(Ok(()), |index| self.tell(index, Event::Replace, 0))
+        match found {
+            Some(index) => self.tell(index, Event::Replace, first_tick).map(|()| true),
+            None => Ok(false),
+        }
     }
 
     /// Stop the last stage, in start order, that still has a process. Says whether there was one.
@@ -238,6 +290,9 @@ impl Fleet {
             Action::Start => {
                 member.generation += 1;
                 member.started = now;
+                member.hung = false;
+                let log = log_file(&self.directory, stage);
+                member.log_began = log.metadata().map_or(0, |log| log.len());
                 match spawn(member, &self.directory, first_tick) {
                     Ok(process) => member.process = Some(process),
                     // As if it had died at once: tried again with growing pauses, the others go on.
@@ -250,7 +305,10 @@ impl Fleet {
                 return Ok(());
             }
             Action::Terminate => Signal::TERM,
-            Action::Abort => Signal::ABORT,
+            Action::Abort => {
+                member.hung = true;
+                Signal::ABORT
+            }
             Action::Kill => Signal::KILL,
         };
         if let Some(process) = &member.process {
@@ -299,12 +357,18 @@ const fn state(phase: Phase) -> StageState {
         Phase::Starting { .. } => StageState::Starting,
         Phase::Running { .. } => StageState::Running,
         Phase::Failing { .. } | Phase::Stopping { .. } => StageState::Stopping,
+        Phase::Held => StageState::Held,
     }
 }
 
+/// Where a stage's words go, life after life.
+fn log_file(directory: &Path, stage: &str) -> PathBuf {
+    directory.join(format!("{stage}.log"))
+}
+
 /// A process for the member's new generation; its words go to a log in the run directory.
-fn spawn(member: &Member, directory: &std::path::Path, first_tick: u64) -> io::Result<Process> {
-    let log = directory.join(format!("{}.log", member.stage.name));
+fn spawn(member: &Member, directory: &Path, first_tick: u64) -> io::Result<Process> {
+    let log = log_file(directory, member.stage.name);
     let log = File::options().create(true).append(true).open(log)?;
     let directory = directory
         .to_str()

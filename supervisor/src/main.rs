@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`stages`] | THE table of stages |
 //! | [`policy`] | what to do with one stage, pure |
+//! | [`death`] | the record of a death |
 //! | [`stall`] | what to do when the robot does not move, pure |
 //! | [`process`], [`fleet`] | child processes; the stages under their policies |
 //! | [`domain`] | the robot's corner of the machine, held and wiped |
@@ -16,6 +17,7 @@
 //! | [`cli`] | the command line |
 
 mod cli;
+mod death;
 mod domain;
 mod fleet;
 mod maps;

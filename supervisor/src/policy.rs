@@ -2,13 +2,16 @@
 //!
 //! ```text
 //!          start            beat            exit
-//!   Down ---------> Starting ----> Running ------> BackingOff --> Down
+//!   Down ---------> Starting ----> Running ------> BackingOff --> Starting
 //!                      |  too late    |  silent        (not at all the first time)
-//!                      +------------->+--> Failing --exit--^
-//!                                          (abort, then kill)
+//!                      +------------->+--> Failing --exit--^   |
+//!                                          (abort, then kill)  | too many deaths in the window
+//!                                                              v
+//!                                                             Held -- released --> Starting
 //! ```
+//! Its siblings are not touched: a stage that cannot live holds itself, and the robot stands meanwhile.
 
-use std::time::Duration;
+use std::{collections::VecDeque, time::Duration};
 
 use crate::stages::Stage;
 
@@ -18,6 +21,11 @@ const WELL_AFTER: Duration = Duration::from_secs(2);
 const FIRST_BACKOFF: Duration = Duration::from_millis(50);
 /// The most to wait between starts: a person who mends the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
+/// A stage that died so often within [`HOLD_WINDOW`] is held: one that cannot live at all gets here in
+/// seven seconds, and no person or test kills the same stage that fast.
+const HOLD_AFTER: usize = 12;
+/// The window in which deaths are counted.
+const HOLD_WINDOW: Duration = Duration::from_secs(10);
 /// Time an aborted stage has to write its last words.
 const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time a terminated stage has to say goodbye. The link sends three datagrams in it.
@@ -35,7 +43,7 @@ pub(crate) enum Event {
     BeatReady,
     /// Its process is gone and reaped.
     Exited,
-    /// It should be replaced by a fresh life.
+    /// It should be replaced by a fresh life; if it is held, that life is its release.
     Replace,
     /// It should stop for good.
     Stop,
@@ -66,6 +74,8 @@ pub(crate) enum Phase {
         /// When.
         until: Now,
     },
+    /// No process; it died too often, and only an operator's word starts it.
+    Held,
     /// A process that has not beaten as ready.
     Starting {
         /// Since when.
@@ -100,6 +110,8 @@ pub(crate) struct Policy {
     phase: Phase,
     /// Deaths in a row, none of a life long enough to be well.
     deaths: u32,
+    /// When it died, within the window; at most [`HOLD_AFTER`].
+    recent: VecDeque<Now>,
 }
 
 impl Policy {
@@ -110,7 +122,13 @@ impl Policy {
             heartbeat: stage.heartbeat,
             phase: Phase::Down,
             deaths: 0,
+            recent: VecDeque::with_capacity(HOLD_AFTER),
         }
+    }
+
+    /// Deaths within [`HOLD_WINDOW`], as of the last one.
+    pub(crate) fn recent_deaths(&self) -> usize {
+        self.recent.len()
     }
 
     /// Where the stage is.
@@ -127,7 +145,7 @@ impl Policy {
     /// When [`Event::Time`] is next worth telling; none when only events move it.
     pub(crate) fn deadline(&self) -> Option<Now> {
         match self.phase {
-            Phase::Down => None,
+            Phase::Down | Phase::Held => None,
             Phase::BackingOff { until } => Some(until),
             Phase::Starting { since } => Some(since + self.startup),
             Phase::Running { beat, .. } => Some(beat + self.heartbeat),
@@ -171,6 +189,11 @@ impl Policy {
                 Some(Action::Kill)
             }
             (Phase::BackingOff { until }, Event::Time) if now >= until => Some(self.start(now)),
+            (Phase::BackingOff { .. } | Phase::Held, Event::Replace) => {
+                self.deaths = 0;
+                self.recent.clear();
+                Some(self.start(now))
+            }
             (
                 Phase::Starting { .. } | Phase::Running { .. } | Phase::Failing { .. },
                 Event::Stop,
@@ -180,7 +203,8 @@ impl Policy {
                 };
                 Some(Action::Terminate)
             }
-            (Phase::BackingOff { .. }, Event::Stop) | (Phase::Stopping { .. }, Event::Exited) => {
+            (Phase::BackingOff { .. } | Phase::Held, Event::Stop)
+            | (Phase::Stopping { .. }, Event::Exited) => {
                 self.phase = Phase::Down;
                 None
             }
@@ -201,6 +225,13 @@ impl Policy {
             self.deaths = 0;
         }
         self.deaths += 1;
+        self.recent
+            .retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
+        self.recent.push_back(now);
+        if self.recent.len() >= HOLD_AFTER {
+            self.phase = Phase::Held;
+            return None;
+        }
         if self.deaths == 1 {
             return Some(self.start(now));
         }
@@ -252,6 +283,54 @@ mod tests {
             now = until;
         }
         assert_eq!(waits, [50, 100, 200, 400, 800, 1000, 1000]);
+    }
+
+    /// Dies as soon as it is started, until it is held; the time of that.
+    fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
+        loop {
+            policy.step(Event::Exited, now);
+            if policy.phase() == Phase::Held {
+                return now;
+            }
+            now = now.max(policy.deadline().unwrap());
+            policy.step(Event::Time, now);
+        }
+    }
+
+    #[test]
+    fn a_stage_that_cannot_live_is_held_within_ten_seconds() {
+        let mut policy = running();
+        let held = crash_until_held(&mut policy, ms(20));
+        assert!(held < Duration::from_secs(10), "{held:?}");
+        let later = held + Duration::from_secs(3600);
+        assert_eq!(policy.step(Event::Time, later), None);
+        assert_eq!((policy.phase(), policy.deadline()), (Phase::Held, None));
+    }
+
+    #[test]
+    fn a_released_stage_starts_with_a_clean_slate() {
+        let mut policy = running();
+        let held = crash_until_held(&mut policy, ms(20));
+        assert_eq!(
+            policy.step(Event::Replace, held + ms(1)),
+            Some(Action::Start)
+        );
+        assert_eq!(
+            policy.step(Event::Exited, held + ms(2)),
+            Some(Action::Start)
+        );
+    }
+
+    #[test]
+    fn a_stage_killed_once_a_second_is_never_held() {
+        let mut policy = running();
+        for second in 1..1000 {
+            policy.step(Event::Exited, ms(second * 1000));
+            if let Some(until) = policy.deadline() {
+                policy.step(Event::Time, until.max(ms(second * 1000)));
+            }
+            assert_ne!(policy.phase(), Phase::Held, "after {second} kills");
+        }
     }
 
     #[test]

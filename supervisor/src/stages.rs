@@ -100,6 +100,13 @@ pub(crate) fn find(name: &str) -> Option<&'static Stage> {
     TABLE.iter().find(|stage| stage.name == name)
 }
 
+/// What to say of a name that no stage has.
+pub(crate) fn unknown(name: &str) -> String {
+    let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
+    let names = names.join(", ");
+    format!("no stage is called {name:?}; the stages are {names}")
+}
+
 /// The stages so that each comes after the writers of its inputs. Stopping goes the other way.
 pub(crate) fn start_order() -> Vec<&'static Stage> {
     let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
@@ -123,7 +130,7 @@ pub(crate) fn start_order() -> Vec<&'static Stage> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::topics::{self, EVERY_STAGE, SUPERVISOR};
+    use common::topics::{self, EVERY_STAGE, OPERATOR, SUPERVISOR};
 
     #[test]
     fn every_input_has_a_writer_and_every_output_names_its_stage() {
@@ -147,7 +154,7 @@ mod tests {
     fn every_topic_is_written_by_the_stage_it_names() {
         for topic in topics::TABLE {
             let spec = topic.spec();
-            if spec.writer != SUPERVISOR && spec.writer != EVERY_STAGE {
+            if ![SUPERVISOR, EVERY_STAGE, OPERATOR].contains(&spec.writer) {
                 let writer = find(spec.writer).unwrap();
                 let writes = writer
                     .outputs

@@ -8,12 +8,15 @@ use std::{
 
 use common::{
     address::{Address, AddressError},
-    bus::{Bus, BusError, SliceWriter, Writer},
+    bus::{Bus, BusError, Reader, SliceWriter, Writer},
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
     domain::{Domain, RobotName},
     mission::Mission,
     run::{Run, RunError},
-    samples::{DirectiveSample, Order, RosterEntry, RosterHeader},
+    samples::{
+        DeathSample, DirectiveSample, HoldReason, Order, RequestKind, RequestSample, RosterEntry,
+        RosterHeader, name_str,
+    },
     signals::{SIGINT, SIGTERM, Signals},
     topics,
     waiter::Waiter,
@@ -21,6 +24,7 @@ use common::{
 use thiserror::Error;
 
 use crate::{
+    death,
     domain::{DomainError, Held},
     fleet::{Fleet, FleetError},
     observer::{Observer, Record},
@@ -136,7 +140,16 @@ struct Supervisor<'a> {
     waiter: Waiter,
     directive: Writer<DirectiveSample>,
     roster: SliceWriter<RosterHeader, RosterEntry>,
+    deaths: Writer<DeathSample>,
+    requests: Reader<RequestSample>,
+    last_request: u64,
     order: Order,
+    /// Why it is not [`Order::Drive`].
+    reason: HoldReason,
+    /// An operator said stop, and has not said resume.
+    operator_stop: bool,
+    /// All was ready once: from then on only what is said here holds the robot.
+    ready: bool,
     stall: StallWatch,
     judged_tick: Option<u64>,
     restated: Option<Instant>,
@@ -176,6 +189,7 @@ impl<'a> Supervisor<'a> {
         run.save(directory)?;
         let mut waiter = Waiter::default();
         let observer = Observer::new(bus, &mut waiter)?;
+        waiter.on(bus.alarm(&topics::REQUESTS)?);
         let mut supervisor = Self {
             options,
             fleet: Fleet::new(directory.clone()),
@@ -184,7 +198,13 @@ impl<'a> Supervisor<'a> {
             waiter,
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
+            deaths: bus.writer(&topics::DEATHS, 1)?,
+            requests: bus.reader(&topics::REQUESTS)?,
+            last_request: 0,
             order: Order::Hold,
+            reason: HoldReason::Starting,
+            operator_stop: false,
+            ready: false,
             stall: StallWatch::new(mission),
             judged_tick: None,
             restated: None,
@@ -246,21 +266,91 @@ impl<'a> Supervisor<'a> {
             .record
             .newest_tick()
             .map_or(0, |tick| tick + 1);
-        let ended = self.fleet.tend(first_tick)?;
+        let asked = self.take_requests(first_tick)?;
+        let died = self.tend(first_tick)?;
         if let Some(simulator) = &mut self.simulator
             && !simulator.tend()?
         {
             return Ok(Some(fault("the simulated robot ended; see x80-sim.log")));
         }
-        if self.order == Order::Hold && self.fleet.all_running() && self.can_drive() {
-            tracing::info!("all stages ready: drive");
-            self.order = Order::Drive;
-            self.progressed = (None, Instant::now());
-            self.restate()?;
-        } else if became_ready || !ended.is_empty() {
+        if self.decide_order() || became_ready || died || asked {
             self.restate()?;
         }
         self.judge()
+    }
+
+    /// Reap and restart; tell each death once, on the bus, in the log and in the run directory. Says whether one was.
+    fn tend(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+        let deaths = self.fleet.tend(first_tick)?;
+        let pose = self.observer.record.pose.unwrap_or_default();
+        for death in &deaths {
+            death.log();
+            self.deaths
+                .publish(pose.stamp.tick, pose.stamp.time(), death.sample())?;
+            let file = self.options.directory.join(death::FILE_NAME);
+            death
+                .append_to(&self.options.directory)
+                .map_err(system(format!("write {}", file.display())))?;
+        }
+        Ok(!deaths.is_empty())
+    }
+
+    /// Do what operators ask. Says whether anything was asked.
+    fn take_requests(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+        let mut asked = false;
+        while let Some(request) = self.requests.take()? {
+            asked = true;
+            self.last_request = request.id;
+            let stage = name_str(&request.stage);
+            match RequestKind::from_byte(request.kind) {
+                RequestKind::Nothing => {}
+                RequestKind::Restart => {
+                    tracing::warn!(stage, "an operator asks for a fresh life");
+                    self.fleet.replace(stage, first_tick)?;
+                }
+                RequestKind::Stop => {
+                    tracing::warn!("an operator says stop");
+                    self.operator_stop = true;
+                }
+                RequestKind::Resume => {
+                    tracing::warn!("an operator says resume");
+                    self.operator_stop = false;
+                }
+            }
+        }
+        Ok(asked)
+    }
+
+    /// Whether the robot may drive, and if not, why. Says whether that changed.
+    fn decide_order(&mut self) -> bool {
+        if self.order == Order::Stop {
+            return false;
+        }
+        if !self.ready && self.fleet.all_running() && self.can_drive() {
+            tracing::info!("all stages ready");
+            self.ready = true;
+        }
+        let reason = if !self.ready {
+            HoldReason::Starting
+        } else if self.operator_stop {
+            HoldReason::Operator
+        } else if self.fleet.held().next().is_some() {
+            HoldReason::StageHeld
+        } else {
+            HoldReason::None
+        };
+        if reason == self.reason {
+            return false;
+        }
+        tracing::info!(?reason, "order");
+        self.reason = reason;
+        self.order = if reason == HoldReason::None {
+            Order::Drive
+        } else {
+            Order::Hold
+        };
+        self.progressed = (None, Instant::now());
+        true
     }
 
     /// Whether the robot answers, and there is a field to follow: the first tick should not wait for it.
@@ -310,7 +400,11 @@ impl<'a> Supervisor<'a> {
             }));
         }
         if self.makes_no_progress() {
-            let reason = if self.order == Order::Hold && !self.robot_answers() {
+            let held: Vec<_> = self.fleet.held().collect();
+            let reason = if !held.is_empty() {
+                let (held, file) = (held.join(", "), death::FILE_NAME);
+                format!("{held} died again and again and is held; see {file} in the run directory")
+            } else if !self.ready && !self.robot_answers() {
                 let address = &self.address;
                 format!("no robot answers at {address}; is it on, is robot.address right?")
             } else {
@@ -321,14 +415,20 @@ impl<'a> Supervisor<'a> {
         self.watch_for_stalls()
     }
 
+    const fn in_ticks(&self) -> bool {
+        matches!(self.clock, MissionClock::Ticks { .. })
+    }
+
     /// On a clock of ticks, whether no tick was made for too long.
     fn makes_no_progress(&mut self) -> bool {
         let tick = self.observer.record.newest_tick();
         if tick != self.progressed.0 {
             self.progressed = (tick, Instant::now());
         }
-        // A real robot may be away for as long as it likes.
-        let waits = self.simulator.is_none() && self.order == Order::Drive;
+        // A real robot may be away for as long as it likes, and an operator may think.
+        let waits = self.simulator.is_none() && self.order == Order::Drive
+            || self.reason == HoldReason::Operator
+            || self.reason == HoldReason::StageHeld && !self.in_ticks();
         !waits && self.progressed.1.elapsed() >= NO_PROGRESS
     }
 
@@ -348,7 +448,9 @@ impl<'a> Supervisor<'a> {
             None => Ok(None),
             Some(Rung::Replan) => {
                 tracing::warn!("the robot stalls: a fresh planner solves the full field");
-                self.fleet.replace("planner")?;
+                let record = &self.observer.record;
+                let first_tick = record.newest_tick().map_or(0, |tick| tick + 1);
+                self.fleet.replace("planner", first_tick)?;
                 Ok(None)
             }
             Some(Rung::Forget { epoch }) => {
@@ -388,6 +490,8 @@ impl<'a> Supervisor<'a> {
         let header = RosterHeader {
             supervisor_pid: std::process::id(),
             order: self.order.into(),
+            reason: self.reason.into(),
+            last_request: self.last_request,
             ..RosterHeader::default()
         };
         self.roster
@@ -397,7 +501,7 @@ impl<'a> Supervisor<'a> {
 
     /// The robot to rest, then the stages down in reverse order, the link last, then the robot itself.
     fn stop(&mut self) -> Result<(), SupervisorError> {
-        self.order = Order::Stop;
+        (self.order, self.reason) = (Order::Stop, HoldReason::Ending);
         self.restate()?;
         let began = Instant::now();
         loop {
@@ -416,7 +520,7 @@ impl<'a> Supervisor<'a> {
         while self.fleet.stop_last()? {
             self.wait()?;
             self.observer.take(&mut self.fleet)?;
-            self.fleet.tend(0)?;
+            self.tend(0)?;
             if let Some(simulator) = &mut self.simulator {
                 // Its pipe must not fill: it could not say goodbye either.
                 simulator.tend()?;

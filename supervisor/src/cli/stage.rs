@@ -28,14 +28,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let stage = stages::find(&arguments.name).ok_or_else(|| {
-        let names: Vec<_> = stages::TABLE.iter().map(|stage| stage.name).collect();
-        format!(
-            "no stage is called {:?}; the stages are {}",
-            arguments.name,
-            names.join(", ")
-        )
-    })?;
+    let stage = stages::find(&arguments.name).ok_or_else(|| stages::unknown(&arguments.name))?;
     let life = Life {
         stage: stage.name,
         directory: arguments.run.clone(),

@@ -10,7 +10,7 @@ use clap::Args;
 use common::{
     bus::Bus,
     domain::{Domain, RobotName},
-    samples::{LinkSample, Order, PowerSample, RosterEntry, StageState, name_str},
+    samples::{HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, name_str},
     topics,
     waiter::Waiter,
 };
@@ -125,7 +125,10 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let status = Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
-        order: order(Order::from_byte(header.order)),
+        order: order(
+            Order::from_byte(header.order),
+            HoldReason::from_byte(header.reason),
+        ),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
         link: link.as_ref().map(link_status),
@@ -178,9 +181,13 @@ const fn power_status(power: &PowerSample) -> PowerStatus {
     }
 }
 
-const fn order(order: Order) -> &'static str {
+const fn order(order: Order, reason: HoldReason) -> &'static str {
     match order {
-        Order::Hold => "starting",
+        Order::Hold => match reason {
+            HoldReason::Operator => "stopped by an operator",
+            HoldReason::StageHeld => "stopped, a stage is held",
+            HoldReason::Starting | HoldReason::None | HoldReason::Ending => "starting",
+        },
         Order::Drive => "driving",
         Order::Stop => "stopping",
     }
@@ -193,6 +200,7 @@ const fn state(state: StageState) -> &'static str {
         StageState::Running => "running",
         StageState::BackingOff => "backing off",
         StageState::Stopping => "stopping",
+        StageState::Held => "held",
     }
 }
 

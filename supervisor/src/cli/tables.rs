@@ -38,6 +38,7 @@ pub(crate) fn topic_table() -> String {
         let rate = match spec.rate {
             Rate::EachTick => "each tick".to_owned(),
             Rate::EachFrame => "each frame of the robot".to_owned(),
+            Rate::WhenItHappens => "when it happens".to_owned(),
             Rate::OnChange(least) => format!("on change, at least every {} ms", least.as_millis()),
         };
         let age = spec
