@@ -292,8 +292,10 @@ mod tests {
             if policy.phase() == Phase::Held {
                 return now;
             }
-            now = now.max(policy.deadline().unwrap());
-            policy.step(Event::Time, now);
+            if let Phase::BackingOff { until } = policy.phase() {
+                now = until;
+                assert_eq!(policy.step(Event::Time, now), Some(Action::Start));
+            }
         }
     }
 
