@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand.
 
+mod chaos;
 mod check;
 mod field;
 mod latency;
@@ -41,6 +42,7 @@ enum Command {
     Kill(operate::Kill),
     Freeze(operate::Freeze),
     Thaw(operate::Thaw),
+    Chaos(chaos::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
 }
@@ -82,6 +84,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Kill(arguments) => operate::kill(&arguments),
         Command::Freeze(arguments) => operate::freeze(&arguments),
         Command::Thaw(arguments) => operate::thaw(&arguments),
+        Command::Chaos(arguments) => chaos::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),
     };

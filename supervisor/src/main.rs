@@ -12,10 +12,12 @@
 //! | [`observer`] | what is heard on the bus |
 //! | [`supervisor`] | the loop |
 //! | [`report`], [`picture`] | how a run ended |
+//! | [`chaos`] | random deaths, for users who doubt |
 //! | [`relay`] | bare hops, for comparison |
 //! | [`maps`] | maps as others keep them |
 //! | [`cli`] | the command line |
 
+mod chaos;
 mod cli;
 mod death;
 mod domain;

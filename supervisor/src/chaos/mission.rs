@@ -1,0 +1,305 @@
+//! One mission under attack.
+
+use std::{
+    fs,
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, Reader, SliceReader},
+    domain::Domain,
+    samples::{
+        CommandSample, GridHeader, GuidanceSample, HealthSample, HealthState, Order, PoseSample,
+        RosterEntry, RosterHeader, StageState, Stamp, Stamped as _, WheelSample, name_str,
+    },
+    topics::{self, AnyTopic as _},
+    waiter::Waiter,
+};
+use rustix::process::{Pid, kill_process};
+use serde_json::Value;
+
+use super::{
+    ChaosError, Options,
+    report::{End, Report},
+    system,
+    victim::{Chance, Kind},
+};
+use crate::{
+    process::{Process, firsthand},
+    stages,
+};
+
+/// Nothing that is waited for takes longer; a mission at a wall-clock pace takes half a minute.
+const PATIENCE: Duration = Duration::from_secs(600);
+/// How often the child is looked at while the bus is silent.
+const LOOK: Duration = Duration::from_millis(50);
+
+fn command(options: &Options, seed: u64, pace: &str, out: &str) -> Command {
+    let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
+    command.args(["--robot", &options.robot.to_string()]);
+    command.args(["--seed", &seed.to_string(), "--out"]);
+    command.arg(options.directory.join(out));
+    for setting in &options.set {
+        command.args(["--set", setting]);
+    }
+    command.stdout(Stdio::piped()).stderr(Stdio::null());
+    command
+}
+
+fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
+    let text = String::from_utf8_lossy(stdout);
+    serde_json::from_str(text.trim()).map_err(|_| ChaosError::NoSummary(text.into_owned()))
+}
+
+/// The same mission left alone: what there is to compare with.
+pub(super) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
+    let output = command(options, seed, "max", "calm")
+        .output()
+        .map_err(system("start a mission"))?;
+    fs::remove_dir_all(options.directory.join("calm")).map_err(system("remove its directory"))?;
+    parse(&output.stdout)
+}
+
+/// The same mission under attack; what happened goes into `report`.
+pub(super) fn attack(
+    options: &Options,
+    seed: u64,
+    chance: &mut Chance,
+    report: &mut Report,
+    calm: &Value,
+) -> Result<(), ChaosError> {
+    let pace = options.pace.to_string();
+    let before = report.kills();
+    let mut child = Process::spawn(command(options, seed, &pace, "attacked"))
+        .map_err(system("start a mission"))?;
+    let stdout = child.take_stdout();
+    // Read beside, or a long summary could block it.
+    let summary = std::thread::spawn(move || {
+        let mut text = Vec::new();
+        if let Some(mut stdout) = stdout {
+            let _ = std::io::Read::read_to_end(&mut stdout, &mut text);
+        }
+        text
+    });
+    let attacked = Attack::until_the_end(options, &mut child, chance, report);
+    child.end(Duration::from_secs(2));
+    let summary = summary.join().unwrap_or_default();
+    attacked?;
+    let summary = parse(&summary)?;
+    fs::remove_dir_all(options.directory.join("attacked"))
+        .map_err(system("remove its directory"))?;
+    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
+    report.ended(&End {
+        outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
+        reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
+        collisions: summary["collisions"].as_u64().unwrap_or_default(),
+        pose_excess_m: number(&summary, "pose_error_m") - number(calm, "pose_error_m"),
+        unattended_s: number(&summary, "unattended_s"),
+        kills: report.kills() - before,
+    });
+    Ok(())
+}
+
+/// A stage that was hit, until its successor works.
+struct Wound {
+    stage: &'static str,
+    kind: Kind,
+    generation: u32,
+    at: Instant,
+    ready: bool,
+    /// To hit the successor so long after its start.
+    again: Option<Duration>,
+}
+
+/// The attacker's place on the bus.
+struct Attack {
+    roster: SliceReader<RosterHeader, RosterEntry>,
+    health: Reader<HealthSample>,
+    wheels: Reader<WheelSample>,
+    pose: Reader<PoseSample>,
+    grid: SliceReader<GridHeader, u8>,
+    guidance: Reader<GuidanceSample>,
+    command: Reader<CommandSample>,
+    waiter: Waiter,
+    entries: Vec<RosterEntry>,
+    driving: bool,
+    wounds: Vec<Wound>,
+}
+
+impl Attack {
+    fn until_the_end(
+        options: &Options,
+        child: &mut Process,
+        chance: &mut Chance,
+        report: &mut Report,
+    ) -> Result<(), ChaosError> {
+        let began = Instant::now();
+        let mut attack = loop {
+            if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= PATIENCE {
+                return Ok(());
+            }
+            match Self::join(options) {
+                Ok(attack) => break attack,
+                // Not up yet.
+                Err(_) => std::thread::park_timeout(LOOK),
+            }
+        };
+        let mut next = Instant::now() + chance.pause();
+        while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < PATIENCE {
+            let due = next.saturating_duration_since(Instant::now()).min(LOOK);
+            attack.waiter.wait(due)?;
+            attack.listen(report)?;
+            attack.hit_successors(report);
+            let enough = report.kills() >= options.kills;
+            if Instant::now() >= next && attack.driving && !enough {
+                next = Instant::now() + chance.pause();
+                attack.hit(options, chance, report);
+            }
+        }
+        Ok(())
+    }
+
+    fn join(options: &Options) -> Result<Self, ChaosError> {
+        let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
+        let mut waiter = Waiter::default();
+        waiter.on(bus.alarm(&topics::ROSTER)?);
+        waiter.on(bus.alarm(&topics::HEALTH)?);
+        waiter.on(bus.alarm(&topics::COMMAND)?);
+        Ok(Self {
+            roster: bus.slice_reader(&topics::ROSTER)?,
+            health: bus.reader(&topics::HEALTH)?,
+            wheels: bus.reader(&topics::WHEELS)?,
+            pose: bus.reader(&topics::POSE)?,
+            grid: bus.slice_reader(&topics::GRID)?,
+            guidance: bus.reader(&topics::GUIDANCE)?,
+            command: bus.reader(&topics::COMMAND)?,
+            waiter,
+            entries: Vec::new(),
+            driving: false,
+            wounds: Vec::new(),
+        })
+    }
+
+    /// Take what came: who runs, who beats, who speaks.
+    fn listen(&mut self, report: &mut Report) -> Result<(), ChaosError> {
+        while let Some(entries) = self.roster.take()? {
+            self.driving = Order::from_byte(entries.header().order) == Order::Drive;
+            self.entries = entries.to_vec();
+        }
+        while let Some(health) = self.health.take()? {
+            if HealthState::from_byte(health.state) == HealthState::Ready {
+                self.heal(name_str(&health.stage), health.stamp, true, report);
+            }
+        }
+        while let Some(sample) = self.wheels.take()? {
+            self.heal(topics::WHEELS.spec().writer, *sample.stamp(), false, report);
+        }
+        while let Some(sample) = self.pose.take()? {
+            self.heal(topics::POSE.spec().writer, *sample.stamp(), false, report);
+        }
+        while let Some(sample) = self.grid.take()? {
+            let stamp = *sample.header().stamp();
+            self.heal(topics::GRID.spec().writer, stamp, false, report);
+        }
+        while let Some(sample) = self.guidance.take()? {
+            self.heal(
+                topics::GUIDANCE.spec().writer,
+                *sample.stamp(),
+                false,
+                report,
+            );
+        }
+        while let Some(sample) = self.command.take()? {
+            self.heal(
+                topics::COMMAND.spec().writer,
+                *sample.stamp(),
+                false,
+                report,
+            );
+        }
+        Ok(())
+    }
+
+    /// A sign of life of `stage`: a beat that says ready, or a sample of a tick.
+    fn heal(&mut self, stage: &str, stamp: Stamp, beat: bool, report: &mut Report) {
+        let is_it = |wound: &Wound| wound.stage == stage && stamp.generation > wound.generation;
+        let Some(at) = self.wounds.iter().position(is_it) else {
+            return;
+        };
+        let wound = &mut self.wounds[at];
+        let took = wound.at.elapsed().as_nanos() as u64;
+        let recovery = report.recovery(wound.stage);
+        if !wound.ready {
+            wound.ready = true;
+            if wound.kind == Kind::Freeze {
+                recovery.thawless.record(took);
+            } else {
+                recovery.ready.record(took);
+            }
+        }
+        if !beat {
+            if wound.kind != Kind::Freeze {
+                recovery.output.record(took);
+            }
+            self.wounds.remove(at);
+        }
+    }
+
+    /// Hit a stage that runs and has no open wound.
+    fn hit(&mut self, options: &Options, chance: &mut Chance, report: &mut Report) {
+        let Some(stage) = stages::find(chance.stage()).map(|stage| stage.name) else {
+            return;
+        };
+        let (kind, again) = (chance.kind(), chance.again());
+        let running = |entry: &&RosterEntry| {
+            name_str(&entry.stage) == stage
+                && StageState::from_byte(entry.state) == StageState::Running
+        };
+        let Some(entry) = self.entries.iter().find(running) else {
+            return;
+        };
+        let hurt = self.wounds.iter().any(|wound| wound.stage == stage);
+        if hurt || !send(entry.pid, kind) {
+            return;
+        }
+        report.hit(stage, kind);
+        self.wounds.push(Wound {
+            stage,
+            kind,
+            generation: entry.generation,
+            at: Instant::now(),
+            ready: false,
+            again: again.filter(|_| options.startup && kind != Kind::Freeze),
+        });
+    }
+
+    /// Hit the successors that are to be hit in their first milliseconds.
+    fn hit_successors(&mut self, report: &mut Report) {
+        for wound in &mut self.wounds {
+            let successor = self.entries.iter().find(|entry| {
+                name_str(&entry.stage) == wound.stage && entry.generation > wound.generation
+            });
+            let (Some(entry), Some(after)) = (successor, wound.again) else {
+                continue;
+            };
+            wound.again = None;
+            let age = Duration::from_nanos(entry.uptime_ns);
+            if let Some(rest) = after.checked_sub(age) {
+                std::thread::park_timeout(rest);
+            }
+            if entry.pid != 0 && send(entry.pid, Kind::KillAtStart) {
+                report.hit(wound.stage, Kind::KillAtStart);
+                wound.generation = entry.generation;
+                wound.kind = Kind::KillAtStart;
+                wound.at = Instant::now();
+                wound.ready = false;
+            }
+        }
+    }
+}
+
+/// Whether the signal reached a process.
+fn send(pid: u32, kind: Kind) -> bool {
+    Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, kind.signal()).is_ok())
+}

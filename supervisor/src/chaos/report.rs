@@ -1,0 +1,233 @@
+//! The sum of all missions under attack.
+
+use std::{
+    collections::BTreeMap,
+    fmt,
+    time::{Duration, Instant},
+};
+
+use common::latency::Histogram;
+use serde::Serialize;
+
+use super::victim::Kind;
+use crate::stages::TABLE;
+
+/// What became of everything. Times in milliseconds.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    missions: u64,
+    reached: u64,
+    collisions: u64,
+    other_ends: Vec<String>,
+    /// Signals by stage and kind.
+    kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
+    #[serde(serialize_with = "recoveries")]
+    recovery_ms: BTreeMap<&'static str, Recovery>,
+    /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and in that mission the
+    /// signals sent.
+    worst_pose_excess_m: f64,
+    worst_pose_kills: u32,
+    /// The longest that a wheel turned after the last command the robot had heard, mission seconds.
+    longest_unattended_s: f64,
+    /// Files, shared memory, processes that outlived a mission.
+    pub(crate) leftovers: usize,
+    descriptors_won: i64,
+    took_s: f64,
+    #[serde(skip)]
+    began: Instant,
+    #[serde(skip)]
+    descriptors: i64,
+}
+
+/// From the signal to the successor.
+#[derive(Debug, Default)]
+pub(crate) struct Recovery {
+    /// To its first beat that says ready, after which it works; of those that were not frozen, which are noticed
+    /// by their silence.
+    pub(crate) ready: Histogram,
+    /// The same of those that were frozen.
+    pub(crate) thawless: Histogram,
+    /// To its first sample of a tick; up to a tick longer.
+    pub(crate) output: Histogram,
+}
+
+/// One mission's end.
+#[derive(Debug)]
+pub(crate) struct End {
+    pub(crate) outcome: String,
+    pub(crate) reason: String,
+    pub(crate) collisions: u64,
+    pub(crate) pose_excess_m: f64,
+    pub(crate) unattended_s: f64,
+    pub(crate) kills: u32,
+}
+
+impl Report {
+    pub(crate) fn new() -> Self {
+        Self {
+            missions: 0,
+            reached: 0,
+            collisions: 0,
+            other_ends: Vec::new(),
+            kills: BTreeMap::new(),
+            recovery_ms: BTreeMap::new(),
+            worst_pose_excess_m: 0.0,
+            worst_pose_kills: 0,
+            longest_unattended_s: 0.0,
+            leftovers: 0,
+            descriptors_won: 0,
+            took_s: 0.0,
+            began: Instant::now(),
+            descriptors: descriptors(),
+        }
+    }
+
+    pub(crate) const fn missions(&self) -> u64 {
+        self.missions
+    }
+
+    pub(crate) fn kills(&self) -> u32 {
+        self.kills.values().flat_map(BTreeMap::values).sum()
+    }
+
+    pub(crate) fn hit(&mut self, stage: &'static str, kind: Kind) {
+        *self
+            .kills
+            .entry(stage)
+            .or_default()
+            .entry(kind)
+            .or_default() += 1;
+    }
+
+    pub(crate) fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
+        self.recovery_ms.entry(stage).or_default()
+    }
+
+    pub(crate) fn ended(&mut self, end: &End) {
+        self.missions += 1;
+        if end.outcome == "reached" {
+            self.reached += 1;
+        } else {
+            self.other_ends
+                .push(format!("{}: {}", end.outcome, end.reason));
+        }
+        self.collisions += end.collisions;
+        self.longest_unattended_s = self.longest_unattended_s.max(end.unattended_s);
+        if end.pose_excess_m > self.worst_pose_excess_m {
+            self.worst_pose_excess_m = end.pose_excess_m;
+            self.worst_pose_kills = end.kills;
+        }
+    }
+
+    pub(crate) fn end(&mut self) {
+        self.descriptors_won = descriptors() - self.descriptors;
+        self.took_s = self.began.elapsed().as_secs_f64();
+    }
+
+    /// Whether every mission arrived untouched and left nothing.
+    pub(crate) fn is_clean(&self) -> bool {
+        self.reached == self.missions && self.collisions == 0 && self.leftovers == 0
+    }
+}
+
+/// Open descriptors of this process.
+fn descriptors() -> i64 {
+    std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as i64)
+}
+
+/// Milliseconds of a quantile.
+fn ms(histogram: &Histogram, share: f64) -> Option<f64> {
+    histogram.quantile_us(share).map(|us| us / 1e3)
+}
+
+fn recoveries<S: serde::Serializer>(
+    all: &BTreeMap<&'static str, Recovery>,
+    to: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Quantiles {
+        p50: Option<f64>,
+        p99: Option<f64>,
+        max: Option<f64>,
+    }
+    let quantiles = |histogram: &Histogram| Quantiles {
+        p50: ms(histogram, 0.5),
+        p99: ms(histogram, 0.99),
+        max: ms(histogram, 1.0),
+    };
+    to.collect_map(all.iter().map(|(stage, recovery)| {
+        let parts = [
+            ("ready", quantiles(&recovery.ready)),
+            ("ready_when_frozen", quantiles(&recovery.thawless)),
+            ("output", quantiles(&recovery.output)),
+        ];
+        (stage, parts.into_iter().collect::<BTreeMap<_, _>>())
+    }))
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let took = Duration::from_secs_f64(self.took_s);
+        writeln!(
+            to,
+            "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} leftovers",
+            self.kills(),
+            self.missions,
+            took.as_secs_f64(),
+            self.reached,
+            self.collisions,
+            self.leftovers
+        )?;
+        for end in &self.other_ends {
+            writeln!(to, "  {end}")?;
+        }
+        writeln!(
+            to,
+            "{:<16} {:>6} {:>22} {:>22} {:>22}",
+            "stage", "hit", "ready, ms", "frozen, ms", "a tick's output, ms"
+        )?;
+        let nothing = Recovery::default();
+        for stage in &TABLE {
+            let hit: u32 = self
+                .kills
+                .get(stage.name)
+                .map_or(0, |kinds| kinds.values().sum());
+            let recovery = self.recovery_ms.get(stage.name).unwrap_or(&nothing);
+            let quantiles = |histogram: &Histogram| match (
+                ms(histogram, 0.5),
+                ms(histogram, 0.99),
+                ms(histogram, 1.0),
+            ) {
+                (Some(p50), Some(p99), Some(max)) => format!("{p50:.1} {p99:.1} {max:.1}"),
+                _ => "-".to_owned(),
+            };
+            writeln!(
+                to,
+                "{:<16} {hit:>6} {:>22} {:>22} {:>22}",
+                stage.name,
+                quantiles(&recovery.ready),
+                quantiles(&recovery.thawless),
+                quantiles(&recovery.output)
+            )?;
+        }
+        let mut kinds: BTreeMap<Kind, u32> = BTreeMap::new();
+        for (&kind, &count) in self.kills.values().flatten() {
+            *kinds.entry(kind).or_default() += count;
+        }
+        let kinds: Vec<_> = kinds
+            .iter()
+            .map(|(kind, count)| format!("{count} {}", kind.as_str()))
+            .collect();
+        writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
+        writeln!(
+            to,
+            "pose error beyond the undisturbed run at most {:.4} m ({} signals in that mission)",
+            self.worst_pose_excess_m, self.worst_pose_kills
+        )?;
+        writeln!(
+            to,
+            "a wheel turned at most {:.2} s of mission time after the last command; descriptors won {}",
+            self.longest_unattended_s, self.descriptors_won
+        )
+    }
+}

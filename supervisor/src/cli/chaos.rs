@@ -1,0 +1,83 @@
+//! `firsthand chaos`: random deaths of random stages, and what became of the missions.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use common::{clock::Pace, domain::RobotName};
+
+use super::{Failure, missions};
+use crate::chaos::{self, Options};
+
+/// Hit random stages with random signals at random times, mission after mission, and report.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A shipped mission or a mission file.
+    #[arg(default_value = "obstacle-course")]
+    mission: String,
+    /// Signals to send in all; the mission under way is left to end after the last.
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    kills: u32,
+    /// Seed of who, how and when; the missions' own seeds count up from it.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Hit some successors again within their first 12 ms: about a fifth of all signals.
+    #[arg(long)]
+    include_startup: bool,
+    /// Mission time, R times wall-clock.
+    #[arg(long, default_value = "4")]
+    pace: Pace,
+    /// KEY=VALUE over the mission file, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Name of the robot, and of its corner of shared memory.
+    #[arg(long, default_value = "chaos")]
+    robot: RobotName,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What it ends with when a mission was lost, touched something, or left something.
+const NOT_CLEAN: u8 = 7;
+
+#[allow(clippy::print_stdout, clippy::print_stderr)]
+pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    // Faults in it are told at once, and once.
+    missions::load(&arguments.mission, &arguments.set)?;
+    if arguments.pace == Pace::Max {
+        return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
+    }
+    let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
+    std::fs::create_dir(&directory)?;
+    let options = Options {
+        mission: arguments.mission.clone(),
+        set: arguments.set.clone(),
+        robot: arguments.robot.clone(),
+        pace: arguments.pace,
+        kills: arguments.kills,
+        seed: arguments.seed,
+        startup: arguments.include_startup,
+        directory: directory.clone(),
+    };
+    let ended = chaos::run(&options, &mut |report| {
+        let (kills, missions) = (report.kills(), report.missions());
+        eprintln!("{kills} of {} signals, {missions} missions", options.kills);
+    });
+    let report = match ended {
+        Ok(report) => report,
+        Err(error) => {
+            return Err(format!("{error}; see {}", directory.display()).into());
+        }
+    };
+    std::fs::remove_dir_all(&directory)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        print!("{report}");
+    }
+    Ok(ExitCode::from(if report.is_clean() {
+        0
+    } else {
+        NOT_CLEAN
+    }))
+}
