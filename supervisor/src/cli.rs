@@ -16,6 +16,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::logging;
+
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar, and off it goes.
 ///
 /// Without a subcommand: `firsthand run obstacle-course`.
@@ -66,8 +68,8 @@ pub(crate) fn main() -> ExitCode {
     match &command {
         // It logs into its run directory.
         Command::Run(_) => {}
-        Command::Stage(_) | Command::Sim(_) => log_to(std::io::stderr, "info"),
-        _ => log_to(std::io::stderr, "error"),
+        Command::Stage(_) | Command::Sim(_) => logging::to_stderr("info"),
+        _ => logging::to_stderr("error"),
     }
     let result = match command {
         Command::Run(arguments) => run::main(&arguments),
@@ -99,17 +101,3 @@ pub(crate) fn main() -> ExitCode {
 
 /// What a subcommand fails with: one clear sentence.
 type Failure = Box<dyn std::error::Error>;
-
-/// Log to `writer` what FIRSTHAND_LOG asks for, or else everything from level `default` up.
-fn log_to<W>(writer: W, default: &str)
-where
-    W: for<'writer> tracing_subscriber::fmt::MakeWriter<'writer> + Send + Sync + 'static,
-{
-    let filter = tracing_subscriber::EnvFilter::try_from_env("FIRSTHAND_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(default));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(writer)
-        .with_ansi(false)
-        .init();
-}

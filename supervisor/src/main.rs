@@ -11,6 +11,7 @@
 //! | [`simulator`] | the simulated robot as a child |
 //! | [`observer`] | what is heard on the bus |
 //! | [`supervisor`] | the loop |
+//! | [`service`], [`logging`] | systemd told how it goes; logs where they are looked for |
 //! | [`report`], [`picture`] | how a run ended |
 //! | [`chaos`] | random deaths, for users who doubt |
 //! | [`relay`] | bare hops, for comparison |
@@ -22,6 +23,7 @@ mod cli;
 mod death;
 mod domain;
 mod fleet;
+mod logging;
 mod maps;
 mod observer;
 mod picture;
@@ -29,6 +31,7 @@ mod policy;
 mod process;
 mod relay;
 mod report;
+mod service;
 mod simulator;
 mod stages;
 mod stall;

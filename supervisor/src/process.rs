@@ -28,6 +28,10 @@ pub(crate) fn firsthand(arguments: &[&str]) -> Command {
         .arg0("firsthand")
         .args(arguments)
         .process_group(0)
+        // What systemd says to the supervisor is not meant for its children.
+        .env_remove("NOTIFY_SOCKET")
+        .env_remove("WATCHDOG_USEC")
+        .env_remove("WATCHDOG_PID")
         .stdin(Stdio::null());
     command
 }

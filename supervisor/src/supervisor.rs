@@ -1,7 +1,7 @@
 //! One robot's supervisor: brings its stages up, lets it drive, watches, brings all down again.
 
 use std::{
-    fs, io,
+    fmt, fs, io,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -29,6 +29,7 @@ use crate::{
     fleet::{Fleet, FleetError},
     observer::{Observer, Record},
     report::{Ending, Outcome, Summary},
+    service::ServiceManager,
     simulator::{Simulator, SimulatorError},
     stages,
     stall::{Rung, StallWatch},
@@ -107,6 +108,33 @@ pub(crate) struct Progress<'a> {
     pub(crate) alive: (usize, usize),
     /// Whether the robot is ordered to drive.
     pub(crate) driving: bool,
+    /// From the start to the target.
+    straight_m: f64,
+}
+
+/// One line.
+impl fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (alive, all) = self.alive;
+        if !self.driving {
+            return write!(f, "starting: {alive}/{all} stages alive");
+        }
+        let record = self.record;
+        let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
+        let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
+        let distance = record
+            .command
+            .map_or(self.straight_m, |command| command.distance_m);
+        let events = record
+            .newest_guidance()
+            .map_or(0, |guidance| guidance.safety_events);
+        let lost = record.link.is_some_and(|link| link.connected == 0);
+        let robot = if lost { ", ROBOT LOST" } else { "" };
+        write!(
+            f,
+            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {alive}/{all} stages alive{robot}"
+        )
+    }
 }
 
 /// Carry out a run. `watch` is called a few times a second.
@@ -156,6 +184,7 @@ struct Supervisor<'a> {
     progressed: (Option<u64>, Instant),
     clock: MissionClock,
     address: Address,
+    service: ServiceManager,
 }
 
 impl<'a> Supervisor<'a> {
@@ -211,6 +240,7 @@ impl<'a> Supervisor<'a> {
             progressed: (None, Instant::now()),
             clock,
             address,
+            service: ServiceManager::of_environment(),
         };
         supervisor.restate()?;
         supervisor.fleet.start_all()?;
@@ -236,12 +266,16 @@ impl<'a> Supervisor<'a> {
                 return Ok(ending);
             }
             if self.restate_if_due()? {
-                watch(&Progress {
+                let progress = Progress {
                     record: &self.observer.record,
                     alive: self.fleet.alive(),
                     driving: self.order == Order::Drive,
-                });
+                    straight_m: self.options.mission.target.length(),
+                };
+                watch(&progress);
+                self.service.show(|| progress.to_string());
             }
+            self.service.feed();
             self.wait()?;
         }
     }
@@ -252,9 +286,10 @@ impl<'a> Supervisor<'a> {
         if let Some(simulator) = &self.simulator {
             descriptors.extend(simulator.descriptors());
         }
-        let until_deadline = self.fleet.time_to_deadline().unwrap_or(topics::RESTATE);
-        self.waiter
-            .wait_also_for(&descriptors, until_deadline.min(topics::RESTATE))?;
+        let deadlines = [self.fleet.time_to_deadline(), self.service.time_to_feed()];
+        let soonest = deadlines.into_iter().flatten().min();
+        let patience = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
+        self.waiter.wait_also_for(&descriptors, patience)?;
         Ok(())
     }
 
@@ -329,6 +364,7 @@ impl<'a> Supervisor<'a> {
         if !self.ready && self.fleet.all_running() && self.can_drive() {
             tracing::info!("all stages ready");
             self.ready = true;
+            self.service.ready();
         }
         let reason = if !self.ready {
             HoldReason::Starting
@@ -501,6 +537,7 @@ impl<'a> Supervisor<'a> {
 
     /// The robot to rest, then the stages down in reverse order, the link last, then the robot itself.
     fn stop(&mut self) -> Result<(), SupervisorError> {
+        self.service.stopping();
         (self.order, self.reason) = (Order::Stop, HoldReason::Ending);
         self.restate()?;
         let began = Instant::now();

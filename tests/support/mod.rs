@@ -43,11 +43,7 @@ pub struct Run {
 impl Run {
     /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
-        // Every process of the run has its directory on its command line.
-        let directory = tempfile::Builder::new()
-            .prefix(&mark(robot))
-            .tempdir()
-            .unwrap();
+        let directory = directory_of(robot);
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
@@ -71,11 +67,9 @@ impl Run {
         self.child.id()
     }
 
-    /// `firsthand status --json`; none before the robot has a bus.
+    /// As [`status_of`].
     pub fn status(&self) -> Option<Value> {
-        let output = output(&["status", "--robot", &self.robot, "--json"]);
-        let text = output.status.success().then_some(output.stdout)?;
-        serde_json::from_slice(&text).ok()
+        status_of(&self.robot)
     }
 
     /// Ask for the status until `is_so` of it: each answer waits for the supervisor's next word.
@@ -159,6 +153,30 @@ pub fn signal_process(pid: u32, signal: Signal) {
 pub fn find<'a>(status: &'a Value, stage: &str) -> &'a Value {
     let stages = status["stages"].as_array().unwrap();
     stages.iter().find(|entry| entry["name"] == stage).unwrap()
+}
+
+/// `firsthand status --json`; none before the robot has a bus.
+pub fn status_of(robot: &str) -> Option<Value> {
+    let output = output(&["status", "--robot", robot, "--json"]);
+    let text = output.status.success().then_some(output.stdout)?;
+    serde_json::from_slice(&text).ok()
+}
+
+/// Ask for the status of a robot that no [`Run`] stands for until `is_so` of it.
+pub fn wait_for_status(robot: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+    let began = Instant::now();
+    loop {
+        match status_of(robot) {
+            Some(status) if is_so(&status) => return status,
+            last => assert!(began.elapsed() < PATIENCE, "waited too long: {last:?}"),
+        }
+    }
+}
+
+/// A directory for a run of `robot`: every process of the run has it on its command line.
+pub fn directory_of(robot: &str) -> TempDir {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&mark(robot)).tempdir().unwrap()
 }
 
 /// Nothing of `robot` is left: no process, no shared memory, no files.

@@ -15,6 +15,7 @@ use common::{
 
 use super::{Failure, missions};
 use crate::{
+    logging,
     picture::{self, Facts, Scene},
     report::{self, Outcome, Summary},
     supervisor::{self, Finished, Options, Progress},
@@ -84,7 +85,8 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         pace: arguments.pace,
         directory: directory.clone(),
     };
-    log_to_file(&directory)?;
+    // The supervisor's own log lies beside its stages'.
+    logging::to_file(&directory.join("supervisor.log"), "info")?;
     let mut console = Console::new(&options);
     let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
         Ok(finished) => finished,
@@ -108,13 +110,6 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         println!("picture: {}", picture.display());
     }
     Ok(exit_code(&finished.summary, finished.asked_for))
-}
-
-/// The supervisor's own log lies beside its stages'.
-fn log_to_file(directory: &Path) -> Result<(), Failure> {
-    let log = fs::File::create(directory.join("supervisor.log"))?;
-    super::log_to(std::sync::Mutex::new(log), "info");
-    Ok(())
 }
 
 /// The documented code.
@@ -200,11 +195,12 @@ fn draw(mission: &Mission, finished: &Finished) -> String {
     })
 }
 
-/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere, none in a
+/// journal: systemd is told it as the service's status.
 struct Console {
     rewrites: bool,
+    silent: bool,
     shown: Option<Instant>,
-    straight: f64,
     title: String,
 }
 
@@ -216,8 +212,8 @@ impl Console {
         let mission = &options.mission;
         Self {
             rewrites: io::stderr().is_terminal(),
+            silent: logging::to_journal(),
             shown: None,
-            straight: mission.target.length(),
             title: format!(
                 "mission {}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
                 mission.name,
@@ -239,34 +235,11 @@ impl Console {
         if self.shown.replace(Instant::now()).is_none() {
             say(&format!("{}\n", self.title));
         }
-        let line = self.line(progress);
         if self.rewrites {
-            say(&format!("\r\x1b[K{line}"));
-        } else {
-            say(&format!("{line}\n"));
+            say(&format!("\r\x1b[K{progress}"));
+        } else if !self.silent {
+            say(&format!("{progress}\n"));
         }
-    }
-
-    fn line(&self, progress: &Progress<'_>) -> String {
-        let (alive, all) = progress.alive;
-        let stages = format!("{alive}/{all} stages alive");
-        if !progress.driving {
-            return format!("starting: {stages}");
-        }
-        let record = progress.record;
-        let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
-        let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
-        let distance = record
-            .command
-            .map_or(self.straight, |command| command.distance_m);
-        let events = record
-            .newest_guidance()
-            .map_or(0, |guidance| guidance.safety_events);
-        let lost = record.link.is_some_and(|link| link.connected == 0);
-        let robot = if lost { ", ROBOT LOST" } else { "" };
-        format!(
-            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {stages}{robot}"
-        )
     }
 
     fn end(&self) {

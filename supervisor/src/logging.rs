@@ -1,0 +1,123 @@
+//! Where this process logs: to standard error, to a file, and, under systemd, to the journal.
+//!
+//! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
+//! keeps the time itself. That needs no library, and a line looks the same to whoever reads it.
+
+use std::{
+    fs::File,
+    io::{self, Write},
+    os::{fd::AsFd, unix::fs::MetadataExt},
+    path::Path,
+    sync::Mutex,
+};
+
+use tracing::{Level, Metadata};
+use tracing_subscriber::{
+    EnvFilter, Layer, Registry,
+    fmt::{self, MakeWriter},
+    layer::SubscriberExt,
+    util::SubscriberInitExt,
+};
+
+type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
+
+/// Whether standard error goes to the journal. `JOURNAL_STREAM` says which file the journal reads, and children
+/// inherit it: one whose standard error was sent elsewhere must not take it for its own.
+pub(crate) fn to_journal() -> bool {
+    let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
+        return false;
+    };
+    let stderr = io::stderr().as_fd().try_clone_to_owned().map(File::from);
+    let Ok(found) = stderr.and_then(|stderr| stderr.metadata()) else {
+        return false;
+    };
+    journal.to_str() == Some(&format!("{}:{}", found.dev(), found.ino()))
+}
+
+/// Log to standard error what FIRSTHAND_LOG asks for, or else everything from level `default` up.
+pub(crate) fn to_stderr(default: &str) {
+    start(vec![stderr_layer()], default);
+}
+
+/// Log to `file`, and to the journal if there is one.
+///
+/// # Errors
+/// When the file cannot be made.
+pub(crate) fn to_file(file: &Path, default: &str) -> io::Result<()> {
+    let log = Mutex::new(File::create(file)?);
+    let mut layers: Vec<AnyLayer> = vec![fmt::layer().with_writer(log).with_ansi(false).boxed()];
+    if to_journal() {
+        layers.push(stderr_layer());
+    }
+    start(layers, default);
+    Ok(())
+}
+
+fn stderr_layer() -> AnyLayer {
+    if to_journal() {
+        let lines = fmt::layer().without_time().with_level(false);
+        lines.with_writer(Journal).with_ansi(false).boxed()
+    } else {
+        let lines = fmt::layer().with_writer(io::stderr);
+        lines.with_ansi(false).boxed()
+    }
+}
+
+fn start(layers: Vec<AnyLayer>, default: &str) {
+    let filter =
+        EnvFilter::try_from_env("FIRSTHAND_LOG").unwrap_or_else(|_| EnvFilter::new(default));
+    tracing_subscriber::registry()
+        .with(layers)
+        .with(filter)
+        .init();
+}
+
+/// Standard error, each event behind its priority.
+struct Journal;
+
+/// One event on its way there.
+struct Entry {
+    priority: &'static str,
+}
+
+impl<'writer> MakeWriter<'writer> for Journal {
+    type Writer = Entry;
+
+    fn make_writer(&'writer self) -> Entry {
+        Entry { priority: "<6>" }
+    }
+
+    fn make_writer_for(&'writer self, event: &Metadata<'_>) -> Entry {
+        Entry {
+            priority: priority(*event.level()),
+        }
+    }
+}
+
+/// syslog(3): 3 error, 4 warning, 6 informational, 7 debug.
+fn priority(level: Level) -> &'static str {
+    match level {
+        Level::ERROR => "<3>",
+        Level::WARN => "<4>",
+        Level::INFO => "<6>",
+        _ => "<7>",
+    }
+}
+
+impl Write for Entry {
+    /// One event a call; each of its lines is an entry of the journal, so each gets the priority. Written at
+    /// once, or lines of two processes could mix.
+    fn write(&mut self, event: &[u8]) -> io::Result<usize> {
+        let mut entry = Vec::with_capacity(event.len() + self.priority.len());
+        for line in event.split_inclusive(|&byte| byte == b'\n') {
+            entry.extend_from_slice(self.priority.as_bytes());
+            entry.extend_from_slice(line);
+        }
+        io::stderr().write_all(&entry)?;
+        Ok(event.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
