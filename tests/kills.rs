@@ -4,15 +4,7 @@
 mod support;
 
 use rustix::process::Signal;
-use support::{Run, assert_nothing_left, processes_of, run};
-
-const STAGES: [&str; 5] = [
-    "x80-link",
-    "dead-reckoning",
-    "mapper",
-    "planner",
-    "controller",
-];
+use support::{Run, STAGES, assert_nothing_left, processes_of, run};
 
 /// Mission time runs so many times as fast as the wall's: a mission takes ten seconds.
 const PACE: &str = "4";

@@ -8,12 +8,12 @@ use std::{
         fd::AsFd,
         unix::{fs::MetadataExt, net::UnixDatagram},
     },
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
     time::{Duration, Instant},
 };
 
 use rustix::process::Signal;
-use support::{PATIENCE, assert_nothing_left, find, firsthand, signal_process};
+use support::{PATIENCE, Run, assert_nothing_left, find, firsthand, signal_process};
 use tempfile::TempDir;
 
 /// What a unit would give as WatchdogSec.
@@ -127,9 +127,11 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
     manager.socket.set_nonblocking(false).unwrap();
     manager.socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     assert!(manager.socket.recv(&mut message).is_err(), "it speaks");
-    // As systemd would, after which the stages go with it.
+    // As systemd would, after which the stages go with it and the next run finds nothing in its way.
     signal_process(run.id(), Signal::KILL);
     run.wait().unwrap();
+    assert_eq!(support::run("hang", "open-room", &[]).0, Some(0));
+    assert_nothing_left("hang");
 }
 
 #[test]
@@ -174,4 +176,158 @@ fn in_a_journal_a_stages_death_has_its_priority() {
         |name: &str| std::fs::read_to_string(directory.path().join("run").join(name)).unwrap();
     assert!(log("supervisor.log").contains("stage ended"));
     assert!(!log("mapper.log").contains("<6>"));
+}
+
+/// Stages that this test starts and starts again, as systemd would.
+struct Units {
+    robot: &'static str,
+    running: Vec<(&'static str, Child)>,
+    // Their words go to files there.
+    directory: TempDir,
+}
+
+impl Units {
+    fn start(robot: &'static str) -> Self {
+        let mut units = Self {
+            robot,
+            running: Vec::new(),
+            directory: tempfile::tempdir().unwrap(),
+        };
+        for stage in support::STAGES {
+            units.start_one(stage);
+        }
+        units
+    }
+
+    fn start_one(&mut self, stage: &'static str) {
+        let mut log = std::fs::File::options();
+        let log = log.create(true).append(true).open(self.log(stage));
+        let child = firsthand(&["stage", stage, "--robot", self.robot])
+            .stderr(log.unwrap())
+            .spawn()
+            .unwrap();
+        self.running.push((stage, child));
+    }
+
+    fn log(&self, stage: &str) -> std::path::PathBuf {
+        self.directory.path().join(stage)
+    }
+
+    /// SIGKILL, and a successor when it is reaped, as with `Restart=always`.
+    fn kill_and_restart(&mut self, stage: &'static str) {
+        let at = self.running.iter().position(|(name, _)| *name == stage);
+        let (_, mut child) = self.running.swap_remove(at.unwrap());
+        signal_process(child.id(), Signal::KILL);
+        child.wait().unwrap();
+        self.start_one(stage);
+    }
+
+    /// Wait until all have ended of themselves, each in order.
+    fn assert_all_leave(&mut self) {
+        for (stage, mut child) in self.running.drain(..) {
+            let code = child.wait().unwrap().code();
+            let log = std::fs::read_to_string(self.directory.path().join(stage)).unwrap();
+            assert_eq!(code, Some(0), "{stage}: {log}");
+        }
+    }
+}
+
+impl Drop for Units {
+    fn drop(&mut self) {
+        for (_, child) in &mut self.running {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// A supervisor that only watches, with a bus to join.
+fn watching(robot: &'static str) -> (Run, Units) {
+    let mut run = Run::start(robot, "obstacle-course", &["--pace", "4", "--watch-only"]);
+    run.wait_until("there is a bus", |status| status["order"] == "starting");
+    (run, Units::start(robot))
+}
+
+#[test]
+fn stages_that_another_starts_drive_and_survive_kills_under_a_supervisor_that_only_watches() {
+    let (mut run, mut units) = watching("units");
+    run.wait_until_under_way(2.0);
+    for stage in support::STAGES {
+        units.kill_and_restart(stage);
+        run.wait_until("its next life runs", |status| {
+            let stage = find(status, stage);
+            stage["generation"] == 2 && stage["state"] == "running"
+        });
+    }
+    let (code, summary) = run.finish();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(0), &"reached".into()),
+        "{summary}"
+    );
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    for stage in support::STAGES {
+        assert_eq!(summary["restarts"][stage], 1, "{summary}");
+    }
+    units.assert_all_leave();
+    assert_nothing_left("units");
+}
+
+#[test]
+fn a_frozen_stage_of_another_is_ended_by_the_supervisor_that_only_watches() {
+    let (mut run, mut units) = watching("unit-hang");
+    let status = run.wait_until_under_way(1.0);
+    let mapper = find(&status, "mapper")["pid"].as_u64().unwrap() as u32;
+    signal_process(mapper, Signal::STOP);
+    let at = units.running.iter().position(|(name, _)| *name == "mapper");
+    let (_, mut frozen) = units.running.swap_remove(at.unwrap());
+    assert_eq!(frozen.wait().unwrap().code(), None, "it was not signalled");
+    units.start_one("mapper");
+    run.wait_until("its next life runs", |status| {
+        find(status, "mapper")["generation"] == 2 && find(status, "mapper")["state"] == "running"
+    });
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
+    units.assert_all_leave();
+    assert_nothing_left("unit-hang");
+}
+
+#[test]
+fn stages_that_another_starts_stop_the_robot_and_end_when_the_supervisor_is_killed() {
+    let robot = "unit-orphan";
+    let (mut run, mut units) = watching(robot);
+    run.wait_until_under_way(1.0);
+    run.signal(Signal::KILL);
+    run.reap();
+    units.assert_all_leave();
+    let log = std::fs::read_to_string(units.log("x80-link")).unwrap();
+    assert!(log.contains("robot told to stand"), "{log}");
+    assert_eq!(support::run(robot, "open-room", &[]).0, Some(0));
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn a_stage_without_a_place_is_refused_with_the_remedy() {
+    let refused = |stage: &str, robot: &str| {
+        let output = support::output(&["stage", stage, "--robot", robot]);
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let none = refused("mapper", "nobody");
+    assert!(none.contains("--watch-only"), "{none}");
+
+    let mut own = Run::start("own", "open-room", &["--pace", "1"]);
+    own.wait_until("it drives", |status| status["order"] == "driving");
+    let child = refused("mapper", "own");
+    assert!(child.contains("starts its stages itself"), "{child}");
+    own.signal(Signal::TERM);
+    own.finish();
+
+    let (mut run, units) = watching("taken");
+    run.wait_until_under_way(0.5);
+    let second = refused("mapper", "taken");
+    assert!(second.contains("lives already"), "{second}");
+    run.signal(Signal::TERM);
+    run.finish();
+    drop(units);
 }

@@ -113,6 +113,12 @@ impl Domain {
         Ok(tenants)
     }
 
+    /// Leads to the run directory where a supervisor leaves it to others to start its stages.
+    #[must_use]
+    pub fn run_link(&self) -> PathBuf {
+        self.directory.join("run")
+    }
+
     /// Under it lie the node and service files of the middleware.
     #[must_use]
     pub fn middleware_root(&self) -> PathBuf {

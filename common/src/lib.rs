@@ -19,6 +19,7 @@
 //! | [`run`] | what the supervisor tells the stages of a run |
 //! | [`signals`] | signals as something to wait for |
 //! | [`shell`] | the process shell every stage runs in |
+//! | `guest` | how a stage that the supervisor did not start finds its place |
 //! | [`wire`] | the X80's protocol: frames and messages |
 //! | [`truth`] | what a simulated robot tells of itself |
 
@@ -29,6 +30,7 @@ pub mod clock;
 pub mod domain;
 pub mod geometry;
 pub mod grid;
+mod guest;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;

@@ -691,6 +691,8 @@ wire_enum! {
         Signalled = 1,
         /// By a signal, and it left a core; `code` is its number.
         SignalledWithCore = 2,
+        /// It was not the supervisor's child: who started it knows.
+        Unknown = 3,
     }
 }
 

@@ -2,15 +2,17 @@
 //!
 //! A stage's own shell file implements [`Process`]: it wires topics to its pure step, and nothing else.
 
-use std::{path::PathBuf, time::Duration};
+use std::{fs::File, os::fd::OwnedFd, path::PathBuf, time::Duration};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
 use crate::{
     bus::{Bus, BusError, Writer},
     checkpoint::CheckpointError,
     clock::{MissionClock, MissionTime, monotonic_ns},
-    domain::Domain,
+    domain::{Domain, RobotName},
+    guest,
     run::{Run, RunError},
     samples::{HealthSample, HealthState, name},
     signals::{SIGTERM, Signals},
@@ -36,8 +38,35 @@ pub struct Life {
     pub generation: u32,
     /// Ticks before this one are another life's.
     pub first_tick: u64,
-    /// The process that must live for this one to live.
-    pub supervisor: u32,
+}
+
+/// How a stage's process came to be.
+#[derive(Clone, Debug)]
+pub enum Start {
+    /// The supervisor started it.
+    Child {
+        /// Which life it is.
+        life: Life,
+        /// The supervisor's process, which must live for this one to live.
+        supervisor: u32,
+    },
+    /// Somebody else started it, for a supervisor that only watches; the rest it finds itself.
+    Guest {
+        /// Which stage to be.
+        stage: &'static str,
+        /// For whom.
+        robot: RobotName,
+    },
+}
+
+/// A process in its place.
+pub(crate) struct Joined {
+    pub(crate) life: Life,
+    pub(crate) run: Run,
+    pub(crate) bus: Bus,
+    /// Becomes readable when the supervisor is gone; a child is signalled instead.
+    pub(crate) supervisor: Option<OwnedFd>,
+    pub(crate) tenancy: File,
 }
 
 /// Why a stage's process ended.
@@ -134,45 +163,95 @@ pub trait Process: Sized {
 ///
 /// # Errors
 /// What [`Process`] says, or what keeps it from being opened.
-pub fn live<P: Process>(life: &Life) -> Result<(), StageError> {
-    let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
-    become_child(life.stage, life.supervisor)?;
-    let run = Run::load(&life.directory)?;
-    let domain = Domain::of(run.robot.clone());
-    let _tenancy = domain
-        .enter()
-        .map_err(system("enter the robot's directory"))?;
-    let bus = Bus::join(&domain, life.stage)?;
+pub fn live<P: Process>(start: &Start) -> Result<(), StageError> {
+    let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
+    let Joined {
+        life,
+        run,
+        bus,
+        supervisor,
+        tenancy: _tenancy,
+    } = match start {
+        Start::Child { life, supervisor } => join_as_child(life, *supervisor)?,
+        Start::Guest { stage, robot } => guest::join(stage, robot)?,
+    };
     let mut waiter = Waiter::default();
     waiter.on_readable(&terminated)?;
-    let mut heart = Heart::new(&bus, life)?;
+    if let Some(supervisor) = &supervisor {
+        waiter.on_readable(supervisor)?;
+    }
+    let mut end = End {
+        terminated,
+        supervisor,
+    };
+    let mut heart = Heart::new(&bus, &life)?;
     heart.beat(HealthState::Starting, Progress::default())?;
+    let generation = life.generation;
     let mut context = Context {
-        life: life.clone(),
+        life,
         run,
         bus,
         waiter,
     };
     let mut process = P::open(&mut context)?;
-    tracing::info!(generation = life.generation, "ready");
-    let worked = work(&mut process, &mut heart, &context, &mut terminated);
+    tracing::info!(generation, "ready");
+    let worked = work(&mut process, &mut heart, &context, &mut end);
     // Whatever went wrong, goodbye is said: the link's stops the robot.
     let stopped = process.stop();
     tracing::info!("stopped");
     worked.and(stopped)
 }
 
+fn join_as_child(life: &Life, supervisor: u32) -> Result<Joined, StageError> {
+    become_child(life.stage, supervisor)?;
+    let run = Run::load(&life.directory)?;
+    let domain = Domain::of(run.robot.clone());
+    let tenancy = enter(&domain)?;
+    let bus = Bus::join(&domain, life.stage)?;
+    Ok(Joined {
+        life: life.clone(),
+        run,
+        bus,
+        supervisor: None,
+        tenancy,
+    })
+}
+
+pub(crate) fn enter(domain: &Domain) -> Result<File, StageError> {
+    domain
+        .enter()
+        .map_err(system("enter the robot's directory"))
+}
+
+/// What ends a stage in order: SIGTERM, or the end of a supervisor that is not its parent.
+struct End {
+    terminated: Signals,
+    supervisor: Option<OwnedFd>,
+}
+
+impl End {
+    fn came(&mut self) -> bool {
+        self.terminated.came() || self.supervisor.as_ref().is_some_and(readable)
+    }
+}
+
+/// Whether `descriptor` is readable now.
+fn readable(descriptor: &OwnedFd) -> bool {
+    let mut polled = [PollFd::new(descriptor, PollFlags::IN)];
+    matches!(poll(&mut polled, Some(&Timespec::default())), Ok(ready) if ready > 0)
+}
+
 fn work(
     process: &mut impl Process,
     heart: &mut Heart,
     context: &Context,
-    terminated: &mut Signals,
+    end: &mut End,
 ) -> Result<(), StageError> {
     let without_lulls = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
     let mut busy = true;
-    while !terminated.came() {
+    while !end.came() {
         let came = context.waiter.wait(if busy { LULL } else { BEAT })?;
         progress = process.turn()?;
         if without_lulls || busy && !came {
@@ -193,11 +272,7 @@ fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {
 /// # Errors
 /// When the supervisor is gone already, or the system is no Linux.
 pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageError> {
-    // A name with a zero byte cannot come from the table.
-    if let Ok(name) = std::ffi::CString::new(process_name) {
-        rustix::thread::set_name(&name)
-            .map_err(|errno| system("name the process")(errno.into()))?;
-    }
+    name_process(process_name)?;
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
         .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
     // It may have died before that took hold.
@@ -209,6 +284,16 @@ pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageErro
             "supervisor {supervisor} is gone; start stages through `firsthand run`"
         )))
     }
+}
+
+/// Take a name that `ps` and `pkill` show.
+pub(crate) fn name_process(name: &str) -> Result<(), StageError> {
+    // A name with a zero byte cannot come from the table.
+    if let Ok(name) = std::ffi::CString::new(name) {
+        rustix::thread::set_name(&name)
+            .map_err(|errno| system("name the process")(errno.into()))?;
+    }
+    Ok(())
 }
 
 /// Beats from inside the work loop: a stage that hangs or spins stops beating.

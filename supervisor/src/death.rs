@@ -5,13 +5,14 @@ use std::{
     io::{self, Read as _, Seek as _, SeekFrom, Write as _},
     os::unix::process::ExitStatusExt as _,
     path::Path,
-    process::ExitStatus,
     time::Duration,
 };
 
 use common::samples::{DeathCause, DeathSample, NextStep, Words, name, words};
 use rustix::process::Signal;
 use serde::Serialize;
+
+use crate::process::Ended;
 
 /// The file of a run's deaths, a JSON object a line.
 pub(crate) const FILE_NAME: &str = "deaths.jsonl";
@@ -56,6 +57,8 @@ pub(crate) enum Cause {
         /// Whether it left a core.
         core: bool,
     },
+    /// It was another's child; its parent knows.
+    Unknown,
 }
 
 /// What the supervisor does about it.
@@ -77,7 +80,10 @@ pub(crate) enum Next {
 
 impl Cause {
     /// As the kernel tells it.
-    pub(crate) fn of(status: ExitStatus) -> Self {
+    pub(crate) fn of(ended: Ended) -> Self {
+        let Ended::Child(status) = ended else {
+            return Self::Unknown;
+        };
         match (status.code(), status.signal()) {
             (Some(code), _) => Self::Exited(code),
             (None, signal) => Self::Signalled {
@@ -92,6 +98,7 @@ impl std::fmt::Display for Cause {
     fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
             Self::Exited(code) => write!(to, "exit code {code}"),
+            Self::Unknown => Ended::Guest.fmt(to),
             Self::Signalled { signal, core } => {
                 match Signal::from_named_raw(signal) {
                     Some(named) => write!(to, "{named:?}")?,
@@ -130,6 +137,7 @@ impl Death {
                 core: false,
             } => (DeathCause::Signalled, signal),
             Cause::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
+            Cause::Unknown => (DeathCause::Unknown, 0),
         };
         let (next, after) = match self.next {
             Next::StartNow => (NextStep::StartNow, 0.0),

@@ -79,6 +79,8 @@ pub(crate) struct Held {
     domain: Domain,
     // Dropped before the files are removed.
     bus: Option<(Services, Bus)>,
+    // Held while the bus is made and removed: stages wait before the door.
+    shut: Option<File>,
     _lock: File,
 }
 
@@ -87,7 +89,7 @@ impl Held {
     /// `cells`.
     pub(crate) fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         let lock = lock(&domain)?;
-        wait_for_tenants(&domain)?;
+        let shut = Some(wait_for_tenants(&domain)?);
         wipe(&domain)?;
         check_shared_memory(
             SHARED_MEMORY,
@@ -96,12 +98,14 @@ impl Held {
         let mut held = Self {
             domain,
             bus: None,
+            shut,
             _lock: lock,
         };
         Bus::write_config(&held.domain)?;
         let bus = Bus::join(&held.domain, "supervisor")?;
         let services = bus.create_all()?;
         held.bus = Some((services, bus));
+        held.shut = None;
         Ok(held)
     }
 
@@ -114,6 +118,10 @@ impl Held {
 impl Drop for Held {
     fn drop(&mut self) {
         self.bus = None;
+        if self.shut.is_none() {
+            // Stages that another started may still be leaving, or just coming.
+            self.shut = wait_for_tenants(&self.domain).ok();
+        }
         // The lock goes last, with its directory: who waits for it finds nothing and makes its own.
         let _ = wipe(&self.domain);
         for file in [self.domain.tenants_file(), self.domain.lock_file()] {
@@ -193,14 +201,14 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
     }
 }
 
-/// Wait until no stage of an earlier supervisor lives: what they use is wiped next.
-fn wait_for_tenants(domain: &Domain) -> Result<(), DomainError> {
+/// Wait until no stage lives in the domain: what they use is wiped next. None enters while the result is held.
+fn wait_for_tenants(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.tenants_file();
     let tenants = File::create(&path).map_err(failed("make", &path))?;
     let began = Instant::now();
     loop {
         match tenants.try_lock() {
-            Ok(()) => return Ok(()),
+            Ok(()) => return Ok(tenants),
             Err(fs::TryLockError::WouldBlock) if began.elapsed() < TENANTS_LEAVE => {
                 // A file lock has no descriptor to wait on.
                 std::thread::park_timeout(TENANTS_LOOK);
@@ -223,11 +231,12 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}
         Err(error) => return Err(failed("remove", &root)(error)),
     }
-    let config = domain.middleware_config();
-    match fs::remove_file(&config) {
-        Ok(()) => {}
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        Err(error) => return Err(failed("remove", &config)(error)),
+    for file in [domain.middleware_config(), domain.run_link()] {
+        match fs::remove_file(&file) {
+            Ok(()) => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(failed("remove", &file)(error)),
+        }
     }
     let prefix = domain.shared_memory_prefix();
     let shared = Path::new(SHARED_MEMORY);

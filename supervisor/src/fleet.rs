@@ -16,7 +16,7 @@ use thiserror::Error;
 use crate::{
     death::{self, Cause, Death, Next},
     policy::{Action, Event, Now, Phase, Policy},
-    process::{Process, firsthand},
+    process::{Ended, Process, firsthand},
     stages::{Stage, start_order},
 };
 
@@ -52,12 +52,23 @@ pub(crate) struct Fleet {
     members: Vec<Member>,
     directory: PathBuf,
     clock: Instant,
+    /// Who starts the stages.
+    starter: Starter,
     ending: bool,
+}
+
+/// Who starts a stage, and starts it again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Starter {
+    /// We do.
+    Supervisor,
+    /// Systemd, a person: a stage is known once it beats, and its next life is waited for.
+    Another,
 }
 
 impl Fleet {
     /// None running yet; they will live in the run directory.
-    pub(crate) fn new(directory: PathBuf) -> Self {
+    pub(crate) fn new(directory: PathBuf, starter: Starter) -> Self {
         let member = |stage| Member {
             stage,
             policy: Policy::new(stage),
@@ -73,6 +84,7 @@ impl Fleet {
             members: start_order().into_iter().map(member).collect(),
             directory,
             clock: Instant::now(),
+            starter,
             ending: false,
         }
     }
@@ -81,8 +93,11 @@ impl Fleet {
         self.clock.elapsed()
     }
 
-    /// Start every stage, in order.
+    /// Start every stage, in order, if that is ours to do.
     pub(crate) fn start_all(&mut self) -> Result<(), FleetError> {
+        if self.starter == Starter::Another {
+            return Ok(());
+        }
         let now = self.now();
         for index in 0..self.members.len() {
             let action = self.members[index].policy.start(now);
@@ -132,8 +147,37 @@ impl Fleet {
             .map(|member| (member.stage.name, member.generation.saturating_sub(1)))
     }
 
-    /// A heartbeat came. Says whether a stage became ready by it.
+    /// The stages that do not.
+    pub(crate) fn missing(&self) -> Vec<&'static str> {
+        let missing = |member: &&Member| !matches!(member.policy.phase(), Phase::Running { .. });
+        let members = self.members.iter().filter(missing);
+        members.map(|member| member.stage.name).collect()
+    }
+
+    /// A guest that was not known beats: from now on it is watched like a child.
+    fn meet(&mut self, health: &HealthSample) -> bool {
+        let now = self.now();
+        let Some(member) = self.members.iter_mut().find(|member| {
+            member.stage.name == name_str(&health.stage)
+                && member.process.is_none()
+                // Beats of the dead may still be on their way.
+                && member.generation < health.stamp.generation
+        }) else {
+            return false;
+        };
+        let Ok(process) = Process::adopt(health.pid, member.stage.name) else {
+            return false;
+        };
+        member.policy.start(now);
+        member.process = Some(process);
+        member.generation = health.stamp.generation;
+        member.started = now;
+        true
+    }
+
+    /// A heartbeat came. Says whether what the roster says of the stage changed by it.
     pub(crate) fn on_health(&mut self, health: &HealthSample) -> bool {
+        let met = self.starter == Starter::Another && !self.ending && self.meet(health);
         let now = self.now();
         let Some(member) = self.members.iter_mut().find(|member| {
             member.stage.name == name_str(&health.stage)
@@ -148,7 +192,7 @@ impl Fleet {
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
         };
         member.policy.step(event, now);
-        !was_running && event == Event::BeatReady
+        met || !was_running && event == Event::BeatReady
     }
 
     /// A stage published something.
@@ -182,7 +226,7 @@ impl Fleet {
     }
 
     /// What ended a stage's process, if it has ended.
-    fn reap(&mut self, index: usize) -> Result<Option<std::process::ExitStatus>, FleetError> {
+    fn reap(&mut self, index: usize) -> Result<Option<Ended>, FleetError> {
         let member = &mut self.members[index];
         let Some(process) = &mut member.process else {
             return Ok(None);
@@ -282,7 +326,7 @@ impl Fleet {
         let member = &mut self.members[index];
         let stage = member.stage.name;
         let signal = match action {
-            Action::Start if self.ending => {
+            Action::Start if self.ending || self.starter == Starter::Another => {
                 member.policy.step(Event::Stop, now);
                 member.policy.step(Event::Exited, now);
                 return Ok(());

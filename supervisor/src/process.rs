@@ -1,7 +1,8 @@
-//! A child process: started from this very executable, watched through a pidfd, signalled, reaped.
+//! A process: a child started from this very executable, or a guest that somebody else started; watched through
+//! a pidfd, signalled, and reaped if it is ours.
 
 use std::{
-    io,
+    fmt, fs, io,
     os::{
         fd::{AsFd, BorrowedFd, OwnedFd},
         unix::process::CommandExt,
@@ -36,11 +37,31 @@ pub(crate) fn firsthand(arguments: &[&str]) -> Command {
     command
 }
 
-/// A child and the descriptor that becomes readable when it ends.
+/// A process and the descriptor that becomes readable when it ends.
 #[derive(Debug)]
 pub(crate) struct Process {
-    child: Child,
+    /// None of a guest: its parent reaps it.
+    child: Option<Child>,
+    id: u32,
     pidfd: OwnedFd,
+}
+
+/// How a process ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Ended {
+    /// A child, so.
+    Child(ExitStatus),
+    /// A guest; how, its parent knows.
+    Guest,
+}
+
+impl fmt::Display for Ended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Child(status) => status.fmt(f),
+            Self::Guest => f.write_str("ask who started it (systemctl, journalctl)"),
+        }
+    }
 }
 
 impl Process {
@@ -48,7 +69,11 @@ impl Process {
     pub(crate) fn spawn(mut command: Command) -> io::Result<Self> {
         let mut child = command.spawn()?;
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
-            Ok(pidfd) => Ok(Self { child, pidfd }),
+            Ok(pidfd) => Ok(Self {
+                id: child.id(),
+                child: Some(child),
+                pidfd,
+            }),
             Err(error) => {
                 // Unwatched it must not live.
                 let _ = child.kill();
@@ -58,14 +83,31 @@ impl Process {
         }
     }
 
+    /// Watch process `id`, which calls itself `name` and spoke a moment ago, and which another started.
+    pub(crate) fn adopt(id: u32, name: &str) -> io::Result<Self> {
+        let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
+        let pid = pid.ok_or(io::ErrorKind::NotFound)?;
+        let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
+        // Should it have died meanwhile and its number be another's, that one must not be signalled for it.
+        let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
+        if called.trim_end() != name {
+            return Err(io::ErrorKind::NotFound.into());
+        }
+        Ok(Self {
+            child: None,
+            id,
+            pidfd,
+        })
+    }
+
     /// Its process id.
-    pub(crate) fn id(&self) -> u32 {
-        self.child.id()
+    pub(crate) const fn id(&self) -> u32 {
+        self.id
     }
 
     /// Its standard output, once, if it is piped.
     pub(crate) fn take_stdout(&mut self) -> Option<ChildStdout> {
-        self.child.stdout.take()
+        self.child.as_mut()?.stdout.take()
     }
 
     /// Send it a signal; one that is gone gets none.
@@ -74,8 +116,22 @@ impl Process {
     }
 
     /// Reap it, if it has ended.
-    pub(crate) fn try_reap(&mut self) -> io::Result<Option<ExitStatus>> {
-        self.child.try_wait()
+    pub(crate) fn try_reap(&mut self) -> io::Result<Option<Ended>> {
+        let Some(child) = &mut self.child else {
+            let gone = self.wait(Duration::ZERO)?;
+            return Ok(gone.then_some(Ended::Guest));
+        };
+        Ok(child.try_wait()?.map(Ended::Child))
+    }
+
+    /// Wait until it has ended; says whether it has.
+    fn wait(&self, patience: Duration) -> io::Result<bool> {
+        let mut polled = [PollFd::new(&self.pidfd, PollFlags::IN)];
+        match poll(&mut polled, Timespec::try_from(patience).ok().as_ref()) {
+            Ok(ready) => Ok(ready > 0),
+            Err(rustix::io::Errno::INTR) => Ok(false),
+            Err(errno) => Err(errno.into()),
+        }
     }
 }
 
@@ -84,15 +140,13 @@ impl Process {
     pub(crate) fn end(&mut self, grace: Duration) {
         self.signal(Signal::TERM);
         let began = Instant::now();
-        while matches!(self.child.try_wait(), Ok(None)) {
+        while matches!(self.try_reap(), Ok(None)) {
             let left = grace.saturating_sub(began.elapsed());
             if left.is_zero() {
                 self.signal(Signal::KILL);
             }
-            let mut polled = [PollFd::new(&self.pidfd, PollFlags::IN)];
-            let timeout = Timespec::try_from(left.max(KILLED_WITHIN)).ok();
-            // Interrupted or not, the child is looked at again.
-            let _ = poll(&mut polled, timeout.as_ref());
+            // Interrupted or not, it is looked at again.
+            let _ = self.wait(left.max(KILLED_WITHIN));
         }
     }
 }
@@ -104,11 +158,13 @@ impl AsFd for Process {
 }
 
 impl Drop for Process {
-    /// Nothing is left running, whatever went wrong.
+    /// Nothing of ours is left running, whatever went wrong.
     fn drop(&mut self) {
-        if !matches!(self.child.try_wait(), Ok(Some(_))) {
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+        if let Some(child) = &mut self.child
+            && !matches!(child.try_wait(), Ok(Some(_)))
+        {
+            let _ = child.kill();
+            let _ = child.wait();
         }
     }
 }

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use common::{
-    shell::{Life, StageError, live},
+    shell::{StageError, Start, live},
     topics::{
         AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
         SURROUNDINGS, WHEELS,
@@ -29,7 +29,7 @@ pub(crate) struct Stage {
     /// What the robot does while the stage is down.
     pub(crate) while_down: &'static str,
     /// Its process.
-    pub(crate) live: fn(&Life) -> Result<(), StageError>,
+    pub(crate) live: fn(&Start) -> Result<(), StageError>,
 }
 
 /// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded

@@ -2,6 +2,7 @@
 
 use std::{
     fmt, fs, io,
+    os::unix::fs::symlink,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -26,7 +27,7 @@ use thiserror::Error;
 use crate::{
     death,
     domain::{DomainError, Held},
-    fleet::{Fleet, FleetError},
+    fleet::{Fleet, FleetError, Starter},
     observer::{Observer, Record},
     report::{Ending, Outcome, Summary},
     service::ServiceManager,
@@ -50,6 +51,8 @@ pub(crate) struct Options {
     pub(crate) pace: Pace,
     /// Where logs, checkpoints and results go; must exist.
     pub(crate) directory: PathBuf,
+    /// Who starts the stages.
+    pub(crate) starter: Starter,
 }
 
 /// Why a run could not be carried out.
@@ -221,7 +224,7 @@ impl<'a> Supervisor<'a> {
         waiter.on(bus.alarm(&topics::REQUESTS)?);
         let mut supervisor = Self {
             options,
-            fleet: Fleet::new(directory.clone()),
+            fleet: Fleet::new(directory.clone(), options.starter),
             simulator,
             observer,
             waiter,
@@ -244,6 +247,12 @@ impl<'a> Supervisor<'a> {
         };
         supervisor.restate()?;
         supervisor.fleet.start_all()?;
+        if options.starter == Starter::Another {
+            let link = Domain::of(options.robot.clone()).run_link();
+            symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
+            // The stages come after this.
+            supervisor.service.ready();
+        }
         Ok(supervisor)
     }
 
@@ -437,7 +446,13 @@ impl<'a> Supervisor<'a> {
         }
         if self.makes_no_progress() {
             let held: Vec<_> = self.fleet.held().collect();
-            let reason = if !held.is_empty() {
+            let missing = self.fleet.missing();
+            let reason = if self.options.starter == Starter::Another && !missing.is_empty() {
+                let (robot, missing) = (&self.options.robot, missing.join(", "));
+                format!(
+                    "not running: {missing}; start each with `firsthand stage NAME --robot {robot}`"
+                )
+            } else if !held.is_empty() {
                 let (held, file) = (held.join(", "), death::FILE_NAME);
                 format!("{held} died again and again and is held; see {file} in the run directory")
             } else if !self.ready && !self.robot_answers() {
@@ -515,8 +530,10 @@ impl<'a> Supervisor<'a> {
 
     fn restate(&mut self) -> Result<(), SupervisorError> {
         self.restated = Some(Instant::now());
-        let pose = self.observer.record.pose.unwrap_or_default();
-        let (tick, time) = (pose.stamp.tick, pose.stamp.time());
+        let record = &self.observer.record;
+        // A stage that another starts takes its first tick from here: it must not be one that was made.
+        let tick = record.newest_tick().unwrap_or_default();
+        let time = record.pose.unwrap_or_default().stamp.time();
         let directive = DirectiveSample {
             order: self.order.into(),
             epoch: self.stall.epoch(),

@@ -17,6 +17,15 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
 
+/// Every stage, in the order of the pipeline.
+pub const STAGES: [&str; 5] = [
+    "x80-link",
+    "dead-reckoning",
+    "mapper",
+    "planner",
+    "controller",
+];
+
 /// Nothing a test waits for takes nearly as long; what does is broken.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 

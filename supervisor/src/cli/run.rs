@@ -15,6 +15,7 @@ use common::{
 
 use super::{Failure, missions};
 use crate::{
+    fleet::Starter,
     logging,
     picture::{self, Facts, Scene},
     report::{self, Outcome, Summary},
@@ -45,6 +46,9 @@ pub(super) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed: `--set start.heading_deg=90`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Start no stages: systemd does, or you do, with `firsthand stage NAME --robot R`.
+    #[arg(long)]
+    watch_only: bool,
     /// End with one line of JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -84,6 +88,11 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         robot: arguments.robot.clone(),
         pace: arguments.pace,
         directory: directory.clone(),
+        starter: if arguments.watch_only {
+            Starter::Another
+        } else {
+            Starter::Supervisor
+        },
     };
     // The supervisor's own log lies beside its stages'.
     logging::to_file(&directory.join("supervisor.log"), "info")?;

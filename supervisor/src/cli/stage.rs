@@ -1,41 +1,55 @@
-//! `firsthand stage NAME`: the process of one stage. The supervisor starts these.
+//! `firsthand stage NAME`: the process of one stage. The supervisor starts these, or leaves it to systemd.
 
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use common::shell::Life;
+use common::{
+    domain::RobotName,
+    shell::{Life, Start},
+};
 
 use super::Failure;
 use crate::stages;
 
-/// Be one stage of a run (the supervisor starts these).
+/// Be one stage of a run. The supervisor starts these, unless it was given --watch-only: then you do, or systemd.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Its name in the table (`firsthand stages`).
     name: String,
+    /// Whose, where the supervisor only watches; it says the rest.
+    #[arg(long, default_value = "x80", conflicts_with = "supervisor")]
+    robot: RobotName,
+    /// The process that must live for this one to live, the parent.
+    #[arg(long, hide = true, requires = "run")]
+    supervisor: Option<u32>,
     /// The run directory.
-    #[arg(long)]
-    run: PathBuf,
+    #[arg(long, hide = true, requires = "supervisor")]
+    run: Option<PathBuf>,
     /// Which life of the stage this is.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, hide = true, requires = "supervisor", default_value_t = 1)]
     generation: u32,
     /// Ticks before this one are another life's.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, hide = true, requires = "supervisor", default_value_t = 0)]
     first_tick: u64,
-    /// The process that must live for this one to live.
-    #[arg(long)]
-    supervisor: u32,
 }
 
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let stage = stages::find(&arguments.name).ok_or_else(|| stages::unknown(&arguments.name))?;
-    let life = Life {
-        stage: stage.name,
-        directory: arguments.run.clone(),
-        generation: arguments.generation,
-        first_tick: arguments.first_tick,
-        supervisor: arguments.supervisor,
+    let start = match (arguments.supervisor, &arguments.run) {
+        (Some(supervisor), Some(directory)) => Start::Child {
+            life: Life {
+                stage: stage.name,
+                directory: directory.clone(),
+                generation: arguments.generation,
+                first_tick: arguments.first_tick,
+            },
+            supervisor,
+        },
+        _ => Start::Guest {
+            stage: stage.name,
+            robot: arguments.robot.clone(),
+        },
     };
-    (stage.live)(&life)?;
+    (stage.live)(&start)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,0 +1,145 @@
+//! A stage that somebody else started (systemd, a person): it finds the run, its place in it, and the supervisor.
+//!
+//! A supervisor that leaves its stages to others links its run directory into the robot's domain, and says in the
+//! roster which of them are down. A stage takes its place when the roster shows it free.
+
+use std::{
+    fs, io,
+    os::fd::OwnedFd,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use rustix::process::{Pid, PidfdFlags, pidfd_open};
+
+use crate::{
+    bus::Bus,
+    domain::{Domain, RobotName},
+    run::Run,
+    samples::{Order, name_str},
+    shell::{Joined, Life, StageError, enter, name_process},
+    topics,
+    waiter::Waiter,
+};
+
+/// The roster comes five times a second, and a place whose holder has died is free in the next.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Take the place of `stage` in what `robot` does.
+pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
+    name_process(stage)?;
+    let domain = Domain::of(robot.clone());
+    if !domain.directory().exists() {
+        return Err(StageError::Other(format!(
+            "robot {:?} has no supervisor here; start one first, with `firsthand run --watch-only`",
+            robot.to_string()
+        )));
+    }
+    // Waits while the supervisor makes the bus.
+    let tenancy = enter(&domain)?;
+    let directory = fs::read_link(domain.run_link()).map_err(|_| {
+        StageError::Other(format!(
+            "the supervisor of robot {:?} starts its stages itself; to start them yourself, give `firsthand run` --watch-only",
+            robot.to_string()
+        ))
+    })?;
+    let run = Run::load(&directory)?;
+    let bus = Bus::join(&domain, stage)?;
+    let place = wait_for_place(&bus, stage)?;
+    let generation = next_life(&directory, stage).map_err(|error| {
+        StageError::Other(format!(
+            "cannot count the lives of {stage} in {}: {error}",
+            directory.display()
+        ))
+    })?;
+    let life = Life {
+        stage,
+        directory,
+        generation,
+        first_tick: place.first_tick,
+    };
+    Ok(Joined {
+        life,
+        run,
+        bus,
+        supervisor: Some(place.supervisor),
+        tenancy,
+    })
+}
+
+/// What the roster says of a free place.
+struct Place {
+    first_tick: u64,
+    supervisor: OwnedFd,
+}
+
+fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
+    let mut roster = bus.slice_reader(&topics::ROSTER)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.alarm(&topics::ROSTER)?);
+    let began = Instant::now();
+    let mut holder = None;
+    while began.elapsed() < PATIENCE {
+        while let Some(entries) = roster.take()? {
+            let header = entries.header();
+            if Order::from_byte(header.order) == Order::Stop {
+                return Err(StageError::Other("the robot is being stopped".to_owned()));
+            }
+            holder = entries
+                .iter()
+                .find(|entry| name_str(&entry.stage) == stage)
+                .map(|entry| entry.pid);
+            if holder == Some(0) {
+                return Ok(Place {
+                    first_tick: header.stamp.tick + 1,
+                    supervisor: watch(header.supervisor_pid)?,
+                });
+            }
+        }
+        waiter.wait(PATIENCE)?;
+    }
+    Err(StageError::Other(match holder {
+        Some(pid) => format!("{stage} lives already, as process {pid}; end that one first"),
+        None => "no supervisor speaks on the robot's bus; is it frozen?".to_owned(),
+    }))
+}
+
+/// A descriptor that becomes readable when the supervisor ends. It spoke a moment ago: the number is still its own.
+fn watch(pid: u32) -> Result<OwnedFd, StageError> {
+    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+    let gone = || StageError::Other("the supervisor is gone".to_owned());
+    pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())
+}
+
+/// One more life of `stage`, counted in the run directory: readers drop what an older one said.
+fn next_life(directory: &Path, stage: &str) -> io::Result<u32> {
+    let counter = directory.join(format!("{stage}.lives"));
+    let lived: u32 = match fs::read_to_string(&counter) {
+        Ok(text) => text.trim().parse().map_err(io::Error::other)?,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => 0,
+        Err(error) => return Err(error),
+    };
+    let generation = lived + 1;
+    // Renamed into place: a kill leaves the old count or the new one.
+    let new = directory.join(format!("{stage}.lives.new"));
+    fs::write(&new, format!("{generation}\n"))?;
+    fs::rename(&new, &counter)?;
+    Ok(generation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lives_are_counted_over_the_lives_of_processes_and_a_torn_count_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let lives: Vec<_> = (0..3)
+            .map(|_| next_life(directory.path(), "mapper").unwrap())
+            .collect();
+        assert_eq!(lives, [1, 2, 3]);
+        assert_eq!(next_life(directory.path(), "planner").unwrap(), 1);
+        fs::write(directory.path().join("mapper.lives"), "").unwrap();
+        assert!(next_life(directory.path(), "mapper").is_err());
+    }
+}
