@@ -8,7 +8,13 @@ use std::{
         fd::AsFd,
         unix::{fs::MetadataExt, net::UnixDatagram},
     },
-    process::{Child, Command, Stdio},
+    path::Path,
+    process::{Command, Stdio},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -17,7 +23,7 @@ use support::{PATIENCE, Run, assert_nothing_left, find, firsthand, signal_proces
 use tempfile::TempDir;
 
 /// What a unit would give as WatchdogSec.
-const WATCHDOG: Duration = Duration::from_millis(600);
+const WATCHDOG: Duration = Duration::from_secs(2);
 
 /// A place where a service says how it goes.
 struct Manager {
@@ -83,7 +89,7 @@ fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
     manager.hear_until("READY=1");
     // A loop that is late by a whole half would be killed; so much is left of what is allowed.
     let mut fed = Instant::now();
-    for _ in 0..6 {
+    for _ in 0..3 {
         manager.hear_until("WATCHDOG=1");
         assert!(fed.elapsed() < WATCHDOG, "{:?}", fed.elapsed());
         fed = Instant::now();
@@ -178,66 +184,61 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     assert!(!log("mapper.log").contains("<6>"));
 }
 
-/// Stages that this test starts and starts again, as systemd would.
+/// Stages that this test starts and starts again, as systemd would with `Restart=always`.
 struct Units {
-    robot: &'static str,
-    running: Vec<(&'static str, Child)>,
+    keepers: Vec<(&'static str, JoinHandle<Option<i32>>)>,
+    over: Arc<AtomicBool>,
     // Their words go to files there.
     directory: TempDir,
 }
 
 impl Units {
     fn start(robot: &'static str) -> Self {
-        let mut units = Self {
-            robot,
-            running: Vec::new(),
-            directory: tempfile::tempdir().unwrap(),
+        let over = Arc::new(AtomicBool::new(false));
+        let directory = tempfile::tempdir().unwrap();
+        let keep = |stage| {
+            let (over, log) = (Arc::clone(&over), directory.path().join(stage));
+            let keeper = thread::spawn(move || keep_up(robot, stage, &log, &over));
+            (stage, keeper)
         };
-        for stage in support::STAGES {
-            units.start_one(stage);
+        Self {
+            keepers: support::STAGES.map(keep).into(),
+            over,
+            directory,
         }
-        units
     }
 
-    fn start_one(&mut self, stage: &'static str) {
-        let mut log = std::fs::File::options();
-        let log = log.create(true).append(true).open(self.log(stage));
-        let child = firsthand(&["stage", stage, "--robot", self.robot])
-            .stderr(log.unwrap())
-            .spawn()
-            .unwrap();
-        self.running.push((stage, child));
-    }
-
-    fn log(&self, stage: &str) -> std::path::PathBuf {
-        self.directory.path().join(stage)
-    }
-
-    /// SIGKILL, and a successor when it is reaped, as with `Restart=always`.
-    fn kill_and_restart(&mut self, stage: &'static str) {
-        let at = self.running.iter().position(|(name, _)| *name == stage);
-        let (_, mut child) = self.running.swap_remove(at.unwrap());
-        signal_process(child.id(), Signal::KILL);
-        child.wait().unwrap();
-        self.start_one(stage);
+    fn log(&self, stage: &str) -> String {
+        std::fs::read_to_string(self.directory.path().join(stage)).unwrap()
     }
 
     /// Wait until all have ended of themselves, each in order.
     fn assert_all_leave(&mut self) {
-        for (stage, mut child) in self.running.drain(..) {
-            let code = child.wait().unwrap().code();
-            let log = std::fs::read_to_string(self.directory.path().join(stage)).unwrap();
-            assert_eq!(code, Some(0), "{stage}: {log}");
+        self.over.store(true, Ordering::Relaxed);
+        for (stage, keeper) in std::mem::take(&mut self.keepers) {
+            let code = keeper.join().unwrap();
+            assert_eq!(code, Some(0), "{stage}: {}", self.log(stage));
+        }
+    }
+}
+
+/// One life of a stage after another, until one leaves in order or all is over. Returns how the last one ended.
+fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
+    loop {
+        let mut append = std::fs::File::options();
+        let log = append.create(true).append(true).open(log).unwrap();
+        let mut command = firsthand(&["stage", stage, "--robot", robot]);
+        let code = command.stderr(log).status().unwrap().code();
+        if code == Some(0) || over.load(Ordering::Relaxed) {
+            return code;
         }
     }
 }
 
 impl Drop for Units {
+    /// The stages end with their supervisor; then they are let go.
     fn drop(&mut self) {
-        for (_, child) in &mut self.running {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
+        self.over.store(true, Ordering::Relaxed);
     }
 }
 
@@ -253,11 +254,7 @@ fn stages_that_another_starts_drive_and_survive_kills_under_a_supervisor_that_on
     let (mut run, mut units) = watching("units");
     run.wait_until_under_way(2.0);
     for stage in support::STAGES {
-        units.kill_and_restart(stage);
-        run.wait_until("its next life runs", |status| {
-            let stage = find(status, stage);
-            stage["generation"] == 2 && stage["state"] == "running"
-        });
+        run.kill_and_await_successor(stage, Signal::KILL);
     }
     let (code, summary) = run.finish();
     assert_eq!(
@@ -267,7 +264,7 @@ fn stages_that_another_starts_drive_and_survive_kills_under_a_supervisor_that_on
     );
     assert_eq!(summary["collisions"], 0, "{summary}");
     for stage in support::STAGES {
-        assert_eq!(summary["restarts"][stage], 1, "{summary}");
+        assert!(summary["restarts"][stage].as_u64() >= Some(1), "{summary}");
     }
     units.assert_all_leave();
     assert_nothing_left("units");
@@ -276,16 +273,8 @@ fn stages_that_another_starts_drive_and_survive_kills_under_a_supervisor_that_on
 #[test]
 fn a_frozen_stage_of_another_is_ended_by_the_supervisor_that_only_watches() {
     let (mut run, mut units) = watching("unit-hang");
-    let status = run.wait_until_under_way(1.0);
-    let mapper = find(&status, "mapper")["pid"].as_u64().unwrap() as u32;
-    signal_process(mapper, Signal::STOP);
-    let at = units.running.iter().position(|(name, _)| *name == "mapper");
-    let (_, mut frozen) = units.running.swap_remove(at.unwrap());
-    assert_eq!(frozen.wait().unwrap().code(), None, "it was not signalled");
-    units.start_one("mapper");
-    run.wait_until("its next life runs", |status| {
-        find(status, "mapper")["generation"] == 2 && find(status, "mapper")["state"] == "running"
-    });
+    run.wait_until_under_way(1.0);
+    run.kill_and_await_successor("mapper", Signal::STOP);
     run.signal(Signal::TERM);
     assert_eq!(run.finish().0, Some(0));
     units.assert_all_leave();
@@ -300,7 +289,7 @@ fn stages_that_another_starts_stop_the_robot_and_end_when_the_supervisor_is_kill
     run.signal(Signal::KILL);
     run.reap();
     units.assert_all_leave();
-    let log = std::fs::read_to_string(units.log("x80-link")).unwrap();
+    let log = units.log("x80-link");
     assert!(log.contains("robot told to stand"), "{log}");
     assert_eq!(support::run(robot, "open-room", &[]).0, Some(0));
     assert_nothing_left(robot);
@@ -330,4 +319,36 @@ fn a_stage_without_a_place_is_refused_with_the_remedy() {
     run.signal(Signal::TERM);
     run.finish();
     drop(units);
+}
+
+#[test]
+fn a_service_does_not_begin_a_mission_anew_that_was_cut_off_until_told_again() {
+    let directory = support::directory_of("cut");
+    let service = || {
+        let arguments = [
+            "run",
+            "open-room",
+            "--robot",
+            "cut",
+            "--no-repeat",
+            "--runs",
+        ];
+        let mut command = firsthand(&arguments);
+        command.arg(directory.path()).stdout(Stdio::null());
+        command
+    };
+    let mut cut = service()
+        .args(["--pace", "1"])
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    support::wait_for_status("cut", |status| status["order"] == "driving");
+    signal_process(cut.id(), Signal::KILL);
+    cut.wait().unwrap();
+    let again = service().output().unwrap();
+    assert_eq!(again.status.code(), Some(7));
+    let reason = String::from_utf8(again.stderr).unwrap();
+    assert!(reason.contains("was cut off"), "{reason}");
+    assert_eq!(service().output().unwrap().status.code(), Some(0));
+    assert_nothing_left("cut");
 }

@@ -2,7 +2,9 @@
 
 mod chaos;
 mod check;
+mod directories;
 mod field;
+mod install;
 mod latency;
 mod missions;
 mod operate;
@@ -45,6 +47,7 @@ enum Command {
     Freeze(operate::Freeze),
     Thaw(operate::Thaw),
     Chaos(chaos::Arguments),
+    Install(install::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
 }
@@ -57,7 +60,8 @@ const EXIT_CODES: &str = "Exit codes of run:
   3  target unreachable
   4  timeout
   5  collision (simulated robot)
-  6  aborted by a fault";
+  6  aborted by a fault
+  7  an earlier run was cut off (--no-repeat)";
 
 /// Run the command line of this process.
 pub(crate) fn main() -> ExitCode {
@@ -87,6 +91,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Freeze(arguments) => operate::freeze(&arguments),
         Command::Thaw(arguments) => operate::thaw(&arguments),
         Command::Chaos(arguments) => chaos::main(&arguments),
+        Command::Install(arguments) => install::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),
     };

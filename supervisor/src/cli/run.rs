@@ -3,7 +3,7 @@
 use std::{
     fs,
     io::{self, IsTerminal, Write as _},
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -13,7 +13,7 @@ use common::{
     clock::Pace, domain::RobotName, kinematics::Pose2, mission::Mission, samples::PoseSample,
 };
 
-use super::{Failure, missions};
+use super::{Failure, directories, missions};
 use crate::{
     fleet::Starter,
     logging,
@@ -37,9 +37,16 @@ pub(super) struct Arguments {
     /// Seed of everything random in the simulation, over the mission's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Where logs, checkpoints, summary and picture go; a new directory below `runs` otherwise.
+    /// Where logs, checkpoints, summary and picture go; a new directory below --runs otherwise.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Where the directories of runs are made.
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    runs: PathBuf,
+    /// After a run below --runs that was cut off, say so instead of starting, once: the robot is not where its
+    /// mission starts. For services, which systemd starts again.
+    #[arg(long)]
+    no_repeat: bool,
     /// Mission seconds after which to give up, over the mission's.
     #[arg(long, value_name = "S")]
     timeout: Option<f64>,
@@ -79,9 +86,18 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         mission.timeout_s = timeout;
     }
+    if arguments.no_repeat
+        && let Some(cut) = directories::cut_off(&arguments.runs)?
+    {
+        let cut = cut.display();
+        eprintln!(
+            "firsthand: {cut} was cut off on its way, and a mission's origin is where the robot stands at its start: put it there, then start again"
+        );
+        return Ok(ExitCode::from(CUT_OFF));
+    }
     let directory = match &arguments.out {
-        Some(directory) => own_directory(directory)?,
-        None => numbered_directory(&mission.name)?,
+        Some(directory) => directories::own(directory)?,
+        None => directories::numbered(&arguments.runs, &mission.name)?,
     };
     let options = Options {
         mission,
@@ -111,7 +127,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let picture = directory.join("picture.svg");
     fs::write(&picture, draw(&options.mission, &finished))?;
     let json = serde_json::to_string(&finished.summary)?;
-    fs::write(directory.join("summary.json"), format!("{json}\n"))?;
+    fs::write(directory.join(directories::SUMMARY), format!("{json}\n"))?;
     if arguments.json {
         println!("{json}");
     } else {
@@ -120,6 +136,9 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     Ok(exit_code(&finished.summary, finished.asked_for))
 }
+
+/// What `--no-repeat` ends with instead of starting.
+const CUT_OFF: u8 = 7;
 
 /// The documented code.
 fn exit_code(summary: &Summary, asked_for: bool) -> ExitCode {
@@ -133,46 +152,6 @@ fn exit_code(summary: &Summary, asked_for: bool) -> ExitCode {
         Outcome::Collision => 5,
         Outcome::Aborted => 6,
     })
-}
-
-/// The directory asked for; results of an earlier run are not mixed with this one's.
-fn own_directory(directory: &Path) -> Result<PathBuf, Failure> {
-    fs::create_dir_all(directory).map_err(|error| {
-        format!(
-            "cannot make {}: {error}; give another --out",
-            directory.display()
-        )
-    })?;
-    if directory.join(common::run::FILE_NAME).exists() {
-        return Err(format!(
-            "{} holds an earlier run; give an empty or new directory with --out",
-            directory.display()
-        )
-        .into());
-    }
-    Ok(fs::canonicalize(directory)?)
-}
-
-/// `runs/NAME-NNN`, the first number that is free.
-fn numbered_directory(name: &str) -> Result<PathBuf, Failure> {
-    let runs = Path::new("runs");
-    fs::create_dir_all(runs).map_err(|error| {
-        format!(
-            "cannot make {}: {error}; say where with --out",
-            runs.display()
-        )
-    })?;
-    let mut number = 1;
-    loop {
-        let directory = runs.join(format!("{name}-{number:03}"));
-        match fs::create_dir(&directory) {
-            Ok(()) => return Ok(fs::canonicalize(directory)?),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-            Err(error) => {
-                return Err(format!("cannot make {}: {error}", directory.display()).into());
-            }
-        }
-    }
 }
 
 fn draw(mission: &Mission, finished: &Finished) -> String {
