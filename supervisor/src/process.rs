@@ -59,7 +59,7 @@ impl fmt::Display for Ended {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Child(status) => status.fmt(f),
-            Self::Guest => f.write_str("ask who started it (systemctl, journalctl)"),
+            Self::Guest => f.write_str("not our child; systemctl status says how"),
         }
     }
 }
