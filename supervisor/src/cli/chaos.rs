@@ -38,7 +38,7 @@ pub(super) struct Arguments {
 }
 
 /// What it ends with when a mission was lost, touched something, or left something.
-const NOT_CLEAN: u8 = 7;
+const NOT_CLEAN: u8 = 8;
 
 #[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
