@@ -165,7 +165,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     let text = std::fs::read_to_string(directory.path().join("journal")).unwrap();
     let death = text
         .lines()
-        .find(|line| line.contains("stage ended"))
+        .find(|line| line.contains("stage died"))
         .unwrap();
     assert!(
         death.starts_with("<4>") && death.contains("mapper"),

@@ -16,7 +16,7 @@ use std::{collections::VecDeque, time::Duration};
 use crate::stages::Stage;
 
 /// A stage that lived so long was well: its next death is a first one.
-const WELL_AFTER: Duration = Duration::from_secs(2);
+const WELL_AFTER: Duration = Duration::from_millis(500);
 /// Wait before the second start in a row; doubles with each further one.
 const FIRST_BACKOFF: Duration = Duration::from_millis(50);
 /// The most to wait between starts: a person who mends the cause should not wait longer.
