@@ -212,13 +212,19 @@ impl Fleet {
         let mut deaths = Vec::new();
         for index in 0..self.members.len() {
             if let Some(status) = self.reap(index)? {
+                let asked = matches!(self.members[index].policy.phase(), Phase::Stopping { .. });
                 let mut death = self.record(index, Cause::of(status));
                 let member = &mut self.members[index];
                 (member.process, member.beat) = (None, None);
                 self.tell(index, Event::Exited, first_tick)?;
                 death.next = self.next(index);
                 death.deaths_in_window = self.members[index].policy.recent_deaths() as u32;
-                deaths.push(death);
+                // One that was told to go, and has gone, is no death.
+                if asked {
+                    tracing::info!(stage = death.stage, cause = %death.cause, "stage ended");
+                } else {
+                    deaths.push(death);
+                }
             }
             self.tell(index, Event::Time, first_tick)?;
         }
