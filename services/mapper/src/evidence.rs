@@ -39,6 +39,8 @@ const RELEASED: i8 = 0;
 const STRONG: i8 = 6;
 /// Half the angle over which an echo is spread: the cone answers over 15 degrees.
 const ARC: f64 = 16.0 * DEGREE;
+/// Half the widest angle that anything is asked of.
+const WIDEST: f64 = ARC;
 /// How far off its range an echo is still it, metres: noise, the byte's centimetre, half a cell.
 const BAND_M: f64 = 0.04;
 /// Half the angle in which a beam that heard nothing speaks for free ground: less than the cone has, for
@@ -193,17 +195,21 @@ impl Evidence {
         let known_to = echo.map_or(swept_to, |range| range + BEHIND_M);
         let far = known_to.max(POINTED_M).max(echo.unwrap_or(0.0) + band);
         let came_from = side_of(beam.axis);
+        // Beyond `near` half a cell's diagonal is narrower than the widest cone.
+        let near = half_diagonal / WIDEST.sin();
+        let outside = WIDEST.tan() * (1.0 + 1e-9);
 
         let mut arc = Vec::new();
         let mut explained = false;
         for cell in around(lattice, beam.origin, far) {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
-            let off = beam
-                .axis
-                .perp_dot(offset)
-                .atan2(beam.axis.dot(offset))
-                .abs();
+            let (across, along) = (beam.axis.perp_dot(offset), beam.axis.dot(offset));
+            // Most cells around lie outside anything asked below, which is told without an angle.
+            if range > far || range > near && across.abs() > along * outside {
+                continue;
+            }
+            let off = across.atan2(along).abs();
             // Half a cell's diagonal seen from the sensor: at its feet the cone is narrower than a cell.
             let slack = (half_diagonal / range.max(half_diagonal)).asin().min(1.0);
             let index = lattice.index(cell);
