@@ -320,30 +320,46 @@ fn a_stage_without_a_place_is_refused_with_the_remedy() {
     drop(units);
 }
 
-#[test]
-fn a_service_does_not_begin_a_mission_anew_that_was_cut_off_until_told_again() {
-    let directory = support::directory_of("cut");
-    let service = || {
-        let arguments = [
-            "run",
-            "open-room",
-            "--robot",
-            "cut",
-            "--no-repeat",
-            "--runs",
-        ];
-        let mut command = firsthand(&arguments);
-        command.arg(directory.path()).stdout(Stdio::null());
+/// A service with `--resume-last`, killed when its robot drives; what starts it again.
+fn killed_service(robot: &'static str) -> (TempDir, impl Fn() -> Command) {
+    let directory = support::directory_of(robot);
+    let runs = directory.path().to_path_buf();
+    let service = move || {
+        let mut command = firsthand(&["run", "open-room", "--robot", robot, "--json"]);
+        command.arg("--resume-last").arg("--runs").arg(&runs);
         command
     };
     let mut cut = service()
         .args(["--pace", "1"])
+        .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    support::wait_for_status("cut", |status| status["order"] == "driving");
+    support::wait_for_status(robot, |status| {
+        status["order"] == "driving" && status["mission_time_s"].as_f64().unwrap() > 0.5
+    });
     signal_process(cut.id(), Signal::KILL);
     cut.wait().unwrap();
+    (directory, service)
+}
+
+#[test]
+fn a_service_goes_on_with_the_mission_of_a_supervisor_that_was_killed_just_now() {
+    let (_runs, service) = killed_service("goes-on");
+    let again = service().output().unwrap();
+    assert_eq!(again.status.code(), Some(0), "{again:?}");
+    let summary: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(summary["resumes"], 1, "{summary}");
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    assert_nothing_left("goes-on");
+}
+
+#[test]
+fn a_service_does_not_begin_a_mission_anew_that_was_cut_off_long_ago_until_told_again() {
+    let (runs, service) = killed_service("cut");
+    // As after a start of the machine: nothing says that it was a moment ago.
+    let run = std::fs::read_dir(runs.path()).unwrap().next().unwrap();
+    std::fs::remove_file(run.unwrap().path().join("supervisor.checkpoint")).unwrap();
     let again = service().output().unwrap();
     assert_eq!(again.status.code(), Some(7));
     let reason = String::from_utf8(again.stderr).unwrap();

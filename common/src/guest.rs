@@ -4,9 +4,8 @@
 //! roster which of them are down. A stage takes its place when the roster shows it free.
 
 use std::{
-    fs, io,
+    fs,
     os::fd::OwnedFd,
-    path::Path,
     time::{Duration, Instant},
 };
 
@@ -15,7 +14,7 @@ use rustix::process::{Pid, PidfdFlags, pidfd_open};
 use crate::{
     bus::Bus,
     domain::{Domain, RobotName},
-    run::Run,
+    run::{self, Run},
     samples::{Order, name_str},
     shell::{Joined, Life, StageError, enter, name_process},
     topics,
@@ -46,12 +45,7 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
     let run = Run::load(&directory)?;
     let bus = Bus::join(&domain, stage)?;
     let place = wait_for_place(&bus, stage)?;
-    let generation = next_life(&directory, stage).map_err(|error| {
-        StageError::Other(format!(
-            "cannot count the lives of {stage} in {}: {error}",
-            directory.display()
-        ))
-    })?;
+    let generation = run::next_life(&directory, stage)?;
     let life = Life {
         stage,
         directory,
@@ -109,37 +103,4 @@ fn watch(pid: u32) -> Result<OwnedFd, StageError> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
     let gone = || StageError::Other("the supervisor is gone".to_owned());
     pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())
-}
-
-/// One more life of `stage`, counted in the run directory: readers drop what an older one said.
-fn next_life(directory: &Path, stage: &str) -> io::Result<u32> {
-    let counter = directory.join(format!("{stage}.lives"));
-    let lived: u32 = match fs::read_to_string(&counter) {
-        Ok(text) => text.trim().parse().map_err(io::Error::other)?,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => 0,
-        Err(error) => return Err(error),
-    };
-    let generation = lived + 1;
-    // Renamed into place: a kill leaves the old count or the new one.
-    let new = directory.join(format!("{stage}.lives.new"));
-    fs::write(&new, format!("{generation}\n"))?;
-    fs::rename(&new, &counter)?;
-    Ok(generation)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lives_are_counted_over_the_lives_of_processes_and_a_torn_count_is_refused() {
-        let directory = tempfile::tempdir().unwrap();
-        let lives: Vec<_> = (0..3)
-            .map(|_| next_life(directory.path(), "mapper").unwrap())
-            .collect();
-        assert_eq!(lives, [1, 2, 3]);
-        assert_eq!(next_life(directory.path(), "planner").unwrap(), 1);
-        fs::write(directory.path().join("mapper.lives"), "").unwrap();
-        assert!(next_life(directory.path(), "mapper").is_err());
-    }
 }

@@ -3,9 +3,10 @@
 
 use glam::DVec2;
 use nalgebra::{Matrix2, Rotation2, Vector2};
+use serde::{Deserialize, Serialize};
 
 /// Where the robot's centre is and which way it faces, in the mission frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2 {
     /// Metres.
     pub position: DVec2,

@@ -1,6 +1,10 @@
-//! What the supervisor tells the stages of a run: one TOML file in the run directory.
+//! What the supervisor tells the stages of a run: one TOML file in the run directory. Beside it, how many lives each
+//! stage has had.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -34,7 +38,7 @@ pub enum RunError {
         /// The file.
         file: PathBuf,
         /// The system's word.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// It is not what a supervisor writes.
     #[error("{file} is not a run file: {problem}; start the stage through `firsthand run`")]
@@ -57,7 +61,7 @@ impl Run {
             file: file.clone(),
             problem: error.to_string(),
         })?;
-        std::fs::write(&file, text).map_err(|source| RunError::File {
+        replace(&file, &text).map_err(|source| RunError::File {
             action: "write",
             file,
             source,
@@ -70,7 +74,7 @@ impl Run {
     /// When it is missing or not what [`Run::save`] writes.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
-        let text = std::fs::read_to_string(&file).map_err(|source| RunError::File {
+        let text = fs::read_to_string(&file).map_err(|source| RunError::File {
             action: "read",
             file: file.clone(),
             source,
@@ -79,5 +83,64 @@ impl Run {
             file,
             problem: error.message().to_owned(),
         })
+    }
+}
+
+/// One more life of `stage` in the run of `directory`, counted over the lives of supervisors too: readers drop what
+/// an older one said. 1 for the first.
+///
+/// # Errors
+/// When the count can be neither read nor written.
+pub fn next_life(directory: &Path, stage: &str) -> Result<u32, RunError> {
+    let file = directory.join(format!("{stage}.lives"));
+    let failed = |action| {
+        let file = file.clone();
+        move |source| RunError::File {
+            action,
+            file,
+            source,
+        }
+    };
+    let lived: u32 = match fs::read_to_string(&file) {
+        Ok(text) => text
+            .trim()
+            .parse()
+            .map_err(|error| failed("understand")(io::Error::other(error)))?,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => 0,
+        Err(error) => return Err(failed("read")(error)),
+    };
+    let generation = lived + 1;
+    replace(&file, &format!("{generation}\n")).map_err(failed("write"))?;
+    Ok(generation)
+}
+
+/// Where a process of the run in `directory` keeps what must outlive it.
+#[must_use]
+pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
+    directory.join(format!("{process}.checkpoint"))
+}
+
+/// Renamed into place: a kill leaves the old text or the new one.
+fn replace(file: &Path, text: &str) -> io::Result<()> {
+    let mut new = file.as_os_str().to_owned();
+    new.push(".new");
+    fs::write(&new, text)?;
+    fs::rename(&new, file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lives_are_counted_over_the_lives_of_processes_and_a_torn_count_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let lives: Vec<_> = (0..3)
+            .map(|_| next_life(directory.path(), "mapper").unwrap())
+            .collect();
+        assert_eq!(lives, [1, 2, 3]);
+        assert_eq!(next_life(directory.path(), "planner").unwrap(), 1);
+        fs::write(directory.path().join("mapper.lives"), "").unwrap();
+        assert!(next_life(directory.path(), "mapper").is_err());
     }
 }

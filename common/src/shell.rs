@@ -13,7 +13,7 @@ use crate::{
     clock::{MissionClock, MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     guest,
-    run::{Run, RunError},
+    run::{self, Run, RunError},
     samples::{HealthSample, HealthState, name},
     signals::{SIGTERM, Signals},
     topics,
@@ -111,9 +111,7 @@ impl Context {
     /// Where this stage's checkpoint lies.
     #[must_use]
     pub fn checkpoint_file(&self) -> PathBuf {
-        self.life
-            .directory
-            .join(format!("{}.checkpoint", self.life.stage))
+        run::checkpoint_file(&self.life.directory, self.life.stage)
     }
 }
 

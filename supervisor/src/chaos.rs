@@ -10,9 +10,10 @@ mod victim;
 
 use std::path::{Path, PathBuf};
 
-use common::{bus::BusError, clock::Pace, domain::RobotName};
+use common::{bus::BusError, clock::Pace, domain::RobotName, mission::Mission};
 use thiserror::Error;
 
+use crate::simulator::SimulatorError;
 pub(crate) use report::Report;
 use victim::Chance;
 
@@ -20,6 +21,8 @@ use victim::Chance;
 pub(crate) struct Options {
     /// The mission, by name or file.
     pub(crate) mission: String,
+    /// The same, overrides and all.
+    pub(crate) loaded: Mission,
     /// Overrides of it.
     pub(crate) set: Vec<String>,
     /// The robot that suffers.
@@ -32,6 +35,9 @@ pub(crate) struct Options {
     pub(crate) seed: u64,
     /// Whether some signals hit a successor in its first milliseconds.
     pub(crate) startup: bool,
+    /// Whether the supervisor is hit too; its run is resumed then. The robot is a process of its own in that case,
+    /// as a real one is.
+    pub(crate) supervisor: bool,
     /// Where the run directories go; emptied mission by mission.
     pub(crate) directory: PathBuf,
 }
@@ -42,6 +48,9 @@ pub(crate) enum ChaosError {
     /// The bus.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// The robot.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
     /// A process or a file.
     #[error("cannot {action}: {source}")]
     System {

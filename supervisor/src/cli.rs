@@ -61,7 +61,7 @@ const EXIT_CODES: &str = "Exit codes of run:
   4  timeout
   5  collision (simulated robot)
   6  aborted by a fault
-  7  an earlier run was cut off (--no-repeat)";
+  7  an earlier run was cut off (--resume-last)";
 
 /// Run the command line of this process.
 pub(crate) fn main() -> ExitCode {

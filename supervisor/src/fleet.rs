@@ -9,7 +9,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::samples::{HealthSample, HealthState, RosterEntry, StageState, name, name_str};
+use common::{
+    run,
+    samples::{HealthSample, HealthState, RosterEntry, StageState, name, name_str},
+};
 use rustix::process::Signal;
 use thiserror::Error;
 
@@ -93,15 +96,15 @@ impl Fleet {
         self.clock.elapsed()
     }
 
-    /// Start every stage, in order, if that is ours to do.
-    pub(crate) fn start_all(&mut self) -> Result<(), FleetError> {
+    /// Start every stage, in order, if that is ours to do; their lives begin at `first_tick`.
+    pub(crate) fn start_all(&mut self, first_tick: u64) -> Result<(), FleetError> {
         if self.starter == Starter::Another {
             return Ok(());
         }
         let now = self.now();
         for index in 0..self.members.len() {
             let action = self.members[index].policy.start(now);
-            self.act(index, action, 0)?;
+            self.act(index, action, first_tick)?;
         }
         Ok(())
     }
@@ -338,12 +341,17 @@ impl Fleet {
                 return Ok(());
             }
             Action::Start => {
-                member.generation += 1;
                 member.started = now;
                 member.hung = false;
                 let log = log_file(&self.directory, stage);
                 member.log_began = log.metadata().map_or(0, |log| log.len());
-                match spawn(member, &self.directory, first_tick) {
+                let spawned = run::next_life(&self.directory, stage)
+                    .map_err(io::Error::other)
+                    .and_then(|life| {
+                        member.generation = life;
+                        spawn(member, &self.directory, first_tick)
+                    });
+                match spawned {
                     Ok(process) => member.process = Some(process),
                     // As if it had died at once: tried again with growing pauses, the others go on.
                     Err(error) => {

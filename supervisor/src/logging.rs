@@ -39,12 +39,12 @@ pub(crate) fn to_stderr(default: &str) {
     start(vec![stderr_layer()], default);
 }
 
-/// Log to `file`, and to the journal if there is one.
+/// Log to the end of `file`, and to the journal if there is one.
 ///
 /// # Errors
 /// When the file cannot be made.
 pub(crate) fn to_file(file: &Path, default: &str) -> io::Result<()> {
-    let log = Mutex::new(File::create(file)?);
+    let log = Mutex::new(File::options().create(true).append(true).open(file)?);
     let mut layers: Vec<AnyLayer> = vec![fmt::layer().with_writer(log).with_ansi(false).boxed()];
     if to_journal() {
         layers.push(stderr_layer());

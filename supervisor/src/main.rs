@@ -6,6 +6,7 @@
 //! | [`policy`] | what to do with one stage, pure |
 //! | [`death`] | the record of a death |
 //! | [`stall`] | what to do when the robot does not move, pure |
+//! | [`kept`] | what of a supervisor outlives it |
 //! | [`process`], [`fleet`] | child processes; the stages under their policies |
 //! | [`domain`] | the robot's corner of the machine, held and wiped |
 //! | [`simulator`] | the simulated robot as a child |
@@ -23,6 +24,7 @@ mod cli;
 mod death;
 mod domain;
 mod fleet;
+mod kept;
 mod logging;
 mod maps;
 mod observer;

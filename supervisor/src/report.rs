@@ -87,6 +87,9 @@ pub(crate) struct Summary {
     pub(crate) local_updates: u64,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
+    /// Supervisors that went on with the run. Path and clearance from the truth, solves and latencies are those of
+    /// the last one; the path is then the believed one, which is whole.
+    pub(crate) resumes: u32,
     /// From the datagram in to the datagram out.
     pub(crate) tick_latency_us: Quantiles,
     pub(crate) full_solve_us: Quantiles,
@@ -102,6 +105,7 @@ impl Summary {
         record: &Record,
         truth: &[TruthTick],
         restarts: impl Iterator<Item = (&'static str, u32)>,
+        resumes: u32,
     ) -> Self {
         let arrival = record
             .arrival
@@ -126,8 +130,8 @@ impl Summary {
             reason: ending.reason.clone(),
             mission_time_s: time.seconds(),
             path_length_m: match ended {
-                Some(_) => path_length(truth),
-                None => pose.map_or(0.0, |pose| pose.travelled_m),
+                Some(_) if resumes == 0 => path_length(truth),
+                _ => pose.map_or(0.0, |pose| pose.travelled_m),
             },
             straight_m: mission.target.length(),
             min_clearance_m: clearance.filter(|&clearance| clearance < TruthTick::NOTHING_NEAR),
@@ -141,6 +145,7 @@ impl Summary {
             local_updates,
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: restarts.collect(),
+            resumes,
             tick_latency_us: (&record.latency()).into(),
             full_solve_us: (&record.full_solves).into(),
             local_update_us: (&record.local_updates).into(),
@@ -179,10 +184,12 @@ impl Summary {
             .filter(|(_, times)| **times > 0)
             .map(|(stage, times)| format!("{stage} restarted {times}×"))
             .collect();
-        if some.is_empty() {
+        let resumed = (self.resumes > 0).then(|| format!("resumed {}×", self.resumes));
+        let all: Vec<_> = resumed.into_iter().chain(some).collect();
+        if all.is_empty() {
             "no restarts".to_owned()
         } else {
-            some.join(", ")
+            all.join(", ")
         }
     }
 }

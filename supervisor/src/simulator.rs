@@ -1,7 +1,7 @@
 //! The simulated robot as a child process, and the truth it tells through its standard output.
 
 use std::{
-    fs::File,
+    fs::{self, File},
     io::{self, Read},
     net::SocketAddr,
     os::fd::{AsFd, BorrowedFd},
@@ -12,6 +12,8 @@ use std::{
 
 use common::{
     clock::Pace,
+    mission::Mission,
+    run,
     truth::{TruthHeader, TruthTick},
 };
 use rustix::{
@@ -65,15 +67,22 @@ struct Truth {
 }
 
 impl Simulator {
-    /// Start one on the mission in `directory`, and wait until it says where it listens.
+    /// Start one on this very `mission`, overrides included, and wait until it says where it listens. Its files are
+    /// in `directory`; it goes on where an earlier one of that directory stands.
     pub(crate) fn start(
         directory: &Path,
-        mission: &Path,
+        mission: &Mission,
         pace: Pace,
     ) -> Result<Self, SimulatorError> {
+        let text = toml::to_string(mission)
+            .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
+        let file = directory.join("mission.toml");
+        fs::write(&file, text).map_err(system("write the mission of"))?;
         let log_path = directory.join("x80-sim.log");
-        let log = File::create(&log_path).map_err(system("log"))?;
-        let mission = mission.to_str().ok_or_else(|| {
+        let log = File::options().create(true).append(true).open(&log_path);
+        let log = log.map_err(system("log"))?;
+        let keep = run::checkpoint_file(directory, "x80-sim");
+        let mission = file.to_str().ok_or_else(|| {
             SimulatorError::Startup("the run directory's name is not UTF-8".into())
         })?;
         let mut command = firsthand(&[
@@ -85,6 +94,7 @@ impl Simulator {
             "--supervisor",
             &std::process::id().to_string(),
         ]);
+        command.arg("--keep").arg(keep);
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command).map_err(system("start"))?;
         let pipe = process
@@ -110,7 +120,7 @@ impl Simulator {
                 });
             }
             if process.try_reap().map_err(system("watch"))?.is_some() || began.elapsed() > STARTUP {
-                let words = std::fs::read_to_string(&log_path).unwrap_or_default();
+                let words = fs::read_to_string(&log_path).unwrap_or_default();
                 return Err(SimulatorError::Startup(words.trim().to_owned()));
             }
             wait(&[truth.pipe.as_fd(), process.as_fd()], STARTUP)?;

@@ -99,6 +99,8 @@ impl StallWatch {
         held: bool,
     ) -> Option<Rung> {
         let now = pose.stamp.time();
+        // The belief outlives its supervisor.
+        self.epoch = self.epoch.max(guidance.epoch);
         if held {
             self.anchor = None;
             return None;

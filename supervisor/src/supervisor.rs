@@ -1,15 +1,16 @@
 //! One robot's supervisor: brings its stages up, lets it drive, watches, brings all down again.
 
 use std::{
-    fmt, fs, io,
+    fmt, io,
     os::unix::fs::symlink,
-    path::{Path, PathBuf},
+    path::PathBuf,
     time::{Duration, Instant},
 };
 
 use common::{
     address::{Address, AddressError},
     bus::{Bus, BusError, Reader, SliceWriter, Writer},
+    checkpoint::CheckpointError,
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
     domain::{Domain, RobotName},
     mission::Mission,
@@ -28,6 +29,7 @@ use crate::{
     death,
     domain::{DomainError, Held},
     fleet::{Fleet, FleetError, Starter},
+    kept::{Interrupted, Keeper},
     observer::{Observer, Record},
     report::{Ending, Outcome, Summary},
     service::ServiceManager,
@@ -53,6 +55,8 @@ pub(crate) struct Options {
     pub(crate) directory: PathBuf,
     /// Who starts the stages.
     pub(crate) starter: Starter,
+    /// The run in that directory, to go on with; none begins one.
+    pub(crate) interrupted: Option<Interrupted>,
 }
 
 /// Why a run could not be carried out.
@@ -73,6 +77,9 @@ pub(crate) enum SupervisorError {
     /// The run file.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// What the supervisor keeps.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// The robot's address.
     #[error("robot.address: {0}")]
     Address(#[from] AddressError),
@@ -174,11 +181,12 @@ struct Supervisor<'a> {
     deaths: Writer<DeathSample>,
     requests: Reader<RequestSample>,
     last_request: u64,
+    keeper: Keeper,
+    /// The first tick that is not made yet, and mission time by then, as long as none was heard of.
+    beginning: (u64, MissionTime),
     order: Order,
     /// Why it is not [`Order::Drive`].
     reason: HoldReason,
-    /// An operator said stop, and has not said resume.
-    operator_stop: bool,
     /// All was ready once: from then on only what is said here holds the robot.
     ready: bool,
     stall: StallWatch,
@@ -195,21 +203,40 @@ impl<'a> Supervisor<'a> {
     fn start(options: &'a Options, bus: &Bus) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
         let mission = &options.mission;
-        let (simulator, address, clock) = match &mission.robot.address {
-            Some(address) => {
-                let address = address.parse::<Address<String>>()?.resolve()?;
-                (None, address, wall_clock(1.0))
-            }
+        let mut keeper = Keeper::open(directory)?;
+        let (simulator, address) = match &mission.robot.address {
+            Some(address) => (None, address.parse::<Address<String>>()?.resolve()?),
             None => {
-                let simulator = start_simulator(directory, mission, options.pace)?;
+                let simulator = Simulator::start(directory, mission, options.pace)?;
                 let address = Address::Udp(simulator.address());
-                let clock = match options.pace {
-                    Pace::Max => MissionClock::Ticks {
-                        period_ns: (1e9 / mission.robot.rate_hz) as u64,
-                    },
-                    Pace::Rate(rate) => wall_clock(rate),
+                (Some(simulator), address)
+            }
+        };
+        let (clock, beginning) = match (&options.interrupted, options.pace) {
+            (Some(interrupted), _) => {
+                keeper.kept.resumes += 1;
+                let (tick, time) = (interrupted.first_tick, interrupted.time);
+                tracing::warn!(tick, seconds = time.seconds(), "the run goes on");
+                (interrupted.clock(), (tick, time))
+            }
+            (None, Pace::Max) if simulator.is_some() => {
+                let period_ns = (1e9 / mission.robot.rate_hz) as u64;
+                (
+                    MissionClock::Ticks { period_ns },
+                    (0, MissionTime::default()),
+                )
+            }
+            // A real robot's time passes as it does.
+            (None, pace) => {
+                let rate = match pace {
+                    Pace::Rate(rate) if simulator.is_some() => rate,
+                    _ => 1.0,
                 };
-                (Some(simulator), address, clock)
+                let epoch_ns = monotonic_ns();
+                (
+                    MissionClock::Wall { epoch_ns, rate },
+                    (0, MissionTime::default()),
+                )
             }
         };
         let run = Run {
@@ -233,9 +260,10 @@ impl<'a> Supervisor<'a> {
             deaths: bus.writer(&topics::DEATHS, 1)?,
             requests: bus.reader(&topics::REQUESTS)?,
             last_request: 0,
+            keeper,
+            beginning,
             order: Order::Hold,
             reason: HoldReason::Starting,
-            operator_stop: false,
             ready: false,
             stall: StallWatch::new(mission),
             judged_tick: None,
@@ -246,7 +274,7 @@ impl<'a> Supervisor<'a> {
             service: ServiceManager::of_environment(),
         };
         supervisor.restate()?;
-        supervisor.fleet.start_all()?;
+        supervisor.fleet.start_all(beginning.0)?;
         if options.starter == Starter::Another {
             let link = Domain::of(options.robot.clone()).run_link();
             symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
@@ -305,11 +333,7 @@ impl<'a> Supervisor<'a> {
     /// Take what came, tend the stages, judge.
     fn turn(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let became_ready = self.observer.take(&mut self.fleet)?;
-        let first_tick = self
-            .observer
-            .record
-            .newest_tick()
-            .map_or(0, |tick| tick + 1);
+        let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.tend(first_tick)?;
         if let Some(simulator) = &mut self.simulator
@@ -321,6 +345,13 @@ impl<'a> Supervisor<'a> {
             self.restate()?;
         }
         self.judge()
+    }
+
+    /// What a new life of a stage begins with: the first tick that nobody has made.
+    fn first_tick(&self) -> u64 {
+        let newest = self.observer.record.newest_tick();
+        // The link speaks of tick 0 before its first.
+        newest.map_or(0, |tick| tick + 1).max(self.beginning.0)
     }
 
     /// Reap and restart; tell each death once, on the bus, in the log and in the run directory. Says whether one was.
@@ -354,15 +385,21 @@ impl<'a> Supervisor<'a> {
                 }
                 RequestKind::Stop => {
                     tracing::warn!("an operator says stop");
-                    self.operator_stop = true;
+                    self.hold_for_operator(true)?;
                 }
                 RequestKind::Resume => {
                     tracing::warn!("an operator says resume");
-                    self.operator_stop = false;
+                    self.hold_for_operator(false)?;
                 }
             }
         }
         Ok(asked)
+    }
+
+    /// Kept at once: a robot that was told to stand still stands when another supervises it.
+    fn hold_for_operator(&mut self, hold: bool) -> Result<(), SupervisorError> {
+        self.keeper.kept.operator_stop = hold;
+        Ok(self.keeper.keep()?)
     }
 
     /// Whether the robot may drive, and if not, why. Says whether that changed.
@@ -377,7 +414,7 @@ impl<'a> Supervisor<'a> {
         }
         let reason = if !self.ready {
             HoldReason::Starting
-        } else if self.operator_stop {
+        } else if self.keeper.kept.operator_stop {
             HoldReason::Operator
         } else if self.fleet.held().next().is_some() {
             HoldReason::StageHeld
@@ -499,9 +536,7 @@ impl<'a> Supervisor<'a> {
             None => Ok(None),
             Some(Rung::Replan) => {
                 tracing::warn!("the robot stalls: a fresh planner solves the full field");
-                let record = &self.observer.record;
-                let first_tick = record.newest_tick().map_or(0, |tick| tick + 1);
-                self.fleet.replace("planner", first_tick)?;
+                self.fleet.replace("planner", self.first_tick())?;
                 Ok(None)
             }
             Some(Rung::Forget { epoch }) => {
@@ -530,10 +565,11 @@ impl<'a> Supervisor<'a> {
 
     fn restate(&mut self) -> Result<(), SupervisorError> {
         self.restated = Some(Instant::now());
-        let record = &self.observer.record;
+        self.keeper.keep()?;
         // A stage that another starts takes its first tick from here: it must not be one that was made.
-        let tick = record.newest_tick().unwrap_or_default();
-        let time = record.pose.unwrap_or_default().stamp.time();
+        let tick = self.first_tick().saturating_sub(1);
+        let pose = self.observer.record.pose;
+        let time = pose.map_or(self.beginning.1, |pose| pose.stamp.time());
         let directive = DirectiveSample {
             order: self.order.into(),
             epoch: self.stall.epoch(),
@@ -592,7 +628,9 @@ impl<'a> Supervisor<'a> {
             .simulator
             .map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
         let restarts = self.fleet.restarts();
-        let mut summary = Summary::of(&self.options.mission, ending, &record, &truth, restarts);
+        let resumes = self.keeper.kept.resumes;
+        let mission = &self.options.mission;
+        let mut summary = Summary::of(mission, ending, &record, &truth, restarts, resumes);
         // The truth comes through a pipe of its own: a touch on the way may be seen after the arrival.
         let touched =
             summary.outcome == Outcome::Reached && summary.collisions.is_some_and(|n| n > 0);
@@ -615,24 +653,4 @@ fn fault(reason: &str) -> Ending {
         reason: reason.to_owned(),
         asked_for: false,
     }
-}
-
-fn wall_clock(rate: f64) -> MissionClock {
-    MissionClock::Wall {
-        epoch_ns: monotonic_ns(),
-        rate,
-    }
-}
-
-/// A simulator of this very mission, overrides included.
-fn start_simulator(
-    directory: &Path,
-    mission: &Mission,
-    pace: Pace,
-) -> Result<Simulator, SupervisorError> {
-    let file = directory.join("mission.toml");
-    let text = toml::to_string(mission)
-        .map_err(|error| system("write the mission")(io::Error::other(error)))?;
-    fs::write(&file, text).map_err(system(format!("write {}", file.display())))?;
-    Ok(Simulator::start(directory, &file, pace)?)
 }

@@ -211,16 +211,21 @@ fn mark(robot: &str) -> String {
 
 /// Command lines of the processes that work for `robot`: supervisor, stages, simulator.
 pub fn processes_of(robot: &str) -> Vec<String> {
+    found(robot).map(|(_, line)| line).collect()
+}
+
+/// Their numbers.
+pub fn pids_of(robot: &str) -> Vec<u32> {
+    found(robot).map(|(pid, _)| pid).collect()
+}
+
+fn found(robot: &str) -> impl Iterator<Item = (u32, String)> {
     let mark = mark(robot);
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir("/proc").unwrap().flatten() {
-        let Ok(line) = std::fs::read(entry.path().join("cmdline")) else {
-            continue;
-        };
+    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    entries.filter_map(move |entry| {
+        let pid = entry.file_name().to_str()?.parse().ok()?;
+        let line = std::fs::read(entry.path().join("cmdline")).ok()?;
         let line = String::from_utf8_lossy(&line).replace('\0', " ");
-        if line.contains(&mark) {
-            found.push(line);
-        }
-    }
-    found
+        line.contains(&mark).then_some((pid, line))
+    })
 }

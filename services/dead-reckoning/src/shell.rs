@@ -1,8 +1,11 @@
 //! `wheels` in, `pose` out, the state kept before it is told.
 
+use std::path::Path;
+
 use common::{
     bus::{Reader, Writer},
-    checkpoint::Checkpoint,
+    checkpoint::{Checkpoint, CheckpointError},
+    run,
     samples::{PoseSample, WheelSample},
     shell::{Context, Process, Progress, StageError},
     topics,
@@ -12,6 +15,15 @@ use crate::step::{DeadReckoning, State};
 
 /// Room for the encoded state, bytes: it is under 100.
 const CHECKPOINT_CAPACITY: usize = 256;
+
+/// What the process of the run in `directory` has kept; none before its first tick.
+///
+/// # Errors
+/// When the file system refuses.
+pub fn kept_state(directory: &Path) -> Result<Option<State>, CheckpointError> {
+    let file = run::checkpoint_file(directory, "dead-reckoning");
+    Ok(Checkpoint::open(&file, CHECKPOINT_CAPACITY)?.1)
+}
 
 /// The dead-reckoning process.
 #[derive(Debug)]

@@ -25,6 +25,14 @@ pub struct State {
     last: Option<Last>,
 }
 
+impl State {
+    /// Tick and mission time of the newest wheel sample in it; none before the first.
+    #[must_use]
+    pub fn newest(&self) -> Option<(u64, MissionTime)> {
+        self.last.map(|last| (last.tick, last.time))
+    }
+}
+
 /// The wheel sample the pose was computed from, and the speeds it gave.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Last {

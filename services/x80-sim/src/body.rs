@@ -64,6 +64,15 @@ impl Body {
         }
     }
 
+    /// Put it where it was when it had touched something `contacts` times.
+    pub fn put(&mut self, pose: Pose2, contacts: u64, world: &World) {
+        self.pose = pose;
+        self.contacts = contacts;
+        self.clearance = world.clearance(pose.position) - self.radius;
+        // Where it leans on something it has come there before.
+        self.touching = self.clearance <= RELEASE_M;
+    }
+
     /// Where it is.
     #[must_use]
     pub fn pose(&self) -> Pose2 {

@@ -11,6 +11,7 @@
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |
+//! | [`kept`] | what of a robot outlives its process |
 //! | [`shell`] | the process: transport, pace, truth |
 //!
 //! A robot is stepped by whoever holds it; only [`shell`] and its transports know sockets and clocks:
@@ -36,6 +37,7 @@
 
 pub mod body;
 pub mod infrared;
+pub mod kept;
 pub mod motor;
 pub mod noise;
 pub mod radio;

@@ -133,6 +133,11 @@ impl Motor {
         self.turned
     }
 
+    /// The counts of an earlier life, standing.
+    pub(crate) fn restore(&mut self, turned: f64) {
+        self.turned = turned;
+    }
+
     /// Obey a motion command until mission time `until`. It brings its mode along and lets the motor run.
     pub fn order(&mut self, quantity: Quantity, value: i16, until: Option<f64>) {
         self.enabled = true;

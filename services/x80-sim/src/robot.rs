@@ -11,6 +11,7 @@ use common::{
 
 use crate::{
     body::{Body, Wheels},
+    kept::Kept,
     motor::Motor,
     noise::{Noise, Source},
     sensors::{self, Ranging},
@@ -20,6 +21,9 @@ use crate::{
 
 /// The longest step of the body, seconds.
 const STEP_S: f64 = 0.005;
+
+/// A robot whose commands hold for ever does not drive on for longer when its process ends, seconds.
+const COMES_TO_REST_S: f64 = 3.0;
 
 /// What a frame from the host was to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,6 +131,58 @@ impl Robot {
         robot.least_clearance = robot.body.clearance();
         robot.measure();
         robot
+    }
+
+    /// The robot of `mission` where an earlier process left it, booted anew but for its counts.
+    #[must_use]
+    pub fn restored(mission: &Mission, kept: &Kept) -> Self {
+        let mut robot = Self::new(&Mission {
+            // The same readings again would be no readings.
+            seed: mission.seed.wrapping_add(kept.tick + 1),
+            ..mission.clone()
+        });
+        robot.tick = kept.tick;
+        robot.time = kept.time_s;
+        (robot.heard_at, robot.ordered_at) = (kept.time_s, kept.time_s);
+        robot.unattended = kept.unattended_s;
+        for (motor, turned) in robot.motors.iter_mut().zip(kept.turned) {
+            motor.restore(turned);
+        }
+        let (centre, radius) = (kept.pose.position, robot.body.radius());
+        robot.world.advance(kept.time_s, centre, radius);
+        robot.body.put(kept.pose, kept.contacts, &robot.world);
+        robot.least_clearance = robot.body.clearance();
+        robot.measure();
+        robot
+    }
+
+    /// What a next process needs to go on from here.
+    #[must_use]
+    pub fn kept(&self) -> Kept {
+        Kept {
+            tick: self.tick,
+            time_s: self.time,
+            pose: self.body.pose(),
+            turned: std::array::from_fn(|channel| self.motors[channel].turned()),
+            contacts: self.body.contacts(),
+            unattended_s: self.unattended,
+        }
+    }
+
+    /// Let it come to rest as it does when no further command comes; a robot that would never is halted.
+    pub fn come_to_rest(&mut self) {
+        let latest = self.time + COMES_TO_REST_S;
+        while self.time < latest && self.is_moving() {
+            self.advance_to((self.time + STEP_S).min(latest));
+        }
+        self.motors.iter_mut().for_each(Motor::halt);
+        // No tick is made up for on the way: nobody listens.
+        self.tick = self.tick.max((self.time * self.rate_hz) as u64);
+    }
+
+    fn is_moving(&self) -> bool {
+        let ordered = self.motors.iter().any(|motor| motor.ends_at().is_some());
+        ordered || self.rims().into_iter().any(|rim| rim != 0.0)
     }
 
     /// Mission time, seconds.

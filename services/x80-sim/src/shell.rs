@@ -3,12 +3,15 @@
 mod session;
 
 use std::{
+    fs::File,
     io::{self, Write},
     net::SocketAddr,
     os::fd::AsFd,
+    path::{Path, PathBuf},
 };
 
 use common::{
+    checkpoint::{Checkpoint, CheckpointError},
     clock::{Pace, monotonic_ns},
     mission::Mission,
 };
@@ -19,7 +22,11 @@ use rustix::{
 use thiserror::Error;
 
 use self::session::Session;
-use crate::transport::Way;
+use crate::{
+    kept::{self, Kept},
+    robot::Robot,
+    transport::Way,
+};
 
 /// Datagrams taken in one go before time and the stop are looked at again.
 const MOST_AT_ONCE: usize = 64;
@@ -53,6 +60,8 @@ pub struct SimOptions {
     pub listen: SocketAddr,
     /// How to listen.
     pub transport: Transport,
+    /// Where it is kept how the robot stands; one that is kept there goes on from it. None forgets.
+    pub keep: Option<PathBuf>,
     /// Where the truth is written: a [`common::truth::TruthHeader`], then a
     /// [`common::truth::TruthTick`] each tick, one JSON object a line, each
     /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
@@ -84,6 +93,17 @@ pub enum SimError {
         /// The system's word.
         source: io::Error,
     },
+    /// How it stands cannot be kept.
+    #[error(transparent)]
+    Keep(#[from] CheckpointError),
+    /// The file that keeps how it stands cannot be had.
+    #[error("the simulated robot cannot have {file} to itself: {source}; give another file")]
+    Lock {
+        /// The file.
+        file: PathBuf,
+        /// The system's word.
+        source: io::Error,
+    },
     /// The system would not let it wait.
     #[error("the simulated robot cannot wait for its socket: {0}; start it again")]
     Wait(#[source] io::Error),
@@ -99,27 +119,54 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
         pace,
         listen,
         transport,
+        keep,
         truth,
     } = options;
     let way = Way::open(transport, listen)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
-    let mut session = Session::new(&mission, pace, way, truth);
-    let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz);
+    let (robot, checkpoint, _lock) = match keep {
+        None => (Robot::new(&mission), None, None),
+        Some(file) => {
+            // The process before may still be coming to rest.
+            let lock = lock(&file).map_err(|source| SimError::Lock {
+                file: file.clone(),
+                source,
+            })?;
+            let (checkpoint, kept) = Checkpoint::open::<Kept>(&file, kept::CAPACITY)?;
+            let robot = match kept {
+                None => Robot::new(&mission),
+                Some(kept) => {
+                    tracing::info!(?kept, "it stands where it stood");
+                    Robot::restored(&mission, &kept)
+                }
+            };
+            (robot, Some(checkpoint), Some(lock))
+        }
+    };
+    let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time_s());
+    let mut session = Session::new(&mission, robot, pace, way, truth, checkpoint)?;
     let mut buffer = vec![0; 65_536];
     loop {
         let timeout = clock.wait_for(session.next_due_s(), monotonic_ns());
         let [came, stopped] = wait(&session, &stop, timeout)?;
         if stopped {
-            return Ok(());
+            return session.end();
         }
         if came {
             session.listen(&mut buffer, MOST_AT_ONCE, || clock.now(monotonic_ns()))?;
         }
         if let Some(now) = clock.now(monotonic_ns()) {
-            session.pass(now);
+            session.pass(now)?;
             clock.forgive(session.next_tick_s(), monotonic_ns());
         }
     }
+}
+
+/// Wait until nobody else has `file`, made if it is not there.
+fn lock(file: &Path) -> io::Result<File> {
+    let file = File::options().create(true).append(true).open(file)?;
+    file.lock()?;
+    Ok(file)
 }
 
 /// Wait for bytes, the stop or the timeout; which of the first two it was.
@@ -153,10 +200,14 @@ struct SimClock {
 }
 
 impl SimClock {
-    fn new(pace: Pace, period_s: f64) -> Self {
+    /// At mission time `begin_s` now.
+    fn new(pace: Pace, period_s: f64, begin_s: f64) -> Self {
         let runs = match pace {
             Pace::Max => None,
-            Pace::Rate(rate) => Some((monotonic_ns(), rate)),
+            Pace::Rate(rate) => {
+                let gone_ns = (begin_s / rate * 1e9) as u64;
+                Some((monotonic_ns().saturating_sub(gone_ns), rate))
+            }
         };
         Self { runs, period_s }
     }
@@ -214,7 +265,7 @@ mod tests {
 
     #[test]
     fn at_the_pace_of_the_commands_there_is_nothing_to_wait_for() {
-        let clock = SimClock::new(Pace::Max, 0.1);
+        let clock = SimClock::new(Pace::Max, 0.1, 0.0);
         assert_eq!(clock.wait_for(5.0, 0), None);
         assert_eq!(clock.now(9), None);
     }

@@ -159,6 +159,7 @@ fn a_port_in_use_is_named_with_its_remedy() {
         pace: Pace::Max,
         listen,
         transport: Transport::Udp,
+        keep: None,
         truth: None,
     };
     let error = run(options, stop).expect_err("the port was free after all");
@@ -185,6 +186,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
         pace: Pace::Max,
         listen,
         transport: Transport::Udp,
+        keep: None,
         truth: Some(Box::new(writer)),
     };
     let sim = std::thread::spawn(move || run(options, stopped));

@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    path::Path,
     process::{Command, Stdio},
     time::{Duration, Instant},
 };
@@ -9,11 +10,13 @@ use std::{
 use common::{
     bus::{Bus, Reader, SliceReader},
     domain::Domain,
+    mission::Mission,
     samples::{
         CommandSample, GridHeader, GuidanceSample, HealthSample, HealthState, Order, PoseSample,
         RosterEntry, RosterHeader, StageState, Stamp, Stamped as _, WheelSample, name_str,
     },
-    topics::{self, AnyTopic as _},
+    topics::{self, AnyTopic as _, SUPERVISOR},
+    truth::TruthTick,
     waiter::Waiter,
 };
 use rustix::process::{Pid, kill_process};
@@ -27,11 +30,19 @@ use super::{
 };
 use crate::{
     process::{Process, firsthand},
+    simulator::Simulator,
     stages,
 };
 
 /// Nothing that is waited for takes longer; a mission at a wall-clock pace takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);
+/// What a supervisor says is always of its newest life: it has the bus made anew.
+const AFTER_ANY: Stamp = Stamp {
+    tick: 0,
+    stamp_ns: 0,
+    generation: u32::MAX,
+    sequence: 0,
+};
 /// How often the child is looked at while the bus is silent.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -43,6 +54,14 @@ fn command(options: &Options, seed: u64, pace: &str, out: &str) -> Command {
     for setting in &options.set {
         command.args(["--set", setting]);
     }
+    command.stdout(Stdio::piped()).stderr(Stdio::null());
+    command
+}
+
+/// The run whose supervisor was hit, once more.
+fn resume(directory: &Path) -> Command {
+    let mut command = firsthand(&["run", "--json", "--resume"]);
+    command.arg(directory);
     command.stdout(Stdio::piped()).stderr(Stdio::null());
     command
 }
@@ -69,10 +88,73 @@ pub(super) fn attack(
     report: &mut Report,
     calm: &Value,
 ) -> Result<(), ChaosError> {
-    let pace = options.pace.to_string();
     let before = report.kills();
-    let mut child = Process::spawn(command(options, seed, &pace, "attacked"))
-        .map_err(system("start a mission"))?;
+    let directory = options.directory.join("attacked");
+    let mut robot = options
+        .supervisor
+        .then(|| robot(options, seed))
+        .transpose()?;
+    let mut start = command(options, seed, &options.pace.to_string(), "attacked");
+    if let Some(robot) = &robot {
+        let address = robot.address();
+        start.args(["--set", &format!("robot.address='udp://{address}'")]);
+    }
+    let mut attack = Attack::default();
+    let began = Instant::now();
+    let summary = loop {
+        let summary = life(options, start, robot.as_mut(), &mut attack, chance, report)?;
+        // A supervisor that was hit leaves no summary, one that was spared by a hair does.
+        if attack.supervisor_hit().is_none() || !summary.is_empty() || began.elapsed() >= PATIENCE {
+            break parse(&summary)?;
+        }
+        start = resume(&directory);
+    };
+    fs::remove_dir_all(&directory).map_err(system("remove its directory"))?;
+    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
+    let mut end = End {
+        outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
+        reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
+        collisions: summary["collisions"].as_u64().unwrap_or_default(),
+        pose_excess_m: number(&summary, "pose_error_m") - number(calm, "pose_error_m"),
+        unattended_s: number(&summary, "unattended_s"),
+        kills: report.kills() - before,
+    };
+    if let Some(mut robot) = robot {
+        robot.stop()?;
+        let truth = robot.truth();
+        let last = truth.last();
+        end.collisions = last.map_or(0, |tick| tick.contacts);
+        end.unattended_s = last.map_or(0.0, |tick| tick.unattended_s);
+        let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
+        end.pose_excess_m = error - number(calm, "pose_error_m");
+        fs::remove_dir_all(options.directory.join("robot"))
+            .map_err(system("remove its directory"))?;
+    }
+    report.ended(&end);
+    Ok(())
+}
+
+/// A robot that does not die with its supervisor.
+fn robot(options: &Options, seed: u64) -> Result<Simulator, ChaosError> {
+    let directory = options.directory.join("robot");
+    fs::create_dir(&directory).map_err(system("make a directory"))?;
+    let mission = Mission {
+        seed,
+        ..options.loaded.clone()
+    };
+    Ok(Simulator::start(&directory, &mission, options.pace)?)
+}
+
+/// One life of a supervisor under attack; what it says at its end.
+fn life(
+    options: &Options,
+    start: Command,
+    robot: Option<&mut Simulator>,
+    attack: &mut Attack,
+    chance: &mut Chance,
+    report: &mut Report,
+) -> Result<Vec<u8>, ChaosError> {
+    let mut child = Process::spawn(start).map_err(system("start a mission"))?;
     let stdout = child.take_stdout();
     // Read beside, or a long summary could block it.
     let summary = std::thread::spawn(move || {
@@ -82,23 +164,10 @@ pub(super) fn attack(
         }
         text
     });
-    let attacked = Attack::until_the_end(options, &mut child, chance, report);
+    let attacked = attack.until_the_end(options, &mut child, robot, chance, report);
     child.end(Duration::from_secs(2));
     let summary = summary.join().unwrap_or_default();
-    attacked?;
-    let summary = parse(&summary)?;
-    fs::remove_dir_all(options.directory.join("attacked"))
-        .map_err(system("remove its directory"))?;
-    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
-    report.ended(&End {
-        outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
-        reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
-        collisions: summary["collisions"].as_u64().unwrap_or_default(),
-        pose_excess_m: number(&summary, "pose_error_m") - number(calm, "pose_error_m"),
-        unattended_s: number(&summary, "unattended_s"),
-        kills: report.kills() - before,
-    });
-    Ok(())
+    attacked.map(|()| summary)
 }
 
 /// A stage that was hit, until its successor works.
@@ -112,8 +181,18 @@ struct Wound {
     again: Option<Duration>,
 }
 
-/// The attacker's place on the bus.
+/// What the attacker knows of a mission.
+#[derive(Default)]
 struct Attack {
+    entries: Vec<RosterEntry>,
+    supervisor: u32,
+    driving: bool,
+    wounds: Vec<Wound>,
+    pose: Option<PoseSample>,
+}
+
+/// The attacker's place on the bus, for one life of the supervisor.
+struct Ears {
     roster: SliceReader<RosterHeader, RosterEntry>,
     health: Reader<HealthSample>,
     wheels: Reader<WheelSample>,
@@ -122,25 +201,28 @@ struct Attack {
     guidance: Reader<GuidanceSample>,
     command: Reader<CommandSample>,
     waiter: Waiter,
-    entries: Vec<RosterEntry>,
-    driving: bool,
-    wounds: Vec<Wound>,
 }
 
 impl Attack {
     fn until_the_end(
+        &mut self,
         options: &Options,
         child: &mut Process,
+        mut robot: Option<&mut Simulator>,
         chance: &mut Chance,
         report: &mut Report,
     ) -> Result<(), ChaosError> {
         let began = Instant::now();
-        let mut attack = loop {
+        self.driving = false;
+        self.entries.clear();
+        // The stages of a supervisor that was hit go with it.
+        self.wounds.retain(|wound| wound.stage == SUPERVISOR);
+        let mut ears = loop {
             if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= PATIENCE {
                 return Ok(());
             }
-            match Self::join(options) {
-                Ok(attack) => break attack,
+            match Ears::join(options) {
+                Ok(ears) => break ears,
                 // Not up yet.
                 Err(_) => std::thread::park_timeout(LOOK),
             }
@@ -148,75 +230,72 @@ impl Attack {
         let mut next = Instant::now() + chance.pause();
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < PATIENCE {
             let due = next.saturating_duration_since(Instant::now()).min(LOOK);
-            attack.waiter.wait(due)?;
-            attack.listen(report)?;
-            attack.hit_successors(report);
+            ears.waiter.wait(due)?;
+            if let Some(robot) = &mut robot {
+                robot.tend()?;
+            }
+            self.listen(&mut ears, report)?;
+            self.hit_successors(report);
             let enough = report.kills() >= options.kills;
-            if Instant::now() >= next && attack.driving && !enough {
+            if Instant::now() >= next && self.driving && !enough {
                 next = Instant::now() + chance.pause();
-                attack.hit(options, chance, report);
+                self.hit(options, chance, report);
             }
         }
         Ok(())
     }
 
-    fn join(options: &Options) -> Result<Self, ChaosError> {
-        let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
-        let mut waiter = Waiter::default();
-        waiter.on(bus.alarm(&topics::ROSTER)?);
-        waiter.on(bus.alarm(&topics::HEALTH)?);
-        waiter.on(bus.alarm(&topics::COMMAND)?);
-        Ok(Self {
-            roster: bus.slice_reader(&topics::ROSTER)?,
-            health: bus.reader(&topics::HEALTH)?,
-            wheels: bus.reader(&topics::WHEELS)?,
-            pose: bus.reader(&topics::POSE)?,
-            grid: bus.slice_reader(&topics::GRID)?,
-            guidance: bus.reader(&topics::GUIDANCE)?,
-            command: bus.reader(&topics::COMMAND)?,
-            waiter,
-            entries: Vec::new(),
-            driving: false,
-            wounds: Vec::new(),
-        })
+    /// When the supervisor was hit, unless its successor works already.
+    fn supervisor_hit(&self) -> Option<Instant> {
+        let mut wounds = self.wounds.iter();
+        wounds
+            .find(|wound| wound.stage == SUPERVISOR)
+            .map(|wound| wound.at)
+    }
+
+    /// How far the last pose heard of was from the truth of its tick, metres. Wheel counts are what both know.
+    fn pose_error(&self, truth: &[TruthTick]) -> Option<f64> {
+        let pose = self.pose?;
+        let counts = (pose.left_counts, pose.right_counts);
+        let same = |tick: &&TruthTick| (tick.left_counts, tick.right_counts) == counts;
+        let tick = truth.iter().rev().find(same)?;
+        Some((pose.x_m - tick.x).hypot(pose.y_m - tick.y))
     }
 
     /// Take what came: who runs, who beats, who speaks.
-    fn listen(&mut self, report: &mut Report) -> Result<(), ChaosError> {
-        while let Some(entries) = self.roster.take()? {
+    fn listen(&mut self, ears: &mut Ears, report: &mut Report) -> Result<(), ChaosError> {
+        while let Some(entries) = ears.roster.take()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
+            self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
+            if self.driving {
+                self.heal(SUPERVISOR, AFTER_ANY, true, report);
+            }
         }
-        while let Some(health) = self.health.take()? {
+        while let Some(health) = ears.health.take()? {
             if HealthState::from_byte(health.state) == HealthState::Ready {
                 self.heal(name_str(&health.stage), health.stamp, true, report);
             }
         }
-        while let Some(sample) = self.wheels.take()? {
+        while let Some(sample) = ears.wheels.take()? {
             self.heal(topics::WHEELS.spec().writer, *sample.stamp(), false, report);
         }
-        while let Some(sample) = self.pose.take()? {
+        while let Some(sample) = ears.pose.take()? {
             self.heal(topics::POSE.spec().writer, *sample.stamp(), false, report);
+            self.pose = Some(sample);
         }
-        while let Some(sample) = self.grid.take()? {
+        while let Some(sample) = ears.grid.take()? {
             let stamp = *sample.header().stamp();
             self.heal(topics::GRID.spec().writer, stamp, false, report);
         }
-        while let Some(sample) = self.guidance.take()? {
-            self.heal(
-                topics::GUIDANCE.spec().writer,
-                *sample.stamp(),
-                false,
-                report,
-            );
+        while let Some(sample) = ears.guidance.take()? {
+            let writer = topics::GUIDANCE.spec().writer;
+            self.heal(writer, *sample.stamp(), false, report);
         }
-        while let Some(sample) = self.command.take()? {
-            self.heal(
-                topics::COMMAND.spec().writer,
-                *sample.stamp(),
-                false,
-                report,
-            );
+        while let Some(sample) = ears.command.take()? {
+            let writer = topics::COMMAND.spec().writer;
+            self.heal(writer, *sample.stamp(), false, report);
+            self.heal(SUPERVISOR, AFTER_ANY, false, report);
         }
         Ok(())
     }
@@ -246,8 +325,24 @@ impl Attack {
         }
     }
 
-    /// Hit a stage that runs and has no open wound.
+    /// Hit a stage that runs and has no open wound, or the supervisor.
     fn hit(&mut self, options: &Options, chance: &mut Chance, report: &mut Report) {
+        if options.supervisor && chance.supervisor() {
+            let kind = chance.supervisor_kind();
+            if self.supervisor_hit().is_none() && send(self.supervisor, kind) {
+                report.hit(SUPERVISOR, kind);
+                self.wounds.push(Wound {
+                    stage: SUPERVISOR,
+                    kind,
+                    generation: 0,
+                    at: Instant::now(),
+                    ready: false,
+                    again: None,
+                });
+                self.driving = false;
+            }
+            return;
+        }
         let Some(stage) = stages::find(chance.stage()).map(|stage| stage.name) else {
             return;
         };
@@ -296,6 +391,26 @@ impl Attack {
                 wound.ready = false;
             }
         }
+    }
+}
+
+impl Ears {
+    fn join(options: &Options) -> Result<Self, ChaosError> {
+        let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
+        let mut waiter = Waiter::default();
+        waiter.on(bus.alarm(&topics::ROSTER)?);
+        waiter.on(bus.alarm(&topics::HEALTH)?);
+        waiter.on(bus.alarm(&topics::COMMAND)?);
+        Ok(Self {
+            roster: bus.slice_reader(&topics::ROSTER)?,
+            health: bus.reader(&topics::HEALTH)?,
+            wheels: bus.reader(&topics::WHEELS)?,
+            pose: bus.reader(&topics::POSE)?,
+            grid: bus.slice_reader(&topics::GRID)?,
+            guidance: bus.reader(&topics::GUIDANCE)?,
+            command: bus.reader(&topics::COMMAND)?,
+            waiter,
+        })
     }
 }
 

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::latency::Histogram;
+use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
 use super::victim::Kind;
@@ -187,12 +187,11 @@ impl fmt::Display for Report {
             "stage", "hit", "ready, ms", "frozen, ms", "a tick's output, ms"
         )?;
         let nothing = Recovery::default();
-        for stage in &TABLE {
-            let hit: u32 = self
-                .kills
-                .get(stage.name)
-                .map_or(0, |kinds| kinds.values().sum());
-            let recovery = self.recovery_ms.get(stage.name).unwrap_or(&nothing);
+        let stages = TABLE.iter().map(|stage| stage.name);
+        let hit_supervisor = self.kills.contains_key(SUPERVISOR).then_some(SUPERVISOR);
+        for name in stages.chain(hit_supervisor) {
+            let hit: u32 = self.kills.get(name).map_or(0, |kinds| kinds.values().sum());
+            let recovery = self.recovery_ms.get(name).unwrap_or(&nothing);
             let quantiles = |histogram: &Histogram| match (
                 ms(histogram, 0.5),
                 ms(histogram, 0.99),
@@ -203,8 +202,7 @@ impl fmt::Display for Report {
             };
             writeln!(
                 to,
-                "{:<16} {hit:>6} {:>22} {:>22} {:>22}",
-                stage.name,
+                "{name:<16} {hit:>6} {:>22} {:>22} {:>22}",
                 quantiles(&recovery.ready),
                 quantiles(&recovery.thawless),
                 quantiles(&recovery.output)

@@ -15,6 +15,9 @@ const STARTUP: Duration = Duration::from_millis(12);
 /// Share of the signals that hit a successor in its start-up, where that is asked for.
 const STARTUP_SHARE: f64 = 0.25;
 
+/// Share of the signals that hit the supervisor, where that is asked for: a hundred in two thousand.
+const SUPERVISOR_SHARE: f64 = 0.05;
+
 /// How a stage is hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -77,6 +80,19 @@ impl Chance {
     pub(crate) fn stage(&mut self) -> &'static str {
         let index = (self.uniform() * TABLE.len() as f64) as usize;
         TABLE[index.min(TABLE.len() - 1)].name
+    }
+
+    /// Whether to hit the supervisor instead.
+    pub(crate) fn supervisor(&mut self) -> bool {
+        self.uniform() < SUPERVISOR_SHARE
+    }
+
+    /// How to hit the supervisor: told to end it would, and one that is frozen is systemd's to notice.
+    pub(crate) fn supervisor_kind(&mut self) -> Kind {
+        match self.uniform() {
+            ..0.8 => Kind::Kill,
+            _ => Kind::Crash,
+        }
     }
 
     /// How to hit it.

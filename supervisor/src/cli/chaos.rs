@@ -23,6 +23,10 @@ pub(super) struct Arguments {
     /// Hit some successors again within their first 12 ms: about a fifth of all signals.
     #[arg(long)]
     include_startup: bool,
+    /// Hit the supervisor too, one in twenty signals, and go on with its run each time. The robot is then a process
+    /// of its own, and mission time is wall-clock.
+    #[arg(long, conflicts_with = "pace")]
+    include_supervisor: bool,
     /// Mission time, R times wall-clock.
     #[arg(long, default_value = "4")]
     pace: Pace,
@@ -43,7 +47,10 @@ const NOT_CLEAN: u8 = 8;
 #[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // Faults in it are told at once, and once.
-    missions::load(&arguments.mission, &arguments.set)?;
+    let loaded = missions::load(&arguments.mission, &arguments.set)?;
+    if arguments.include_supervisor && loaded.robot.address.is_some() {
+        return Err("chaos brings its own robot; leave robot.address out".into());
+    }
     if arguments.pace == Pace::Max {
         return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
     }
@@ -51,9 +58,15 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     std::fs::create_dir(&directory)?;
     let options = Options {
         mission: arguments.mission.clone(),
+        loaded,
         set: arguments.set.clone(),
         robot: arguments.robot.clone(),
-        pace: arguments.pace,
+        pace: if arguments.include_supervisor {
+            Pace::Rate(1.0)
+        } else {
+            arguments.pace
+        },
+        supervisor: arguments.include_supervisor,
         kills: arguments.kills,
         seed: arguments.seed,
         startup: arguments.include_startup,

@@ -6,9 +6,8 @@ use std::{
 };
 
 use super::Failure;
+use crate::kept::SUMMARY;
 
-/// In a run directory whose run ended in order.
-pub(super) const SUMMARY: &str = "summary.json";
 /// In a run directory whose run was cut off, once somebody was told.
 const CUT_OFF: &str = "cut-off";
 
@@ -51,24 +50,31 @@ pub(super) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     }
 }
 
-/// A run below `runs` that was begun and never summed up: its supervisor was killed, or the machine. It is told
-/// once, and noted there: who then starts anew means it.
+/// The newest run below `runs` that was begun, never summed up, and not told of yet: its supervisor was killed, or
+/// the machine.
 pub(super) fn cut_off(runs: &Path) -> io::Result<Option<PathBuf>> {
     let entries = match fs::read_dir(runs) {
         Ok(entries) => entries,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error),
     };
-    let mut found = None;
+    let mut newest = None;
     for entry in entries {
         let directory = entry?.path();
         let has = |name: &str| directory.join(name).exists();
         if has(common::run::FILE_NAME) && !has(SUMMARY) && !has(CUT_OFF) {
-            fs::write(directory.join(CUT_OFF), "")?;
-            found = Some(directory);
+            let began = fs::metadata(directory.join(common::run::FILE_NAME))?.modified()?;
+            newest = newest.max(Some((began, directory)));
         }
     }
-    Ok(found)
+    newest
+        .map(|(_, directory)| fs::canonicalize(directory))
+        .transpose()
+}
+
+/// Note that a run was told of as cut off: who then starts anew means it.
+pub(super) fn mark_cut_off(directory: &Path) -> io::Result<()> {
+    fs::write(directory.join(CUT_OFF), "")
 }
 
 #[cfg(test)]
@@ -86,8 +92,9 @@ mod tests {
         };
         fs::write(begun("ended").join(SUMMARY), "").unwrap();
         assert_eq!(cut_off(runs.path()).unwrap(), None);
-        let cut = begun("cut");
-        assert_eq!(cut_off(runs.path()).unwrap(), Some(cut));
+        let cut = fs::canonicalize(begun("cut")).unwrap();
+        assert_eq!(cut_off(runs.path()).unwrap(), Some(cut.clone()));
+        mark_cut_off(&cut).unwrap();
         assert_eq!(cut_off(runs.path()).unwrap(), None, "told again");
     }
 }

@@ -16,6 +16,7 @@ use common::{
 use super::{Failure, directories, missions};
 use crate::{
     fleet::Starter,
+    kept::{self, Interrupted, SUMMARY},
     logging,
     picture::{self, Facts, Scene},
     report::{self, Outcome, Summary},
@@ -43,10 +44,18 @@ pub(super) struct Arguments {
     /// Where the directories of runs are made.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// After a run below --runs that was cut off, say so instead of starting, once: the robot is not where its
-    /// mission starts. For services, which systemd starts again.
-    #[arg(long)]
-    no_repeat: bool,
+    /// Go on with the run in DIR, whose supervisor died. The robot stands where it came to rest, and must not have
+    /// been carried since.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["mission", "robot", "pace", "seed", "out", "timeout", "set"]
+    )]
+    resume: Option<PathBuf>,
+    /// Go on with the newest run below --runs if it was cut off within the last minute; say so instead of starting,
+    /// once, if that was before: the robot is not where its mission starts. For services, which systemd starts again.
+    #[arg(long, conflicts_with_all = ["resume", "out"])]
+    resume_last: bool,
     /// Mission seconds after which to give up, over the mission's.
     #[arg(long, value_name = "S")]
     timeout: Option<f64>,
@@ -74,8 +83,62 @@ impl Default for Arguments {
     }
 }
 
-#[allow(clippy::print_stdout)]
-pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+/// A run to carry out; none when one was cut off too long ago, and that was said.
+fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
+    if let Some(directory) = &arguments.resume {
+        return resumed(arguments, fs::canonicalize(directory)?).map(Some);
+    }
+    if arguments.resume_last
+        && let Some(cut) = directories::cut_off(&arguments.runs)?
+    {
+        if kept::age_s(&cut).is_some_and(|age| age <= RESUMED_WITHIN_S) {
+            return resumed(arguments, cut).map(Some);
+        }
+        directories::mark_cut_off(&cut)?;
+        let cut = cut.display();
+        eprintln!(
+            "firsthand: {cut} was cut off on its way, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`"
+        );
+        return Ok(None);
+    }
+    let mission = mission(arguments)?;
+    let directory = match &arguments.out {
+        Some(directory) => directories::own(directory)?,
+        None => directories::numbered(&arguments.runs, &mission.name)?,
+    };
+    Ok(Some(Options {
+        mission,
+        robot: arguments.robot.clone(),
+        pace: arguments.pace,
+        directory,
+        starter: starter(arguments),
+        interrupted: None,
+    }))
+}
+
+/// The run in `directory`, to go on with.
+fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
+    let interrupted = Interrupted::load(&directory)?;
+    Ok(Options {
+        mission: interrupted.run.mission.clone(),
+        robot: interrupted.run.robot.clone(),
+        pace: interrupted.pace(),
+        directory,
+        starter: starter(arguments),
+        interrupted: Some(interrupted),
+    })
+}
+
+fn starter(arguments: &Arguments) -> Starter {
+    if arguments.watch_only {
+        Starter::Another
+    } else {
+        Starter::Supervisor
+    }
+}
+
+/// The mission asked for, overrides and all.
+fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;
@@ -86,30 +149,15 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         mission.timeout_s = timeout;
     }
-    if arguments.no_repeat
-        && let Some(cut) = directories::cut_off(&arguments.runs)?
-    {
-        let cut = cut.display();
-        eprintln!(
-            "firsthand: {cut} was cut off on its way, and a mission's origin is where the robot stands at its start: put it there, then start again"
-        );
+    Ok(mission)
+}
+
+#[allow(clippy::print_stdout)]
+pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let Some(options) = options(arguments)? else {
         return Ok(ExitCode::from(CUT_OFF));
-    }
-    let directory = match &arguments.out {
-        Some(directory) => directories::own(directory)?,
-        None => directories::numbered(&arguments.runs, &mission.name)?,
     };
-    let options = Options {
-        mission,
-        robot: arguments.robot.clone(),
-        pace: arguments.pace,
-        directory: directory.clone(),
-        starter: if arguments.watch_only {
-            Starter::Another
-        } else {
-            Starter::Supervisor
-        },
-    };
+    let directory = &options.directory;
     // The supervisor's own log lies beside its stages'.
     logging::to_file(&directory.join("supervisor.log"), "info")?;
     let mut console = Console::new(&options);
@@ -118,7 +166,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Err(error) => {
             // A directory made for a run that never was is litter.
             if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
-                let _ = fs::remove_dir_all(&directory);
+                let _ = fs::remove_dir_all(directory);
             }
             return Err(error.into());
         }
@@ -127,7 +175,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let picture = directory.join("picture.svg");
     fs::write(&picture, draw(&options.mission, &finished))?;
     let json = serde_json::to_string(&finished.summary)?;
-    fs::write(directory.join(directories::SUMMARY), format!("{json}\n"))?;
+    fs::write(directory.join(SUMMARY), format!("{json}\n"))?;
     if arguments.json {
         println!("{json}");
     } else {
@@ -137,7 +185,9 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(exit_code(&finished.summary, finished.asked_for))
 }
 
-/// What `--no-repeat` ends with instead of starting.
+/// A robot that stands unsupervised for longer may have been carried.
+const RESUMED_WITHIN_S: f64 = 60.0;
+/// What `--resume-last` ends with instead of starting.
 const CUT_OFF: u8 = 7;
 
 /// The documented code.
@@ -203,8 +253,13 @@ impl Console {
             silent: logging::to_journal(),
             shown: None,
             title: format!(
-                "mission {}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
+                "mission {}{}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
                 mission.name,
+                if options.interrupted.is_some() {
+                    " goes on"
+                } else {
+                    ""
+                },
                 mission.target.length(),
                 options.robot,
                 options.pace,

@@ -1,6 +1,6 @@
 //! `firsthand sim MISSION`: a simulated X80 to drive with anything that speaks its protocol.
 
-use std::{net::SocketAddr, process::ExitCode};
+use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
 use clap::{Args, ValueEnum};
 use common::{
@@ -32,6 +32,9 @@ pub(super) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Keep in this file how the robot stands; if it is there, go on from it.
+    #[arg(long, value_name = "FILE")]
+    keep: Option<PathBuf>,
     /// Tell the truth, a JSON object a line, on standard output.
     #[arg(long)]
     truth: bool,
@@ -73,6 +76,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         pace: arguments.pace,
         listen: arguments.listen,
         transport: arguments.transport.into(),
+        keep: arguments.keep.clone(),
         truth: arguments
             .truth
             .then(|| Box::new(std::io::stdout()) as Box<_>),

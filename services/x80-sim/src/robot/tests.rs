@@ -2,15 +2,19 @@
 
 use std::path::Path;
 
-use common::wire::{Decoder, Gains, Parameter, Quantity, Request, Stream, Targets};
+use common::wire::{Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between};
 
 use proptest::prelude::*;
 
 use super::*;
 
-fn robot(text: &str) -> Robot {
+fn mission(text: &str) -> Mission {
     let text = format!("target = [3, 0]\n{text}");
-    Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+    Mission::parse(&text, Path::new("m.toml")).unwrap()
+}
+
+fn robot(text: &str) -> Robot {
+    Robot::new(&mission(text))
 }
 
 /// Tell the robot `command`; what it was to it, and what it answered.
@@ -388,4 +392,30 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_its_counts() {
+    let mut first = robot("simulation.realism = 'measured'");
+    for _ in 0..20 {
+        tell(&mut first, forward(800, 250));
+        first.advance_to_next_tick();
+    }
+    let driving = first.truth();
+    assert!(driving.v > 0.2, "{driving:?}");
+    first.come_to_rest();
+    let kept = first.kept();
+    let mission = mission("simulation.realism = 'measured'");
+    let mut next = Robot::restored(&mission, &kept);
+    assert_eq!(next.kept(), kept);
+    let stands = next.truth();
+    assert!(stands.x > driving.x + 0.05, "it rolled on: {stands:?}");
+    assert_eq!(stands.v, 0.0);
+    next.advance_to_next_tick();
+    let later = next.truth();
+    assert_eq!((later.x, later.y), (stands.x, stands.y), "it stands");
+    assert!(later.time_s > driving.time_s && later.tick > driving.tick);
+    // One that counted anew would show zero.
+    let rolled = counts_between(driving.left_counts, later.left_counts);
+    assert!((50..600).contains(&rolled), "{rolled} counts");
 }

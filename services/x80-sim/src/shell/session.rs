@@ -3,6 +3,7 @@
 use std::{io::Write, os::fd::BorrowedFd};
 
 use common::{
+    checkpoint::Checkpoint,
     clock::Pace,
     mission::Mission,
     truth::TruthHeader,
@@ -40,6 +41,8 @@ pub(super) struct Session {
     /// The peer's and one other's: half a frame of the one must not garble the other's.
     ears: Vec<Ear>,
     truth: Option<Box<dyn Write + Send>>,
+    /// Where it is kept how the robot stands.
+    checkpoint: Option<Checkpoint>,
 }
 
 /// What has come from one source.
@@ -49,27 +52,45 @@ struct Ear {
 }
 
 impl Session {
-    /// A robot at tick 0, which is written to the truth.
+    /// A robot at its first tick, which is written to the truth.
     pub(super) fn new(
         mission: &Mission,
+        robot: Robot,
         pace: Pace,
         way: Way,
         truth: Option<Box<dyn Write + Send>>,
-    ) -> Self {
+        checkpoint: Option<Checkpoint>,
+    ) -> Result<Self, SimError> {
         let listening = way.address();
         let radio = Radio::new(mission.simulation.physics().radio, mission.seed);
         let mut session = Self {
-            robot: Robot::new(mission),
+            robot,
             lock_step: pace == Pace::Max,
             way,
             radio: Some(radio).filter(|radio| !radio.is_perfect()),
             peer: None,
             ears: Vec::new(),
             truth,
+            checkpoint,
         };
         session.tell(&TruthHeader { listening });
         session.tell_tick();
-        session
+        session.keep()?;
+        Ok(session)
+    }
+
+    /// Keep how the robot stands.
+    fn keep(&mut self) -> Result<(), SimError> {
+        if let Some(checkpoint) = &mut self.checkpoint {
+            checkpoint.save(&self.robot.kept())?;
+        }
+        Ok(())
+    }
+
+    /// The process ends: the robot comes to rest, for nobody speaks to it any more.
+    pub(super) fn end(mut self) -> Result<(), SimError> {
+        self.robot.come_to_rest();
+        self.keep()
     }
 
     /// What becomes readable when bytes have come.
@@ -100,20 +121,20 @@ impl Session {
                 return Ok(());
             };
             if let Some(now) = now() {
-                self.pass(now);
+                self.pass(now)?;
                 let now = self.robot.time_s();
                 if let Some(radio) = &mut self.radio {
                     radio.send(now, Leg::ToRobot(source), bytes);
                     continue;
                 }
             }
-            self.hear(source, bytes);
+            self.hear(source, bytes)?;
         }
         Ok(())
     }
 
     /// Let everything happen that is due by mission time `now`, in its order.
-    pub(super) fn pass(&mut self, now: f64) {
+    pub(super) fn pass(&mut self, now: f64) -> Result<(), SimError> {
         // More than a period is not caught up: the shell lets the clock wait for it.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
         loop {
@@ -124,25 +145,27 @@ impl Session {
             let arrived = self.radio.as_mut().and_then(|radio| radio.arrived(due));
             self.robot.advance_to(due.min(self.next_tick_s()));
             match arrived {
-                Some((Leg::ToRobot(source), bytes)) => self.hear(source, &bytes),
+                Some((Leg::ToRobot(source), bytes)) => self.hear(source, &bytes)?,
                 Some((Leg::ToHost(source), bytes)) => self.way.send(source, &bytes),
-                None => self.tick(),
+                None => self.tick()?,
             }
         }
         self.robot.advance_to(now.min(self.next_tick_s()));
+        Ok(())
     }
 
     /// Pass mission time to the next tick, tell the truth of it, and send its frames.
-    fn tick(&mut self) {
-        let frames = self.measured();
+    fn tick(&mut self) -> Result<(), SimError> {
+        let frames = self.measured()?;
         self.send(&frames);
+        Ok(())
     }
 
     /// A tick in lock-step. When the radio loses its frames nobody sends the next command, so time moves
     /// on by itself until frames come through.
-    fn tick_until_heard(&mut self) {
+    fn tick_until_heard(&mut self) -> Result<(), SimError> {
         for _ in 0..MOST_UNHEARD {
-            let frames = self.measured();
+            let frames = self.measured()?;
             let now = self.robot.time_s();
             let lost = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
             if !lost {
@@ -152,21 +175,23 @@ impl Session {
                 };
                 self.deliver(&first);
                 self.deliver(&second);
-                return;
+                break;
             }
         }
+        Ok(())
     }
 
-    /// The frames of the next tick, its truth told.
-    fn measured(&mut self) -> Vec<u8> {
+    /// The frames of the next tick, its truth told and kept.
+    fn measured(&mut self) -> Result<Vec<u8>, SimError> {
         self.robot.advance_to_next_tick();
         self.tell_tick();
+        self.keep()?;
         let mut frames = Vec::with_capacity(256);
         self.robot.stream(&mut frames);
-        frames
+        Ok(frames)
     }
 
-    fn hear(&mut self, source: Source, bytes: &[u8]) {
+    fn hear(&mut self, source: Source, bytes: &[u8]) -> Result<(), SimError> {
         let known = self.ears.iter().position(|ear| ear.source == source);
         let mut ear = known.map_or_else(
             || Ear {
@@ -177,7 +202,7 @@ impl Session {
         );
         ear.decoder.push(bytes);
         while let Some(frame) = ear.decoder.next_frame() {
-            self.on_frame(source, &frame);
+            self.on_frame(source, &frame)?;
         }
         // Of others than the peer, only one is remembered.
         if self.peer != Some(source) {
@@ -187,16 +212,17 @@ impl Session {
             self.ears.remove(0);
         }
         self.ears.push(ear);
+        Ok(())
     }
 
-    fn on_frame(&mut self, source: Source, frame: &Frame<'_>) {
+    fn on_frame(&mut self, source: Source, frame: &Frame<'_>) -> Result<(), SimError> {
         let mut answer = Vec::with_capacity(16);
         if !self.lock_step {
             if self.robot.on_frame(frame, &mut answer) != Heard::Stranger {
                 self.peer = Some(source);
                 self.send(&answer);
             }
-            return;
+            return Ok(());
         }
         match Robot::kind(frame) {
             Heard::Stranger => {}
@@ -214,7 +240,7 @@ impl Session {
                     self.robot.on_frame(frame, &mut answer);
                     self.deliver(&answer);
                 }
-                self.tick_until_heard();
+                self.tick_until_heard()?;
             }
             Heard::Ping => {
                 self.peer = Some(source);
@@ -230,6 +256,7 @@ impl Session {
                 self.deliver(&answer);
             }
         }
+        Ok(())
     }
 
     /// Send to the peer over the radio.

@@ -55,6 +55,7 @@ impl Sim {
             pace,
             listen: SocketAddr::from(([127, 0, 0, 1], 0)),
             transport,
+            keep: None,
             truth: Some(Box::new(truth_writer)),
         };
         let thread = std::thread::spawn(move || run(options, stopped));
