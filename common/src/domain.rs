@@ -125,6 +125,12 @@ impl Domain {
         self.directory.join("bus")
     }
 
+    /// Where they are moved to be removed.
+    #[must_use]
+    pub fn middleware_root_aside(&self) -> PathBuf {
+        self.directory.join("bus.old")
+    }
+
     /// The middleware's configuration: what a consumer in any language loads first.
     #[must_use]
     pub fn middleware_config(&self) -> PathBuf {

@@ -225,18 +225,21 @@ fn wait_for_tenants(domain: &Domain) -> Result<File, DomainError> {
 
 /// Remove every trace of the middleware in this domain.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
-    let root = domain.middleware_root();
-    match fs::remove_dir_all(&root) {
-        Ok(()) => {}
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        Err(error) => return Err(failed("remove", &root)(error)),
-    }
+    // Without a configuration nobody joins.
     for file in [domain.middleware_config(), domain.run_link()] {
         match fs::remove_file(&file) {
             Ok(()) => {}
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => return Err(failed("remove", &file)(error)),
         }
+    }
+    // Out of the way first: a consumer that is joining would fill it while it is emptied.
+    let (root, aside) = (domain.middleware_root(), domain.middleware_root_aside());
+    remove_directory(&aside)?;
+    match fs::rename(&root, &aside) {
+        Ok(()) => remove_directory(&aside)?,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(failed("move", &root)(error)),
     }
     let prefix = domain.shared_memory_prefix();
     let shared = Path::new(SHARED_MEMORY);
@@ -255,6 +258,14 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
         }
     }
     Ok(())
+}
+
+/// With all that is in it, if it is there.
+fn remove_directory(path: &Path) -> Result<(), DomainError> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
+        _ => Ok(()),
+    }
 }
 
 /// A segment made in a full file system is a SIGBUS later: look before.
