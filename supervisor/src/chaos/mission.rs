@@ -24,7 +24,7 @@ use serde_json::Value;
 
 use super::{
     ChaosError, Options,
-    report::{End, Report},
+    report::{End, Possessions, Report},
     system,
     victim::{Chance, Kind},
 };
@@ -189,6 +189,8 @@ struct Attack {
     driving: bool,
     wounds: Vec<Wound>,
     pose: Option<PoseSample>,
+    /// Of the supervisor that lives: when its robot began to drive, and when it was last looked at.
+    held: Option<[Possessions; 2]>,
 }
 
 /// The attacker's place on the bus, for one life of the supervisor.
@@ -215,6 +217,7 @@ impl Attack {
         let began = Instant::now();
         self.driving = false;
         self.entries.clear();
+        self.held = None;
         // The stages of a supervisor that was hit go with it.
         self.wounds.retain(|wound| wound.stage == SUPERVISOR);
         let mut ears = loop {
@@ -241,6 +244,9 @@ impl Attack {
                 next = Instant::now() + chance.pause();
                 self.hit(options, chance, report);
             }
+        }
+        if let Some([first, last]) = self.held {
+            report.held(first, last);
         }
         Ok(())
     }
@@ -270,6 +276,10 @@ impl Attack {
             self.entries = entries.to_vec();
             if self.driving {
                 self.heal(SUPERVISOR, AFTER_ANY, true, report);
+                if let Some(held) = Possessions::of(self.supervisor) {
+                    let [first, _] = self.held.unwrap_or([held; 2]);
+                    self.held = Some([first, held]);
+                }
             }
         }
         while let Some(health) = ears.health.take()? {

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fmt,
+    fmt, fs,
     time::{Duration, Instant},
 };
 
@@ -31,12 +31,37 @@ pub(crate) struct Report {
     longest_unattended_s: f64,
     /// Files, shared memory, processes that outlived a mission.
     pub(crate) leftovers: usize,
-    descriptors_won: i64,
+    /// The most that a supervisor held more at the end of its life than when its robot began to drive.
+    most_won: Possessions,
     took_s: f64,
     #[serde(skip)]
     began: Instant,
-    #[serde(skip)]
-    descriptors: i64,
+}
+
+/// What a process holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct Possessions {
+    /// Open descriptors.
+    pub(crate) descriptors: i64,
+    /// Memory that is its own, KiB.
+    pub(crate) memory_kib: i64,
+}
+
+impl Possessions {
+    /// Of process `pid`; none when it is gone.
+    pub(crate) fn of(pid: u32) -> Option<Self> {
+        let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as i64;
+        let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+        // Pages of shared memory come with the samples that were looked at: they are the bus's.
+        let line = status
+            .lines()
+            .find_map(|line| line.strip_prefix("RssAnon:"))?;
+        let memory_kib = line.trim().trim_end_matches(" kB").parse().ok()?;
+        Some(Self {
+            descriptors,
+            memory_kib,
+        })
+    }
 }
 
 /// From the signal to the successor.
@@ -75,10 +100,9 @@ impl Report {
             worst_pose_kills: 0,
             longest_unattended_s: 0.0,
             leftovers: 0,
-            descriptors_won: 0,
+            most_won: Possessions::default(),
             took_s: 0.0,
             began: Instant::now(),
-            descriptors: descriptors(),
         }
     }
 
@@ -119,8 +143,14 @@ impl Report {
         }
     }
 
+    /// A supervisor held `first` when its robot began to drive, and `last` when it was last looked at.
+    pub(crate) fn held(&mut self, first: Possessions, last: Possessions) {
+        let most = &mut self.most_won;
+        most.descriptors = most.descriptors.max(last.descriptors - first.descriptors);
+        most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
+    }
+
     pub(crate) fn end(&mut self) {
-        self.descriptors_won = descriptors() - self.descriptors;
         self.took_s = self.began.elapsed().as_secs_f64();
     }
 
@@ -128,11 +158,6 @@ impl Report {
     pub(crate) fn is_clean(&self) -> bool {
         self.reached == self.missions && self.collisions == 0 && self.leftovers == 0
     }
-}
-
-/// Open descriptors of this process.
-fn descriptors() -> i64 {
-    std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as i64)
 }
 
 /// Milliseconds of a quantile.
@@ -224,8 +249,16 @@ impl fmt::Display for Report {
         )?;
         writeln!(
             to,
-            "a wheel turned at most {:.2} s of mission time after the last command; descriptors won {}",
-            self.longest_unattended_s, self.descriptors_won
+            "a wheel turned at most {:.2} s of mission time after the last command",
+            self.longest_unattended_s
+        )?;
+        let Possessions {
+            descriptors,
+            memory_kib,
+        } = self.most_won;
+        writeln!(
+            to,
+            "a supervisor won at most {descriptors} descriptors and {memory_kib} KiB on its way"
         )
     }
 }
