@@ -319,6 +319,8 @@ pub struct GuidanceSample {
     pub speed_limit_m_s: f64,
     /// A [`GuidanceStatus`].
     pub status: u8,
+    /// Mission time of the pose it was computed for, nanoseconds.
+    pub pose_ns: u64,
     /// The version of `grid` it was computed from.
     pub grid_version: u64,
     /// That version's safety events.
@@ -398,6 +400,11 @@ pub struct CommandSample {
     pub omega_rad_s: f64,
     /// dst of (14), metres.
     pub distance_m: f64,
+    /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds: the link
+    /// lets no old one move the robot, whatever the stamp says.
+    pub pose_ns: u64,
+    /// Mission time of the guidance it follows, nanoseconds; likewise.
+    pub guidance_ns: u64,
     /// A [`CommandState`].
     pub state: u8,
 }
@@ -451,6 +458,51 @@ pub struct HealthSample {
     pub turns: u64,
 }
 
+wire_enum! {
+    /// What the link's failsafe does with the robot, the mildest first.
+    #[derive(PartialOrd, Ord)]
+    Action, unknown = Stop {
+        /// Commands pass as they are.
+        Go = 0,
+        /// Commands pass at a share of their speed, along the same curve.
+        Slow = 1,
+        /// The robot stands; it goes on when the cause is gone.
+        Stop = 2,
+        /// The robot stands for good: the mission ends.
+        End = 3,
+    }
+}
+
+wire_enum! {
+    /// Why the link's failsafe does it; `firsthand failsafe` tells of each.
+    Cause, unknown = NotOrdered {
+        /// Nothing is wrong.
+        None = 0,
+        /// The supervisor has not said drive.
+        NotOrdered = 1,
+        /// The supervisor ends the mission.
+        MissionOver = 2,
+        /// A battery that the robot drives on is empty.
+        BatteryEmpty = 3,
+        /// An operator said stop.
+        OperatorStop = 4,
+        /// A stage is held.
+        StageHeld = 5,
+        /// The supervisor says nothing any more.
+        SupervisorSilent = 6,
+        /// The robot does not answer; it is told to stand in case it hears.
+        RobotLost = 7,
+        /// No command yet, or the newest is too old: a stage is down or slow.
+        CommandStale = 8,
+        /// The command was computed from too old a pose.
+        PoseStale = 9,
+        /// The command follows too old a guidance.
+        GuidanceStale = 10,
+        /// A battery that the robot drives on is low.
+        BatteryLow = 11,
+    }
+}
+
 /// Topic `link`: the state of the wire.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Link")]
@@ -460,8 +512,10 @@ pub struct LinkSample {
     pub stamp: Stamp,
     /// 1: the robot answers.
     pub connected: u32,
-    /// 1: the last command sent was zero by the link's own decision.
-    pub stopped: u32,
+    /// What the failsafe does: an [`Action`].
+    pub action: u8,
+    /// Why: a [`Cause`].
+    pub cause: u8,
     /// Frames received whole.
     pub frames_in: u64,
     /// Bytes that belonged to no frame.
@@ -499,7 +553,8 @@ impl Default for LinkSample {
         Self {
             stamp: Stamp::default(),
             connected: 0,
-            stopped: 0,
+            action: Action::Stop.into(),
+            cause: Cause::NotOrdered.into(),
             frames_in: 0,
             bytes_dropped: 0,
             strangers: 0,
@@ -516,6 +571,26 @@ impl Default for LinkSample {
             latency_max_ns: 0,
             latency_histogram: [0; latency::BUCKETS],
         }
+    }
+}
+
+impl LinkSample {
+    /// What the failsafe does.
+    #[must_use]
+    pub const fn action(&self) -> Action {
+        Action::from_byte(self.action)
+    }
+
+    /// Why.
+    #[must_use]
+    pub const fn cause(&self) -> Cause {
+        Cause::from_byte(self.cause)
+    }
+
+    /// Whether the link lets no command pass.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        self.action() >= Action::Stop
     }
 }
 
@@ -606,6 +681,8 @@ pub struct DirectiveSample {
     pub epoch: u64,
     /// An [`Order`].
     pub order: u8,
+    /// Why it is not to drive: a [`HoldReason`].
+    pub reason: u8,
 }
 
 wire_enum! {
@@ -821,6 +898,7 @@ mod tests {
         assert_eq!(CommandState::from_byte(200), CommandState::Halt);
         assert_eq!(GuidanceStatus::from_byte(200), GuidanceStatus::Waiting);
         assert_eq!(RangeStatus::from_byte(200), RangeStatus::Absent);
+        assert_eq!(Action::from_byte(200), Action::Stop);
     }
 
     #[test]

@@ -50,6 +50,7 @@ enum Command {
     Install(install::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
+    Failsafe(tables::FailsafeArguments),
 }
 
 /// What `run` ends with.
@@ -94,6 +95,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Install(arguments) => install::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),
+        Command::Failsafe(arguments) => tables::failsafe(&arguments),
     };
     match result {
         Ok(code) => code,

@@ -16,14 +16,15 @@ use common::{
     mission::Mission,
     run::{Run, RunError},
     samples::{
-        DeathSample, DirectiveSample, HoldReason, Order, RequestKind, RequestSample, RosterEntry,
-        RosterHeader, name_str,
+        Action, Cause, DeathSample, DirectiveSample, HoldReason, LinkSample, Order, RequestKind,
+        RequestSample, RosterEntry, RosterHeader, name_str,
     },
     signals::{SIGINT, SIGTERM, Signals},
     topics,
     waiter::Waiter,
 };
 use thiserror::Error;
+use x80_link::failsafe;
 
 use crate::{
     death,
@@ -126,10 +127,11 @@ pub(crate) struct Progress<'a> {
 impl fmt::Display for Progress<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (alive, all) = self.alive;
-        if !self.driving {
+        let record = self.record;
+        let link = record.link.unwrap_or_default();
+        if !self.driving && link.cause() == Cause::NotOrdered {
             return write!(f, "starting: {alive}/{all} stages alive");
         }
-        let record = self.record;
         let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
         let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
         let distance = record
@@ -138,12 +140,17 @@ impl fmt::Display for Progress<'_> {
         let events = record
             .newest_guidance()
             .map_or(0, |guidance| guidance.safety_events);
-        let lost = record.link.is_some_and(|link| link.connected == 0);
-        let robot = if lost { ", ROBOT LOST" } else { "" };
         write!(
             f,
-            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {alive}/{all} stages alive{robot}"
-        )
+            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {alive}/{all} stages alive"
+        )?;
+        match link.action() {
+            Action::Go => Ok(()),
+            action => {
+                let cause = failsafe::name(link.cause()).to_uppercase();
+                write!(f, ", {cause}: the robot {}", failsafe::effect(action))
+            }
+        }
     }
 }
 
@@ -454,6 +461,9 @@ impl<'a> Supervisor<'a> {
                 asked_for: true,
             }));
         }
+        if let Some(ending) = record.link.as_ref().and_then(ended_by_the_link) {
+            return Ok(Some(ending));
+        }
         let truth = self
             .simulator
             .as_ref()
@@ -529,7 +539,7 @@ impl<'a> Supervisor<'a> {
             return Ok(None);
         }
         self.judged_tick = Some(pose.stamp.tick);
-        let stopped = record.link.is_none_or(|link| link.stopped == 1);
+        let stopped = record.link.is_none_or(|link| link.stopped());
         let held = stopped || !self.fleet.all_running();
         let guidance = *guidance;
         match self.stall.step(&pose, &guidance, held) {
@@ -572,6 +582,7 @@ impl<'a> Supervisor<'a> {
         let time = pose.map_or(self.beginning.1, |pose| pose.stamp.time());
         let directive = DirectiveSample {
             order: self.order.into(),
+            reason: self.reason.into(),
             epoch: self.stall.epoch(),
             ..DirectiveSample::default()
         };
@@ -596,11 +607,7 @@ impl<'a> Supervisor<'a> {
         let began = Instant::now();
         loop {
             self.observer.take(&mut self.fleet)?;
-            let confirmed = self
-                .observer
-                .record
-                .link
-                .is_none_or(|link| link.stopped == 1);
+            let confirmed = self.observer.record.link.is_none_or(|link| link.stopped());
             if confirmed || began.elapsed() >= STAND_CONFIRMED {
                 break;
             }
@@ -645,6 +652,13 @@ impl<'a> Supervisor<'a> {
             truth,
         }
     }
+}
+
+/// The ending that the link's failsafe asks for, if it does.
+fn ended_by_the_link(link: &LinkSample) -> Option<Ending> {
+    let rule = failsafe::rule(link.cause())?;
+    let words = format!("{}: {}", rule.name, rule.when);
+    (link.action() == Action::End).then(|| fault(&words))
 }
 
 fn fault(reason: &str) -> Ending {

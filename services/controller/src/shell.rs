@@ -47,7 +47,11 @@ impl Process for Shell {
         let Some(pose) = self.latest_pose else {
             return Ok(self.progress);
         };
-        let command = self.controller.step(pose.pose(), &guidance);
+        let command = CommandSample {
+            pose_ns: pose.stamp.stamp_ns.min(guidance.pose_ns),
+            guidance_ns: guidance.stamp.stamp_ns,
+            ..self.controller.step(pose.pose(), &guidance)
+        };
         self.progress = Progress {
             tick: guidance.stamp.tick,
             time: guidance.stamp.time(),

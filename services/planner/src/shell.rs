@@ -223,6 +223,7 @@ impl Shell {
             return Ok(());
         };
         let guidance = GuidanceSample {
+            pose_ns: pose.stamp.stamp_ns,
             full_solve_ns: self.full_solve_ns,
             local_update_ns: self.local_update_ns,
             ..self.planner.guide(&pose.pose())

@@ -1,100 +1,261 @@
-//! Whether the robot may move: one pure function, evaluated where the stop is made.
+//! Whether the robot may move: one pure function of what is known to the worst action that applies, evaluated
+//! where the stop is made.
+//!
+//! [`TABLE`] is all there is to it. The README shows it (`firsthand failsafe`).
 
 use std::time::Duration;
 
-use common::samples::Order;
+use common::samples::{Action, Cause, HoldReason, Order};
+
+/// A supervisor that has been silent for so long watches nobody: ten times what it says its word again after,
+/// so that a loaded machine does not stop the robot, and a second before systemd's watchdog would kill it.
+pub const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
+
+/// The share of its speed that a robot with a low battery goes at. Motors that draw less let the battery give
+/// more; slower still, and wheels begin to stick.
+pub const SLOW_SHARE: f64 = 0.5;
 
 /// What the link knows when it decides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flags {
-    /// What the supervisor wants; none before it spoke.
-    pub order: Option<Order>,
-    /// Mission time since the newest command was computed from its tick; none before the first.
-    pub command_age: Option<Duration>,
+    /// The supervisor's last word; none before it spoke.
+    pub directive: Option<Directive>,
     /// Whether the robot answers.
     pub connected: bool,
+    /// How old the newest command is; none before the first.
+    pub command: Option<Ages>,
+    /// The worst of the batteries that the robot drives on.
+    pub battery: Charge,
 }
 
-/// Why the robot must stand still.
+/// What the supervisor said last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Directive {
+    /// What it wants.
+    pub order: Order,
+    /// Why it does not want the robot to drive.
+    pub reason: HoldReason,
+    /// How long ago it said so, by the machine's clock.
+    pub age: Duration,
+}
+
+/// How old a command and what it was computed from are, in mission time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ages {
+    /// Since the tick it answers began.
+    pub command: Duration,
+    /// Since the oldest pose it was computed from.
+    pub pose: Duration,
+    /// Since the guidance it follows.
+    pub guidance: Duration,
+}
+
+/// What a battery still holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Charge {
+    /// Enough, or there is no such battery.
+    #[default]
+    Well,
+    /// Little.
+    Low,
+    /// Nothing to drive on.
+    Empty,
+}
+
+/// What to do, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
-    /// The supervisor has not said drive.
-    NotOrdered,
-    /// No command yet, or the newest is too old: a stage is down or slow.
-    CommandStale,
-    /// The robot does not answer; it is told to stand in case it hears.
-    RobotLost,
+pub struct Decision {
+    /// What.
+    pub action: Action,
+    /// Why.
+    pub cause: Cause,
 }
 
-impl Cause {
-    /// For logs.
+impl Decision {
+    /// Nothing is wrong.
+    pub const GO: Self = Self {
+        action: Action::Go,
+        cause: Cause::None,
+    };
+
+    /// Whether no command may pass.
     #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::NotOrdered => "no order to drive",
-            Self::CommandStale => "command stale",
-            Self::RobotLost => "robot lost",
+    pub fn stops(self) -> bool {
+        self.action >= Action::Stop
+    }
+}
+
+/// A row of the table. What it says for people stands beside what it does.
+#[derive(Debug)]
+pub struct Rule {
+    /// What is wrong.
+    pub cause: Cause,
+    /// The same in a few words.
+    pub name: &'static str,
+    /// When it applies, in words.
+    pub when: &'static str,
+    /// What is done.
+    pub action: Action,
+    /// When it no longer applies, in words.
+    pub until: &'static str,
+    /// Whether it applies; the duration is how old a command may be.
+    applies: fn(&Flags, Duration) -> bool,
+}
+
+/// Every rule, the worst action first; of those with the same action the first that applies is told.
+pub static TABLE: &[Rule] = &[
+    Rule {
+        cause: Cause::MissionOver,
+        name: "mission over",
+        when: "the supervisor ends the mission",
+        action: Action::End,
+        until: "a mission is started",
+        applies: |flags, _| ordered(flags, Order::Stop),
+    },
+    Rule {
+        cause: Cause::BatteryEmpty,
+        name: "battery empty",
+        when: "the boards' or the motors' battery has given less than 10/11 of its `robot.low_battery_v` for 2 s",
+        action: Action::End,
+        until: "it is charged and a mission started",
+        applies: |flags, _| flags.battery == Charge::Empty,
+    },
+    Rule {
+        cause: Cause::OperatorStop,
+        name: "stopped by an operator",
+        when: "`firsthand stop`",
+        action: Action::Stop,
+        until: "`firsthand resume`",
+        applies: |flags, _| held(flags) == Some(HoldReason::Operator),
+    },
+    Rule {
+        cause: Cause::StageHeld,
+        name: "stage held",
+        when: "a stage died again and again",
+        action: Action::Stop,
+        until: "`firsthand restart NAME`",
+        applies: |flags, _| held(flags) == Some(HoldReason::StageHeld),
+    },
+    Rule {
+        cause: Cause::NotOrdered,
+        name: "no order to drive",
+        when: "the supervisor has not said drive: the stages start",
+        action: Action::Stop,
+        until: "it does",
+        applies: |flags, _| {
+            let other = |reason| !matches!(reason, HoldReason::Operator | HoldReason::StageHeld);
+            flags.directive.is_none() || held(flags).is_some_and(other)
+        },
+    },
+    Rule {
+        cause: Cause::SupervisorSilent,
+        name: "supervisor silent",
+        when: "it has said nothing for 2 s, which it does five times a second",
+        action: Action::Stop,
+        until: "its next word",
+        applies: |flags, _| {
+            let silent = |directive: Directive| directive.age > SUPERVISOR_SILENT;
+            flags.directive.is_some_and(silent)
+        },
+    },
+    Rule {
+        cause: Cause::RobotLost,
+        name: "robot lost",
+        when: "it has said nothing for three times `robot.command_limit_s`, or the wire is down",
+        action: Action::Stop,
+        until: "its next frame",
+        applies: |flags, _| !flags.connected,
+    },
+    Rule {
+        cause: Cause::CommandStale,
+        name: "command stale",
+        when: "the newest command's tick began more than `robot.command_limit_s` ago, or there is none",
+        action: Action::Stop,
+        until: "a fresh one",
+        applies: |flags, limit| flags.command.is_none_or(|ages| ages.command > limit),
+    },
+    Rule {
+        cause: Cause::PoseStale,
+        name: "pose stale",
+        when: "the command or its guidance was computed from a pose older than that",
+        action: Action::Stop,
+        until: "a command from a fresh one",
+        applies: |flags, limit| flags.command.is_some_and(|ages| ages.pose > limit),
+    },
+    Rule {
+        cause: Cause::GuidanceStale,
+        name: "guidance stale",
+        when: "the command follows a guidance older than that",
+        action: Action::Stop,
+        until: "a command that follows a fresh one",
+        applies: |flags, limit| flags.command.is_some_and(|ages| ages.guidance > limit),
+    },
+    Rule {
+        cause: Cause::BatteryLow,
+        name: "battery low",
+        when: "the boards' or the motors' battery gives less than its `robot.low_battery_v`",
+        action: Action::Slow,
+        until: "it gives 0.3 V more than that",
+        applies: |flags, _| flags.battery == Charge::Low,
+    },
+];
+
+/// What an action means for the robot.
+#[must_use]
+pub const fn effect(action: Action) -> &'static str {
+    match action {
+        Action::Go => "goes",
+        Action::Slow => "goes at half speed",
+        Action::Stop => "stands",
+        Action::End => "stands, and the mission ends",
+    }
+}
+
+/// The row of a cause; none for [`Cause::None`].
+#[must_use]
+pub fn rule(cause: Cause) -> Option<&'static Rule> {
+    TABLE.iter().find(|rule| rule.cause == cause)
+}
+
+/// A cause in a few words.
+#[must_use]
+pub fn name(cause: Cause) -> &'static str {
+    rule(cause).map_or("nothing is wrong", |rule| rule.name)
+}
+
+/// The worst action that applies, and the first cause of it.
+#[must_use]
+pub fn decide(flags: &Flags, command_limit: Duration) -> Decision {
+    worst(TABLE, flags, command_limit)
+}
+
+fn worst<'a>(
+    rules: impl IntoIterator<Item = &'a Rule>,
+    flags: &Flags,
+    command_limit: Duration,
+) -> Decision {
+    let mut worst = Decision::GO;
+    for rule in rules {
+        if rule.action > worst.action && (rule.applies)(flags, command_limit) {
+            worst = Decision {
+                action: rule.action,
+                cause: rule.cause,
+            };
         }
     }
+    worst
 }
 
-/// The first cause that applies; none lets the newest command through.
-#[must_use]
-pub fn stop_cause(flags: &Flags, command_limit: Duration) -> Option<Cause> {
-    if flags.order != Some(Order::Drive) {
-        return Some(Cause::NotOrdered);
-    }
-    if !flags.connected {
-        return Some(Cause::RobotLost);
-    }
-    match flags.command_age {
-        Some(age) if age <= command_limit => None,
-        _ => Some(Cause::CommandStale),
-    }
+fn ordered(flags: &Flags, order: Order) -> bool {
+    let orders = |directive: Directive| directive.order == order;
+    flags.directive.is_some_and(orders)
+}
+
+/// Why the supervisor has the robot wait, if it has.
+fn held(flags: &Flags) -> Option<HoldReason> {
+    let directive = flags.directive?;
+    (directive.order == Order::Hold).then_some(directive.reason)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const LIMIT: Duration = Duration::from_millis(250);
-    const GO: Flags = Flags {
-        order: Some(Order::Drive),
-        command_age: Some(LIMIT),
-        connected: true,
-    };
-
-    #[test]
-    fn a_fresh_command_passes_and_one_past_its_limit_does_not() {
-        assert_eq!(stop_cause(&GO, LIMIT), None);
-        let stale = Flags {
-            command_age: Some(LIMIT + Duration::from_nanos(1)),
-            ..GO
-        };
-        assert_eq!(stop_cause(&stale, LIMIT), Some(Cause::CommandStale));
-        let never = Flags {
-            command_age: None,
-            ..GO
-        };
-        assert_eq!(stop_cause(&never, LIMIT), Some(Cause::CommandStale));
-    }
-
-    #[test]
-    fn without_an_order_to_drive_nothing_passes() {
-        for order in [None, Some(Order::Hold), Some(Order::Stop)] {
-            assert_eq!(
-                stop_cause(&Flags { order, ..GO }, LIMIT),
-                Some(Cause::NotOrdered)
-            );
-        }
-    }
-
-    #[test]
-    fn a_robot_that_does_not_answer_is_told_to_stand() {
-        let lost = Flags {
-            connected: false,
-            ..GO
-        };
-        assert_eq!(stop_cause(&lost, LIMIT), Some(Cause::RobotLost));
-    }
-}
+mod tests;

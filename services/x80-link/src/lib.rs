@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`step`] | the link itself, pure: bytes and commands in, samples and bytes out |
 //! | [`drive`] | the two wheels on the wire: channels and signs, counts in, timed commands out |
-//! | [`failsafe`] | whether a command may move the robot, and why not |
+//! | [`failsafe`] | THE table of what slows, stops or ends, and why |
 //! | [`transport`] | datagrams, a connection or a serial line |
 //! | [`presence`] | whether the robot answers, and how it is looked for |
 //! | [`restart`] | whether the robot restarted its counts |

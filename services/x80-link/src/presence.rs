@@ -8,7 +8,7 @@ use crate::backoff::Backoff;
 
 /// A robot that said nothing for so many command limits is lost: longer than a radio's short fade, and
 /// the robot stands by then anyway.
-const SILENT_LIMITS: u32 = 3;
+pub(crate) const SILENT_LIMITS: u32 = 3;
 /// However fast mission time runs, processes are late by so much now and then.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
 /// Between the first two pings of a robot that does not answer.

@@ -7,7 +7,7 @@ use common::{
     clock::monotonic_ns,
     latency::Histogram,
     samples::{
-        CommandSample, DirectiveSample, InfraredSample, LinkSample, Order, PowerSample,
+        CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order, PowerSample,
         RangeSample, SurroundingsSample, WheelSample,
     },
     shell::{Context, Process, Progress, StageError},
@@ -15,6 +15,7 @@ use common::{
 };
 
 use crate::{
+    failsafe::{self, Charge, Decision},
     step::{Effect, Event, Link},
     telemetry::BatteryChange,
     transport::{Transport, TransportError},
@@ -83,7 +84,8 @@ impl Process for Shell {
         self.tend()?;
         if let Some(directive) = self.directive.newest()? {
             let order = Order::from_byte(directive.order);
-            let effects = self.link.step(Event::Order(order), monotonic_ns());
+            let word = Event::Order(order, HoldReason::from_byte(directive.reason));
+            let effects = self.link.step(word, monotonic_ns());
             self.carry_out(effects)?;
         }
         while let Some(command) = self.command.take()? {
@@ -136,17 +138,35 @@ fn wire_broke(error: TransportError) -> StageError {
 }
 
 fn tell_battery(change: &BatteryChange) {
-    let BatteryChange { pack, volts, low } = *change;
+    let BatteryChange {
+        pack,
+        volts,
+        charge,
+    } = *change;
     let volts = format!("{volts:.1}");
     let pack = pack.as_str();
-    if low {
-        tracing::warn!(
+    match charge {
+        Charge::Empty => tracing::error!(
+            pack,
+            volts,
+            "battery empty: charge it, or set robot.low_battery_v"
+        ),
+        Charge::Low => tracing::warn!(
             pack,
             volts,
             "battery low: charge it, or set robot.low_battery_v"
-        );
+        ),
+        Charge::Well => tracing::info!(pack, volts, "battery well again"),
+    }
+}
+
+fn tell_decision(before: Decision, now: Decision) {
+    let robot = failsafe::effect(now.action);
+    let cause = failsafe::name(now.cause);
+    if now.action > before.action {
+        tracing::warn!(robot, cause, "failsafe");
     } else {
-        tracing::info!(pack, volts, "battery well again");
+        tracing::info!(robot, cause, "failsafe");
     }
 }
 
@@ -180,8 +200,8 @@ impl Shell {
                     self.latency.record(self.latency_ns);
                     self.state()?;
                 }
-                Effect::Stopped(cause) => {
-                    tracing::warn!(cause = cause.as_str(), "robot stopped");
+                Effect::Decided { before, now } => {
+                    tell_decision(before, now);
                     self.state()?;
                 }
                 Effect::Connected(true) => {
@@ -220,7 +240,8 @@ impl Shell {
         let carried = self.transport.tally();
         let sample = LinkSample {
             connected: self.link.connected().into(),
-            stopped: self.link.stopped().is_some().into(),
+            action: self.link.decision().action.into(),
+            cause: self.link.decision().cause.into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
             strangers: carried.strangers,

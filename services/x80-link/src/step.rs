@@ -12,7 +12,10 @@ use std::time::Duration;
 use common::{
     clock::{MissionClock, MissionTime},
     mission::Mission,
-    samples::{CommandSample, CommandState, Order, RangeSample, RangeStatus, WheelSample},
+    samples::{
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, RangeStatus,
+        WheelSample,
+    },
     wire::{
         Command, CustomSensors, Decoder, DecoderTally, Echo, MotorSensors, Report, StandardSensors,
         SystemSignal,
@@ -21,7 +24,7 @@ use common::{
 
 use crate::{
     drive::{Drive, encoded},
-    failsafe::{self, Cause, Flags},
+    failsafe::{self, Ages, Decision, Directive, Flags, SLOW_SHARE},
     presence::{Absence, Presence},
     restart::RestartWatch,
     telemetry::Telemetry,
@@ -60,6 +63,14 @@ struct Repeat {
     due: MissionTime,
 }
 
+/// The supervisor's last word.
+#[derive(Clone, Copy, Debug)]
+struct Word {
+    order: Order,
+    reason: HoldReason,
+    heard_ns: u64,
+}
+
 /// The link to one robot.
 #[derive(Debug)]
 pub struct Link {
@@ -68,7 +79,7 @@ pub struct Link {
     sonar_index: usize,
     half_period_ns: u64,
     decoder: Decoder,
-    order: Option<Order>,
+    word: Option<Word>,
     presence: Presence,
     pinged_ns: Option<u64>,
     restart: RestartWatch,
@@ -79,7 +90,7 @@ pub struct Link {
     open: Option<OpenTick>,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
-    stopped: Option<Cause>,
+    decision: Decision,
     stop_sent_ns: Option<u64>,
     /// On a clock of ticks: motor frames that are due, one for each command and each ping since the order.
     due: u32,
@@ -98,7 +109,7 @@ impl Link {
             sonar_index: usize::from(mission.sonar.index),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             decoder: Decoder::default(),
-            order: None,
+            word: None,
             presence: Presence::new(mission, clock),
             pinged_ns: None,
             restart: RestartWatch::new(mission),
@@ -110,7 +121,10 @@ impl Link {
             newest_command: None,
             repeat: None,
             // Nothing has moved yet: what holds it needs no stop of its own.
-            stopped: Some(Cause::NotOrdered),
+            decision: Decision {
+                action: Action::Stop,
+                cause: Cause::NotOrdered,
+            },
             stop_sent_ns: None,
             due: 0,
             arrived: false,
@@ -124,10 +138,10 @@ impl Link {
         self.presence.connected()
     }
 
-    /// Why the robot stands by the link's own decision; none while commands pass.
+    /// What the failsafe does, and why.
     #[must_use]
-    pub const fn stopped(&self) -> Option<Cause> {
-        self.stopped
+    pub const fn decision(&self) -> Decision {
+        self.decision
     }
 
     /// Counts of the wire.
@@ -176,7 +190,7 @@ impl Link {
             }
             Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
             Event::Command(command) => self.take_command(command, now_ns, &mut effects),
-            Event::Order(order) => self.take_order(order, now_ns, &mut effects),
+            Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
             Event::Quiet => {}
         }
         self.keep_connected(now_ns, &mut effects);
@@ -190,6 +204,10 @@ impl Link {
     #[must_use]
     pub fn farewell(&self) -> Vec<Vec<u8>> {
         (0..STOPS).map(|_| self.drive.stop()).collect()
+    }
+
+    fn ordered_to_drive(&self) -> bool {
+        self.word.is_some_and(|word| word.order == Order::Drive)
     }
 
     const fn in_ticks(&self) -> bool {
@@ -234,7 +252,14 @@ impl Link {
                 effects.push(Effect::Send(self.drive.greeting()));
             }
         }
-        self.tell_the_rest(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
+        let now = self.clock.at(self.next_tick, now_ns);
+        self.tell_the_rest(
+            motor.as_ref(),
+            standard.as_ref(),
+            custom.as_ref(),
+            now,
+            effects,
+        );
         if heard && self.presence.heard(now_ns) {
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
@@ -246,7 +271,7 @@ impl Link {
                 if motor.is_some() {
                     self.due = self.due.saturating_sub(1);
                 }
-                if self.order == Some(Order::Drive) {
+                if self.ordered_to_drive() {
                     self.ping(now_ns, effects);
                 }
                 return;
@@ -271,13 +296,14 @@ impl Link {
         motor: Option<&MotorSensors>,
         standard: Option<&StandardSensors>,
         custom: Option<&CustomSensors>,
+        now: MissionTime,
         effects: &mut Vec<Effect>,
     ) {
         if let Some(motor) = motor {
             self.telemetry.take_motor(motor);
         }
         if let Some(standard) = standard {
-            let (power, surroundings, changes) = self.telemetry.take_standard(standard);
+            let (power, surroundings, changes) = self.telemetry.take_standard(standard, now);
             effects.push(Effect::Power(power));
             effects.push(Effect::Surroundings(surroundings));
             effects.extend(changes.into_iter().map(Effect::Battery));
@@ -287,7 +313,7 @@ impl Link {
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
-        if self.order != Some(Order::Drive) {
+        if !self.ordered_to_drive() {
             return;
         }
         if self.in_ticks() {
@@ -346,17 +372,19 @@ impl Link {
             return;
         }
         self.newest_command = Some(*command);
-        if self.stop_cause(now_ns).is_some() {
+        let decision = self.decide(now_ns);
+        if decision.stops() {
             return;
         }
-        if self.stopped.take().is_some() {
-            tracing::debug!("commands pass again");
-        }
+        let share = match decision.action {
+            Action::Slow => SLOW_SHARE,
+            _ => 1.0,
+        };
         let wheels = match CommandState::from_byte(command.state) {
             CommandState::Driving => [command.left_rad_s, command.right_rad_s],
             CommandState::Halt | CommandState::Arrived => [0.0, 0.0],
         };
-        let counts = wheels.map(|speed| self.drive.counts_per_second(speed));
+        let counts = wheels.map(|speed| self.drive.counts_per_second(share * speed));
         effects.push(Effect::Send(
             self.drive.velocity(counts, self.drive.limit()),
         ));
@@ -379,9 +407,19 @@ impl Link {
         }
     }
 
-    fn take_order(&mut self, order: Order, now_ns: u64, effects: &mut Vec<Effect>) {
-        let drives = order == Order::Drive && self.order != Some(Order::Drive);
-        self.order = Some(order);
+    fn take_order(
+        &mut self,
+        order: Order,
+        reason: HoldReason,
+        now_ns: u64,
+        effects: &mut Vec<Effect>,
+    ) {
+        let drives = order == Order::Drive && !self.ordered_to_drive();
+        self.word = Some(Word {
+            order,
+            reason,
+            heard_ns: now_ns,
+        });
         if drives && self.in_ticks() {
             // A robot that waits for commands tells its state again when pinged: tick 0.
             self.ping(now_ns, effects);
@@ -391,7 +429,7 @@ impl Link {
     fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.pinged_ns = Some(now_ns);
         self.presence.pinged(now_ns);
-        if self.order == Some(Order::Drive) {
+        if self.ordered_to_drive() {
             self.due += 1;
         }
         effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ping))));
@@ -400,7 +438,7 @@ impl Link {
     fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let silent = self.presence.is_silent(now_ns);
         // A robot that waits for a command is not lost; at most a datagram is, if it owes us a tick.
-        let owes = self.order == Some(Order::Drive) && self.open.is_none();
+        let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
         }
@@ -450,54 +488,77 @@ impl Link {
         let left = self.drive.limit().saturating_sub(now.since(repeat.stamp));
         // With a tick open, the next command is on its way.
         let superseded = self.open.is_some();
-        if superseded || left < LEAST_LEFT || self.stop_cause(now_ns).is_some() {
+        if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
             return;
         }
         effects.push(Effect::Send(self.drive.velocity(repeat.counts, left)));
         self.tally.repeated_commands += 1;
     }
 
-    fn stop_cause(&self, now_ns: u64) -> Option<Cause> {
-        // On a clock of ticks no time passes until the command has come.
-        let age = |command: &CommandSample| {
-            let stamp = command.stamp.time();
-            let now = match self.clock {
-                MissionClock::Ticks { .. } => stamp,
-                MissionClock::Wall { .. } => self.clock.at(self.next_tick, now_ns),
-            };
-            // A stamp from the future would never grow old.
-            if stamp <= now {
-                now.since(stamp)
+    fn decide(&self, now_ns: u64) -> Decision {
+        let directive = |word: Word| Directive {
+            order: word.order,
+            reason: word.reason,
+            age: Duration::from_nanos(now_ns.saturating_sub(word.heard_ns)),
+        };
+        let flags = Flags {
+            directive: self.word.map(directive),
+            connected: self.presence.connected(),
+            command: self
+                .newest_command
+                .map(|command| self.ages(&command, now_ns)),
+            battery: self.telemetry.charge(),
+        };
+        failsafe::decide(&flags, self.drive.limit())
+    }
+
+    fn ages(&self, command: &CommandSample, now_ns: u64) -> Ages {
+        let stamp = command.stamp.time();
+        let now = match self.clock {
+            // On a clock of ticks no time passes until the command has come.
+            MissionClock::Ticks { .. } => stamp,
+            MissionClock::Wall { .. } => self.clock.at(self.next_tick, now_ns),
+        };
+        // A stamp from the future would never grow old.
+        let age = |then: MissionTime| {
+            if then <= now {
+                now.since(then)
             } else {
                 Duration::MAX
             }
         };
-        let flags = Flags {
-            order: self.order,
-            command_age: self.newest_command.as_ref().map(age),
-            connected: self.presence.connected(),
-        };
-        failsafe::stop_cause(&flags, self.drive.limit())
+        Ages {
+            command: age(stamp),
+            pose: age(MissionTime(command.pose_ns)),
+            guidance: age(MissionTime(command.guidance_ns)),
+        }
     }
 
-    /// Stop the robot when it must not move.
+    /// Stop the robot when it must not move. On a clock of ticks it waits for commands, and to let none pass
+    /// stops its time, too: a run that was held goes on as if it had not been.
     fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let Some(cause) = self.stop_cause(now_ns) else {
-            return;
-        };
-        self.repeat = None;
-        if self.stopped.is_none() {
+        let now = self.decide(now_ns);
+        let before = std::mem::replace(&mut self.decision, now);
+        if now.stops() {
+            self.repeat = None;
+            if !self.in_ticks() {
+                self.tell_to_stand(!before.stops(), now_ns, effects);
+            }
+        }
+        if now != before {
+            effects.push(Effect::Decided { before, now });
+        }
+    }
+
+    /// Several times when the stop is new, then again now and then.
+    fn tell_to_stand(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
+        if new {
             effects.extend(self.farewell().into_iter().map(Effect::Send));
-            effects.push(Effect::Stopped(cause));
-        } else if !self.in_ticks()
-            && self.presence.connected()
-            && passed(self.stop_sent_ns, now_ns, STOP_AGAIN)
-        {
+        } else if self.presence.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
             effects.push(Effect::Send(self.drive.stop()));
         } else {
             return;
         }
-        self.stopped = Some(cause);
         self.stop_sent_ns = Some(now_ns);
     }
 }

@@ -10,12 +10,15 @@ use clap::Args;
 use common::{
     bus::Bus,
     domain::{Domain, RobotName},
-    samples::{HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, name_str},
+    samples::{
+        Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, name_str,
+    },
     topics,
     waiter::Waiter,
 };
 
 use serde::Serialize;
+use x80_link::failsafe;
 
 use super::Failure;
 
@@ -52,6 +55,10 @@ struct LinkStatus {
     connected: bool,
     /// Whether the link holds the robot still.
     stopped: bool,
+    /// What its failsafe makes of the robot: goes, stands and the like.
+    robot: &'static str,
+    /// Why; none while it goes.
+    cause: Option<&'static str>,
     /// For how long it has not answered; none while it does.
     lost_s: Option<f64>,
     attempts: u64,
@@ -161,7 +168,9 @@ fn link_status(link: &LinkSample) -> LinkStatus {
     let while_lost = |nanoseconds: u64| (!connected).then_some(nanoseconds as f64 * 1e-9);
     LinkStatus {
         connected,
-        stopped: link.stopped == 1,
+        stopped: link.stopped(),
+        robot: failsafe::effect(link.action()),
+        cause: (link.action() != Action::Go).then(|| failsafe::name(link.cause())),
         lost_s: while_lost(link.lost_ns),
         attempts: link.attempts,
         next_attempt_s: while_lost(link.next_attempt_ns),
@@ -255,9 +264,12 @@ impl fmt::Display for LinkStatus {
         if self.losses > 0 {
             write!(f, "; times it was lost: {}", self.losses)?;
         }
-        match self.reboots {
-            0 => Ok(()),
-            reboots => write!(f, "; times it restarted: {reboots}"),
+        if self.reboots > 0 {
+            write!(f, "; times it restarted: {}", self.reboots)?;
+        }
+        match self.cause {
+            None => Ok(()),
+            Some(cause) => write!(f, "; it {}: {cause}", self.robot),
         }
     }
 }

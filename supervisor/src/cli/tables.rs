@@ -1,9 +1,10 @@
-//! `firsthand topics` and `firsthand stages`: the two tables, as the README shows them.
+//! `firsthand topics`, `firsthand stages` and `firsthand failsafe`: the tables, as the README shows them.
 
 use std::{fmt::Write as _, process::ExitCode};
 
 use clap::Args;
 use common::topics::{self, AnyTopic, Rate};
+use x80_link::failsafe;
 
 use super::Failure;
 use crate::stages;
@@ -16,6 +17,10 @@ pub(super) struct TopicArguments {}
 #[derive(Debug, Args)]
 pub(super) struct StageArguments {}
 
+/// Print the table of what slows the robot, stops it or ends its mission.
+#[derive(Debug, Args)]
+pub(super) struct FailsafeArguments {}
+
 #[allow(clippy::print_stdout)]
 pub(super) fn topics(_: &TopicArguments) -> Result<ExitCode, Failure> {
     print!("{}", topic_table());
@@ -25,6 +30,12 @@ pub(super) fn topics(_: &TopicArguments) -> Result<ExitCode, Failure> {
 #[allow(clippy::print_stdout)]
 pub(super) fn stages(_: &StageArguments) -> Result<ExitCode, Failure> {
     print!("{}", stage_table());
+    Ok(ExitCode::SUCCESS)
+}
+
+#[allow(clippy::print_stdout)]
+pub(super) fn failsafe(_: &FailsafeArguments) -> Result<ExitCode, Failure> {
+    print!("{}", failsafe_table());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -86,6 +97,22 @@ pub(crate) fn stage_table() -> String {
     table
 }
 
+/// The rules of the link's failsafe as a Markdown table.
+pub(crate) fn failsafe_table() -> String {
+    let mut table = String::from("| cause | when | the robot | until |\n|---|---|---|---|\n");
+    for rule in failsafe::TABLE {
+        let _ = writeln!(
+            table,
+            "| {} | {} | {} | {} |",
+            rule.name,
+            rule.when,
+            failsafe::effect(rule.action),
+            rule.until
+        );
+    }
+    table
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,7 +120,11 @@ mod tests {
     #[test]
     fn the_readme_shows_the_tables_as_they_are() {
         let readme = include_str!("../../../README.md");
-        for (command, table) in [("topics", topic_table()), ("stages", stage_table())] {
+        for (command, table) in [
+            ("topics", topic_table()),
+            ("stages", stage_table()),
+            ("failsafe", failsafe_table()),
+        ] {
             assert!(
                 readme.contains(&table),
                 "README.md is behind; paste the output of `firsthand {command}`:\n{table}"

@@ -3,12 +3,12 @@
 use common::{
     clock::MissionTime,
     samples::{
-        CommandSample, InfraredSample, Order, PowerSample, RangeSample, SurroundingsSample,
-        WheelSample,
+        CommandSample, HoldReason, InfraredSample, Order, PowerSample, RangeSample,
+        SurroundingsSample, WheelSample,
     },
 };
 
-use crate::{failsafe::Cause, telemetry::BatteryChange};
+use crate::{failsafe::Decision, telemetry::BatteryChange};
 
 /// What happened.
 #[derive(Clone, Copy, Debug)]
@@ -20,8 +20,8 @@ pub enum Event<'a> {
     Wire(bool),
     /// A command of the controller.
     Command(&'a CommandSample),
-    /// The supervisor's word.
-    Order(Order),
+    /// The supervisor's word, and why it is not drive.
+    Order(Order, HoldReason),
     /// Nothing; time passed.
     Quiet,
 }
@@ -47,8 +47,13 @@ pub enum Effect {
         /// Nanoseconds.
         began_ns: u64,
     },
-    /// The robot was stopped for this cause.
-    Stopped(Cause),
+    /// The failsafe decides otherwise than before; what follows from that comes as effects of its own.
+    Decided {
+        /// What it decided before.
+        before: Decision,
+        /// What it decides now.
+        now: Decision,
+    },
     /// The robot answers again, or no longer.
     Connected(bool),
     /// The robot restarted its encoder counts.
@@ -59,7 +64,7 @@ pub enum Effect {
     Power(PowerSample),
     /// Publish what the other sensors said.
     Surroundings(SurroundingsSample),
-    /// A battery became low, or is no longer.
+    /// A battery became low or empty, or is no longer.
     Battery(BatteryChange),
 }
 

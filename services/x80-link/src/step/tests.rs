@@ -51,6 +51,8 @@ fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
             stamp_ns: time_ns,
             ..Stamp::default()
         },
+        pose_ns: time_ns,
+        guidance_ns: time_ns,
         left_rad_s: left,
         right_rad_s: right,
         state: CommandState::Driving.into(),
@@ -61,7 +63,7 @@ fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
 /// Connected, ordered to drive.
 fn driving(mut link: Link) -> Link {
     link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.step(Event::Order(Order::Drive), 0);
+    link.step(Event::Order(Order::Drive, HoldReason::None), 0);
     link
 }
 
@@ -85,6 +87,14 @@ fn velocities(effects: &[Effect]) -> Vec<[Option<i16>; 2]> {
         _ => None,
     };
     sent(effects).into_iter().filter_map(motion).collect()
+}
+
+fn decided(effects: &[Effect]) -> Vec<(Action, Cause)> {
+    let decision = |effect: &Effect| match effect {
+        Effect::Decided { now, .. } => Some((now.action, now.cause)),
+        _ => None,
+    };
+    effects.iter().filter_map(decision).collect()
 }
 
 fn ticks(effects: &[Effect]) -> Vec<(u64, RangeSample, WheelSample)> {
@@ -230,7 +240,7 @@ fn a_command_whose_successor_is_due_is_not_sent_again() {
 #[test]
 fn a_command_that_no_longer_holds_is_not_sent_again() {
     for (event, at) in [
-        (Event::Order(Order::Hold), 20),
+        (Event::Order(Order::Hold, HoldReason::Operator), 20),
         (Event::Wire(false), 20),
         (Event::Quiet, 270),
     ] {
@@ -278,7 +288,7 @@ fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
     let mut link = on_the_wall();
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
-    assert!(velocities(&link.step(Event::Order(Order::Drive), MS)).is_empty());
+    assert!(velocities(&link.step(Event::Order(Order::Drive, HoldReason::None), MS)).is_empty());
     let effects = link.step(Event::Quiet, 201 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
 }
@@ -307,10 +317,10 @@ fn a_command_from_the_future_moves_nothing() {
 fn on_a_clock_of_ticks_a_second_answer_to_a_ping_is_no_tick() {
     let mut link = in_ticks();
     link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.step(Event::Order(Order::Drive), 0);
+    link.step(Event::Order(Order::Drive, HoldReason::None), 0);
     // The robot is slow, so it is asked again; then both answers come.
-    link.step(Event::Order(Order::Hold), MS);
-    link.step(Event::Order(Order::Drive), 2 * MS);
+    link.step(Event::Order(Order::Hold, HoldReason::Operator), MS);
+    link.step(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
     assert!(ticks(&link.step(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
     assert_eq!(ticks(&effects).len(), 1);
@@ -411,7 +421,7 @@ fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
     );
     let effects = link.step(Event::Quiet, 261 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
-    assert!(effects.contains(&Effect::Stopped(Cause::CommandStale)));
+    assert_eq!(decided(&effects), [(Action::Stop, Cause::CommandStale)]);
     assert!(link.step(Event::Quiet, 262 * MS).is_empty(), "said");
     assert_eq!(
         velocities(&link.step(Event::Quiet, 462 * MS)),
@@ -424,7 +434,7 @@ fn the_supervisors_stop_stops_the_robot_and_later_commands_do_not_move_it() {
     let mut link = driving(on_the_wall());
     link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let effects = link.step(Event::Order(Order::Stop), 20 * MS);
+    let effects = link.step(Event::Order(Order::Stop, HoldReason::Ending), 20 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
     let effects = link.step(Event::Command(&command(1, 20 * MS, 1.0, 1.0)), 21 * MS);
     assert!(velocities(&effects).is_empty());
@@ -452,7 +462,7 @@ fn on_a_clock_of_ticks_the_order_asks_for_tick_0_and_each_command_for_the_next()
     let mut link = in_ticks();
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(ticks(&effects), [], "the greeting's frames start nothing");
-    let effects = link.step(Event::Order(Order::Drive), 1);
+    let effects = link.step(Event::Order(Order::Drive, HoldReason::None), 1);
     assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
     for tick in 0..3 {
         let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 2);
@@ -468,7 +478,7 @@ fn on_a_clock_of_ticks_the_order_asks_for_tick_0_and_each_command_for_the_next()
 #[test]
 fn on_a_clock_of_ticks_a_robot_found_after_the_order_still_starts() {
     let mut link = in_ticks();
-    link.step(Event::Order(Order::Drive), 0);
+    link.step(Event::Order(Order::Drive, HoldReason::None), 0);
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
     assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 2);
@@ -506,3 +516,5 @@ fn a_successor_numbers_its_ticks_after_its_predecessors() {
     let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(ticks(&effects)[0].0, 41);
 }
+
+mod held;

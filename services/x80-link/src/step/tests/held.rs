@@ -1,0 +1,182 @@
+//! What the failsafe is told, and what comes of its decisions.
+
+use super::*;
+
+const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
+/// A turn a second is 1200 counts/s.
+const TURN: f64 = std::f64::consts::TAU;
+
+/// A tick and its command.
+fn tick(link: &mut Link, number: u64, now_ns: u64) -> Vec<Effect> {
+    tick_by(
+        link,
+        now_ns,
+        &datagram(255, 0, 0),
+        &command(number, now_ns, TURN, TURN),
+    )
+}
+
+fn tick_by(link: &mut Link, now_ns: u64, frames: &[u8], command: &CommandSample) -> Vec<Effect> {
+    let mut effects = link.step(Event::Datagram(frames), now_ns);
+    effects.extend(link.step(Event::Command(command), now_ns + MS));
+    effects
+}
+
+/// Frames of a robot whose batteries give so many volts.
+fn powered(volts: f64) -> Vec<u8> {
+    let ad = |scale: f64| (volts / scale * 4095.0).round() as u16;
+    let standard = StandardSensors {
+        board_battery: ad(9.0),
+        motor_battery: ad(24.0),
+        servo_battery: ad(9.0),
+        ..StandardSensors::default()
+    };
+    let mut bytes = Vec::new();
+    Report::Standard(standard).encode(Addressing::default(), &mut bytes);
+    Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
+    bytes
+}
+
+#[test]
+fn a_supervisor_that_falls_silent_stops_the_robot_and_its_next_word_lets_it_go_on() {
+    let mut link = driving(on_the_wall());
+    let mut now = 0;
+    for number in 0..14 {
+        now = number * 143 * MS;
+        let effects = tick(&mut link, number, now);
+        assert!(!velocities(&effects).contains(&STAND), "{now} {effects:?}");
+    }
+    // Between two ticks: the last command is fresh.
+    let effects = link.step(Event::Quiet, 2001 * MS);
+    assert_eq!(velocities(&effects), [STAND; 3]);
+    assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
+    now += 143 * MS;
+    let effects = tick(&mut link, 14, now);
+    assert_eq!(ticks(&effects).len(), 1, "the stages work on");
+    assert!(velocities(&effects).is_empty(), "{effects:?}");
+    link.step(Event::Order(Order::Drive, HoldReason::None), now + 2 * MS);
+    let effects = tick(&mut link, 15, now + 143 * MS);
+    assert_eq!(velocities(&effects), [[Some(-1200), Some(1200)]]);
+}
+
+#[test]
+fn on_a_clock_of_ticks_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
+    let mut link = driving(in_ticks());
+    link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.step(Event::Command(&command(0, 0, TURN, TURN)), 2);
+    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 3);
+    assert_eq!(ticks(&effects)[0].0, 1);
+    let frozen = 2001 * MS;
+    let effects = link.step(Event::Command(&command(1, PERIOD_NS, TURN, TURN)), frozen);
+    assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
+    assert_eq!(sent(&effects), [], "each command would be a tick");
+    let word = Event::Order(Order::Drive, HoldReason::None);
+    assert_eq!(sent(&link.step(word, frozen + MS)), []);
+    let effects = link.step(Event::Quiet, frozen + 100 * MS);
+    assert_eq!(ticks(&effects)[0].0, 1, "the same tick again");
+    let answer = command(1, PERIOD_NS, TURN, TURN);
+    let effects = link.step(Event::Command(&answer), frozen + 101 * MS);
+    assert_eq!(velocities(&effects), [[Some(-1200), Some(1200)]]);
+}
+
+#[test]
+fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
+    let fresh = command(2, 300 * MS, TURN, TURN);
+    let old_pose = CommandSample {
+        pose_ns: 49 * MS,
+        ..fresh
+    };
+    let old_guidance = CommandSample {
+        guidance_ns: 49 * MS,
+        ..fresh
+    };
+    // One that does not say how old they are says 0.
+    let silent = CommandSample {
+        pose_ns: 0,
+        guidance_ns: 0,
+        ..fresh
+    };
+    for (command, cause) in [
+        (old_pose, Cause::PoseStale),
+        (old_guidance, Cause::GuidanceStale),
+        (silent, Cause::PoseStale),
+    ] {
+        let mut link = driving(on_the_wall());
+        tick(&mut link, 0, 0);
+        tick(&mut link, 1, 150 * MS);
+        let effects = tick_by(&mut link, 300 * MS, &datagram(255, 0, 0), &command);
+        assert_eq!(velocities(&effects), [STAND; 3], "{cause:?}");
+        assert_eq!(decided(&effects), [(Action::Stop, cause)]);
+        let effects = tick(&mut link, 3, 443 * MS);
+        assert_eq!(velocities(&effects), [[Some(-1200), Some(1200)]]);
+    }
+}
+
+#[test]
+fn a_pose_that_grows_old_stops_the_robot_before_the_command_does() {
+    let mut link = driving(on_the_wall());
+    tick(&mut link, 0, 0);
+    let older = CommandSample {
+        pose_ns: 0,
+        ..command(1, 150 * MS, TURN, TURN)
+    };
+    let effects = tick_by(&mut link, 150 * MS, &datagram(255, 0, 0), &older);
+    assert_eq!(velocities(&effects).len(), 1);
+    let effects = link.step(Event::Quiet, 251 * MS);
+    assert_eq!(decided(&effects), [(Action::Stop, Cause::PoseStale)]);
+}
+
+#[test]
+fn on_a_low_battery_the_robot_goes_the_same_way_at_half_speed() {
+    let mut link = driving(on_the_wall());
+    let curve = command(0, 0, TURN, 0.5 * TURN);
+    let effects = tick_by(&mut link, 0, &powered(6.5), &curve);
+    assert_eq!(velocities(&effects), [[Some(-600), Some(300)]]);
+    assert!(decided(&effects).contains(&(Action::Slow, Cause::BatteryLow)));
+    let curve = command(1, 143 * MS, TURN, 0.5 * TURN);
+    let effects = tick_by(&mut link, 143 * MS, &powered(7.2), &curve);
+    assert_eq!(velocities(&effects), [[Some(-1200), Some(600)]]);
+}
+
+#[test]
+fn on_an_empty_battery_the_robot_stands_for_good() {
+    for (mut link, period) in [(in_ticks(), PERIOD_NS), (on_the_wall(), PERIOD_NS)] {
+        link.step(Event::Datagram(&powered(5.9)), 0);
+        let mut ended = None;
+        for number in 0..20 {
+            let now = number * period;
+            let word = Event::Order(Order::Drive, HoldReason::None);
+            link.step(word, now);
+            let command = command(number, now, TURN, TURN);
+            let effects = tick_by(&mut link, now, &powered(5.9), &command);
+            if decided(&effects).contains(&(Action::End, Cause::BatteryEmpty)) {
+                ended.get_or_insert(number);
+            }
+        }
+        // Two seconds are 14 periods.
+        assert!(matches!(ended, Some(14..=15)), "{ended:?}");
+        let charged = command(21, 21 * period, TURN, TURN);
+        let effects = tick_by(&mut link, 21 * period, &powered(7.8), &charged);
+        let mut commands = velocities(&effects).into_iter();
+        assert!(commands.all(|velocity| velocity == STAND), "{effects:?}");
+    }
+}
+
+#[test]
+fn the_cause_of_a_hold_is_the_supervisors() {
+    for (reason, cause) in [
+        (HoldReason::Operator, Cause::OperatorStop),
+        (HoldReason::StageHeld, Cause::StageHeld),
+        (HoldReason::Starting, Cause::NotOrdered),
+    ] {
+        let mut link = driving(on_the_wall());
+        tick(&mut link, 0, 0);
+        let effects = link.step(Event::Order(Order::Hold, reason), 20 * MS);
+        assert_eq!(velocities(&effects), [STAND; 3]);
+        assert_eq!(decided(&effects), [(Action::Stop, cause)]);
+    }
+    let mut link = driving(on_the_wall());
+    let over = Event::Order(Order::Stop, HoldReason::Ending);
+    let effects = link.step(over, 20 * MS);
+    assert_eq!(decided(&effects), [(Action::End, Cause::MissionOver)]);
+}
