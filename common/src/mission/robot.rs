@@ -62,6 +62,8 @@ pub struct RobotConfig {
 
 /// The voltages below which the batteries are low, volts; 0 is never. The X80's packs are six NiMH cells,
 /// 7.2 V: at 1.1 V a cell nine tenths of the charge are gone, and what follows goes within minutes.
+/// With a low board or motor battery the robot goes at half speed; with one below 10/11 of this for 2 s, 1.0 V
+/// a cell, its mission ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BatteryLimits {
