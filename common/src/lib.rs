@@ -16,6 +16,7 @@
 //! | [`bus`] | writers and readers: the one file that names the middleware |
 //! | [`waiter`] | one wait for topics, sockets, signals, processes |
 //! | [`checkpoint`] | state that outlives a SIGKILL |
+//! | [`faults`] | THE table of what can be broken in a stage on purpose |
 //! | [`run`] | what the supervisor tells the stages of a run |
 //! | [`signals`] | signals as something to wait for |
 //! | [`shell`] | the process shell every stage runs in |
@@ -28,6 +29,7 @@ pub mod bus;
 pub mod checkpoint;
 pub mod clock;
 pub mod domain;
+pub mod faults;
 pub mod geometry;
 pub mod grid;
 mod guest;

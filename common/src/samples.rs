@@ -79,7 +79,9 @@ stamped!(
     DirectiveSample,
     RosterHeader,
     DeathSample,
+    StallSample,
     RequestSample,
+    FaultSample,
 );
 
 /// What a byte on the bus stands for.
@@ -456,6 +458,10 @@ pub struct HealthSample {
     pub state: u8,
     /// Times round the work loop.
     pub turns: u64,
+    /// The fault that this life was asked for last; 0 for none.
+    pub last_fault: u64,
+    /// What it made of it: a [`FaultAnswer`].
+    pub fault_answer: u8,
 }
 
 wire_enum! {
@@ -732,6 +738,8 @@ pub struct RosterHeader {
     pub order: u8,
     /// A [`HoldReason`].
     pub reason: u8,
+    /// 1: the robot is a simulated one.
+    pub simulated: u8,
     /// The request that was taken last; 0 for none.
     pub last_request: u64,
 }
@@ -860,6 +868,59 @@ pub struct DeathSample {
 }
 
 wire_enum! {
+    /// What a robot that stalls is tried to be freed by.
+    #[derive(Serialize)]
+    #[serde(rename_all = "snake_case")]
+    StallRung, unknown = GiveUp {
+        /// A fresh planner, which solves the full field.
+        Replan = 0,
+        /// What was sensed is forgotten.
+        Forget = 1,
+        /// The mission ends: the target is unreachable.
+        GiveUp = 2,
+    }
+}
+
+wire_enum! {
+    /// How a robot that should get on does not.
+    #[derive(Serialize)]
+    #[serde(rename_all = "snake_case")]
+    StallCause, unknown = Still {
+        /// It neither drives nor turns.
+        Still = 0,
+        /// It moves, and stays where it is.
+        Pinned = 1,
+        /// It stands in hazard, u = 0, and drives without coming out.
+        Buried = 2,
+        /// It stands where the belief has no way to the target, u = 0.
+        CutOff = 3,
+    }
+}
+
+/// Topic `stalls`: the robot should get on and does not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Stall")]
+#[repr(C)]
+pub struct StallSample {
+    /// Which sample; its tick and time are those of the pose it was seen at.
+    pub stamp: Stamp,
+    /// Where the robot believes it is, metres.
+    pub x_m: f64,
+    /// Where the robot believes it is, metres.
+    pub y_m: f64,
+    /// The belief's epoch from now on.
+    pub epoch: u64,
+    /// Fresh planners tried so far in this mission, this one among them.
+    pub replans: u32,
+    /// Beliefs forgotten so far in this mission, this one among them.
+    pub resets: u64,
+    /// A [`StallCause`].
+    pub cause: u8,
+    /// A [`StallRung`]: what is done about it.
+    pub rung: u8,
+}
+
+wire_enum! {
     /// What an operator asks of the supervisor.
     RequestKind, unknown = Nothing {
         /// Nothing.
@@ -886,6 +947,56 @@ pub struct RequestSample {
     pub stage: Name,
     /// A [`RequestKind`].
     pub kind: u8,
+}
+
+wire_enum! {
+    /// What can be broken in a running stage on purpose; [`crate::faults::TABLE`] says where and how.
+    #[derive(Serialize, Deserialize)]
+    FaultKind, unknown = Nothing {
+        /// Nothing.
+        Nothing = 0,
+        /// A turn of the work loop that does not end.
+        Spin = 1,
+        /// A live field whose ways all lead to where the robot is.
+        CorruptField = 2,
+        /// No direction, as where the gradient is zero.
+        Saddle = 3,
+        /// Hazard believed wherever the robot is.
+        BuryRobot = 4,
+        /// A closed wall believed around the target, whatever is forgotten.
+        CutOff = 5,
+    }
+}
+
+wire_enum! {
+    /// What a stage made of a fault it was asked for.
+    FaultAnswer, unknown = Refused {
+        /// Asked for none.
+        None = 0,
+        /// It is broken now.
+        Taken = 1,
+        /// Not done: the robot is a real one, and the request does not say that it is meant all the same.
+        Refused = 2,
+        /// Not done: the stage has no such fault, or nothing yet to break.
+        Impossible = 3,
+    }
+}
+
+/// Topic `faults`: break something in a stage, to see the rest cope.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Fault")]
+#[repr(C)]
+pub struct FaultSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Names the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
+    pub id: u64,
+    /// The stage it is for.
+    pub stage: Name,
+    /// A [`FaultKind`].
+    pub kind: u8,
+    /// 1: meant although the robot is a real one.
+    pub although_real: u8,
 }
 
 #[cfg(test)]

@@ -12,9 +12,10 @@ use crate::{
     checkpoint::CheckpointError,
     clock::{MissionClock, MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
+    faults::{Asked, Requests},
     guest,
     run::{self, Run, RunError},
-    samples::{HealthSample, HealthState, name},
+    samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
     signals::{SIGTERM, Signals},
     topics,
     waiter::Waiter,
@@ -148,6 +149,16 @@ pub trait Process: Sized {
         Ok(())
     }
 
+    /// Break like this, on purpose. Says whether it could be done: whether the fault is one of this stage's, and
+    /// what it breaks is there.
+    ///
+    /// # Errors
+    /// When the stage cannot go on; it will be restarted.
+    fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
+        let _ = fault;
+        Ok(false)
+    }
+
     /// Say goodbye.
     ///
     /// # Errors
@@ -248,6 +259,9 @@ fn work(
     let without_lulls = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
+    // After the first turn: what nobody needs to be ready for.
+    let simulated = context.run.mission.robot.address.is_none();
+    let mut faults = Requests::open(&context.bus, &context.life, simulated)?;
     let mut busy = true;
     while !end.came() {
         let came = context.waiter.wait(if busy { LULL } else { BEAT })?;
@@ -256,9 +270,31 @@ fn work(
             process.idle()?;
         }
         busy = came;
-        heart.beat_if_due(progress)?;
+        if heart.beat_if_due(progress)? {
+            while let Some(Asked { id, fault }) = faults.take()? {
+                let answer = inject(process, fault)?;
+                tracing::warn!(?fault, ?answer, "asked for a fault");
+                heart.answer(id, answer, progress)?;
+                while fault == Ok(FaultKind::Spin) && !end.came() {
+                    std::hint::spin_loop();
+                }
+            }
+        }
     }
     heart.beat(HealthState::Stopping, progress)
+}
+
+/// Put the fault that was asked for into `process`, if that may be.
+fn inject(
+    process: &mut impl Process,
+    request: Result<FaultKind, FaultAnswer>,
+) -> Result<FaultAnswer, StageError> {
+    Ok(match request {
+        Err(answer) => answer,
+        // The one that every stage has is done in the work loop.
+        Ok(fault) if fault == FaultKind::Spin || process.inject(fault)? => FaultAnswer::Taken,
+        Ok(_) => FaultAnswer::Impossible,
+    })
 }
 
 fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {
@@ -322,11 +358,25 @@ impl Heart {
         Ok(())
     }
 
-    fn beat_if_due(&mut self, progress: Progress) -> Result<(), StageError> {
+    /// Says whether it was due.
+    fn beat_if_due(&mut self, progress: Progress) -> Result<bool, StageError> {
         self.sample.turns += 1;
-        if monotonic_ns() - self.last_beat_ns >= BEAT.as_nanos() as u64 {
+        let due = monotonic_ns() - self.last_beat_ns >= BEAT.as_nanos() as u64;
+        if due {
             self.beat(HealthState::Ready, progress)?;
         }
-        Ok(())
+        Ok(due)
+    }
+
+    /// Say what was made of the fault that was asked for under `id`.
+    fn answer(
+        &mut self,
+        id: u64,
+        answer: FaultAnswer,
+        progress: Progress,
+    ) -> Result<(), StageError> {
+        self.sample.last_fault = id;
+        self.sample.fault_answer = answer.into();
+        self.beat(HealthState::Ready, progress)
     }
 }

@@ -6,9 +6,9 @@
 use std::time::Duration;
 
 use crate::samples::{
-    CommandSample, DeathSample, DirectiveSample, FieldCell, FieldHeader, GridHeader,
+    CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader, GridHeader,
     GuidanceSample, HealthSample, InfraredSample, LinkSample, PoseSample, PowerSample, RangeSample,
-    RequestSample, RosterEntry, RosterHeader, SurroundingsSample, WheelSample,
+    RequestSample, RosterEntry, RosterHeader, StallSample, SurroundingsSample, WheelSample,
 };
 
 pub use crate::bus::{AnyTopic, SliceTopic, Topic};
@@ -166,9 +166,17 @@ topics! {
     DEATHS: Topic<DeathSample> {
         name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
     }
+    /// The robot should get on and does not: how, and what is tried.
+    STALLS: Topic<StallSample> {
+        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+    }
     /// What an operator asks: restart, stop, resume.
     REQUESTS: Topic<RequestSample> {
         name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+    }
+    /// What an operator breaks in a stage on purpose; every stage listens.
+    FAULTS: Topic<FaultSample> {
+        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
     }
 }
 

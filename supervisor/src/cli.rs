@@ -3,6 +3,7 @@
 mod chaos;
 mod check;
 mod directories;
+mod fault;
 mod field;
 mod install;
 mod latency;
@@ -46,11 +47,13 @@ enum Command {
     Kill(operate::Kill),
     Freeze(operate::Freeze),
     Thaw(operate::Thaw),
+    Fault(fault::Arguments),
     Chaos(chaos::Arguments),
     Install(install::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
     Failsafe(tables::FailsafeArguments),
+    Faults(tables::FaultArguments),
 }
 
 /// What `run` ends with.
@@ -91,11 +94,13 @@ pub(crate) fn main() -> ExitCode {
         Command::Kill(arguments) => operate::kill(&arguments),
         Command::Freeze(arguments) => operate::freeze(&arguments),
         Command::Thaw(arguments) => operate::thaw(&arguments),
+        Command::Fault(arguments) => fault::main(&arguments),
         Command::Chaos(arguments) => chaos::main(&arguments),
         Command::Install(arguments) => install::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),
         Command::Failsafe(arguments) => tables::failsafe(&arguments),
+        Command::Faults(arguments) => tables::faults(&arguments),
     };
     match result {
         Ok(code) => code,

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, Read as _, Seek as _, SeekFrom, Write as _},
+    io::{self, Read as _, Seek as _, SeekFrom},
     os::unix::process::ExitStatusExt as _,
     path::Path,
     time::Duration,
@@ -12,7 +12,7 @@ use common::samples::{DeathCause, DeathSample, NextStep, Words, name, words};
 use rustix::process::Signal;
 use serde::Serialize;
 
-use crate::process::Ended;
+use crate::{process::Ended, report::append_line};
 
 /// The file of a run's deaths, a JSON object a line.
 pub(crate) const FILE_NAME: &str = "deaths.jsonl";
@@ -165,11 +165,7 @@ impl Death {
 
     /// Append it to the run's list.
     pub(crate) fn append_to(&self, directory: &Path) -> io::Result<()> {
-        let mut line = serde_json::to_vec(self)?;
-        line.push(b'\n');
-        let file = directory.join(FILE_NAME);
-        let mut file = File::options().create(true).append(true).open(file)?;
-        file.write_all(&line)
+        append_line(&directory.join(FILE_NAME), self)
     }
 }
 

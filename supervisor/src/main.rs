@@ -5,7 +5,7 @@
 //! | [`stages`] | THE table of stages |
 //! | [`policy`] | what to do with one stage, pure |
 //! | [`death`] | the record of a death |
-//! | [`stall`] | what to do when the robot does not move, pure |
+//! | [`stall`] | what to do when the robot does not get on, pure, and the record of it |
 //! | [`kept`] | what of a supervisor outlives it |
 //! | [`process`], [`fleet`] | child processes; the stages under their policies |
 //! | [`domain`] | the robot's corner of the machine, held and wiped |

@@ -1,6 +1,12 @@
 //! How a run ended, as numbers: for people, for scripts, for the picture.
 
-use std::{collections::BTreeMap, fmt};
+use std::{
+    collections::BTreeMap,
+    fmt,
+    fs::File,
+    io::{self, Write as _},
+    path::Path,
+};
 
 use common::{
     clock::MissionTime, kinematics::Pose2, latency::Histogram, mission::Mission, truth::TruthTick,
@@ -90,6 +96,10 @@ pub(crate) struct Summary {
     /// Supervisors that went on with the run. Path and clearance from the truth, solves and latencies are those of
     /// the last one; the path is then the believed one, which is whole.
     pub(crate) resumes: u32,
+    /// Fresh planners that a stalled robot was given.
+    pub(crate) replans: u32,
+    /// Times its sensed belief was forgotten.
+    pub(crate) resets: u64,
     /// From the datagram in to the datagram out.
     pub(crate) tick_latency_us: Quantiles,
     pub(crate) full_solve_us: Quantiles,
@@ -146,6 +156,8 @@ impl Summary {
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: restarts.collect(),
             resumes,
+            replans: 0,
+            resets: 0,
             tick_latency_us: (&record.latency()).into(),
             full_solve_us: (&record.full_solves).into(),
             local_update_us: (&record.local_updates).into(),
@@ -157,7 +169,13 @@ impl Summary {
         let metres = |value: Option<f64>| {
             value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))
         };
-        vec![
+        let stalls = (self.replans > 0 || self.resets > 0).then(|| {
+            format!(
+                "The robot stalled: fresh planners {}, beliefs forgotten {}",
+                self.replans, self.resets
+            )
+        });
+        let numbers = [
             format!(
                 "Least true clearance {} · pose error at the end {} · {} full solves, {} local updates",
                 metres(self.min_clearance_m),
@@ -174,7 +192,8 @@ impl Summary {
                     " · at rest {seconds:.2} s after a last command at the latest"
                 )),
             ),
-        ]
+        ];
+        stalls.into_iter().chain(numbers).collect()
     }
 
     fn restarted(&self) -> String {
@@ -246,6 +265,14 @@ fn path_length(truth: &[TruthTick]) -> f64 {
         .windows(2)
         .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))
         .sum()
+}
+
+/// Append `record` to a file of JSON objects, one a line.
+pub(crate) fn append_line(file: &Path, record: &impl Serialize) -> io::Result<()> {
+    let mut line = serde_json::to_vec(record)?;
+    line.push(b'\n');
+    let mut file = File::options().create(true).append(true).open(file)?;
+    file.write_all(&line)
 }
 
 /// Poses of the truth, for the picture.

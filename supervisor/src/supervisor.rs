@@ -17,7 +17,7 @@ use common::{
     run::{Run, RunError},
     samples::{
         Action, Cause, DeathSample, DirectiveSample, HoldReason, LinkSample, Order, RequestKind,
-        RequestSample, RosterEntry, RosterHeader, name_str,
+        RequestSample, RosterEntry, RosterHeader, StallSample, name_str,
     },
     signals::{SIGINT, SIGTERM, Signals},
     topics,
@@ -36,7 +36,10 @@ use crate::{
     service::ServiceManager,
     simulator::{Simulator, SimulatorError},
     stages,
-    stall::{Rung, StallWatch},
+    stall::{
+        Rung, StallWatch,
+        record::{self, StallRecord},
+    },
 };
 
 /// On a clock of ticks nothing waits for wall-clock: a pipeline that makes no tick for so long is stuck.
@@ -186,6 +189,7 @@ struct Supervisor<'a> {
     directive: Writer<DirectiveSample>,
     roster: SliceWriter<RosterHeader, RosterEntry>,
     deaths: Writer<DeathSample>,
+    stalls: Writer<StallSample>,
     requests: Reader<RequestSample>,
     last_request: u64,
     keeper: Keeper,
@@ -265,6 +269,7 @@ impl<'a> Supervisor<'a> {
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
             deaths: bus.writer(&topics::DEATHS, 1)?,
+            stalls: bus.writer(&topics::STALLS, 1)?,
             requests: bus.reader(&topics::REQUESTS)?,
             last_request: 0,
             keeper,
@@ -542,24 +547,32 @@ impl<'a> Supervisor<'a> {
         let stopped = record.link.is_none_or(|link| link.stopped());
         let held = stopped || !self.fleet.all_running();
         let guidance = *guidance;
-        match self.stall.step(&pose, &guidance, held) {
-            None => Ok(None),
-            Some(Rung::Replan) => {
-                tracing::warn!("the robot stalls: a fresh planner solves the full field");
+        let Some(stall) = self.stall.step(&pose, &guidance, held) else {
+            return Ok(None);
+        };
+        let record = StallRecord::new(stall, &pose, &self.stall);
+        record.log();
+        self.stalls
+            .publish(pose.stamp.tick, pose.stamp.time(), record.sample())?;
+        let directory = &self.options.directory;
+        record.append_to(directory).map_err(system(format!(
+            "write {}",
+            directory.join(record::FILE_NAME).display()
+        )))?;
+        match stall.rung {
+            Rung::Replan => {
                 self.fleet.replace("planner", self.first_tick())?;
-                Ok(None)
             }
-            Some(Rung::Forget { epoch }) => {
-                tracing::warn!(epoch, "no way forward: the sensed belief is forgotten");
-                self.restate()?;
-                Ok(None)
+            Rung::Forget { .. } => self.restate()?,
+            Rung::GiveUp => {
+                return Ok(Some(Ending {
+                    outcome: Outcome::Unreachable,
+                    reason: format!("target unreachable: {}", record.words()),
+                    asked_for: false,
+                }));
             }
-            Some(Rung::GiveUp { reason }) => Ok(Some(Ending {
-                outcome: Outcome::Unreachable,
-                reason: format!("target unreachable: {reason}"),
-                asked_for: false,
-            })),
         }
+        Ok(None)
     }
 
     /// Say again what late joiners need; a few times a second. Says whether it did.
@@ -591,6 +604,7 @@ impl<'a> Supervisor<'a> {
             supervisor_pid: std::process::id(),
             order: self.order.into(),
             reason: self.reason.into(),
+            simulated: self.simulator.is_some().into(),
             last_request: self.last_request,
             ..RosterHeader::default()
         };
@@ -638,6 +652,7 @@ impl<'a> Supervisor<'a> {
         let resumes = self.keeper.kept.resumes;
         let mission = &self.options.mission;
         let mut summary = Summary::of(mission, ending, &record, &truth, restarts, resumes);
+        (summary.replans, summary.resets) = (self.stall.replans(), self.stall.resets());
         // The truth comes through a pipe of its own: a touch on the way may be seen after the arrival.
         let touched =
             summary.outcome == Outcome::Reached && summary.collisions.is_some_and(|n| n > 0);

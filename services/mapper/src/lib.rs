@@ -5,5 +5,6 @@
 mod careful;
 mod dilation;
 mod evidence;
+mod fault;
 pub mod shell;
 pub mod step;

@@ -8,7 +8,7 @@ use common::{
     clock::MissionTime,
     grid::{Revision, Window},
     journal::Journal,
-    samples::{DirectiveSample, GridHeader, PoseSample, RangeSample},
+    samples::{DirectiveSample, FaultKind, GridHeader, PoseSample, RangeSample},
     shell::{Context, Process, Progress, StageError},
     topics,
 };
@@ -35,6 +35,8 @@ enum Event {
         /// The epoch that began.
         epoch: u64,
     },
+    /// It was broken on purpose.
+    Fault(FaultKind),
 }
 
 /// The mapper process.
@@ -67,6 +69,7 @@ impl Process for Shell {
                 Event::Forget { epoch } => {
                     mapper.forget(*epoch);
                 }
+                Event::Fault(fault) => mapper.inject(*fault),
             }
         }
         let version = mapper.belief().version();
@@ -115,6 +118,13 @@ impl Process for Shell {
             self.tell_whole()?;
         }
         Ok(self.progress)
+    }
+
+    /// A belief that is wrong is wrong in its checkpoint, too.
+    fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
+        self.mapper.inject(fault);
+        self.journal.append(&Event::Fault(fault))?;
+        Ok(true)
     }
 
     /// What takes the time of the whole map.

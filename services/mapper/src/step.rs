@@ -7,7 +7,7 @@
 use common::{
     grid::{Cell, CellState, GridFrame, Window},
     mission::{Method, Mission},
-    samples::{PoseSample, RangeSample, RangeStatus},
+    samples::{FaultKind, PoseSample, RangeSample, RangeStatus},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     careful::{Memory, Reading, united},
     evidence::Evidence,
+    fault,
 };
 
 /// "4 cm or nearer" is mapped at 4 cm.
@@ -42,6 +43,8 @@ pub struct Belief {
     rolled: f64,
     /// What was heard; none in the paper's method.
     evidence: Option<Evidence>,
+    /// What it was broken by on purpose.
+    fault: FaultKind,
 }
 
 impl Belief {
@@ -74,6 +77,7 @@ impl Belief {
 #[derive(Clone, Debug)]
 pub struct Mapper {
     frame: GridFrame,
+    target_m: DVec2,
     target: Option<Cell>,
     margin: i64,
     /// How far a surface blocks the cells around it, metres.
@@ -99,6 +103,7 @@ impl Mapper {
         let around_a_hit = (f64::from(margin) + 0.5) * frame.resolution_m;
         let mut mapper = Self {
             frame,
+            target_m: mission.target,
             target: frame.cell_at(mission.target),
             margin: i64::from(margin),
             reach: memory.as_ref().map_or(around_a_hit, Memory::reach),
@@ -117,6 +122,7 @@ impl Mapper {
                 heading: mission.start_pose().heading,
                 rolled: 0.0,
                 evidence: memory.as_ref().map(Memory::unheard),
+                fault: FaultKind::Nothing,
             },
             memory,
         };
@@ -196,9 +202,18 @@ impl Mapper {
         self.belief.rolled += last.distance(now.position)
             + self.half_track * (now.heading - self.belief.heading).abs();
         (self.belief.robot, self.belief.heading) = (now.position, now.heading);
-        if self.memory.is_some() {
-            return self.weigh(pose, range, rolled);
-        }
+        let changed = if self.memory.is_some() {
+            self.weigh(pose, range, rolled)
+        } else {
+            self.mark_hit(pose, range)
+        };
+        let changed = united(changed, self.falsify());
+        self.belief.version += u64::from(changed.area() > 0);
+        changed
+    }
+
+    /// The paper's method: a reading that says where something is puts hazard there.
+    fn mark_hit(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
         let Some(distance) = range.and_then(safety_distance) else {
             return Window::default();
         };
@@ -209,10 +224,7 @@ impl Mapper {
         let beam = DVec2::from_angle(robot.heading + self.sensor_bearing);
         let hit = robot.position + robot.axis() * self.sensor_forward + beam * distance;
         let changed = self.mark(hit, robot.position);
-        if changed.area() > 0 {
-            self.belief.safety_events += 1;
-            self.belief.version += 1;
-        }
+        self.belief.safety_events += u64::from(changed.area() > 0);
         changed
     }
 
@@ -235,7 +247,6 @@ impl Mapper {
         let news = memory.take(evidence, robot.position, reading);
         let changed = self.redraw(united(stale, news.window));
         self.belief.safety_events += u64::from(news.safety_event);
-        self.belief.version += u64::from(changed.area() > 0);
         changed
     }
 
@@ -307,9 +318,36 @@ impl Mapper {
                 }
             }
         }
+        self.belief.fault = fault::after_forgetting(self.belief.fault);
+        self.falsify();
         self.belief.epoch = epoch;
         self.belief.version += 1;
         true
+    }
+
+    /// Break the belief like this, on purpose, from the next tick on.
+    pub fn inject(&mut self, fault: FaultKind) {
+        self.belief.fault = fault;
+    }
+
+    /// What the fault in it puts on the map; the window that changed.
+    fn falsify(&mut self) -> Window {
+        let mut changed = Window::default();
+        let Some(area) = fault::hazard(self.belief.fault, self.belief.robot, self.target_m) else {
+            return changed;
+        };
+        for row in 0..self.frame.cells {
+            for col in 0..self.frame.cells {
+                let cell = Cell { col, row };
+                let state = &mut self.belief.cells[self.frame.index(cell)];
+                let spared = Some(cell) == self.target || CellState::from_byte(*state).is_hazard();
+                if !spared && area.covers(self.frame.centre_of(cell), self.frame.resolution_m) {
+                    *state = CellState::Sensed as u8;
+                    changed = changed.including(cell);
+                }
+            }
+        }
+        changed
     }
 }
 

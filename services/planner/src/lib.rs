@@ -43,6 +43,7 @@ pub mod beside;
 mod cancellation;
 mod domain;
 mod error;
+mod fault;
 mod field;
 mod guidance;
 mod lookout;

@@ -6,7 +6,7 @@ use common::{
     bus::{Reader, SliceReader, SliceWriter, Writer},
     clock::{MissionClock, MissionTime},
     grid::Revision,
-    samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
     topics::{self, AnyTopic as _},
 };
@@ -93,6 +93,13 @@ impl Process for Shell {
             self.answer()?;
         }
         Ok(self.progress)
+    }
+
+    fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
+        let robot = self.latest_pose.unwrap_or_default().pose();
+        let broken = self.planner.inject(fault, robot.position);
+        self.field_changed |= broken;
+        Ok(broken)
     }
 
     fn idle(&mut self) -> Result<(), StageError> {

@@ -4,7 +4,7 @@ use common::{
     grid::{Applied, CellState, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
-    samples::{FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
+    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
 };
 use glam::DVec2;
 
@@ -49,6 +49,8 @@ pub struct Planner {
     advised: bool,
     /// Until then the field is not to be followed: a passage closed or opened.
     unsafe_until_solved: bool,
+    /// Broken on purpose: no direction is given, wherever the robot is.
+    on_a_saddle: bool,
     beside: Option<Beside>,
     jobs: u64,
     full_solves: u64,
@@ -97,6 +99,7 @@ impl Planner {
             solved: None,
             advised: false,
             unsafe_until_solved: false,
+            on_a_saddle: false,
             beside: None,
             jobs: 0,
             full_solves: 0,
@@ -243,6 +246,23 @@ impl Planner {
         Ok(true)
     }
 
+    /// Break like this, on purpose, with the robot at `position`. Says whether that could be done: whether the fault is
+    /// the planner's, and there is a field.
+    pub fn inject(&mut self, fault: FaultKind, position: DVec2) -> bool {
+        match (fault, &mut self.solved) {
+            (FaultKind::CorruptField, Some(solved)) => {
+                let at = solved.frame.to_cells(position);
+                solved.field.lead_astray([at.x, at.y]);
+                true
+            }
+            (FaultKind::Saddle, _) => {
+                self.on_a_saddle = true;
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// The reference direction for a robot at `pose`.
     #[must_use]
     pub fn guide(&self, pose: &Pose2) -> GuidanceSample {
@@ -261,7 +281,11 @@ impl Planner {
                 }
             }
         };
-        let (status, direction, limit) = self.look_first(pose, status, direction);
+        let (status, direction, limit) = if self.on_a_saddle {
+            (GuidanceStatus::Along, DVec2::ZERO, 0.0)
+        } else {
+            self.look_first(pose, status, direction)
+        };
         GuidanceSample {
             ex: direction.x,
             ey: direction.y,

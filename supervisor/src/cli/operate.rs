@@ -81,7 +81,7 @@ pub(super) struct Thaw {
 }
 
 /// The roster comes five times a second; a frozen supervisor says nothing.
-const PATIENCE: Duration = Duration::from_secs(2);
+pub(super) const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn stop(arguments: &Stop) -> Result<ExitCode, Failure> {
     ask(&arguments.whose.robot, RequestKind::Stop, "")
@@ -109,7 +109,7 @@ pub(super) fn thaw(arguments: &Thaw) -> Result<ExitCode, Failure> {
 }
 
 /// A stage of the table.
-fn known(stage: &str) -> Result<&'static str, Failure> {
+pub(super) fn known(stage: &str) -> Result<&'static str, Failure> {
     match stages::find(stage) {
         Some(stage) => Ok(stage.name),
         None => Err(stages::unknown(stage).into()),
@@ -123,8 +123,7 @@ fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<ExitCode, Fa
     let mut waiter = Waiter::default();
     waiter.on(bus.alarm(&topics::ROSTER)?);
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
-    // No two processes ask in the same nanosecond of one boot under one pid.
-    let id = monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1;
+    let id = fresh_id();
     let request = RequestSample {
         id,
         stage: name(stage),
@@ -135,6 +134,11 @@ fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<ExitCode, Fa
     await_roster(&mut roster, &waiter, robot, |header, _| {
         (header.last_request == id).then_some(ExitCode::SUCCESS)
     })
+}
+
+/// A name for a request: no two processes ask in the same nanosecond of one boot under one pid.
+pub(super) fn fresh_id() -> u64 {
+    monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1
 }
 
 /// Send a signal to a process of the robot.
@@ -169,7 +173,7 @@ fn pid_of(domain: &Domain, stage: &str) -> Result<Option<i32>, Failure> {
 }
 
 /// Look at each roster until `is_it` finds what it looks for.
-fn await_roster<T>(
+pub(super) fn await_roster<T>(
     roster: &mut SliceReader<RosterHeader, RosterEntry>,
     waiter: &Waiter,
     robot: &RobotName,

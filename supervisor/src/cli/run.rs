@@ -208,6 +208,10 @@ fn draw(mission: &Mission, finished: &Finished) -> String {
     let record = &finished.record;
     let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
     let summary = &finished.summary;
+    let mut captions = summary.captions();
+    if summary.outcome != Outcome::Reached {
+        captions.insert(0, summary.reason.clone());
+    }
     picture::svg(&Scene {
         mission,
         grid: record
@@ -229,7 +233,7 @@ fn draw(mission: &Mission, finished: &Finished) -> String {
             safety_events: summary.safety_events,
             seed: mission.robot.address.is_none().then_some(mission.seed),
         },
-        captions: &summary.captions(),
+        captions: &captions,
     })
 }
 

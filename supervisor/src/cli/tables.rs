@@ -1,9 +1,12 @@
-//! `firsthand topics`, `firsthand stages` and `firsthand failsafe`: the tables, as the README shows them.
+//! `firsthand topics`, `stages`, `failsafe` and `faults`: the tables, as the README shows them.
 
 use std::{fmt::Write as _, process::ExitCode};
 
 use clap::Args;
-use common::topics::{self, AnyTopic, Rate};
+use common::{
+    faults,
+    topics::{self, AnyTopic, Rate},
+};
 use x80_link::failsafe;
 
 use super::Failure;
@@ -21,6 +24,10 @@ pub(super) struct StageArguments {}
 #[derive(Debug, Args)]
 pub(super) struct FailsafeArguments {}
 
+/// Print the table of faults.
+#[derive(Debug, Args)]
+pub(super) struct FaultArguments {}
+
 #[allow(clippy::print_stdout)]
 pub(super) fn topics(_: &TopicArguments) -> Result<ExitCode, Failure> {
     print!("{}", topic_table());
@@ -36,6 +43,12 @@ pub(super) fn stages(_: &StageArguments) -> Result<ExitCode, Failure> {
 #[allow(clippy::print_stdout)]
 pub(super) fn failsafe(_: &FailsafeArguments) -> Result<ExitCode, Failure> {
     print!("{}", failsafe_table());
+    Ok(ExitCode::SUCCESS)
+}
+
+#[allow(clippy::print_stdout)]
+pub(super) fn faults(_: &FaultArguments) -> Result<ExitCode, Failure> {
+    print!("{}", fault_table());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -113,6 +126,22 @@ pub(crate) fn failsafe_table() -> String {
     table
 }
 
+/// The faults as a Markdown table.
+pub(crate) fn fault_table() -> String {
+    let mut table = String::from("| stage | fault | what it does | until |\n|---|---|---|---|\n");
+    for fault in &faults::TABLE {
+        let stage = fault
+            .stage
+            .map_or("any".to_owned(), |stage| format!("`{stage}`"));
+        let _ = writeln!(
+            table,
+            "| {stage} | `{}` | {} | {} |",
+            fault.name, fault.meaning, fault.ends
+        );
+    }
+    table
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,15 +149,25 @@ mod tests {
     #[test]
     fn the_readme_shows_the_tables_as_they_are() {
         let readme = include_str!("../../../README.md");
-        for (command, table) in [
+        let tables = [
             ("topics", topic_table()),
             ("stages", stage_table()),
             ("failsafe", failsafe_table()),
-        ] {
+            ("faults", fault_table()),
+        ];
+        for (command, table) in tables {
             assert!(
                 readme.contains(&table),
                 "README.md is behind; paste the output of `firsthand {command}`:\n{table}"
             );
+        }
+    }
+
+    #[test]
+    fn every_fault_is_of_a_stage_that_exists() {
+        let its = faults::TABLE.iter().filter_map(|fault| fault.stage);
+        for stage in its {
+            assert!(stages::find(stage).is_some(), "{stage}");
         }
     }
 }

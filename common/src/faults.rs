@@ -1,0 +1,188 @@
+//! THE table of faults: what can be broken in a running stage on purpose, to see the rest cope.
+//!
+//! `firsthand fault`, its help and the README read it. Every stage listens to the topic `faults` in its
+//! [`crate::shell`], which refuses them on a real robot unless the request says that it means one.
+
+use crate::{
+    bus::{Bus, BusError, Reader},
+    samples::{FaultAnswer, FaultKind, FaultSample, name_str},
+    shell::Life,
+    topics,
+};
+
+/// What the table says of a fault.
+#[derive(Debug)]
+pub struct Fault {
+    /// Which.
+    pub kind: FaultKind,
+    /// What the command line calls it.
+    pub name: &'static str,
+    /// The stage that has it; none for every stage.
+    pub stage: Option<&'static str>,
+    /// What it does.
+    pub meaning: &'static str,
+    /// What ends it.
+    pub ends: &'static str,
+}
+
+/// Every fault, in the order of the pipeline.
+pub static TABLE: [Fault; 5] = [
+    Fault {
+        kind: FaultKind::Spin,
+        name: "spin",
+        stage: None,
+        meaning: "a turn of the work loop that does not end: no output, no beat",
+        ends: "the stage is aborted as hung, and started again",
+    },
+    Fault {
+        kind: FaultKind::BuryRobot,
+        name: "bury-robot",
+        stage: Some("mapper"),
+        meaning: "hazard believed 0.5 m around the robot, wherever it goes: it stands where u = 0",
+        ends: "what was sensed is forgotten",
+    },
+    Fault {
+        kind: FaultKind::CutOff,
+        name: "cut-off",
+        stage: Some("mapper"),
+        meaning: "a closed wall believed 0.5 m around the target, again after everything that was sensed is forgotten",
+        ends: "never: the mission ends unreachable",
+    },
+    Fault {
+        kind: FaultKind::CorruptField,
+        name: "corrupt-field",
+        stage: Some("planner"),
+        meaning: "the live field overwritten: every way leads to where the robot is",
+        ends: "the field is solved in full",
+    },
+    Fault {
+        kind: FaultKind::Saddle,
+        name: "saddle",
+        stage: Some("planner"),
+        meaning: "no direction, as where the gradient is zero",
+        ends: "the planner is a fresh one",
+    },
+];
+
+/// The fault of that name in `stage`.
+#[must_use]
+pub fn find(stage: &str, name: &str) -> Option<&'static Fault> {
+    of(stage).find(|fault| fault.name == name)
+}
+
+/// What can be broken in `stage`.
+pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
+    TABLE
+        .iter()
+        .filter(move |fault| fault.stage.is_none_or(|its| its == stage))
+}
+
+/// What to make of a request, before the stage itself is asked: the fault, or the answer that ends the matter.
+///
+/// # Errors
+/// With the answer, when the robot is a real one and not meant, or the stage has no such fault.
+pub fn admit(
+    request: &FaultSample,
+    stage: &str,
+    simulated: bool,
+) -> Result<FaultKind, FaultAnswer> {
+    let kind = FaultKind::from_byte(request.kind);
+    if !of(stage).any(|fault| fault.kind == kind) {
+        Err(FaultAnswer::Impossible)
+    } else if simulated || request.although_real == 1 {
+        Ok(kind)
+    } else {
+        Err(FaultAnswer::Refused)
+    }
+}
+
+/// A request for a stage.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asked {
+    /// Its id.
+    pub(crate) id: u64,
+    /// What to make of it, as [`admit`] says.
+    pub(crate) fault: Result<FaultKind, FaultAnswer>,
+}
+
+/// What operators ask of one stage's process.
+#[derive(Debug)]
+pub(crate) struct Requests {
+    requests: Reader<FaultSample>,
+    stage: &'static str,
+    simulated: bool,
+}
+
+impl Requests {
+    pub(crate) fn open(bus: &Bus, life: &Life, simulated: bool) -> Result<Self, BusError> {
+        Ok(Self {
+            requests: bus.reader(&topics::FAULTS)?,
+            stage: life.stage,
+            simulated,
+        })
+    }
+
+    /// The next request for this stage.
+    pub(crate) fn take(&mut self) -> Result<Option<Asked>, BusError> {
+        while let Some(request) = self.requests.take()? {
+            if name_str(&request.stage) == self.stage {
+                return Ok(Some(Asked {
+                    id: request.id,
+                    fault: admit(&request, self.stage, self.simulated),
+                }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(kind: FaultKind, although_real: bool) -> FaultSample {
+        FaultSample {
+            kind: kind.into(),
+            although_real: although_real.into(),
+            ..FaultSample::default()
+        }
+    }
+
+    #[test]
+    fn a_real_robot_is_broken_only_when_it_is_meant() {
+        let careless = request(FaultKind::Saddle, false);
+        assert_eq!(
+            admit(&careless, "planner", false),
+            Err(FaultAnswer::Refused)
+        );
+        assert_eq!(admit(&careless, "planner", true), Ok(FaultKind::Saddle));
+        let meant = request(FaultKind::Saddle, true);
+        assert_eq!(admit(&meant, "planner", false), Ok(FaultKind::Saddle));
+    }
+
+    #[test]
+    fn a_stage_is_not_broken_by_another_ones_fault_nor_by_an_unheard_of_one() {
+        let request = request(FaultKind::Saddle, true);
+        assert_eq!(
+            admit(&request, "mapper", true),
+            Err(FaultAnswer::Impossible)
+        );
+        let unheard_of = FaultSample {
+            kind: 200,
+            ..request
+        };
+        assert_eq!(
+            admit(&unheard_of, "planner", true),
+            Err(FaultAnswer::Impossible)
+        );
+    }
+
+    #[test]
+    fn no_two_faults_of_a_stage_share_a_name() {
+        for fault in &TABLE {
+            let stage = fault.stage.unwrap_or("any");
+            let same = of(stage).filter(|other| other.name == fault.name);
+            assert_eq!(same.count(), 1, "{}", fault.name);
+        }
+    }
+}
