@@ -1,0 +1,228 @@
+//! Robots that do not get on, each pinned by a fault put into a running stage: every rung frees one, and the last
+//! says that it could not.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use std::path::Path;
+
+use common::{
+    bus::Bus,
+    clock::MissionTime,
+    domain::Domain,
+    samples::{FaultAnswer, FaultKind, FaultSample, name, name_str},
+    topics,
+    waiter::Waiter,
+};
+use serde_json::Value;
+use support::{Run, assert_nothing_left, find, output};
+
+/// At this speed the mission has thousands of ticks: seconds to be broken in, on a clock of ticks, which does not
+/// care how loaded the machine is.
+const SLOW: [&str; 4] = ["--set", "controller.speed_m_s=0.004", "--timeout", "20000"];
+const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
+
+/// `firsthand fault`, which must succeed.
+fn inject(robot: &str, stage: &str, fault: &str) {
+    let output = output(&["fault", stage, fault, "--robot", robot]);
+    assert!(output.status.success(), "{fault}: {output:?}");
+}
+
+/// What `firsthand` says when it refuses.
+fn refusal(arguments: &[&str]) -> String {
+    let output = output(arguments);
+    assert!(!output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// The run's list of stalls.
+fn stalls(directory: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(directory.join("stalls.jsonl")).unwrap_or_default();
+    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    lines.collect()
+}
+
+/// How many of them were met by `rung`.
+fn count(stalls: &[Value], rung: &str) -> usize {
+    stalls.iter().filter(|stall| stall["rung"] == rung).count()
+}
+
+/// A mission of open-room in which `stage` is broken on the way: summary, stalls, and what the supervisor logged.
+fn broken(
+    robot: &str,
+    stage: &str,
+    fault: &str,
+    arguments: &[&str],
+) -> (Value, Vec<Value>, String) {
+    let mut run = Run::start(robot, "open-room", &[&SLOW[..], arguments].concat());
+    run.wait_until("the robot drives", |status| {
+        status["order"] == "driving" && status["mission_time_s"].as_f64() > Some(1.0)
+    });
+    inject(robot, stage, fault);
+    let (_, summary, kept) = run.finish_in();
+    let directory = kept.path().join("run");
+    let log = std::fs::read_to_string(directory.join("supervisor.log")).unwrap();
+    let stalls = stalls(&directory);
+    assert_eq!(summary["replans"], count(&stalls, "replan"), "{stalls:?}");
+    assert_eq!(summary["resets"], count(&stalls, "forget"), "{stalls:?}");
+    assert_eq!(
+        log.matches("the robot stalls").count(),
+        stalls.len(),
+        "{log}"
+    );
+    assert_nothing_left(robot);
+    (summary, stalls, log)
+}
+
+#[test]
+fn a_robot_on_a_saddle_comes_free_by_a_fresh_planner() {
+    let (summary, stalls, _) = broken("saddle", "planner", "saddle", &[]);
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    assert_eq!(
+        (&stalls[0]["cause"], &stalls[0]["rung"]),
+        (&"still".into(), &"replan".into())
+    );
+    assert_eq!(count(&stalls, "forget"), 0, "{stalls:?}");
+}
+
+#[test]
+fn a_robot_pinned_by_a_corrupted_field_comes_free_by_a_fresh_planner_by_either_method() {
+    for (robot, method) in [("astray", &[][..]), ("astray-p", &PAPER[..])] {
+        let (summary, stalls, _) = broken(robot, "planner", "corrupt-field", method);
+        assert_eq!(summary["outcome"], "reached", "{summary}");
+        assert_eq!(stalls[0]["rung"], "replan", "{stalls:?}");
+        assert_eq!(count(&stalls, "forget"), 0, "{stalls:?}");
+    }
+}
+
+#[test]
+fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_forgotten_belief_by_either_method() {
+    for (robot, method) in [("buried", &[][..]), ("buried-p", &PAPER[..])] {
+        let (summary, stalls, _) = broken(robot, "mapper", "bury-robot", method);
+        assert_eq!(summary["outcome"], "reached", "{summary}");
+        let first = stalls.iter().find(|stall| stall["rung"] == "forget");
+        assert_eq!(first.unwrap()["cause"], "buried", "{stalls:?}");
+    }
+}
+
+#[test]
+fn a_robot_cut_off_for_good_ends_unreachable_with_a_picture_that_says_so() {
+    let mut run = Run::start("cut-off", "open-room", &SLOW);
+    run.wait_until("the robot drives", |status| status["order"] == "driving");
+    inject("cut-off", "mapper", "cut-off");
+    let (code, summary, kept) = run.finish_in();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(3), &"unreachable".into()),
+        "{summary}"
+    );
+    let directory = kept.path().join("run");
+    let stalls = stalls(&directory);
+    let rungs: Vec<_> = stalls.iter().map(|stall| &stall["rung"]).collect();
+    assert_eq!(
+        rungs,
+        ["forget", "forget", "forget", "give_up"],
+        "{stalls:?}"
+    );
+    assert!(
+        stalls.iter().all(|stall| stall["cause"] == "cut_off"),
+        "{stalls:?}"
+    );
+    assert_eq!(summary["resets"], 3, "{summary}");
+    let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
+    for words in [
+        ">unreachable<",
+        summary["reason"].as_str().unwrap(),
+        "sensed, with margin",
+        "no way to the target",
+    ] {
+        assert!(
+            picture.contains(words),
+            "the picture does not say {words:?}"
+        );
+    }
+    assert_nothing_left("cut-off");
+}
+
+#[test]
+fn a_stage_that_spins_is_aborted_as_hung() {
+    let mut run = Run::start("spins", "open-room", &["--pace", "4"]);
+    run.wait_until_under_way(1.0);
+    inject("spins", "controller", "spin");
+    run.wait_until("it is replaced", |status| {
+        find(status, "controller")["generation"] == 2
+            && find(status, "controller")["state"] == "running"
+    });
+    let text = std::fs::read_to_string(run.directory().join("deaths.jsonl")).unwrap();
+    let death: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+    assert_eq!(
+        (&death["stage"], &death["hung"]),
+        (&"controller".into(), &true.into())
+    );
+    let (_, summary) = run.finish();
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    assert_nothing_left("spins");
+}
+
+/// Ask the planner for a fault past the command line; what it answered.
+fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
+    let bus = Bus::join(&Domain::of(robot.parse().unwrap()), "careless").unwrap();
+    let mut health = bus.reader(&topics::HEALTH).unwrap();
+    let mut waiter = Waiter::default();
+    waiter.on(bus.alarm(&topics::HEALTH).unwrap());
+    let request = FaultSample {
+        id: 1 + u64::from(although_real),
+        stage: name("planner"),
+        kind: FaultKind::Saddle.into(),
+        although_real: although_real.into(),
+        ..FaultSample::default()
+    };
+    let mut faults = bus.writer(&topics::FAULTS, 1).unwrap();
+    faults.publish(0, MissionTime::default(), request).unwrap();
+    let began = std::time::Instant::now();
+    loop {
+        assert!(
+            began.elapsed() < support::PATIENCE,
+            "the planner says nothing"
+        );
+        waiter.wait(support::PATIENCE).unwrap();
+        while let Some(beat) = health.take().unwrap() {
+            if name_str(&beat.stage) == "planner" && beat.last_fault == request.id {
+                return FaultAnswer::from_byte(beat.fault_answer);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor_by_the_stage() {
+    // An address makes it real. Nobody answers there: it never moves.
+    let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
+    let mut run = Run::start("metal", "open-room", &address);
+    run.wait_until("its stages run", |status| {
+        find(status, "planner")["state"] == "running"
+    });
+    let fault = ["fault", "planner", "saddle", "--robot", "metal"];
+    let said = refusal(&fault);
+    assert!(said.contains("--break-a-real-robot"), "{said}");
+    assert_eq!(ask_planner("metal", false), FaultAnswer::Refused);
+    assert_eq!(ask_planner("metal", true), FaultAnswer::Taken);
+    let meant = output(&[&fault[..], &["--break-a-real-robot"]].concat());
+    assert!(meant.status.success(), "{meant:?}");
+    run.signal(rustix::process::Signal::INT);
+    run.finish();
+    assert_nothing_left("metal");
+}
+
+#[test]
+fn a_fault_that_nobody_has_is_refused_with_those_there_are() {
+    let said = refusal(&["fault", "mapper", "saddle", "--robot", "nobody"]);
+    assert!(
+        said.contains("bury-robot") && said.contains("spin"),
+        "{said}"
+    );
+    let said = refusal(&["fault", "wheel", "spin"]);
+    assert!(said.contains("dead-reckoning"), "{said}");
+    let said = refusal(&["fault", "mapper", "spin", "--robot", "nobody"]);
+    assert!(said.contains("nobody"), "{said}");
+}
