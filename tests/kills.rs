@@ -68,8 +68,13 @@ fn a_frozen_stage_is_noticed_and_replaced() {
 }
 
 #[test]
-fn ctrl_c_and_sigterm_end_a_run_in_order_and_leave_nothing() {
-    for (robot, signal) in [("ctrl-c", Signal::INT), ("sigterm", Signal::TERM)] {
+fn ctrl_c_sigterm_and_a_closed_terminal_end_a_run_in_order_and_leave_nothing() {
+    let mut signals = vec![("ctrl-c", Signal::INT), ("sigterm", Signal::TERM)];
+    // Whoever starts these tests under `nohup` starts their runs under it.
+    if !ignores(Signal::HUP) {
+        signals.push(("hangup", Signal::HUP));
+    }
+    for (robot, signal) in signals {
         let mut stopped = Run::start(robot, "obstacle-course", &["--pace", "1"]);
         stopped.wait_until_under_way(0.5);
         stopped.signal(signal);
@@ -85,6 +90,14 @@ fn ctrl_c_and_sigterm_end_a_run_in_order_and_leave_nothing() {
         assert_nothing_left(robot);
         drop(kept);
     }
+}
+
+/// Whether this process ignores `signal`, and so what it starts.
+fn ignores(signal: Signal) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = u64::from_str_radix(mask.unwrap().trim(), 16).unwrap();
+    mask >> (signal.as_raw() - 1) & 1 == 1
 }
 
 #[test]
@@ -109,6 +122,32 @@ fn stages_die_with_their_supervisor_and_the_link_stops_the_robot_first() {
     let (code, summary) = run("orphans", "open-room", &[]);
     assert_eq!(code, Some(0), "{summary}");
     assert_nothing_left("orphans");
+}
+
+#[test]
+fn a_frozen_stage_that_outlives_its_supervisor_is_not_in_the_way_of_the_next() {
+    // One that the supervisor started is woken by the kernel when its parent dies; another's stays frozen.
+    let watching = ["--pace", "1", "--watch-only"];
+    let mut watching = Run::start("ice-orphan", "obstacle-course", &watching);
+    watching.wait_until("there is a bus", |_| true);
+    let mapper = ["stage", "mapper", "--robot", "ice-orphan"];
+    let mut mapper = support::firsthand(&mapper).spawn().unwrap();
+    watching.wait_until("the mapper runs", |status| {
+        support::find(status, "mapper")["state"] == "running"
+    });
+    support::signal_process(mapper.id(), Signal::STOP);
+    watching.signal(Signal::KILL);
+    watching.reap();
+    let directory = support::directory_of("ice-orphan");
+    let out = directory.path().join("run");
+    let next = ["run", "open-room", "--robot", "ice-orphan", "--out"];
+    let next = support::firsthand(&next).arg(out).output().unwrap();
+    let gone = mapper.try_wait().unwrap();
+    mapper.kill().unwrap();
+    mapper.wait().unwrap();
+    assert!(next.status.success(), "{next:?}");
+    assert!(gone.is_some(), "the frozen stage is still there");
+    assert_nothing_left("ice-orphan");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::{
     },
 };
 
-pub use signal_hook::consts::{SIGINT, SIGTERM};
+pub use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 /// Signals caught by this process.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Catch `signals` from now on.
+    /// Catch `signals` from now on. A terminal that is closed stays unheard where that is asked for, as by `nohup`.
     ///
     /// # Errors
     /// When the process has no descriptor left.
@@ -27,6 +27,9 @@ impl Signals {
         let (pipe, written_by_handler) = UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
         for &signal in signals {
+            if signal == SIGHUP && is_ignored(SIGHUP) {
+                continue;
+            }
             signal_hook::low_level::pipe::register(signal, written_by_handler.try_clone()?)?;
         }
         Ok(Self { pipe })
@@ -36,6 +39,16 @@ impl Signals {
     pub fn came(&mut self) -> bool {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }
+}
+
+/// Whether whoever started this process had it ignore `signal`.
+fn is_ignored(signal: c_int) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 impl AsFd for Signals {

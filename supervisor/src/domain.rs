@@ -5,7 +5,6 @@ use std::{
     io,
     os::unix::fs::{DirBuilderExt, MetadataExt},
     path::{Path, PathBuf},
-    time::{Duration, Instant},
 };
 
 use common::{
@@ -13,6 +12,8 @@ use common::{
     domain::{Domain, SHARED_MEMORY},
 };
 use thiserror::Error;
+
+use crate::tenants;
 
 /// Why a robot's domain cannot be had.
 #[derive(Debug, Error)]
@@ -27,13 +28,15 @@ pub(crate) enum DomainError {
         /// What the lock file says.
         holder: String,
     },
-    /// Stages of a dead supervisor live on.
+    /// Stages of a dead supervisor live on, killed as they are.
     #[error(
-        "stages of an earlier supervisor of robot {robot:?} are still running; end them with `pkill -f 'firsthand stage'`"
+        "robot {robot:?} is held by processes that do not even end when killed: {holders}; give this one another name with --robot, or restart the machine"
     )]
     Tenants {
         /// The robot.
         robot: String,
+        /// Their numbers.
+        holders: String,
     },
     /// Shared memory is missing or full.
     #[error("{SHARED_MEMORY} {problem}; {remedy}")]
@@ -69,10 +72,6 @@ const SMALL_TOPICS_BYTES: u64 = 16 << 20;
 /// Shared memory a cell of the map takes: a byte in `grid` and twelve in `field`, in each of the samples
 /// that are under way at once when readers keep up.
 const CELL_BYTES: u64 = 8 * 13;
-/// Stages get SIGTERM when their supervisor dies and are gone within this.
-const TENANTS_LEAVE: Duration = Duration::from_secs(2);
-/// How often it is looked whether they have.
-const TENANTS_LOOK: Duration = Duration::from_millis(10);
 
 /// A domain held by this process. Dropping it leaves nothing behind.
 pub(crate) struct Held {
@@ -81,6 +80,7 @@ pub(crate) struct Held {
     bus: Option<(Services, Bus)>,
     // Held while the bus is made and removed: stages wait before the door.
     shut: Option<File>,
+    cells: usize,
     _lock: File,
 }
 
@@ -89,24 +89,40 @@ impl Held {
     /// `cells`.
     pub(crate) fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         let lock = lock(&domain)?;
-        let shut = Some(wait_for_tenants(&domain)?);
-        wipe(&domain)?;
-        check_shared_memory(
-            SHARED_MEMORY,
-            SMALL_TOPICS_BYTES + CELL_BYTES * cells as u64,
-        )?;
         let mut held = Self {
             domain,
             bus: None,
-            shut,
+            shut: None,
+            cells,
             _lock: lock,
         };
-        Bus::write_config(&held.domain)?;
-        let bus = Bus::join(&held.domain, "supervisor")?;
-        let services = bus.create_all()?;
-        held.bus = Some((services, bus));
-        held.shut = None;
+        held.renew()?;
         Ok(held)
+    }
+
+    /// Make the bus, anew if there is one: what was had through the old one must be gone.
+    pub(crate) fn renew(&mut self) -> Result<(), DomainError> {
+        self.clear()?;
+        check_shared_memory(
+            SHARED_MEMORY,
+            SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
+        )?;
+        Bus::write_config(&self.domain)?;
+        let bus = Bus::join(&self.domain, "supervisor")?;
+        let services = bus.create_all()?;
+        self.bus = Some((services, bus));
+        self.shut = None;
+        Ok(())
+    }
+
+    /// Remove the bus. Nobody enters until there is one again.
+    fn clear(&mut self) -> Result<(), DomainError> {
+        self.bus = None;
+        if self.shut.is_none() {
+            // Stages that another started may still be leaving, or just coming.
+            self.shut = Some(tenants::wait_for(&self.domain)?);
+        }
+        wipe(&self.domain)
     }
 
     /// The bus.
@@ -117,13 +133,8 @@ impl Held {
 
 impl Drop for Held {
     fn drop(&mut self) {
-        self.bus = None;
-        if self.shut.is_none() {
-            // Stages that another started may still be leaving, or just coming.
-            self.shut = wait_for_tenants(&self.domain).ok();
-        }
         // The lock goes last, with its directory: who waits for it finds nothing and makes its own.
-        let _ = wipe(&self.domain);
+        let _ = self.clear();
         for file in [self.domain.tenants_file(), self.domain.lock_file()] {
             let _ = fs::remove_file(file);
         }
@@ -131,7 +142,7 @@ impl Drop for Held {
     }
 }
 
-fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
     let path = path.to_path_buf();
     move |source| DomainError::File {
         action,
@@ -197,28 +208,6 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
             fs::write(&path, format!("{}\n", std::process::id()))
                 .map_err(failed("write", &path))?;
             return Ok(file);
-        }
-    }
-}
-
-/// Wait until no stage lives in the domain: what they use is wiped next. None enters while the result is held.
-fn wait_for_tenants(domain: &Domain) -> Result<File, DomainError> {
-    let path = domain.tenants_file();
-    let tenants = File::create(&path).map_err(failed("make", &path))?;
-    let began = Instant::now();
-    loop {
-        match tenants.try_lock() {
-            Ok(()) => return Ok(tenants),
-            Err(fs::TryLockError::WouldBlock) if began.elapsed() < TENANTS_LEAVE => {
-                // A file lock has no descriptor to wait on.
-                std::thread::park_timeout(TENANTS_LOOK);
-            }
-            Err(fs::TryLockError::WouldBlock) => {
-                return Err(DomainError::Tenants {
-                    robot: domain.robot.to_string(),
-                });
-            }
-            Err(fs::TryLockError::Error(error)) => return Err(failed("lock", &path)(error)),
         }
     }
 }
@@ -291,6 +280,19 @@ fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_domain_that_could_not_be_had_keeps_no_lock() {
+        let domain = Domain::of("no-lock".parse().unwrap());
+        make_directory(&domain).unwrap();
+        // A directory cannot be removed as the file that should be there.
+        fs::create_dir(domain.middleware_config()).unwrap();
+        let refused = Held::acquire(domain.clone(), 1).err().unwrap();
+        fs::remove_dir(domain.middleware_config()).unwrap();
+        assert!(refused.to_string().contains("iceoryx2.toml"), "{refused}");
+        assert!(!domain.lock_file().exists() && !domain.tenants_file().exists());
+        fs::remove_dir(domain.directory()).unwrap();
+    }
 
     #[test]
     fn too_little_or_no_shared_memory_is_said_with_the_remedy() {

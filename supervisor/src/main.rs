@@ -8,7 +8,7 @@
 //! | [`stall`] | what to do when the robot does not get on, pure, and the record of it |
 //! | [`kept`] | what of a supervisor outlives it |
 //! | [`process`], [`fleet`] | child processes; the stages under their policies |
-//! | [`domain`] | the robot's corner of the machine, held and wiped |
+//! | [`domain`], [`tenants`] | the robot's corner of the machine, held and wiped; who lives in it |
 //! | [`simulator`] | the simulated robot as a child |
 //! | [`observer`] | what is heard on the bus |
 //! | [`supervisor`] | the loop |
@@ -38,6 +38,7 @@ mod simulator;
 mod stages;
 mod stall;
 mod supervisor;
+mod tenants;
 
 fn main() -> std::process::ExitCode {
     cli::main()

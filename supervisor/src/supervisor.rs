@@ -19,7 +19,7 @@ use common::{
         Action, Cause, DeathSample, DirectiveSample, HoldReason, LinkSample, Order, RequestKind,
         RequestSample, RosterEntry, RosterHeader, StallSample, name_str,
     },
-    signals::{SIGINT, SIGTERM, Signals},
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
     topics,
     waiter::Waiter,
 };
@@ -162,7 +162,8 @@ pub(crate) fn run(
     options: &Options,
     watch: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<Finished, SupervisorError> {
-    let mut signals = Signals::catch(&[SIGINT, SIGTERM]).map_err(system("catch signals"))?;
+    let mut signals =
+        Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
     let held = Held::acquire(
         Domain::of(options.robot.clone()),
         options.mission.grid_frame().area(),
