@@ -18,9 +18,10 @@ use thiserror::Error;
 
 use crate::{
     death::{self, Cause, Death, Next},
+    flow::Flow,
     policy::{Action, Event, Now, Phase, Policy},
     process::{Ended, Process, firsthand},
-    stages::{Stage, start_order},
+    stages::{self, Stage, start_order},
 };
 
 /// A stage's process could not be started or watched.
@@ -53,11 +54,14 @@ struct Member {
 /// All stages, in start order.
 pub(crate) struct Fleet {
     members: Vec<Member>,
+    flow: Flow,
     directory: PathBuf,
     clock: Instant,
     /// Who starts the stages.
     starter: Starter,
     ending: bool,
+    /// A stage cannot begin a life on the bus as it is.
+    jammed: bool,
 }
 
 /// Who starts a stage, and starts it again.
@@ -85,10 +89,12 @@ impl Fleet {
         };
         Self {
             members: start_order().into_iter().map(member).collect(),
+            flow: Flow::new(),
             directory,
             clock: Instant::now(),
             starter,
             ending: false,
+            jammed: false,
         }
     }
 
@@ -96,15 +102,15 @@ impl Fleet {
         self.clock.elapsed()
     }
 
-    /// Start every stage, in order, if that is ours to do; their lives begin at `first_tick`.
+    /// Start every stage that is down on a new bus, in order, from `first_tick` on, if that is ours to do.
     pub(crate) fn start_all(&mut self, first_tick: u64) -> Result<(), FleetError> {
         if self.starter == Starter::Another {
             return Ok(());
         }
-        let now = self.now();
         for index in 0..self.members.len() {
-            let action = self.members[index].policy.start(now);
-            self.act(index, action, first_tick)?;
+            if self.members[index].policy.phase() == Phase::Down {
+                self.tell(index, Event::Start, first_tick)?;
+            }
         }
         Ok(())
     }
@@ -171,7 +177,8 @@ impl Fleet {
         let Ok(process) = Process::adopt(health.pid, member.stage.name) else {
             return false;
         };
-        member.policy.start(now);
+        self.flow.on_start(member.stage.name);
+        member.policy.step(Event::Start, now);
         member.process = Some(process);
         member.generation = health.stamp.generation;
         member.started = now;
@@ -198,8 +205,9 @@ impl Fleet {
         met || !was_running && event == Event::BeatReady
     }
 
-    /// A stage published something.
-    pub(crate) fn on_output(&mut self, stage: &str) {
+    /// A stage published something of `tick`.
+    pub(crate) fn on_output(&mut self, stage: &str, tick: u64) {
+        self.flow.on_output(stage, tick);
         let now = self.now();
         if let Some(member) = self
             .members
@@ -210,16 +218,46 @@ impl Fleet {
         }
     }
 
+    /// A stage that beats and leaves its inputs unanswered is late, while the robot is driven. What follows it is not
+    /// judged meanwhile.
+    pub(crate) fn judge_outputs(
+        &mut self,
+        driven: bool,
+        first_tick: u64,
+    ) -> Result<(), FleetError> {
+        if !driven || !self.all_running() {
+            self.flow.forgive();
+            return Ok(());
+        }
+        let Some(stage) = self.flow.stale(self.now()) else {
+            return Ok(());
+        };
+        tracing::warn!(stage, "beats, and does not answer what it reads");
+        let index = self.members.iter().position(|it| it.stage.name == stage);
+        index.map_or(Ok(()), |index| {
+            self.tell(index, Event::OutputStale, first_tick)
+        })
+    }
+
     /// Reap what ended, meet the deadlines. `first_tick` is what a new life starts from. Returns the deaths.
     pub(crate) fn tend(&mut self, first_tick: u64) -> Result<Vec<Death>, FleetError> {
         let mut deaths = Vec::new();
         for index in 0..self.members.len() {
             if let Some(status) = self.reap(index)? {
-                let asked = matches!(self.members[index].policy.phase(), Phase::Stopping { .. });
+                let asked = matches!(
+                    self.members[index].policy.phase(),
+                    Phase::Replaced { .. } | Phase::Stopping { .. }
+                );
                 let mut death = self.record(index, Cause::of(status));
                 let member = &mut self.members[index];
                 (member.process, member.beat) = (None, None);
-                self.tell(index, Event::Exited, first_tick)?;
+                let refused = death.cause == Cause::Exited(stages::REFUSED.into());
+                let event = if refused {
+                    Event::Refused
+                } else {
+                    Event::Exited
+                };
+                self.tell(index, event, first_tick)?;
                 death.next = self.next(index);
                 death.deaths_in_window = self.members[index].policy.recent_deaths() as u32;
                 // One that was told to go, and has gone, is no death.
@@ -275,9 +313,10 @@ impl Fleet {
             },
             Phase::Held => Next::Hold,
             Phase::Down | Phase::Stopping { .. } => Next::Nothing,
-            Phase::Starting { .. } | Phase::Running { .. } | Phase::Failing { .. } => {
-                Next::StartNow
-            }
+            Phase::Starting { .. }
+            | Phase::Running { .. }
+            | Phase::Late { .. }
+            | Phase::Replaced { .. } => Next::StartNow,
         }
     }
 
@@ -288,6 +327,11 @@ impl Fleet {
             .iter()
             .filter(held)
             .map(|member| member.stage.name)
+    }
+
+    /// Whether, since this was last asked, it was seen that the bus must be made anew.
+    pub(crate) fn is_jammed(&mut self) -> bool {
+        std::mem::take(&mut self.jammed)
     }
 
     /// From now on a stage that ends stays down.
@@ -308,10 +352,10 @@ impl Fleet {
         }
     }
 
-    /// Stop the last stage, in start order, that still has a process. Says whether there was one.
+    /// Stop the last stage, in start order, that has a process or waits for one. Says whether there was one.
     pub(crate) fn stop_last(&mut self) -> Result<bool, FleetError> {
         let last = self.members.iter().rposition(|member| {
-            member.process.is_some() || !matches!(member.policy.phase(), Phase::Down)
+            member.process.is_some() || !matches!(member.policy.phase(), Phase::Down | Phase::Held)
         });
         if let Some(index) = last {
             let stopping = matches!(self.members[index].policy.phase(), Phase::Stopping { .. });
@@ -341,6 +385,7 @@ impl Fleet {
                 return Ok(());
             }
             Action::Start => {
+                self.flow.on_start(stage);
                 member.started = now;
                 member.hung = false;
                 let log = log_file(&self.directory, stage);
@@ -353,11 +398,10 @@ impl Fleet {
                     });
                 match spawned {
                     Ok(process) => member.process = Some(process),
-                    // As if it had died at once: tried again with growing pauses, the others go on.
+                    // Tried again with growing pauses, the others go on.
                     Err(error) => {
                         tracing::error!(stage, %error, "cannot be started; are processes, descriptors or disk used up?");
-                        member.policy.step(Event::Exited, now);
-                        member.policy.step(Event::Exited, now);
+                        member.policy.step(Event::StartFailed, now);
                     }
                 }
                 return Ok(());
@@ -368,6 +412,12 @@ impl Fleet {
                 Signal::ABORT
             }
             Action::Kill => Signal::KILL,
+            Action::Renew => {
+                tracing::error!(stage, "cannot begin a life on the bus as it is");
+                // Guests are another's to stop and start.
+                self.jammed = self.starter == Starter::Supervisor;
+                return Ok(());
+            }
         };
         if let Some(process) = &member.process {
             tracing::debug!(stage, ?signal, "signalled");
@@ -414,7 +464,9 @@ const fn state(phase: Phase) -> StageState {
         Phase::BackingOff { .. } => StageState::BackingOff,
         Phase::Starting { .. } => StageState::Starting,
         Phase::Running { .. } => StageState::Running,
-        Phase::Failing { .. } | Phase::Stopping { .. } => StageState::Stopping,
+        Phase::Late { .. } | Phase::Replaced { .. } | Phase::Stopping { .. } => {
+            StageState::Stopping
+        }
         Phase::Held => StageState::Held,
     }
 }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`stages`] | THE table of stages |
 //! | [`policy`] | what to do with one stage, pure |
+//! | [`flow`] | whether each stage answers what it reads, pure |
 //! | [`death`] | the record of a death |
 //! | [`stall`] | what to do when the robot does not get on, pure, and the record of it |
 //! | [`kept`] | what of a supervisor outlives it |
@@ -24,6 +25,7 @@ mod cli;
 mod death;
 mod domain;
 mod fleet;
+mod flow;
 mod kept;
 mod logging;
 mod maps;

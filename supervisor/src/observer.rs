@@ -80,6 +80,14 @@ impl Observer {
         })
     }
 
+    /// Listen no more; what was heard stays, but of the wire to the robot, which is opened anew.
+    pub(crate) fn close(self) -> Record {
+        Record {
+            link: None,
+            ..self.record
+        }
+    }
+
     /// Take all that came. Says whether a stage became ready.
     pub(crate) fn take(&mut self, fleet: &mut Fleet) -> Result<bool, BusError> {
         let mut became_ready = false;
@@ -88,32 +96,32 @@ impl Observer {
         }
         let record = &mut self.record;
         while let Some(link) = self.link.take()? {
-            fleet.on_output(topics::LINK.spec().writer);
+            fleet.on_output(topics::LINK.spec().writer, link.stamp.tick);
             record.latencies.insert(link.stamp.generation, link);
             record.link = Some(link);
         }
         // The command of a tick is looked at before what it was computed from, so that whatever led to
         // it is in the record when it is.
         while let Some(command) = self.command.take()? {
-            fleet.on_output(topics::COMMAND.spec().writer);
+            fleet.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
             if CommandState::from_byte(command.state) == CommandState::Arrived {
                 record.arrival.get_or_insert(command);
             }
         }
         while let Some(guidance) = self.guidance.take()? {
-            fleet.on_output(topics::GUIDANCE.spec().writer);
+            fleet.on_output(topics::GUIDANCE.spec().writer, guidance.stamp.tick);
             record.take_guidance(guidance);
         }
         while let Some(grid) = self.grid.take()? {
-            fleet.on_output(topics::GRID.spec().writer);
+            fleet.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
             record.grid.apply(&grid.header().part.revision(), &grid);
         }
         while let Some(field) = self.field.take()? {
             record.field.apply(&field.header().part.revision(), &field);
         }
         while let Some(pose) = self.pose.take()? {
-            fleet.on_output(topics::POSE.spec().writer);
+            fleet.on_output(topics::POSE.spec().writer, pose.stamp.tick);
             record.pose = Some(pose);
             if record.poses.len() == POSES_KEPT {
                 // Half as fine from here on; the ends of the way stay.

@@ -3,29 +3,35 @@
 //! ```text
 //!          start            beat            exit
 //!   Down ---------> Starting ----> Running ------> BackingOff --> Starting
-//!                      |  too late    |  silent        (not at all the first time)
-//!                      +------------->+--> Failing --exit--^   |
-//!                                          (abort, then kill)  | too many deaths in the window
-//!                                                              v
-//!                                                             Held -- released --> Starting
+//!                      |  too late    |  silent, or   (not at all the first time)
+//!                      |              |  no output         ^   |
+//!                      +------------->+--> Late ------exit-+   | too many deaths
+//!                      |              |   (abort, then kill)   v
+//!                      +--replace---->+--> Replaced       Held -- released --> Starting
+//!                      |              |        +-------exit-------------------> Starting
+//!                      +--stop------->+--> Stopping --exit--> Down
 //! ```
-//! Its siblings are not touched: a stage that cannot live holds itself, and the robot stands meanwhile.
+//! Its siblings are not touched: a stage that cannot live holds itself, and the robot stands meanwhile. The one
+//! exception is a bus that lets no life of it begin: that is made anew under all of them.
 
 use std::{collections::VecDeque, time::Duration};
 
 use crate::stages::Stage;
 
-/// A stage that lived so long was well: its next death is a first one.
+/// A stage that was ready for so long was well: its next death is a first one.
 const WELL_AFTER: Duration = Duration::from_millis(500);
 /// Wait before the second start in a row; doubles with each further one.
 const FIRST_BACKOFF: Duration = Duration::from_millis(50);
 /// The most to wait between starts: a person who mends the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
-/// A stage that died so often within [`HOLD_WINDOW`] is held: one that cannot live at all gets here in
-/// seven seconds, and no person or test kills the same stage that fast.
+/// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been well, is held: one that
+/// cannot live at all gets here in seven seconds, and no person or test kills the same stage that fast.
 const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
 const HOLD_WINDOW: Duration = Duration::from_secs(10);
+/// Starts in a row that the bus may be to blame for, before it is made anew: one may have met what the life before
+/// left half made, which is removed when it ends.
+const JAMMED_AFTER: u32 = 2;
 /// Time an aborted stage has to write its last words.
 const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time a terminated stage has to say goodbye. The link sends three datagrams in it.
@@ -35,14 +41,22 @@ const STOP_GRACE: Duration = Duration::from_millis(300);
 pub(crate) type Now = Duration;
 
 /// What happened to a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Event {
+    /// It has no process and should have one.
+    Start,
+    /// It could not be given one.
+    StartFailed,
     /// It beat, not ready yet.
     BeatStarting,
     /// It beat, ready.
     BeatReady,
+    /// It beats, and does not answer its inputs.
+    OutputStale,
     /// Its process is gone and reaped.
     Exited,
+    /// As exited, and it said that the bus would not have it.
+    Refused,
     /// It should be replaced by a fresh life; if it is held, that life is its release.
     Replace,
     /// It should stop for good.
@@ -62,10 +76,12 @@ pub(crate) enum Action {
     Abort,
     /// SIGKILL.
     Kill,
+    /// Stop all stages, make the bus anew, start them again.
+    Renew,
 }
 
 /// Where a stage is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Phase {
     /// No process, none wanted.
     Down,
@@ -83,35 +99,64 @@ pub(crate) enum Phase {
     },
     /// A process that beats.
     Running {
-        /// Since its start.
+        /// Since it was ready.
         since: Now,
         /// Its last beat.
         beat: Now,
     },
-    /// A process that was told to go, and will be killed then.
-    Failing {
-        /// When its life began.
-        since: Now,
+    /// A process that was not ready, silent or without output for too long: it was aborted.
+    Late {
+        /// How it had lived.
+        lived: Lived,
         /// When it is killed.
         kill: Now,
     },
-    /// As failing, and no successor is wanted.
+    /// A process that was told to make room for its successor; that is no death.
+    Replaced {
+        /// When it is killed.
+        kill: Now,
+    },
+    /// A process that was told to go, and no successor is wanted.
     Stopping {
         /// When it is killed.
         kill: Now,
     },
 }
 
+/// How well a life went before its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Lived {
+    /// It never became ready.
+    Never,
+    /// It was ready.
+    Briefly,
+    /// It was ready for [`WELL_AFTER`].
+    Well,
+}
+
+impl Lived {
+    /// From ready to last known well.
+    fn ready(since: Now, until: Now) -> Self {
+        if until.saturating_sub(since) >= WELL_AFTER {
+            Self::Well
+        } else {
+            Self::Briefly
+        }
+    }
+}
+
 /// The policy for one stage.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Policy {
     startup: Duration,
     heartbeat: Duration,
     phase: Phase,
     /// Deaths in a row, none of a life long enough to be well.
-    deaths: u32,
+    deaths: usize,
     /// When it died, within the window; at most [`HOLD_AFTER`].
     recent: VecDeque<Now>,
+    /// Starts in a row that the bus may be to blame for.
+    jams: u32,
 }
 
 impl Policy {
@@ -123,6 +168,7 @@ impl Policy {
             phase: Phase::Down,
             deaths: 0,
             recent: VecDeque::with_capacity(HOLD_AFTER),
+            jams: 0,
         }
     }
 
@@ -136,12 +182,6 @@ impl Policy {
         self.phase
     }
 
-    /// Start the first life.
-    pub(crate) fn start(&mut self, now: Now) -> Action {
-        self.phase = Phase::Starting { since: now };
-        Action::Start
-    }
-
     /// When [`Event::Time`] is next worth telling; none when only events move it.
     pub(crate) fn deadline(&self) -> Option<Now> {
         match self.phase {
@@ -149,62 +189,93 @@ impl Policy {
             Phase::BackingOff { until } => Some(until),
             Phase::Starting { since } => Some(since + self.startup),
             Phase::Running { beat, .. } => Some(beat + self.heartbeat),
-            Phase::Failing { kill, .. } | Phase::Stopping { kill } => Some(kill),
+            Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } => {
+                Some(kill)
+            }
         }
     }
 
     /// What to do now.
     pub(crate) fn step(&mut self, event: Event, now: Now) -> Option<Action> {
+        let due = self.deadline().is_some_and(|deadline| now >= deadline);
         match (self.phase, event) {
-            (Phase::Starting { since } | Phase::Running { since, .. }, Event::BeatReady) => {
-                self.phase = Phase::Running { since, beat: now };
-                None
-            }
-            (
-                Phase::Starting { since }
-                | Phase::Running { since, .. }
-                | Phase::Failing { since, .. },
-                Event::Exited,
-            ) => self.bury(since, now),
-            (Phase::Starting { since } | Phase::Running { since, .. }, Event::Replace) => {
-                self.phase = Phase::Failing {
-                    since,
-                    kill: now + STOP_GRACE,
-                };
-                Some(Action::Terminate)
-            }
-            (Phase::Starting { since } | Phase::Running { since, .. }, Event::Time)
-                if self.deadline().is_some_and(|deadline| now >= deadline) =>
-            {
-                self.phase = Phase::Failing {
-                    since,
-                    kill: now + ABORT_GRACE,
-                };
-                Some(Action::Abort)
-            }
-            (Phase::Failing { kill, .. } | Phase::Stopping { kill }, Event::Time)
-                if now >= kill =>
-            {
-                self.retry_kill(now);
-                Some(Action::Kill)
-            }
-            (Phase::BackingOff { until }, Event::Time) if now >= until => Some(self.start(now)),
-            (Phase::BackingOff { .. } | Phase::Held, Event::Replace) => {
+            (Phase::Down | Phase::BackingOff { .. }, Event::Start) => Some(self.start(now)),
+            (Phase::BackingOff { .. }, Event::Time) if due => Some(self.start(now)),
+            (Phase::Held, Event::Start)
+            | (Phase::BackingOff { .. } | Phase::Held, Event::Replace) => {
                 self.deaths = 0;
+                self.jams = 0;
                 self.recent.clear();
                 Some(self.start(now))
             }
-            (
-                Phase::Starting { .. } | Phase::Running { .. } | Phase::Failing { .. },
-                Event::Stop,
-            ) => {
-                self.phase = Phase::Stopping {
-                    kill: now + STOP_GRACE,
-                };
+            (Phase::Starting { .. }, Event::StartFailed) => {
+                // Whatever is used up: not at once again.
+                self.deaths = self.deaths.max(1);
+                self.bury(Lived::Never, now)
+            }
+
+            (Phase::Starting { .. }, Event::BeatReady) => {
+                self.jams = 0;
+                let (since, beat) = (now, now);
+                self.phase = Phase::Running { since, beat };
+                None
+            }
+            (Phase::Running { since, .. }, Event::BeatReady) => {
+                self.phase = Phase::Running { since, beat: now };
+                None
+            }
+
+            (Phase::Starting { .. }, Event::Time) if due => self.abort(Lived::Never, now),
+            (Phase::Running { since, beat }, Event::Time) if due => {
+                self.abort(Lived::ready(since, beat), now)
+            }
+            (Phase::Running { since, .. }, Event::OutputStale) => {
+                self.abort(Lived::ready(since, now), now)
+            }
+            (Phase::Starting { .. } | Phase::Running { .. }, Event::Replace) => {
+                let kill = now + STOP_GRACE;
+                self.phase = Phase::Replaced { kill };
                 Some(Action::Terminate)
             }
-            (Phase::BackingOff { .. } | Phase::Held, Event::Stop)
-            | (Phase::Stopping { .. }, Event::Exited) => {
+            (Phase::Late { kill, .. }, Event::Replace) => {
+                self.phase = Phase::Replaced { kill };
+                None
+            }
+            (
+                Phase::Starting { .. }
+                | Phase::Running { .. }
+                | Phase::Late { .. }
+                | Phase::Replaced { .. },
+                Event::Stop,
+            ) => {
+                let kill = now + STOP_GRACE;
+                self.phase = Phase::Stopping { kill };
+                Some(Action::Terminate)
+            }
+            (
+                Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill },
+                Event::Time,
+            ) if now >= kill => {
+                self.ask_again(now);
+                Some(Action::Kill)
+            }
+
+            (Phase::Starting { .. }, Event::Refused)
+            | (
+                Phase::Late {
+                    lived: Lived::Never,
+                    ..
+                },
+                Event::Exited | Event::Refused,
+            ) => self.bury_jammed(now),
+            (Phase::Starting { .. }, Event::Exited) => self.bury(Lived::Never, now),
+            (Phase::Running { since, .. }, Event::Exited | Event::Refused) => {
+                self.bury(Lived::ready(since, now), now)
+            }
+            (Phase::Late { lived, .. }, Event::Exited | Event::Refused) => self.bury(lived, now),
+            (Phase::Replaced { .. }, Event::Exited | Event::Refused) => Some(self.start(now)),
+            (Phase::Stopping { .. }, Event::Exited | Event::Refused)
+            | (Phase::BackingOff { .. } | Phase::Held, Event::Stop) => {
                 self.phase = Phase::Down;
                 None
             }
@@ -212,30 +283,52 @@ impl Policy {
         }
     }
 
+    const fn start(&mut self, now: Now) -> Action {
+        self.phase = Phase::Starting { since: now };
+        Action::Start
+    }
+
+    fn abort(&mut self, lived: Lived, now: Now) -> Option<Action> {
+        let kill = now + ABORT_GRACE;
+        self.phase = Phase::Late { lived, kill };
+        Some(Action::Abort)
+    }
+
     /// SIGKILL cannot be refused, only delayed by the kernel: ask again later.
-    fn retry_kill(&mut self, now: Now) {
-        match &mut self.phase {
-            Phase::Failing { kill, .. } | Phase::Stopping { kill } => *kill = now + ABORT_GRACE,
-            _ => {}
+    fn ask_again(&mut self, now: Now) {
+        if let Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } =
+            &mut self.phase
+        {
+            *kill = now + ABORT_GRACE;
         }
     }
 
-    fn bury(&mut self, since: Now, now: Now) -> Option<Action> {
-        if now.saturating_sub(since) >= WELL_AFTER {
+    /// A life has ended that the bus did not let begin. Made anew once, it is not blamed again before a life begins.
+    fn bury_jammed(&mut self, now: Now) -> Option<Action> {
+        self.jams = self.jams.saturating_add(1);
+        let next = self.bury(Lived::Never, now);
+        if self.jams == JAMMED_AFTER && self.phase != Phase::Held {
+            return Some(Action::Renew);
+        }
+        next
+    }
+
+    fn bury(&mut self, lived: Lived, now: Now) -> Option<Action> {
+        if lived == Lived::Well {
             self.deaths = 0;
         }
         self.deaths += 1;
         self.recent
             .retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
         self.recent.push_back(now);
-        if self.recent.len() >= HOLD_AFTER {
+        if self.recent.len() >= HOLD_AFTER || self.deaths >= HOLD_AFTER {
             self.phase = Phase::Held;
             return None;
         }
         if self.deaths == 1 {
             return Some(self.start(now));
         }
-        let doublings = (self.deaths - 2).min(10);
+        let doublings = (self.deaths - 2).min(10) as u32;
         let backoff = (FIRST_BACKOFF * 2_u32.pow(doublings)).min(LONGEST_BACKOFF);
         self.phase = Phase::BackingOff {
             until: now + backoff,
@@ -245,136 +338,4 @@ impl Policy {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::stages::TABLE;
-
-    const fn ms(count: u64) -> Duration {
-        Duration::from_millis(count)
-    }
-
-    /// Of the link: beats due every 500 ms, ready due after 3 s.
-    fn running() -> Policy {
-        let mut policy = Policy::new(&TABLE[0]);
-        assert_eq!(policy.start(ms(0)), Action::Start);
-        assert_eq!(policy.step(Event::BeatStarting, ms(5)), None);
-        assert_eq!(policy.step(Event::BeatReady, ms(10)), None);
-        policy
-    }
-
-    #[test]
-    fn the_first_death_is_answered_at_once() {
-        let mut policy = running();
-        assert_eq!(policy.step(Event::Exited, ms(20)), Some(Action::Start));
-    }
-
-    #[test]
-    fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
-        let mut policy = running();
-        let mut now = ms(20);
-        policy.step(Event::Exited, now);
-        let mut waits = Vec::new();
-        for _ in 0..7 {
-            assert_eq!(policy.step(Event::Exited, now), None);
-            let until = policy.deadline().unwrap();
-            waits.push((until - now).as_millis());
-            assert_eq!(policy.step(Event::Time, until - ms(1)), None);
-            assert_eq!(policy.step(Event::Time, until), Some(Action::Start));
-            now = until;
-        }
-        assert_eq!(waits, [50, 100, 200, 400, 800, 1000, 1000]);
-    }
-
-    /// Dies as soon as it is started, until it is held; the time of that.
-    fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
-        loop {
-            policy.step(Event::Exited, now);
-            if policy.phase() == Phase::Held {
-                return now;
-            }
-            if let Phase::BackingOff { until } = policy.phase() {
-                now = until;
-                assert_eq!(policy.step(Event::Time, now), Some(Action::Start));
-            }
-        }
-    }
-
-    #[test]
-    fn a_stage_that_cannot_live_is_held_within_ten_seconds() {
-        let mut policy = running();
-        let held = crash_until_held(&mut policy, ms(20));
-        assert!(held < Duration::from_secs(10), "{held:?}");
-        let later = held + Duration::from_secs(3600);
-        assert_eq!(policy.step(Event::Time, later), None);
-        assert_eq!((policy.phase(), policy.deadline()), (Phase::Held, None));
-    }
-
-    #[test]
-    fn a_released_stage_starts_with_a_clean_slate() {
-        let mut policy = running();
-        let held = crash_until_held(&mut policy, ms(20));
-        assert_eq!(
-            policy.step(Event::Replace, held + ms(1)),
-            Some(Action::Start)
-        );
-        assert_eq!(
-            policy.step(Event::Exited, held + ms(2)),
-            Some(Action::Start)
-        );
-    }
-
-    #[test]
-    fn a_stage_killed_once_a_second_is_never_held() {
-        let mut policy = running();
-        for second in 1..1000 {
-            policy.step(Event::Exited, ms(second * 1000));
-            if let Some(until) = policy.deadline() {
-                policy.step(Event::Time, until.max(ms(second * 1000)));
-            }
-            assert_ne!(policy.phase(), Phase::Held, "after {second} kills");
-        }
-    }
-
-    #[test]
-    fn a_life_that_was_well_clears_the_deaths_before_it() {
-        let mut policy = running();
-        policy.step(Event::Exited, ms(20));
-        policy.step(Event::BeatReady, ms(30));
-        assert_eq!(policy.step(Event::Exited, ms(2030)), Some(Action::Start));
-    }
-
-    #[test]
-    fn a_stage_that_stops_beating_is_aborted_then_killed() {
-        let mut policy = running();
-        assert_eq!(policy.step(Event::Time, ms(509)), None);
-        assert_eq!(policy.step(Event::Time, ms(510)), Some(Action::Abort));
-        assert_eq!(policy.step(Event::Time, ms(609)), None);
-        assert_eq!(policy.step(Event::Time, ms(610)), Some(Action::Kill));
-        assert_eq!(policy.step(Event::Exited, ms(611)), Some(Action::Start));
-    }
-
-    #[test]
-    fn a_stage_that_never_becomes_ready_is_aborted() {
-        let mut policy = Policy::new(&TABLE[0]);
-        policy.start(ms(0));
-        policy.step(Event::BeatStarting, ms(2999));
-        assert_eq!(policy.step(Event::Time, ms(3000)), Some(Action::Abort));
-    }
-
-    #[test]
-    fn a_replaced_stage_is_asked_to_go_and_followed() {
-        let mut policy = running();
-        assert_eq!(policy.step(Event::Replace, ms(50)), Some(Action::Terminate));
-        assert_eq!(policy.step(Event::Exited, ms(60)), Some(Action::Start));
-    }
-
-    #[test]
-    fn a_stopped_stage_is_not_followed_and_killed_if_it_stays() {
-        let mut policy = running();
-        assert_eq!(policy.step(Event::Stop, ms(50)), Some(Action::Terminate));
-        assert_eq!(policy.step(Event::Time, ms(350)), Some(Action::Kill));
-        assert_eq!(policy.step(Event::Exited, ms(351)), None);
-        assert_eq!(policy.phase(), Phase::Down);
-        assert_eq!(policy.step(Event::Time, ms(9999)), None);
-    }
-}
+mod tests;

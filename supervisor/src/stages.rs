@@ -26,6 +26,8 @@ pub(crate) struct Stage {
     pub(crate) startup: Duration,
     /// From beat to beat; they come every 20 ms.
     pub(crate) heartbeat: Duration,
+    /// From a tick on its inputs to its output of that tick, or of a later one.
+    pub(crate) answers: Duration,
     /// What the robot does while the stage is down.
     pub(crate) while_down: &'static str,
     /// Its process.
@@ -40,6 +42,13 @@ const STARTUP: Duration = Duration::from_secs(3);
 const HEARTBEAT: Duration = Duration::from_millis(500);
 /// The planner beats between solves, and the costliest solve of the largest map takes its time.
 const PLANNER_HEARTBEAT: Duration = Duration::from_secs(2);
+/// An answer takes a hundredth of that where it takes long.
+const ANSWERS: Duration = Duration::from_secs(1);
+/// The planner may owe some answers while it solves: it is rather seen to hang.
+const PLANNER_ANSWERS: Duration = Duration::from_secs(4);
+
+/// What a stage's process ends with when the bus would not have it.
+pub(crate) const REFUSED: u8 = 8;
 
 /// Every stage, in the order of the pipeline.
 pub(crate) static TABLE: [Stage; 5] = [
@@ -50,6 +59,7 @@ pub(crate) static TABLE: [Stage; 5] = [
         outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
         startup: STARTUP,
         heartbeat: HEARTBEAT,
+        answers: ANSWERS,
         while_down: "stands when its timed command ends",
         live: live::<x80_link::shell::Shell>,
     },
@@ -60,6 +70,7 @@ pub(crate) static TABLE: [Stage; 5] = [
         outputs: &[&POSE],
         startup: STARTUP,
         heartbeat: HEARTBEAT,
+        answers: ANSWERS,
         while_down: "stopped by the link when the command is stale",
         live: live::<dead_reckoning::shell::Shell>,
     },
@@ -70,6 +81,7 @@ pub(crate) static TABLE: [Stage; 5] = [
         outputs: &[&GRID],
         startup: STARTUP,
         heartbeat: HEARTBEAT,
+        answers: ANSWERS,
         while_down: "stopped by the link when the command is stale",
         live: live::<mapper::shell::Shell>,
     },
@@ -80,6 +92,7 @@ pub(crate) static TABLE: [Stage; 5] = [
         outputs: &[&GUIDANCE, &FIELD],
         startup: STARTUP,
         heartbeat: PLANNER_HEARTBEAT,
+        answers: PLANNER_ANSWERS,
         while_down: "stopped by the link when the command is stale",
         live: live::<planner::shell::Shell>,
     },
@@ -90,6 +103,7 @@ pub(crate) static TABLE: [Stage; 5] = [
         outputs: &[&COMMAND],
         startup: STARTUP,
         heartbeat: HEARTBEAT,
+        answers: ANSWERS,
         while_down: "stopped by the link when the command is stale",
         live: live::<controller::shell::Shell>,
     },

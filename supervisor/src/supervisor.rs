@@ -164,20 +164,28 @@ pub(crate) fn run(
 ) -> Result<Finished, SupervisorError> {
     let mut signals =
         Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
-    let held = Held::acquire(
+    let mut held = Held::acquire(
         Domain::of(options.robot.clone()),
         options.mission.grid_frame().area(),
     )?;
-    let Some(bus) = held.bus() else {
-        return Err(system("keep the bus")(io::ErrorKind::NotConnected.into()));
+    let mut supervisor = Supervisor::start(options, bus_of(&held)?)?;
+    let ending = loop {
+        match supervisor.drive(&mut signals, watch) {
+            Ok(Some(ending)) => break Ok(ending),
+            Ok(None) => supervisor = supervisor.renew(&mut held)?,
+            Err(error) => break Err(error),
+        }
     };
-    let mut supervisor = Supervisor::start(options, bus)?;
-    let ending = supervisor.drive(&mut signals, watch);
     // Whatever went wrong, the robot is stopped first and the stages go in order.
     let stopped = supervisor.stop();
     let ending = ending?;
     stopped?;
     Ok(supervisor.finish(&ending))
+}
+
+fn bus_of(held: &Held) -> Result<&Bus, SupervisorError> {
+    let bus = held.bus();
+    bus.ok_or_else(|| system("keep the bus")(io::ErrorKind::NotConnected.into()))
 }
 
 struct Supervisor<'a> {
@@ -297,23 +305,26 @@ impl<'a> Supervisor<'a> {
         Ok(supervisor)
     }
 
-    /// Until the mission ends, one way or another.
+    /// Until the mission ends, one way or another; or, without an ending, until the bus must be made anew.
     fn drive(
         &mut self,
         signals: &mut Signals,
         watch: &mut dyn FnMut(&Progress<'_>),
-    ) -> Result<Ending, SupervisorError> {
+    ) -> Result<Option<Ending>, SupervisorError> {
         self.waiter.on_readable(&*signals)?;
         loop {
             if signals.came() {
-                return Ok(Ending {
+                return Ok(Some(Ending {
                     outcome: Outcome::Aborted,
                     reason: "told to stop".to_owned(),
                     asked_for: true,
-                });
+                }));
             }
             if let Some(ending) = self.turn()? {
-                return Ok(ending);
+                return Ok(Some(ending));
+            }
+            if self.fleet.is_jammed() {
+                return Ok(None);
             }
             if self.restate_if_due()? {
                 let progress = Progress {
@@ -349,6 +360,8 @@ impl<'a> Supervisor<'a> {
         let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.tend(first_tick)?;
+        let driven = self.order == Order::Drive;
+        self.fleet.judge_outputs(driven, first_tick)?;
         if let Some(simulator) = &mut self.simulator
             && !simulator.tend()?
         {
@@ -618,6 +631,54 @@ impl<'a> Supervisor<'a> {
     fn stop(&mut self) -> Result<(), SupervisorError> {
         self.service.stopping();
         (self.order, self.reason) = (Order::Stop, HoldReason::Ending);
+        self.stand()?;
+        self.fleet.want_no_more();
+        self.stop_stages()?;
+        if let Some(simulator) = &mut self.simulator {
+            simulator.stop()?;
+        }
+        Ok(())
+    }
+
+    /// Make the bus anew under all stages: what the middleware keeps of it lets one of them begin no life. The mission
+    /// goes on from what the stages have kept.
+    ///
+    /// A consumer of the old bus hears nothing more, and one that leaves it as its topic's last takes the topic's file
+    /// of the new one for its own: then that topic takes in nobody until the bus is made anew again.
+    fn renew(mut self, held: &mut Held) -> Result<Self, SupervisorError> {
+        tracing::error!("the bus is made anew; consumers must join it again");
+        (self.order, self.reason) = (Order::Hold, HoldReason::Starting);
+        self.ready = false;
+        self.stand()?;
+        self.stop_stages()?;
+        // The old ends go before the new bus is made: they would take its files for theirs.
+        drop((self.waiter, self.directive, self.roster));
+        drop((self.deaths, self.stalls, self.requests));
+        let record = self.observer.close();
+        held.renew()?;
+        let bus = bus_of(held)?;
+        let mut waiter = Waiter::default();
+        let mut observer = Observer::new(bus, &mut waiter)?;
+        observer.record = record;
+        waiter.on(bus.alarm(&topics::REQUESTS)?);
+        let mut supervisor = Self {
+            observer,
+            waiter,
+            directive: bus.writer(&topics::DIRECTIVE, 1)?,
+            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
+            deaths: bus.writer(&topics::DEATHS, 1)?,
+            stalls: bus.writer(&topics::STALLS, 1)?,
+            requests: bus.reader(&topics::REQUESTS)?,
+            ..self
+        };
+        supervisor.restate()?;
+        supervisor.fleet.start_all(supervisor.first_tick())?;
+        supervisor.progressed = (None, Instant::now());
+        Ok(supervisor)
+    }
+
+    /// Say that the robot is to stand, and wait a moment for the link to say that it was told.
+    fn stand(&mut self) -> Result<(), SupervisorError> {
         self.restate()?;
         let began = Instant::now();
         loop {
@@ -628,7 +689,11 @@ impl<'a> Supervisor<'a> {
             }
             self.waiter.wait(STAND_CONFIRMED)?;
         }
-        self.fleet.want_no_more();
+        Ok(())
+    }
+
+    /// One after the other, in reverse order.
+    fn stop_stages(&mut self) -> Result<(), SupervisorError> {
         while self.fleet.stop_last()? {
             self.wait()?;
             self.observer.take(&mut self.fleet)?;
@@ -637,9 +702,6 @@ impl<'a> Supervisor<'a> {
                 // Its pipe must not fill: it could not say goodbye either.
                 simulator.tend()?;
             }
-        }
-        if let Some(simulator) = &mut self.simulator {
-            simulator.stop()?;
         }
         Ok(())
     }

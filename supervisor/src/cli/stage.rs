@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 use common::{
     domain::RobotName,
-    shell::{Life, Start},
+    shell::{Life, StageError, Start},
 };
 
 use super::Failure;
@@ -50,6 +50,12 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             robot: arguments.robot.clone(),
         },
     };
-    (stage.live)(&start)?;
-    Ok(ExitCode::SUCCESS)
+    match (stage.live)(&start) {
+        Ok(()) => Ok(ExitCode::SUCCESS),
+        Err(StageError::Bus(error)) => {
+            eprintln!("firsthand: {error}");
+            Ok(ExitCode::from(stages::REFUSED))
+        }
+        Err(error) => Err(error.into()),
+    }
 }
