@@ -10,6 +10,7 @@ use std::{
 };
 
 use common::{
+    domain::Domain,
     run,
     samples::{HealthSample, HealthState, RosterEntry, StageState, name, name_str},
 };
@@ -21,6 +22,7 @@ use crate::{
     flow::Flow,
     policy::{Action, Event, Now, Phase, Policy},
     process::{Ended, Process, firsthand},
+    remains::Remains,
     stages::{self, Stage, start_order},
 };
 
@@ -55,6 +57,7 @@ struct Member {
 pub(crate) struct Fleet {
     members: Vec<Member>,
     flow: Flow,
+    remains: Remains,
     directory: PathBuf,
     clock: Instant,
     /// Who starts the stages.
@@ -74,8 +77,8 @@ pub(crate) enum Starter {
 }
 
 impl Fleet {
-    /// None running yet; they will live in the run directory.
-    pub(crate) fn new(directory: PathBuf, starter: Starter) -> Self {
+    /// None running yet; they will live in the run directory and on the bus of `domain`.
+    pub(crate) fn new(domain: Domain, directory: PathBuf, starter: Starter) -> Self {
         let member = |stage| Member {
             stage,
             policy: Policy::new(stage),
@@ -90,6 +93,7 @@ impl Fleet {
         Self {
             members: start_order().into_iter().map(member).collect(),
             flow: Flow::new(),
+            remains: Remains::new(domain),
             directory,
             clock: Instant::now(),
             starter,
@@ -104,6 +108,7 @@ impl Fleet {
 
     /// Start every stage that is down on a new bus, in order, from `first_tick` on, if that is ours to do.
     pub(crate) fn start_all(&mut self, first_tick: u64) -> Result<(), FleetError> {
+        self.remains.forget();
         if self.starter == Starter::Another {
             return Ok(());
         }
@@ -202,7 +207,11 @@ impl Fleet {
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
         };
         member.policy.step(event, now);
-        met || !was_running && event == Event::BeatReady
+        let became_ready = !was_running && event == Event::BeatReady;
+        if became_ready {
+            self.remains.on_ready(member.started);
+        }
+        met || became_ready
     }
 
     /// A stage published something of `tick`.
@@ -249,6 +258,7 @@ impl Fleet {
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
                 let mut death = self.record(index, Cause::of(status));
+                self.remains.on_death(death.pid, self.now());
                 let member = &mut self.members[index];
                 (member.process, member.beat) = (None, None);
                 let refused = death.cause == Cause::Exited(stages::REFUSED.into());
@@ -269,6 +279,7 @@ impl Fleet {
             }
             self.tell(index, Event::Time, first_tick)?;
         }
+        self.remains.sweep(self.now());
         Ok(deaths)
     }
 

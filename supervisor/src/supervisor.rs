@@ -271,7 +271,11 @@ impl<'a> Supervisor<'a> {
         waiter.on(bus.alarm(&topics::REQUESTS)?);
         let mut supervisor = Self {
             options,
-            fleet: Fleet::new(directory.clone(), options.starter),
+            fleet: Fleet::new(
+                Domain::of(options.robot.clone()),
+                directory.clone(),
+                options.starter,
+            ),
             simulator,
             observer,
             waiter,

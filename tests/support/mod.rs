@@ -8,6 +8,7 @@
 )]
 
 use std::{
+    io::Read as _,
     path::Path,
     process::{Child, Command, Output, Stdio},
     time::{Duration, Instant},
@@ -91,7 +92,9 @@ impl Run {
                 return status;
             }
             if let Some(exit) = self.child.try_wait().unwrap() {
-                panic!("the run ended ({exit}) before {what}");
+                let mut said = String::new();
+                let _ = self.child.stderr.take().unwrap().read_to_string(&mut said);
+                panic!("the run ended ({exit}) before {what}: {said}");
             }
             assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
         }

@@ -1,0 +1,212 @@
+//! The states of its files in which the middleware lets nobody in any more, each made by hand in the middle of a
+//! mission: it goes on without a hand.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use std::{
+    fs::{self, File, Permissions},
+    os::unix::fs::PermissionsExt as _,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use common::{bus::Bus, domain::Domain, topics};
+use rustix::process::Signal;
+use serde_json::Value;
+use support::{PATIENCE, Run, STAGES, assert_nothing_left, find, signal_process};
+
+/// Mission time runs so many times as fast as the wall's.
+const PACE: [&str; 2] = ["--pace", "4"];
+
+fn domain(robot: &str) -> Domain {
+    Domain::of(robot.parse().unwrap())
+}
+
+fn pid(status: &Value, stage: &str) -> u32 {
+    find(status, stage)["pid"].as_u64().unwrap() as u32
+}
+
+/// The process in a port's or a node's number.
+fn process_of(number: u128) -> u32 {
+    (number >> 64) as u32
+}
+
+/// The directories of the node files of process `pid`.
+fn nodes_of(domain: &Domain, pid: u32) -> Vec<PathBuf> {
+    let nodes = fs::read_dir(domain.middleware_root().join("nodes")).unwrap();
+    let nodes = nodes.map(|entry| entry.unwrap().path()).filter(|path| {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        name.parse().is_ok_and(|id| process_of(id) == pid)
+    });
+    nodes.collect()
+}
+
+/// The files in shared memory of `domain` that end so.
+fn shared(domain: &Domain, suffix: &str) -> Vec<String> {
+    let names = fs::read_dir("/dev/shm").unwrap().flatten();
+    let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    names
+        .filter(|name| name.starts_with(&domain.shared_memory_prefix()) && name.ends_with(suffix))
+        .collect()
+}
+
+/// A file as it is between its creation and its completion.
+fn half_make(path: &Path) {
+    // One that is there may not be writable.
+    let _ = fs::remove_file(path);
+    let file = File::create(path).unwrap();
+    file.set_permissions(Permissions::from_mode(0o200)).unwrap();
+}
+
+/// A connection of port `port` to another, half made.
+fn half_make_connection(domain: &Domain, port: u128) {
+    let made = shared(domain, ".connection");
+    // Prefix and hash of the type: up to the first port's number.
+    let start = made[0].rsplitn(3, '_').last().unwrap();
+    half_make(Path::new(&format!(
+        "/dev/shm/{start}_{port}_{port}.connection"
+    )));
+}
+
+/// Kill `stage`, as it was in the status `before`, and wait until it lives again.
+fn kill_and_await(run: &mut Run, stage: &str, before: &Value) -> Value {
+    let generation = find(before, stage)["generation"].as_u64();
+    signal_process(pid(before, stage), Signal::KILL);
+    run.wait_until("it lives again", |status| {
+        let stage = find(status, stage);
+        stage["generation"].as_u64() > generation && stage["state"] == "running"
+    })
+}
+
+/// The mission is finished as if nothing had happened, and leaves nothing.
+fn assert_arrives(robot: &str, run: Run) -> Value {
+    let (code, summary) = run.finish();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(0), &"reached".into()),
+        "{summary}"
+    );
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    // A lost pose is metres.
+    let error = summary["pose_error_m"].as_f64().unwrap();
+    assert!(error < 0.05, "{summary}");
+    assert_nothing_left(robot);
+    summary
+}
+
+/// That the bus was made anew is seen on every stage: each has had another life.
+fn assert_renewed(summary: &Value) {
+    for stage in STAGES {
+        let restarts = summary["restarts"][stage].as_u64();
+        assert!(restarts >= Some(1), "{stage}: {summary}");
+    }
+}
+
+#[test]
+fn a_connection_half_made_by_a_stage_that_was_killed_is_in_nobodys_way() {
+    let mut run = Run::start("jam-own", "obstacle-course", &PACE);
+    let status = run.wait_until_under_way(1.0);
+    let domain = domain("jam-own");
+    let mapper = pid(&status, "mapper");
+    let ports = shared(&domain, ".data");
+    let port = ports.iter().find_map(|name| {
+        let id = name.strip_suffix(".data")?.rsplit('_').next()?;
+        id.parse().ok().filter(|id| process_of(*id) == mapper)
+    });
+    half_make_connection(&domain, port.unwrap());
+    let began = Instant::now();
+    kill_and_await(&mut run, "mapper", &status);
+    // Not after a start-up that was too late.
+    assert!(began.elapsed().as_secs() < 3, "{:?}", began.elapsed());
+    let summary = assert_arrives("jam-own", run);
+    assert_eq!(summary["restarts"]["mapper"], 1, "{summary}");
+    assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
+}
+
+#[test]
+fn a_connection_half_made_by_who_knows_whom_jams_one_start_at_most() {
+    let mut run = Run::start("jam-other", "obstacle-course", &PACE);
+    let status = run.wait_until_under_way(1.0);
+    let domain = domain("jam-other");
+    // Of the dead mapper, by its tags, but with a number that is not its own.
+    let port = 7;
+    let node = nodes_of(&domain, pid(&status, "mapper")).remove(0);
+    let tag = format!("{}{port}.port_tag", domain.shared_memory_prefix());
+    fs::write(node.join(tag), "").unwrap();
+    half_make_connection(&domain, port);
+    kill_and_await(&mut run, "mapper", &status);
+    assert!(shared(&domain, "_7.connection").is_empty());
+    let summary = assert_arrives("jam-other", run);
+    let restarts = summary["restarts"]["mapper"].as_u64().unwrap();
+    assert!((1..=2).contains(&restarts), "{summary}");
+    assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
+}
+
+#[test]
+fn a_half_made_service_jams_starts_until_the_bus_is_made_anew() {
+    let mut run = Run::start("jam-service", "obstacle-course", &PACE);
+    let status = run.wait_until_under_way(1.0);
+    let services = domain("jam-service").middleware_root().join("services");
+    for service in fs::read_dir(services).unwrap() {
+        half_make(&service.unwrap().path());
+    }
+    kill_and_await(&mut run, "planner", &status);
+    assert_renewed(&assert_arrives("jam-service", run));
+}
+
+#[test]
+fn places_in_a_topic_that_nobody_gives_back_jam_starts_until_the_bus_is_made_anew() {
+    let mut run = Run::start("jam-places", "obstacle-course", &PACE);
+    let status = run.wait_until_under_way(1.0);
+    let bus = Bus::join(&domain("jam-places"), "greedy").unwrap();
+    let mut places = Vec::new();
+    let mut take_all = || {
+        loop {
+            match bus.writer(&topics::POSE, 0) {
+                Ok(place) => places.push(place),
+                Err(error) if error.to_string().contains("ExceedsMax") => return places.len(),
+                Err(error) => panic!("{error}"),
+            }
+        }
+    };
+    let all_but_one = take_all();
+    // The last place, too, before there is a successor to take it.
+    run.signal(Signal::STOP);
+    signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
+    let began = Instant::now();
+    while take_all() == all_but_one {
+        assert!(began.elapsed() < PATIENCE, "its place stays taken");
+    }
+    run.signal(Signal::CONT);
+    // Never given back: as when their owners were killed in a bad moment.
+    std::mem::forget((places, bus));
+    assert_renewed(&assert_arrives("jam-places", run));
+}
+
+#[test]
+fn node_files_of_the_dead_are_swept() {
+    let mut run = Run::start("jam-nodes", "obstacle-course", &PACE);
+    let status = run.wait_until_under_way(1.0);
+    let domain = domain("jam-nodes");
+    let mapper = pid(&status, "mapper");
+    let nodes = domain.middleware_root().join("nodes");
+    // As left by hundreds of processes killed while they joined; of the number, the process alone counts.
+    for counter in 1_000..1_300_u128 {
+        let id = (counter << 96) | (u128::from(mapper) << 64);
+        fs::create_dir(nodes.join(id.to_string())).unwrap();
+        let monitor = format!("{}{id}.node_monitor_context", domain.shared_memory_prefix());
+        fs::write(nodes.join(monitor), [0; 16]).unwrap();
+    }
+    let status = kill_and_await(&mut run, "mapper", &status);
+    let living: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
+    let began = Instant::now();
+    while !nodes_of(&domain, mapper).is_empty() {
+        assert!(began.elapsed() < PATIENCE, "node files stay");
+        run.status();
+    }
+    for pid in living {
+        assert_eq!(nodes_of(&domain, pid).len(), 1, "of the living");
+    }
+    assert_arrives("jam-nodes", run);
+}
