@@ -32,6 +32,8 @@ pub(crate) struct Death {
     pub(crate) cause: Cause,
     /// Whether it hung, or was never ready, and was ended by the supervisor for that.
     pub(crate) hung: bool,
+    /// Age of its last beat when that was seen.
+    pub(crate) noticed_after_s: Option<f64>,
     /// Age of its last beat; none if it never beat.
     pub(crate) beat_age_s: Option<f64>,
     /// Length of its life.
@@ -119,6 +121,7 @@ impl Death {
             generation,
             cause,
             hung,
+            noticed_after_s: _,
             beat_age_s,
             uptime_s,
             deaths_in_window,
@@ -224,6 +227,7 @@ mod tests {
                 core: false,
             },
             hung: false,
+            noticed_after_s: None,
             beat_age_s: Some(0.02),
             uptime_s: 12.5,
             deaths_in_window: 2,

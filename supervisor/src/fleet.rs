@@ -49,8 +49,8 @@ struct Member {
     output: Option<Now>,
     /// Length of its log when this life began.
     log_began: u64,
-    /// Whether the supervisor ended it for hanging.
-    hung: bool,
+    /// When the supervisor saw that it hung.
+    hung: Option<Now>,
 }
 
 /// All stages, in start order.
@@ -88,7 +88,7 @@ impl Fleet {
             beat: None,
             output: None,
             log_began: 0,
-            hung: false,
+            hung: None,
         };
         Self {
             members: start_order().into_iter().map(member).collect(),
@@ -307,7 +307,11 @@ impl Fleet {
             pid: member.process.as_ref().map_or(0, Process::id),
             generation: member.generation,
             cause,
-            hung: member.hung,
+            hung: member.hung.is_some(),
+            noticed_after_s: member
+                .hung
+                .zip(member.beat)
+                .map(|(seen, beat)| seen.saturating_sub(beat).as_secs_f64()),
             beat_age_s: member.beat.map(age),
             uptime_s: age(member.started),
             deaths_in_window: 0,
@@ -398,7 +402,7 @@ impl Fleet {
             Action::Start => {
                 self.flow.on_start(stage);
                 member.started = now;
-                member.hung = false;
+                member.hung = None;
                 let log = log_file(&self.directory, stage);
                 member.log_began = log.metadata().map_or(0, |log| log.len());
                 let spawned = run::next_life(&self.directory, stage)
@@ -419,7 +423,7 @@ impl Fleet {
             }
             Action::Terminate => Signal::TERM,
             Action::Abort => {
-                member.hung = true;
+                member.hung = Some(now);
                 Signal::ABORT
             }
             Action::Kill => Signal::KILL,

@@ -1,0 +1,94 @@
+//! Stages frozen again and again: how soon each is noticed.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
+
+mod support;
+
+use rustix::process::Signal;
+use serde_json::Value;
+use support::{Run, STAGES, assert_nothing_left, find, signal_process};
+
+/// How late a deadline may be noticed.
+const SLACK: f64 = 0.020;
+
+/// Freeze each stage so often in a mission at the pace of the wall, and print how late each was noticed.
+fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
+    // At this speed the mission outlasts every freeze.
+    let slow = [
+        "--pace",
+        "1",
+        "--set",
+        "controller.speed_m_s=0.002",
+        "--timeout",
+        "80000",
+    ];
+    let mut run = Run::start(robot, "open-room", &slow);
+    run.wait_until_under_way(0.5);
+    for _ in 0..times {
+        for stage in STAGES {
+            let status = run.wait_until("all run", |status| {
+                STAGES
+                    .iter()
+                    .all(|stage| find(status, stage)["state"] == "running")
+            });
+            let generation = find(&status, stage)["generation"].as_u64();
+            signal_process(
+                find(&status, stage)["pid"].as_u64().unwrap() as u32,
+                Signal::STOP,
+            );
+            run.wait_until("it is replaced", |status| {
+                find(status, stage)["generation"].as_u64() > generation
+            });
+        }
+    }
+    let text = std::fs::read_to_string(run.directory().join("deaths.jsonl")).unwrap();
+    run.signal(Signal::INT);
+    let (code, summary) = run.finish();
+    assert_eq!(code, Some(0), "{summary}");
+    assert_nothing_left(robot);
+    let deaths: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    // On a machine that stands still for a moment others may be late too.
+    assert!(deaths.len() >= times * STAGES.len(), "{text}");
+    let mut late: Vec<f64> = deaths
+        .iter()
+        .map(|death| {
+            assert_eq!(death["hung"], true, "{death}");
+            let deadline = if death["stage"] == "planner" {
+                2.0
+            } else {
+                0.5
+            };
+            death["noticed_after_s"].as_f64().unwrap() - deadline
+        })
+        .collect();
+    late.sort_by(f64::total_cmp);
+    let at = |share: f64| late[((late.len() - 1) as f64 * share) as usize] * 1e3;
+    println!(
+        "{} freezes, noticed so many ms after the deadline: median {:.2}, 99 % {:.2}, most {:.2}",
+        late.len(),
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    );
+    late
+}
+
+#[test]
+fn frozen_stages_are_noticed_when_their_beat_is_due() {
+    let late = freeze_each("freezes", 2);
+    // The processors are shared with other tests: not each of them.
+    let median = late[late.len() / 2];
+    assert!(late[0] >= 0.0 && median < SLACK, "{late:?}");
+}
+
+/// Ten minutes, on a machine that does nothing else:
+/// `cargo test --release -p supervisor --test freezes -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes ten minutes and a quiet machine"]
+fn five_hundred_frozen_stages_are_noticed_within_20_ms() {
+    for late in freeze_each("freezes-500", 100) {
+        assert!((0.0..SLACK).contains(&late), "{late}");
+    }
+}
