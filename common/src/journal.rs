@@ -16,8 +16,11 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::checkpoint::{Checkpoint, CheckpointError, failed};
 
-/// Entries after which a snapshot is due: folding so many takes a new life a few milliseconds.
-const SNAPSHOT_AFTER: u64 = 128;
+/// Entries after which a snapshot is due at the soonest and at the latest: a new life folds a dozen entries in a
+/// millisecond.
+const SNAPSHOT_AFTER: (u64, u64) = (32, 128);
+/// In between, an entry more for so many bytes of the state: a large one takes long to write.
+const BYTES_FOR_AN_ENTRY: u64 = 4096;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
 /// No entry is longer, bytes.
@@ -37,6 +40,8 @@ pub struct Journal {
     number: u64,
     /// The number of the first entry that the snapshot does not hold.
     first: u64,
+    /// Entries after which a snapshot is due.
+    snapshot_after: u64,
 }
 
 /// What an earlier life left.
@@ -85,6 +90,7 @@ impl Journal {
             end: 0,
             number: first,
             first,
+            snapshot_after: snapshot_after(capacity),
         };
         let entries = journal.read()?;
         Ok((journal, Kept { state, entries }))
@@ -109,7 +115,10 @@ impl Journal {
             rest = after;
         }
         self.end = (bytes.len() - rest.len()) as u64;
-        self.cut()?;
+        // A whole one is left alone: the file system may have to wait for the disk.
+        if !rest.is_empty() {
+            self.cut()?;
+        }
         Ok(entries)
     }
 
@@ -153,7 +162,7 @@ impl Journal {
     /// whole state: at a moment when nobody waits.
     #[must_use]
     pub const fn is_long(&self) -> bool {
-        self.number - self.first >= SNAPSHOT_AFTER
+        self.number - self.first >= self.snapshot_after
     }
 
     /// Keep `state`, into which every entry so far is folded, and forget the entries.
@@ -169,6 +178,11 @@ impl Journal {
         self.end = 0;
         self.cut()
     }
+}
+
+fn snapshot_after(capacity: usize) -> u64 {
+    let (soonest, latest) = SNAPSHOT_AFTER;
+    (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }
 
 /// The first entry of `bytes`: its number, its body, and what comes after. None when it is not whole.
@@ -268,7 +282,7 @@ mod tests {
     fn a_snapshot_is_due_after_so_many_entries_and_not_before() {
         let directory = tempfile::tempdir().unwrap();
         let (mut journal, _) = open(&directory.path().join("map.checkpoint"));
-        for entry in 0..SNAPSHOT_AFTER {
+        for entry in 0..snapshot_after(64) {
             assert!(!journal.is_long(), "after {entry}");
             journal.append(&entry).unwrap();
         }
