@@ -21,11 +21,11 @@ use crate::stages::Stage;
 /// A stage that was ready for so long was well: its next death is a first one.
 const WELL_AFTER: Duration = Duration::from_millis(500);
 /// Wait before the second start in a row; doubles with each further one.
-const FIRST_BACKOFF: Duration = Duration::from_millis(50);
+const FIRST_BACKOFF: Duration = Duration::from_millis(10);
 /// The most to wait between starts: a person who mends the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
 /// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been well, is held: one that
-/// cannot live at all gets here in seven seconds, and no person or test kills the same stage that fast.
+/// cannot live at all gets here in five seconds, and no person or test kills the same stage that fast.
 const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
 const HOLD_WINDOW: Duration = Duration::from_secs(10);
