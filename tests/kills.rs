@@ -52,6 +52,45 @@ fn a_stage_killed_on_a_clock_of_ticks_does_not_hang_the_mission() {
     }
 }
 
+/// Names of the node files of `robot`'s bus, its nodes' directories among them.
+fn node_files(robot: &str) -> Vec<String> {
+    let user = rustix::process::geteuid().as_raw();
+    let nodes = format!("/dev/shm/fh{user}_{robot}_bus/nodes");
+    let entries = std::fs::read_dir(nodes).unwrap().flatten();
+    entries
+        .map(|entry| entry.file_name().into_string().unwrap())
+        .collect()
+}
+
+#[test]
+fn what_a_stage_killed_in_its_start_left_on_the_bus_is_cleared_away() {
+    let mut run = Run::start("dregs", "obstacle-course", &["--pace", "1"]);
+    let status = run.wait_until_under_way(0.5);
+    let pid = support::find(&status, "mapper")["pid"].as_u64().unwrap();
+    // The process is the third of the four words of a node's id.
+    let own = |name: &String| {
+        let id = name.parse::<u128>().ok()?;
+        ((id >> 64) as u32 == pid as u32).then_some(id)
+    };
+    let id = node_files("dregs").iter().find_map(own).unwrap();
+    // A life that was killed between making its node's directory and saying that the node lives.
+    let cut_off = (id + (1 << 96)).to_string();
+    let user = rustix::process::geteuid().as_raw();
+    let directory = format!("/dev/shm/fh{user}_dregs_bus/nodes/{cut_off}");
+    std::fs::create_dir(&directory).unwrap();
+    std::fs::write(format!("{directory}/fh{user}_dregs_node.details"), "").unwrap();
+    run.kill_and_await_successor("mapper", Signal::KILL);
+    run.wait_until("the dead node is cleared away", |_| {
+        let left = node_files("dregs");
+        !left
+            .iter()
+            .any(|name| name.contains(&id.to_string()) || *name == cut_off)
+    });
+    run.signal(Signal::INT);
+    run.finish();
+    assert_nothing_left("dregs");
+}
+
 #[test]
 fn a_frozen_stage_is_noticed_and_replaced() {
     let mut frozen = Run::start("frozen", "obstacle-course", &["--pace", PACE]);

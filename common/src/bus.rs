@@ -16,21 +16,27 @@
 use std::{
     any::Any,
     collections::HashSet,
+    ffi::OsStr,
     fmt::Debug,
+    io,
     marker::PhantomData,
     ops::Deref,
-    os::fd::{AsFd, BorrowedFd},
-    path::PathBuf,
+    os::{
+        fd::{AsFd, BorrowedFd},
+        unix::ffi::OsStrExt as _,
+    },
+    path::{Path, PathBuf},
     time::Duration,
 };
 
 mod error;
+mod leftovers;
 
 pub use error::BusError;
 pub use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::{
     config::Config,
-    node::{Node, NodeBuilder},
+    node::{Node, NodeBuilder, NodeState, NodeView as _},
     port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber},
     prelude::{
         AllocationStrategy, CallbackProgression, FileDescriptorBased, LogLevel, NodeName,
@@ -45,7 +51,7 @@ use iceoryx2::{
 
 use crate::{
     clock::MissionTime,
-    domain::Domain,
+    domain::{Domain, SHARED_MEMORY},
     samples::Stamped,
     topics::{EVERY_STAGE, Limits, OPERATOR, Rate, Spec},
 };
@@ -215,6 +221,10 @@ impl Bus {
         config.global.set_root_path(&path);
         config.global.prefix = SemanticString::new(prefix.as_bytes())
             .map_err(|error| failed(format!("{error:?} in {prefix:?}")))?;
+        // The supervisor clears up after the dead: a stage that starts does not wait for it.
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
         let file = domain.middleware_config();
         std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
@@ -268,6 +278,46 @@ impl Bus {
             .map(|topic| topic.create(self))
             .collect::<Result<_, _>>()
             .map(Services)
+    }
+
+    /// Remove what `process`, which must be gone, was just making: its successor could wait for it for ever. The
+    /// supervisor's business alone.
+    ///
+    /// # Errors
+    /// When files of the dead cannot be removed.
+    pub fn remove_unfilled(&self, process: u32) -> io::Result<()> {
+        let prefix = String::from_utf8_lossy(self.node.config().global.prefix.as_bytes());
+        leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
+    }
+
+    /// Free what the dead held: their places on the topics, their memory; and what the processes `killed`, which
+    /// must be gone, left of a start that was cut off. The supervisor's business alone; a few milliseconds for each.
+    ///
+    /// # Errors
+    /// When files of the dead cannot be removed.
+    pub fn clear_up(&self, killed: &[u32]) -> io::Result<()> {
+        let config = self.node.config();
+        let nodes = config.global.node_dir();
+        let nodes = Path::new(OsStr::from_bytes(nodes.as_bytes()));
+        let mut outcome = Ok(());
+        let listed = Node::<ipc::Service>::list(config, |node| {
+            if let NodeState::Dead(dead) = node {
+                // Or the next could wait for ever.
+                outcome = self.remove_unfilled(leftovers::process_of(dead.id().value()));
+                if outcome.is_err() {
+                    return CallbackProgression::Stop;
+                }
+                // One that cannot be freed now is met again next time.
+                let _ = dead.try_remove_stale_resources();
+            }
+            CallbackProgression::Continue
+        });
+        outcome?;
+        listed.map_err(|error| io::Error::other(format!("{error:?}")))?;
+        killed.iter().try_for_each(|&process| {
+            self.remove_unfilled(process)?;
+            leftovers::remove_nodes(nodes, process)
+        })
     }
 
     fn create_event(&self, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {

@@ -119,16 +119,17 @@ impl Domain {
         self.directory.join("run")
     }
 
-    /// Under it lie the node and service files of the middleware.
+    /// Under it lie the node and service files of the middleware: in memory, since it syncs each to the disk,
+    /// and a stage that starts makes twenty.
     #[must_use]
     pub fn middleware_root(&self) -> PathBuf {
-        self.directory.join("bus")
+        Path::new(SHARED_MEMORY).join(self.shared_memory_prefix() + "bus")
     }
 
     /// Where they are moved to be removed.
     #[must_use]
     pub fn middleware_root_aside(&self) -> PathBuf {
-        self.directory.join("bus.old")
+        Path::new(SHARED_MEMORY).join(self.shared_memory_prefix() + "bus.old")
     }
 
     /// The middleware's configuration: what a consumer in any language loads first.

@@ -5,6 +5,7 @@ use std::{
     io,
     os::unix::fs::{DirBuilderExt, MetadataExt},
     path::{Path, PathBuf},
+    rc::Rc,
 };
 
 use common::{
@@ -77,7 +78,7 @@ const CELL_BYTES: u64 = 8 * 13;
 pub(crate) struct Held {
     domain: Domain,
     // Dropped before the files are removed.
-    bus: Option<(Services, Bus)>,
+    bus: Option<(Services, Rc<Bus>)>,
     // Held while the bus is made and removed: stages wait before the door.
     shut: Option<File>,
     cells: usize,
@@ -107,10 +108,11 @@ impl Held {
             SHARED_MEMORY,
             SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
         )?;
+        make_own_directory(&self.domain.middleware_root())?;
         Bus::write_config(&self.domain)?;
         let bus = Bus::join(&self.domain, "supervisor")?;
         let services = bus.create_all()?;
-        self.bus = Some((services, bus));
+        self.bus = Some((services, Rc::new(bus)));
         self.shut = None;
         Ok(())
     }
@@ -126,8 +128,8 @@ impl Held {
     }
 
     /// The bus.
-    pub(crate) fn bus(&self) -> Option<&Bus> {
-        self.bus.as_ref().map(|(_, bus)| bus)
+    pub(crate) fn bus(&self) -> Option<Rc<Bus>> {
+        self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
     }
 }
 
@@ -154,20 +156,22 @@ pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error
 /// The user's directory and the robot's in it, for their owner only.
 fn make_directory(domain: &Domain) -> Result<(), DomainError> {
     let directory = domain.directory();
-    let user = rustix::process::geteuid().as_raw();
-    for path in directory.parent().into_iter().chain([directory]) {
-        match DirBuilder::new().mode(0o700).create(path) {
-            Ok(()) => {}
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(failed("make", path)(error)),
-        }
-        // Anyone may have made it in /tmp before us.
-        let found = fs::symlink_metadata(path).map_err(failed("look at", path))?;
-        if !found.is_dir() || found.uid() != user {
-            return Err(DomainError::Foreign {
-                path: path.to_path_buf(),
-            });
-        }
+    let mut both = directory.parent().into_iter().chain([directory]);
+    both.try_for_each(make_own_directory)
+}
+
+/// A directory for its owner only, in a place where anyone may have made it before us.
+fn make_own_directory(path: &Path) -> Result<(), DomainError> {
+    match DirBuilder::new().mode(0o700).create(path) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        Err(error) => return Err(failed("make", path)(error)),
+    }
+    let found = fs::symlink_metadata(path).map_err(failed("look at", path))?;
+    if !found.is_dir() || found.uid() != rustix::process::geteuid().as_raw() {
+        return Err(DomainError::Foreign {
+            path: path.to_path_buf(),
+        });
     }
     Ok(())
 }
@@ -243,7 +247,12 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
             .starts_with(prefix.as_bytes())
         {
             let path = entry.path();
-            fs::remove_file(&path).map_err(failed("remove", &path))?;
+            let directory = entry.file_type().is_ok_and(|kind| kind.is_dir());
+            if directory {
+                remove_directory(&path)?;
+            } else {
+                fs::remove_file(&path).map_err(failed("remove", &path))?;
+            }
         }
     }
     Ok(())

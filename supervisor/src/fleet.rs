@@ -10,7 +10,7 @@ use std::{
 };
 
 use common::{
-    domain::Domain,
+    bus::Bus,
     run,
     samples::{HealthSample, HealthState, RosterEntry, StageState, name, name_str},
 };
@@ -22,7 +22,6 @@ use crate::{
     flow::Flow,
     policy::{Action, Event, Now, Phase, Policy},
     process::{Ended, Process, firsthand},
-    remains::Remains,
     stages::{self, Stage, start_order},
 };
 
@@ -57,7 +56,6 @@ struct Member {
 pub(crate) struct Fleet {
     members: Vec<Member>,
     flow: Flow,
-    remains: Remains,
     directory: PathBuf,
     clock: Instant,
     /// Who starts the stages.
@@ -77,8 +75,8 @@ pub(crate) enum Starter {
 }
 
 impl Fleet {
-    /// None running yet; they will live in the run directory and on the bus of `domain`.
-    pub(crate) fn new(domain: Domain, directory: PathBuf, starter: Starter) -> Self {
+    /// None running yet; they will live in the run directory.
+    pub(crate) fn new(directory: PathBuf, starter: Starter) -> Self {
         let member = |stage| Member {
             stage,
             policy: Policy::new(stage),
@@ -93,7 +91,6 @@ impl Fleet {
         Self {
             members: start_order().into_iter().map(member).collect(),
             flow: Flow::new(),
-            remains: Remains::new(domain),
             directory,
             clock: Instant::now(),
             starter,
@@ -108,7 +105,6 @@ impl Fleet {
 
     /// Start every stage that is down on a new bus, in order, from `first_tick` on, if that is ours to do.
     pub(crate) fn start_all(&mut self, first_tick: u64) -> Result<(), FleetError> {
-        self.remains.forget();
         if self.starter == Starter::Another {
             return Ok(());
         }
@@ -208,9 +204,6 @@ impl Fleet {
         };
         member.policy.step(event, now);
         let became_ready = !was_running && event == Event::BeatReady;
-        if became_ready {
-            self.remains.on_ready(member.started);
-        }
         met || became_ready
     }
 
@@ -248,9 +241,11 @@ impl Fleet {
         })
     }
 
-    /// Reap what ended, meet the deadlines. `first_tick` is what a new life starts from. Returns the deaths.
-    pub(crate) fn tend(&mut self, first_tick: u64) -> Result<Vec<Death>, FleetError> {
+    /// Reap what ended, meet the deadlines. `first_tick` is what a new life on `bus` starts from. Returns the deaths.
+    pub(crate) fn tend(&mut self, bus: &Bus, first_tick: u64) -> Result<Vec<Death>, FleetError> {
         let mut deaths = Vec::new();
+        // Beats were taken until now. What follows may wait for the disk, and no stage is silent for that.
+        let heard = self.now();
         for index in 0..self.members.len() {
             if let Some(status) = self.reap(index)? {
                 let asked = matches!(
@@ -258,7 +253,9 @@ impl Fleet {
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
                 let mut death = self.record(index, Cause::of(status));
-                self.remains.on_death(death.pid, self.now());
+                if let Err(error) = bus.remove_unfilled(death.pid) {
+                    tracing::warn!(stage = death.stage, %error, "cannot remove what it was just making");
+                }
                 let member = &mut self.members[index];
                 (member.process, member.beat) = (None, None);
                 let refused = death.cause == Cause::Exited(stages::REFUSED.into());
@@ -277,9 +274,8 @@ impl Fleet {
                     deaths.push(death);
                 }
             }
-            self.tell(index, Event::Time, first_tick)?;
+            self.tell_as_of(heard, index, Event::Time, first_tick)?;
         }
-        self.remains.sweep(self.now());
         Ok(deaths)
     }
 
@@ -382,7 +378,16 @@ impl Fleet {
     }
 
     fn tell(&mut self, index: usize, event: Event, first_tick: u64) -> Result<(), FleetError> {
-        let now = self.now();
+        self.tell_as_of(self.now(), index, event, first_tick)
+    }
+
+    fn tell_as_of(
+        &mut self,
+        now: Now,
+        index: usize,
+        event: Event,
+        first_tick: u64,
+    ) -> Result<(), FleetError> {
         match self.members[index].policy.step(event, now) {
             Some(action) => self.act(index, action, first_tick),
             None => Ok(()),

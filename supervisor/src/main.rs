@@ -10,7 +10,6 @@
 //! | [`kept`] | what of a supervisor outlives it |
 //! | [`process`], [`fleet`] | child processes; the stages under their policies |
 //! | [`domain`], [`tenants`] | the robot's corner of the machine, held and wiped; who lives in it |
-//! | [`remains`] | what dead processes leave in it |
 //! | [`simulator`] | the simulated robot as a child |
 //! | [`observer`] | what is heard on the bus |
 //! | [`supervisor`] | the loop |
@@ -35,7 +34,6 @@ mod picture;
 mod policy;
 mod process;
 mod relay;
-mod remains;
 mod report;
 mod service;
 mod simulator;

@@ -4,6 +4,7 @@ use std::{
     fmt, io,
     os::unix::fs::symlink,
     path::PathBuf,
+    rc::Rc,
     time::{Duration, Instant},
 };
 
@@ -46,6 +47,8 @@ use crate::{
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 /// Time the link has to say that the robot was told to stand, before it is asked to go.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
+/// How often the bus is cleared of consumers that died.
+const CLEAR_UP: Duration = Duration::from_secs(1);
 
 /// What a run is made from.
 pub(crate) struct Options {
@@ -183,13 +186,14 @@ pub(crate) fn run(
     Ok(supervisor.finish(&ending))
 }
 
-fn bus_of(held: &Held) -> Result<&Bus, SupervisorError> {
+fn bus_of(held: &Held) -> Result<Rc<Bus>, SupervisorError> {
     let bus = held.bus();
     bus.ok_or_else(|| system("keep the bus")(io::ErrorKind::NotConnected.into()))
 }
 
 struct Supervisor<'a> {
     options: &'a Options,
+    bus: Rc<Bus>,
     // Dropped in this order: the stages go before the robot they speak to.
     fleet: Fleet,
     simulator: Option<Simulator>,
@@ -213,6 +217,7 @@ struct Supervisor<'a> {
     judged_tick: Option<u64>,
     restated: Option<Instant>,
     progressed: (Option<u64>, Instant),
+    cleared_up: Instant,
     clock: MissionClock,
     address: Address,
     service: ServiceManager,
@@ -220,7 +225,7 @@ struct Supervisor<'a> {
 
 impl<'a> Supervisor<'a> {
     /// The robot, the run file, the stages.
-    fn start(options: &'a Options, bus: &Bus) -> Result<Self, SupervisorError> {
+    fn start(options: &'a Options, bus: Rc<Bus>) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
         let mission = &options.mission;
         let mut keeper = Keeper::open(directory)?;
@@ -267,15 +272,11 @@ impl<'a> Supervisor<'a> {
         };
         run.save(directory)?;
         let mut waiter = Waiter::default();
-        let observer = Observer::new(bus, &mut waiter)?;
+        let observer = Observer::new(&bus, &mut waiter)?;
         waiter.on(bus.alarm(&topics::REQUESTS)?);
         let mut supervisor = Self {
             options,
-            fleet: Fleet::new(
-                Domain::of(options.robot.clone()),
-                directory.clone(),
-                options.starter,
-            ),
+            fleet: Fleet::new(directory.clone(), options.starter),
             simulator,
             observer,
             waiter,
@@ -284,6 +285,7 @@ impl<'a> Supervisor<'a> {
             deaths: bus.writer(&topics::DEATHS, 1)?,
             stalls: bus.writer(&topics::STALLS, 1)?,
             requests: bus.reader(&topics::REQUESTS)?,
+            bus,
             last_request: 0,
             keeper,
             beginning,
@@ -294,6 +296,7 @@ impl<'a> Supervisor<'a> {
             judged_tick: None,
             restated: None,
             progressed: (None, Instant::now()),
+            cleared_up: Instant::now(),
             clock,
             address,
             service: ServiceManager::of_environment(),
@@ -339,6 +342,10 @@ impl<'a> Supervisor<'a> {
                 };
                 watch(&progress);
                 self.service.show(|| progress.to_string());
+                // Consumers die, too, and nobody tells us.
+                if self.cleared_up.elapsed() >= CLEAR_UP {
+                    self.clear_up(&[]);
+                }
             }
             self.service.feed();
             self.wait()?;
@@ -386,7 +393,7 @@ impl<'a> Supervisor<'a> {
 
     /// Reap and restart; tell each death once, on the bus, in the log and in the run directory. Says whether one was.
     fn tend(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
-        let deaths = self.fleet.tend(first_tick)?;
+        let deaths = self.fleet.tend(&self.bus, first_tick)?;
         let pose = self.observer.record.pose.unwrap_or_default();
         for death in &deaths {
             death.log();
@@ -397,7 +404,19 @@ impl<'a> Supervisor<'a> {
                 .append_to(&self.options.directory)
                 .map_err(system(format!("write {}", file.display())))?;
         }
+        if !deaths.is_empty() {
+            let killed: Vec<_> = deaths.iter().map(|death| death.pid).collect();
+            self.clear_up(&killed);
+        }
         Ok(!deaths.is_empty())
+    }
+
+    /// Free what the dead held, while their successors start; what cannot be freed makes the bus slower, not wrong.
+    fn clear_up(&mut self, killed: &[u32]) {
+        self.cleared_up = Instant::now();
+        if let Err(error) = self.bus.clear_up(killed) {
+            tracing::warn!(%error, ?killed, "cannot remove what the dead left on the bus");
+        }
     }
 
     /// Do what operators ask. Says whether anything was asked.
@@ -657,12 +676,12 @@ impl<'a> Supervisor<'a> {
         self.stop_stages()?;
         // The old ends go before the new bus is made: they would take its files for theirs.
         drop((self.waiter, self.directive, self.roster));
-        drop((self.deaths, self.stalls, self.requests));
+        drop((self.deaths, self.stalls, self.requests, self.bus));
         let record = self.observer.close();
         held.renew()?;
         let bus = bus_of(held)?;
         let mut waiter = Waiter::default();
-        let mut observer = Observer::new(bus, &mut waiter)?;
+        let mut observer = Observer::new(&bus, &mut waiter)?;
         observer.record = record;
         waiter.on(bus.alarm(&topics::REQUESTS)?);
         let mut supervisor = Self {
@@ -673,6 +692,7 @@ impl<'a> Supervisor<'a> {
             deaths: bus.writer(&topics::DEATHS, 1)?,
             stalls: bus.writer(&topics::STALLS, 1)?,
             requests: bus.reader(&topics::REQUESTS)?,
+            bus,
             ..self
         };
         supervisor.restate()?;

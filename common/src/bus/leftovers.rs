@@ -1,0 +1,153 @@
+//! What a process that was killed while it joined the bus leaves, and the middleware neither expects nor removes.
+//!
+//! - Shared memory it had made and not yet filled. Root may open that, where others are refused, and the middleware
+//!   then waits for ever for it to be filled.
+//! - Files of a node that is not yet one: they would be looked at, and not removed, at each start from then on.
+//!
+//! Both are found by their names: these hold ids of nodes and ports, and an id tells the process that made it.
+
+use std::{
+    fs::{self, DirEntry},
+    io,
+    os::unix::fs::PermissionsExt as _,
+    path::Path,
+    time::Duration,
+};
+
+/// What shared memory is before it is filled: its maker may write, nobody may read.
+const UNFILLED: u32 = 0o200;
+
+/// Filling a piece of shared memory takes microseconds.
+const FILLED: Duration = Duration::from_secs(1);
+
+/// Remove shared memory that was to connect `dead`, which must be gone, and was never filled; and what anybody made so
+/// long ago that it will not be filled. `prefix` starts the names of this robot's files in `directory`.
+///
+/// # Errors
+/// When the directory cannot be read, or a file not be removed.
+pub(super) fn remove_unfilled(directory: &Path, prefix: &str, dead: u32) -> io::Result<()> {
+    for entry in fs::read_dir(directory)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if !name.starts_with(prefix) {
+            continue;
+        }
+        if unfilled_for(&entry).is_some_and(|age| names(&name, dead) || age >= FILLED) {
+            gone(fs::remove_file(entry.path()))?;
+        }
+    }
+    Ok(())
+}
+
+/// How long it has been unfilled, if it is there and is; it may be removed or filled at any moment.
+fn unfilled_for(entry: &DirEntry) -> Option<Duration> {
+    let file = entry.metadata().ok()?;
+    let unfilled = file.is_file() && file.permissions().mode() & 0o777 == UNFILLED;
+    // A clock that was set back makes it new.
+    unfilled
+        .then(|| file.modified().ok()?.elapsed().ok())
+        .map(Option::unwrap_or_default)
+}
+
+/// Remove from the directory `nodes` what is named after nodes of `dead`, which must be gone.
+///
+/// # Errors
+/// When the directory cannot be read, or something not be removed.
+pub(super) fn remove_nodes(nodes: &Path, dead: u32) -> io::Result<()> {
+    for entry in fs::read_dir(nodes)? {
+        let entry = entry?;
+        if names(&entry.file_name().to_string_lossy(), dead) {
+            gone(if entry.file_type()?.is_dir() {
+                fs::remove_dir_all(entry.path())
+            } else {
+                fs::remove_file(entry.path())
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Somebody else may have removed it.
+fn gone(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}
+
+/// Whether a file's name holds an id that `process` made.
+fn names(file: &str, process: u32) -> bool {
+    file.split(['_', '.'])
+        .filter_map(|part| part.parse().ok())
+        .any(|id| process_of(id) == process)
+}
+
+/// The process that made a node or a port: the third of the four words of its id.
+pub(super) const fn process_of(id: u128) -> u32 {
+    (id >> 64) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::Permissions;
+
+    const DEAD: u32 = 4321;
+    const LIVING: u32 = 4322;
+
+    const fn id(process: u32) -> u128 {
+        (7 << 96) + ((process as u128) << 64) + (123 << 32) + 456
+    }
+
+    fn left(directory: &Path) -> Vec<String> {
+        let entries = fs::read_dir(directory).unwrap();
+        let mut left: Vec<_> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        left.sort();
+        left
+    }
+
+    #[test]
+    fn node_files_of_the_dead_are_removed_and_no_others() {
+        let directory = tempfile::tempdir().unwrap();
+        let nodes = directory.path();
+        for id in [id(DEAD), id(LIVING)] {
+            fs::create_dir(nodes.join(id.to_string())).unwrap();
+            fs::write(nodes.join(format!("{id}/fh0_x80_node.details")), "").unwrap();
+            fs::write(nodes.join(format!("fh0_x80_{id}.node_monitor")), "").unwrap();
+        }
+        remove_nodes(nodes, DEAD).unwrap();
+        let monitor = format!("fh0_x80_{}.node_monitor", id(LIVING));
+        assert_eq!(left(nodes), [id(LIVING).to_string(), monitor]);
+    }
+
+    #[test]
+    fn unfilled_memory_of_the_dead_or_of_long_ago_is_removed_and_no_other() {
+        let directory = tempfile::tempdir().unwrap();
+        let (dead, living) = (id(DEAD), id(LIVING));
+        let make = |name: String, mode| {
+            let path = directory.path().join(&name);
+            fs::write(&path, "").unwrap();
+            fs::set_permissions(&path, Permissions::from_mode(mode)).unwrap();
+            name
+        };
+        make(format!("fh0_x80_ab12_{living}_{dead}.connection"), UNFILLED);
+        make(format!("fh0_x80_ab12_{dead}.data"), UNFILLED);
+        let mut stay = [
+            make(format!("fh0_x80_ab12_{dead}_{living}.connection"), 0o600),
+            make(format!("fh0_x80_ab12_{living}.data"), UNFILLED),
+            make(format!("fh0_other_ab12_{dead}.data"), UNFILLED),
+        ];
+        let old = make(format!("fh0_x80_cd34_{living}.data"), 0o600);
+        let old = directory.path().join(old);
+        let file = fs::File::options().write(true).open(&old).unwrap();
+        file.set_modified(std::time::SystemTime::now() - FILLED)
+            .unwrap();
+        fs::set_permissions(&old, Permissions::from_mode(UNFILLED)).unwrap();
+        stay.sort();
+        remove_unfilled(directory.path(), "fh0_x80_", DEAD).unwrap();
+        assert_eq!(left(directory.path()), stay);
+    }
+}
