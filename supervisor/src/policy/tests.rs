@@ -231,7 +231,7 @@ fn a_stage_that_got_no_process_is_tried_again_but_not_at_once() {
     let mut policy = Policy::new(&TABLE[0]);
     policy.step(Event::Start, ms(0));
     assert_eq!(policy.step(Event::StartFailed, ms(0)), None);
-    assert_eq!(policy.deadline(), Some(ms(50)));
+    assert_eq!(policy.deadline(), Some(ms(10)));
 }
 
 #[test]
