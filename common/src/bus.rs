@@ -281,43 +281,51 @@ impl Bus {
     }
 
     /// Remove what `process`, which must be gone, was just making: its successor could wait for it for ever. The
-    /// supervisor's business alone.
+    /// supervisor's business alone. Says whether somebody else is just making something, or died of it.
     ///
     /// # Errors
     /// When files of the dead cannot be removed.
-    pub fn remove_unfilled(&self, process: u32) -> io::Result<()> {
+    pub fn remove_unfilled(&self, process: u32) -> io::Result<bool> {
         let prefix = String::from_utf8_lossy(self.node.config().global.prefix.as_bytes());
         leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
     }
 
     /// Free what the dead held: their places on the topics, their memory; and what the processes `killed`, which
     /// must be gone, left of a start that was cut off. The supervisor's business alone; a few milliseconds for each.
+    /// Says whether all that could be done: else it is to be tried again, with the same processes.
     ///
     /// # Errors
     /// When files of the dead cannot be removed.
-    pub fn clear_up(&self, killed: &[u32]) -> io::Result<()> {
+    pub fn clear_up(&self, killed: &[u32]) -> io::Result<bool> {
         let config = self.node.config();
         let nodes = config.global.node_dir();
         let nodes = Path::new(OsStr::from_bytes(nodes.as_bytes()));
-        let mut outcome = Ok(());
+        let (mut outcome, mut all) = (Ok(()), true);
         let listed = Node::<ipc::Service>::list(config, |node| {
             if let NodeState::Dead(dead) = node {
-                // Or the next could wait for ever.
-                outcome = self.remove_unfilled(leftovers::process_of(dead.id().value()));
-                if outcome.is_err() {
-                    return CallbackProgression::Stop;
+                match self.remove_unfilled(leftovers::process_of(dead.id().value())) {
+                    // One that cannot be freed now is met again next time.
+                    Ok(false) => drop(dead.try_remove_stale_resources()),
+                    // To wait for what is never filled would be to wait for ever: next time it is old.
+                    Ok(true) => all = false,
+                    Err(error) => {
+                        outcome = Err(error);
+                        return CallbackProgression::Stop;
+                    }
                 }
-                // One that cannot be freed now is met again next time.
-                let _ = dead.try_remove_stale_resources();
             }
             CallbackProgression::Continue
         });
         outcome?;
         listed.map_err(|error| io::Error::other(format!("{error:?}")))?;
-        killed.iter().try_for_each(|&process| {
-            self.remove_unfilled(process)?;
-            leftovers::remove_nodes(nodes, process)
-        })
+        // By these files the places of the dead are found.
+        if all {
+            killed.iter().try_for_each(|&process| {
+                self.remove_unfilled(process)?;
+                leftovers::remove_nodes(nodes, process)
+            })?;
+        }
+        Ok(all)
     }
 
     fn create_event(&self, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {

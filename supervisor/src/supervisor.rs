@@ -218,6 +218,8 @@ struct Supervisor<'a> {
     restated: Option<Instant>,
     progressed: (Option<u64>, Instant),
     cleared_up: Instant,
+    /// Processes whose remains are not cleared up yet.
+    unburied: Vec<u32>,
     clock: MissionClock,
     address: Address,
     service: ServiceManager,
@@ -297,6 +299,7 @@ impl<'a> Supervisor<'a> {
             restated: None,
             progressed: (None, Instant::now()),
             cleared_up: Instant::now(),
+            unburied: Vec::new(),
             clock,
             address,
             service: ServiceManager::of_environment(),
@@ -344,7 +347,7 @@ impl<'a> Supervisor<'a> {
                 self.service.show(|| progress.to_string());
                 // Consumers die, too, and nobody tells us.
                 if self.cleared_up.elapsed() >= CLEAR_UP {
-                    self.clear_up(&[]);
+                    self.clear_up();
                 }
             }
             self.service.feed();
@@ -405,17 +408,22 @@ impl<'a> Supervisor<'a> {
                 .map_err(system(format!("write {}", file.display())))?;
         }
         if !deaths.is_empty() {
-            let killed: Vec<_> = deaths.iter().map(|death| death.pid).collect();
-            self.clear_up(&killed);
+            self.unburied.extend(deaths.iter().map(|death| death.pid));
+            self.clear_up();
         }
         Ok(!deaths.is_empty())
     }
 
     /// Free what the dead held, while their successors start; what cannot be freed makes the bus slower, not wrong.
-    fn clear_up(&mut self, killed: &[u32]) {
+    fn clear_up(&mut self) {
         self.cleared_up = Instant::now();
-        if let Err(error) = self.bus.clear_up(killed) {
-            tracing::warn!(%error, ?killed, "cannot remove what the dead left on the bus");
+        match self.bus.clear_up(&self.unburied) {
+            Ok(true) => self.unburied.clear(),
+            Ok(false) => {}
+            Err(error) => {
+                let dead = std::mem::take(&mut self.unburied);
+                tracing::warn!(%error, ?dead, "cannot remove what the dead left on the bus");
+            }
         }
     }
 

@@ -21,23 +21,28 @@ const UNFILLED: u32 = 0o200;
 const FILLED: Duration = Duration::from_secs(1);
 
 /// Remove shared memory that was to connect `dead`, which must be gone, and was never filled; and what anybody made so
-/// long ago that it will not be filled. `prefix` starts the names of this robot's files in `directory`.
+/// long ago that it will not be filled. `prefix` starts the names of this robot's files in `directory`. Says whether
+/// something unfilled is left, which its maker may be filling just now.
 ///
 /// # Errors
 /// When the directory cannot be read, or a file not be removed.
-pub(super) fn remove_unfilled(directory: &Path, prefix: &str, dead: u32) -> io::Result<()> {
+pub(super) fn remove_unfilled(directory: &Path, prefix: &str, dead: u32) -> io::Result<bool> {
+    let mut left = false;
     for entry in fs::read_dir(directory)? {
         let entry = entry?;
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if !name.starts_with(prefix) {
+        let ours = name.starts_with(prefix);
+        let Some(age) = ours.then(|| unfilled_for(&entry)).flatten() else {
             continue;
-        }
-        if unfilled_for(&entry).is_some_and(|age| names(&name, dead) || age >= FILLED) {
+        };
+        if names(&name, dead) || age >= FILLED {
             gone(fs::remove_file(entry.path()))?;
+        } else {
+            left = true;
         }
     }
-    Ok(())
+    Ok(left)
 }
 
 /// How long it has been unfilled, if it is there and is; it may be removed or filled at any moment.
@@ -147,7 +152,7 @@ mod tests {
             .unwrap();
         fs::set_permissions(&old, Permissions::from_mode(UNFILLED)).unwrap();
         stay.sort();
-        remove_unfilled(directory.path(), "fh0_x80_", DEAD).unwrap();
+        assert!(remove_unfilled(directory.path(), "fh0_x80_", DEAD).unwrap());
         assert_eq!(left(directory.path()), stay);
     }
 }
