@@ -220,11 +220,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // Without a configuration nobody joins.
     for file in [domain.middleware_config(), domain.run_link()] {
-        match fs::remove_file(&file) {
-            Ok(()) => {}
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(failed("remove", &file)(error)),
-        }
+        remove_file(&file)?;
     }
     // Out of the way first: a consumer that is joining would fill it while it is emptied.
     let (root, aside) = (domain.middleware_root(), domain.middleware_root_aside());
@@ -247,15 +243,22 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
             .starts_with(prefix.as_bytes())
         {
             let path = entry.path();
-            let directory = entry.file_type().is_ok_and(|kind| kind.is_dir());
-            if directory {
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 remove_directory(&path)?;
             } else {
-                fs::remove_file(&path).map_err(failed("remove", &path))?;
+                remove_file(&path)?;
             }
         }
     }
     Ok(())
+}
+
+/// If it is there: a consumer of the old bus that leaves it just now removes what is its own.
+fn remove_file(path: &Path) -> Result<(), DomainError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
+        _ => Ok(()),
+    }
 }
 
 /// With all that is in it, if it is there.

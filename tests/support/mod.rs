@@ -45,7 +45,7 @@ pub fn output(arguments: &[&str]) -> Output {
 /// A run of a mission by a robot of its own.
 pub struct Run {
     pub robot: String,
-    child: Child,
+    child: Option<Child>,
     // Removed when the test ends.
     directory: TempDir,
 }
@@ -64,7 +64,7 @@ impl Run {
             .unwrap();
         Self {
             robot: robot.to_owned(),
-            child,
+            child: Some(child),
             directory,
         }
     }
@@ -74,7 +74,7 @@ impl Run {
     }
 
     pub fn pid(&self) -> u32 {
-        self.child.id()
+        self.child.as_ref().unwrap().id()
     }
 
     /// As [`status_of`].
@@ -91,9 +91,10 @@ impl Run {
             {
                 return status;
             }
-            if let Some(exit) = self.child.try_wait().unwrap() {
+            let child = self.child.as_mut().unwrap();
+            if let Some(exit) = child.try_wait().unwrap() {
                 let mut said = String::new();
-                let _ = self.child.stderr.take().unwrap().read_to_string(&mut said);
+                let _ = child.stderr.take().unwrap().read_to_string(&mut said);
                 panic!("the run ended ({exit}) before {what}: {said}");
             }
             assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
@@ -109,7 +110,7 @@ impl Run {
 
     /// Wait until the supervisor itself is gone.
     pub fn reap(&mut self) {
-        self.child.wait().unwrap();
+        self.child.as_mut().unwrap().wait().unwrap();
     }
 
     pub fn signal(&self, signal: Signal) {
@@ -130,8 +131,8 @@ impl Run {
     }
 
     /// Wait for the end: exit code, and the JSON of the last line.
-    pub fn finish(self) -> (Option<i32>, Value) {
-        let output = self.child.wait_with_output().unwrap();
+    pub fn finish(mut self) -> (Option<i32>, Value) {
+        let output = self.child.take().unwrap().wait_with_output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
         let last = text.lines().last().unwrap_or_default();
         let summary = serde_json::from_str(last).unwrap_or_else(|_| {
@@ -148,6 +149,16 @@ impl Run {
         let kept = std::mem::replace(&mut self.directory, tempfile::tempdir().unwrap());
         let (code, summary) = self.finish();
         (code, summary, kept)
+    }
+}
+
+/// A test that fails leaves nobody behind: the stages go with their supervisor.
+impl Drop for Run {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
     }
 }
 
