@@ -224,16 +224,17 @@ impl Attack {
             if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= PATIENCE {
                 return Ok(());
             }
-            match Ears::join(options) {
-                Ok(ears) => break ears,
+            match Ears::join(options, child.id()) {
+                Ok(Some(ears)) => break ears,
                 // Not up yet.
-                Err(_) => std::thread::park_timeout(LOOK),
+                Ok(None) | Err(_) => std::thread::park_timeout(LOOK),
             }
         };
         let mut next = Instant::now() + chance.pause();
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < PATIENCE {
-            let due = next.saturating_duration_since(Instant::now()).min(LOOK);
-            ears.waiter.wait(due)?;
+            // A hit that is overdue waits for the robot to drive, which is heard.
+            let due = next.checked_duration_since(Instant::now());
+            ears.waiter.wait(due.unwrap_or(LOOK).min(LOOK))?;
             if let Some(robot) = &mut robot {
                 robot.tend()?;
             }
@@ -405,13 +406,14 @@ impl Attack {
 }
 
 impl Ears {
-    fn join(options: &Options) -> Result<Self, ChaosError> {
+    /// None on the bus of another than `supervisor`: one that died leaves its bus to its successor to remove.
+    fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, ChaosError> {
         let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
         let mut waiter = Waiter::default();
         waiter.on(bus.alarm(&topics::ROSTER)?);
         waiter.on(bus.alarm(&topics::HEALTH)?);
         waiter.on(bus.alarm(&topics::COMMAND)?);
-        Ok(Self {
+        let mut ears = Self {
             roster: bus.slice_reader(&topics::ROSTER)?,
             health: bus.reader(&topics::HEALTH)?,
             wheels: bus.reader(&topics::WHEELS)?,
@@ -420,7 +422,17 @@ impl Ears {
             guidance: bus.reader(&topics::GUIDANCE)?,
             command: bus.reader(&topics::COMMAND)?,
             waiter,
-        })
+        };
+        let began = Instant::now();
+        while began.elapsed() < 2 * topics::RESTATE {
+            while let Some(entries) = ears.roster.take()? {
+                if entries.header().supervisor_pid == supervisor {
+                    return Ok(Some(ears));
+                }
+            }
+            ears.waiter.wait(LOOK)?;
+        }
+        Ok(None)
     }
 }
 
