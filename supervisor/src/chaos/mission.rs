@@ -54,14 +54,19 @@ fn command(options: &Options, seed: u64, pace: &str, out: &str) -> Command {
     for setting in &options.set {
         command.args(["--set", setting]);
     }
-    command.stdout(Stdio::piped()).stderr(Stdio::null());
-    command
+    ours(command)
 }
 
 /// The run whose supervisor was hit, once more.
 fn resume(directory: &Path) -> Command {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
+    ours(command)
+}
+
+/// A run that ends with us, and tells us alone.
+fn ours(mut command: Command) -> Command {
+    command.args(["--parent", &std::process::id().to_string()]);
     command.stdout(Stdio::piped()).stderr(Stdio::null());
     command
 }

@@ -11,6 +11,7 @@ use std::{
 use clap::Args;
 use common::{
     clock::Pace, domain::RobotName, kinematics::Pose2, mission::Mission, samples::PoseSample,
+    shell::become_child,
 };
 
 use super::{Failure, directories, missions};
@@ -68,6 +69,9 @@ pub(super) struct Arguments {
     /// End with one line of JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
+    /// Stop in order when this process, the parent, ends.
+    #[arg(long, hide = true)]
+    parent: Option<u32>,
 }
 
 impl Default for Arguments {
@@ -154,6 +158,9 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
 
 #[allow(clippy::print_stdout)]
 pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if let Some(parent) = arguments.parent {
+        become_child("firsthand", parent)?;
+    }
     let Some(options) = options(arguments)? else {
         return Ok(ExitCode::from(CUT_OFF));
     };
