@@ -1,0 +1,262 @@
+//! Where the robot is, what is around it, and where it goes.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::Stamp;
+use crate::{
+    bus::ZeroCopySend,
+    grid::{GridFrame, Revision, Window},
+    kinematics::{Pose2, Twist},
+};
+
+/// Topic `pose`: where dead reckoning believes the robot is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
+#[type_name("firsthand.Pose")]
+#[repr(C)]
+pub struct PoseSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Metres in the mission frame.
+    pub x_m: f64,
+    /// Metres in the mission frame.
+    pub y_m: f64,
+    /// theta, radians counter-clockwise from x; not wrapped.
+    pub heading_rad: f64,
+    /// v over the last tick, m/s.
+    pub v_m_s: f64,
+    /// omega over the last tick, rad/s.
+    pub omega_rad_s: f64,
+    /// Length of the way so far, metres.
+    pub travelled_m: f64,
+    /// The encoder counts it was computed at.
+    pub left_counts: u16,
+    /// The encoder counts it was computed at.
+    pub right_counts: u16,
+}
+
+impl PoseSample {
+    /// Position and heading.
+    #[must_use]
+    pub const fn pose(&self) -> Pose2 {
+        Pose2 {
+            position: DVec2::new(self.x_m, self.y_m),
+            heading: self.heading_rad,
+        }
+    }
+
+    /// Speeds over the last tick.
+    #[must_use]
+    pub const fn twist(&self) -> Twist {
+        Twist {
+            v: self.v_m_s,
+            omega: self.omega_rad_s,
+        }
+    }
+}
+
+/// How a map lies and which part of which version came along.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Part")]
+#[repr(C)]
+pub struct Part {
+    /// The version the map has with these cells. Consecutive versions differ in one window.
+    pub version: u64,
+    /// N: the map is N x N cells.
+    pub cells: u32,
+    /// First column of the window.
+    pub col: u32,
+    /// First row of the window.
+    pub row: u32,
+    /// Columns of the window.
+    pub width: u32,
+    /// Rows of the window.
+    pub height: u32,
+    /// 1: the window is the whole map.
+    pub keyframe: u32,
+    /// Delta: side of a cell, metres.
+    pub resolution_m: f64,
+    /// Where cell (N/2, N/2) lies, metres.
+    pub centre_x_m: f64,
+    /// Where cell (N/2, N/2) lies, metres.
+    pub centre_y_m: f64,
+}
+
+impl Part {
+    /// The part as [`crate::grid::Replica`] takes it.
+    #[must_use]
+    pub const fn revision(&self) -> Revision {
+        Revision {
+            frame: GridFrame {
+                cells: self.cells,
+                resolution_m: self.resolution_m,
+                centre: DVec2::new(self.centre_x_m, self.centre_y_m),
+            },
+            window: Window {
+                col: self.col,
+                row: self.row,
+                width: self.width,
+                height: self.height,
+            },
+            version: self.version,
+            keyframe: self.keyframe == 1,
+        }
+    }
+}
+
+impl From<Revision> for Part {
+    fn from(revision: Revision) -> Self {
+        Self {
+            version: revision.version,
+            cells: revision.frame.cells,
+            col: revision.window.col,
+            row: revision.window.row,
+            width: revision.window.width,
+            height: revision.window.height,
+            keyframe: revision.keyframe.into(),
+            resolution_m: revision.frame.resolution_m,
+            centre_x_m: revision.frame.centre.x,
+            centre_y_m: revision.frame.centre.y,
+        }
+    }
+}
+
+/// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.GridHeader")]
+#[repr(C)]
+pub struct GridHeader {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Which part of which version.
+    pub part: Part,
+    /// Range samples that put a hazard on the map so far.
+    pub safety_events: u64,
+    /// The belief's epoch: grows when the sensed belief was reset.
+    pub epoch: u64,
+}
+
+wire_enum! {
+    /// What the planner says of the pose.
+    GuidanceStatus, unknown = Waiting {
+        /// No field yet.
+        Waiting = 0,
+        /// Go along (ex, ey).
+        Along = 1,
+        /// The robot's cell is the target's.
+        AtTarget = 2,
+        /// The robot stands in a hazard cell: (ex, ey) leads to the nearest free one.
+        WayOut = 3,
+        /// The belief isolates the robot from the target; (ex, ey), unless 0, is where to look meanwhile.
+        Unreachable = 4,
+        /// Nobody has looked where the way leads: turn on the spot until the robot faces (ex, ey).
+        Look = 5,
+    }
+}
+
+/// Topic `guidance`: E of (11) at the robot's pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Guidance")]
+#[repr(C)]
+pub struct GuidanceSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Ex: unit vector, 0 where there is none.
+    pub ex: f64,
+    /// Ey.
+    pub ey: f64,
+    /// dst of (14): straight to the target, metres.
+    pub distance_m: f64,
+    /// The most tangential speed that what is believed of the way ahead allows, m/s; infinite for no limit.
+    pub speed_limit_m_s: f64,
+    /// A [`GuidanceStatus`].
+    pub status: u8,
+    /// Mission time of the pose it was computed for, nanoseconds.
+    pub pose_ns: u64,
+    /// The version of `grid` it was computed from.
+    pub grid_version: u64,
+    /// That version's safety events.
+    pub safety_events: u64,
+    /// That version's belief epoch.
+    pub epoch: u64,
+    /// Full solves in this life of the planner.
+    pub full_solves: u64,
+    /// Local updates in this life of the planner.
+    pub local_updates: u64,
+    /// Wall-clock of the last full solve, nanoseconds.
+    pub full_solve_ns: u64,
+    /// Wall-clock of the last local update, nanoseconds.
+    pub local_update_ns: u64,
+}
+
+/// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.FieldHeader")]
+#[repr(C)]
+pub struct FieldHeader {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Which part of which version.
+    pub part: Part,
+    /// The version of `grid` it was computed from.
+    pub grid_version: u64,
+    /// X_T, metres.
+    pub target_x_m: f64,
+    /// X_T, metres.
+    pub target_y_m: f64,
+    /// Certificate: the worst componentwise relative residual of the last full solve.
+    pub worst_residual: f64,
+    /// Certificate: free cells from which the target can be reached.
+    pub reachable: u64,
+}
+
+/// The policy at one cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.FieldCell")]
+#[repr(C)]
+pub struct FieldCell {
+    /// Ex at the cell's centre: unit vector, 0 where there is no guidance.
+    pub ex: f32,
+    /// Ey.
+    pub ey: f32,
+    /// log2 u; -inf on hazards and where the target cannot be reached.
+    pub log2_u: f32,
+}
+
+wire_enum! {
+    /// Why a command is what it is.
+    CommandState, unknown = Halt {
+        /// No guidance to follow: stand.
+        Halt = 0,
+        /// Following the guidance.
+        Driving = 1,
+        /// The target is reached: stand for good.
+        Arrived = 2,
+    }
+}
+
+/// Topic `command`: U of (17).
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Command")]
+#[repr(C)]
+pub struct CommandSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// omega_L, rad/s.
+    pub left_rad_s: f64,
+    /// omega_R, rad/s.
+    pub right_rad_s: f64,
+    /// vc of (16), m/s.
+    pub v_m_s: f64,
+    /// wc of (15), rad/s.
+    pub omega_rad_s: f64,
+    /// dst of (14), metres.
+    pub distance_m: f64,
+    /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds: the link
+    /// lets no old one move the robot, whatever the stamp says.
+    pub pose_ns: u64,
+    /// Mission time of the guidance it follows, nanoseconds; likewise.
+    pub guidance_ns: u64,
+    /// A [`CommandState`].
+    pub state: u8,
+}

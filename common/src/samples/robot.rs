@@ -1,0 +1,257 @@
+//! What the robot says, and what the link makes of it.
+
+use serde::{Deserialize, Serialize};
+
+use super::Stamp;
+use crate::{bus::ZeroCopySend, latency};
+
+wire_enum! {
+    /// What the front sonar said in a tick.
+    RangeStatus, unknown = Absent {
+        /// No sonar frame came since the last tick: the map stays as it is.
+        Absent = 0,
+        /// `range_m` holds a distance.
+        Measured = 1,
+        /// 255: nothing in range, or no echo.
+        Nothing = 2,
+        /// 4: at 4 cm or nearer.
+        AtContact = 3,
+        /// 0: no valid reading.
+        Invalid = 4,
+    }
+}
+
+/// Topic `range`: the front sonar.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
+#[type_name("firsthand.Range")]
+#[repr(C)]
+pub struct RangeSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// S of (19): metres from the sensor, where the status says so; else 0.
+    pub range_m: f64,
+    /// A [`RangeStatus`].
+    pub status: u8,
+    /// The byte as the robot sent it, cm.
+    pub raw_cm: u8,
+}
+
+/// Topic `wheels`: the encoders.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Wheels")]
+#[repr(C)]
+pub struct WheelSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Left encoder, counts modulo 32768, growing forward.
+    pub left_counts: u16,
+    /// Right encoder, counts modulo 32768, growing forward.
+    pub right_counts: u16,
+    /// Left speed, counts a second, forward positive.
+    pub left_counts_per_s: i32,
+    /// Right speed, counts a second, forward positive.
+    pub right_counts_per_s: i32,
+    /// Times this life of the link noticed that the robot restarted its counts: the step from a sample with
+    /// a lower number is no motion.
+    pub restarts: u32,
+}
+
+wire_enum! {
+    /// What the link's failsafe does with the robot, the mildest first.
+    #[derive(PartialOrd, Ord)]
+    Action, unknown = Stop {
+        /// Commands pass as they are.
+        Go = 0,
+        /// Commands pass at a share of their speed, along the same curve.
+        Slow = 1,
+        /// The robot stands; it goes on when the cause is gone.
+        Stop = 2,
+        /// The robot stands for good: the mission ends.
+        End = 3,
+    }
+}
+
+wire_enum! {
+    /// Why the link's failsafe does it; `firsthand failsafe` tells of each.
+    Cause, unknown = NotOrdered {
+        /// Nothing is wrong.
+        None = 0,
+        /// The supervisor has not said drive.
+        NotOrdered = 1,
+        /// The supervisor ends the mission.
+        MissionOver = 2,
+        /// A battery that the robot drives on is empty.
+        BatteryEmpty = 3,
+        /// An operator said stop.
+        OperatorStop = 4,
+        /// A stage is held.
+        StageHeld = 5,
+        /// The supervisor says nothing any more.
+        SupervisorSilent = 6,
+        /// The robot does not answer; it is told to stand in case it hears.
+        RobotLost = 7,
+        /// No command yet, or the newest is too old: a stage is down or slow.
+        CommandStale = 8,
+        /// The command was computed from too old a pose.
+        PoseStale = 9,
+        /// The command follows too old a guidance.
+        GuidanceStale = 10,
+        /// A battery that the robot drives on is low.
+        BatteryLow = 11,
+    }
+}
+
+/// Topic `link`: the state of the wire.
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Link")]
+#[repr(C)]
+pub struct LinkSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// 1: the robot answers.
+    pub connected: u32,
+    /// What the failsafe does: an [`Action`].
+    pub action: u8,
+    /// Why: a [`Cause`].
+    pub cause: u8,
+    /// Frames received whole.
+    pub frames_in: u64,
+    /// Bytes that belonged to no frame.
+    pub bytes_dropped: u64,
+    /// Datagrams from another address than the robot's, dropped.
+    pub strangers: u64,
+    /// Messages the wire did not take, lost.
+    pub unsent: u64,
+    /// Times the robot was lost.
+    pub losses: u64,
+    /// Times the robot was seen to have restarted its counts.
+    pub reboots: u64,
+    /// For how long the robot has not answered, nanoseconds of the machine's clock; 0 while it does.
+    pub lost_ns: u64,
+    /// Attempts to reach it since: pings, or openings of the wire.
+    pub attempts: u64,
+    /// Until the next attempt, nanoseconds of the machine's clock.
+    pub next_attempt_ns: u64,
+    /// Commands sent.
+    pub commands_out: u64,
+    /// Commands sent a second time, halfway to the next tick.
+    pub repeated_commands: u64,
+    /// Ticks given to the stages a second time, because no command came.
+    pub repeated_ticks: u64,
+    /// From the datagram in to the datagram out, last tick, nanoseconds.
+    pub latency_ns: u64,
+    /// The longest of this life of the link, nanoseconds.
+    pub latency_max_ns: u64,
+    /// All of this life, a [`crate::latency::Histogram`]: bucket k counts those from 2^(k/8) microseconds.
+    pub latency_histogram: [u32; latency::BUCKETS],
+}
+
+impl Default for LinkSample {
+    fn default() -> Self {
+        Self {
+            stamp: Stamp::default(),
+            connected: 0,
+            action: Action::Stop.into(),
+            cause: Cause::NotOrdered.into(),
+            frames_in: 0,
+            bytes_dropped: 0,
+            strangers: 0,
+            unsent: 0,
+            losses: 0,
+            reboots: 0,
+            lost_ns: 0,
+            attempts: 0,
+            next_attempt_ns: 0,
+            commands_out: 0,
+            repeated_commands: 0,
+            repeated_ticks: 0,
+            latency_ns: 0,
+            latency_max_ns: 0,
+            latency_histogram: [0; latency::BUCKETS],
+        }
+    }
+}
+
+impl LinkSample {
+    /// What the failsafe does.
+    #[must_use]
+    pub const fn action(&self) -> Action {
+        Action::from_byte(self.action)
+    }
+
+    /// Why.
+    #[must_use]
+    pub const fn cause(&self) -> Cause {
+        Cause::from_byte(self.cause)
+    }
+
+    /// Whether the link lets no command pass.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        self.action() >= Action::Stop
+    }
+}
+
+/// Topic `infrared`: the seven infrared rangers, which look straight ahead of themselves. Which one looks
+/// where differs from robot to robot; no source numbers them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Infrared")]
+#[repr(C)]
+pub struct InfraredSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
+    pub range_m: [f64; 7],
+    /// As the robot sent them, AD counts.
+    pub raw_ad: [u16; 7],
+}
+
+/// Topic `power`: what the batteries give and the motors draw.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Power")]
+#[repr(C)]
+pub struct PowerSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The boards' battery, volts.
+    pub board_v: f64,
+    /// The motors' battery, volts.
+    pub motor_v: f64,
+    /// The servos' battery, volts.
+    pub servo_v: f64,
+    /// The two motor drivers, degrees Celsius by the vendor's formula.
+    pub driver_c: [f64; 2],
+    /// What the motors of the six channels draw, AD counts: no source says how many are an ampere.
+    pub current_ad: [u16; 6],
+    /// 1: the boards' battery is low by the mission's `robot.low_battery_v`.
+    pub board_low: u8,
+    /// 1: the motors' battery is low.
+    pub motor_low: u8,
+    /// 1: the servos' battery is low.
+    pub servo_low: u8,
+}
+
+impl PowerSample {
+    /// Whether any battery is low.
+    #[must_use]
+    pub const fn is_low(&self) -> bool {
+        self.board_low == 1 || self.motor_low == 1 || self.servo_low == 1
+    }
+}
+
+/// Topic `surroundings`: what else the robot feels of where it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Surroundings")]
+#[repr(C)]
+pub struct SurroundingsSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// At the board, degrees Celsius by the vendor's formula.
+    pub temperature_c: f64,
+    /// The two human sensors: presence, AD counts.
+    pub human_alarm_ad: [u16; 2],
+    /// The two human sensors: motion, AD counts around the middle of their scale.
+    pub human_motion_ad: [u16; 2],
+    /// Tilt along x and y, AD counts.
+    pub tilt_ad: [u16; 2],
+}

@@ -1,0 +1,394 @@
+//! Who lives, who orders, who asks, who died.
+
+use serde::{Deserialize, Serialize};
+
+use super::Stamp;
+use crate::bus::ZeroCopySend;
+
+wire_enum! {
+    /// How a stage is.
+    HealthState, unknown = Starting {
+        /// Opening its topics, or waiting for what it cannot work without.
+        Starting = 0,
+        /// Working, or ready to.
+        Ready = 1,
+        /// Told to stop, or stopping for a reason of its own.
+        Stopping = 2,
+    }
+}
+
+/// A short name in shared memory: UTF-8, padded with zeros.
+pub type Name = [u8; 24];
+
+/// `text` as a [`Name`], cut at 24 bytes.
+#[must_use]
+pub fn name(text: &str) -> Name {
+    let mut name = [0; 24];
+    for (slot, byte) in name.iter_mut().zip(text.bytes()) {
+        *slot = byte;
+    }
+    name
+}
+
+/// What a [`Name`] says; what is not UTF-8 is left out.
+#[must_use]
+pub fn name_str(name: &Name) -> &str {
+    let text = name.split(|&byte| byte == 0).next().unwrap_or_default();
+    std::str::from_utf8(text).unwrap_or_default()
+}
+
+/// Topic `health`: the heartbeat of every stage, beaten from inside its work loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Health")]
+#[repr(C)]
+pub struct HealthSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The stage.
+    pub stage: Name,
+    /// Its process.
+    pub pid: u32,
+    /// A [`HealthState`].
+    pub state: u8,
+    /// Times round the work loop.
+    pub turns: u64,
+    /// The fault that this life was asked for last; 0 for none.
+    pub last_fault: u64,
+    /// What it made of it: a [`FaultAnswer`].
+    pub fault_answer: u8,
+}
+
+wire_enum! {
+    /// What the supervisor wants of the robot.
+    Order, unknown = Stop {
+        /// Stand still; do not start ticks.
+        Hold = 0,
+        /// Go to the target.
+        Drive = 1,
+        /// Stand still for good: the mission ends.
+        Stop = 2,
+    }
+}
+
+/// Topic `directive`: the supervisor's word to all stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Directive")]
+#[repr(C)]
+pub struct DirectiveSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The belief's epoch: a mapper that holds a lower one resets the sensed belief.
+    pub epoch: u64,
+    /// An [`Order`].
+    pub order: u8,
+    /// Why it is not to drive: a [`HoldReason`].
+    pub reason: u8,
+}
+
+wire_enum! {
+    /// Where the supervisor has a stage.
+    StageState, unknown = Down {
+        /// No process; one will be started.
+        Down = 0,
+        /// Started, not ready yet.
+        Starting = 1,
+        /// Beating.
+        Running = 2,
+        /// Died too often; waits before the next start.
+        BackingOff = 3,
+        /// Told to stop.
+        Stopping = 4,
+        /// Died far too often: only an operator's word starts it again.
+        Held = 5,
+    }
+}
+
+wire_enum! {
+    /// Why the robot is not ordered to drive.
+    HoldReason, unknown = Starting {
+        /// Not all stages are ready, or the robot does not answer, or there is no field yet.
+        Starting = 0,
+        /// It may drive.
+        None = 1,
+        /// An operator said stop, and has not said resume.
+        Operator = 2,
+        /// A stage is held.
+        StageHeld = 3,
+        /// The mission ends.
+        Ending = 4,
+    }
+}
+
+/// Topic `roster`, header; the slice is one [`RosterEntry`] a stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.RosterHeader")]
+#[repr(C)]
+pub struct RosterHeader {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The supervisor's process.
+    pub supervisor_pid: u32,
+    /// The current [`Order`].
+    pub order: u8,
+    /// A [`HoldReason`].
+    pub reason: u8,
+    /// 1: the robot is a simulated one.
+    pub simulated: u8,
+    /// The request that was taken last; 0 for none.
+    pub last_request: u64,
+}
+
+/// One stage, as the supervisor sees it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.RosterEntry")]
+#[repr(C)]
+pub struct RosterEntry {
+    /// The stage.
+    pub stage: Name,
+    /// Its process; 0 for none.
+    pub pid: u32,
+    /// Which life.
+    pub generation: u32,
+    /// A [`StageState`].
+    pub state: u8,
+    /// Times it was started again.
+    pub restarts: u32,
+    /// Age of this life, nanoseconds.
+    pub uptime_ns: u64,
+    /// Age of its last heartbeat, nanoseconds; u64::MAX for none yet.
+    pub beat_age_ns: u64,
+    /// Age of its last output on any topic, nanoseconds; u64::MAX for none yet.
+    pub output_age_ns: u64,
+}
+
+wire_enum! {
+    /// How a stage's process ended.
+    DeathCause, unknown = Exited {
+        /// By itself; `code` is its exit code.
+        Exited = 0,
+        /// By a signal; `code` is its number.
+        Signalled = 1,
+        /// By a signal, and it left a core; `code` is its number.
+        SignalledWithCore = 2,
+        /// It was not the supervisor's child: who started it knows.
+        Unknown = 3,
+    }
+}
+
+wire_enum! {
+    /// What the supervisor does about a death.
+    NextStep, unknown = Nothing {
+        /// Nothing: the run ends.
+        Nothing = 0,
+        /// A successor is started at once.
+        StartNow = 1,
+        /// A successor is started after `next_after_ns`.
+        StartLater = 2,
+        /// It died too often: an operator's word starts it.
+        Hold = 3,
+    }
+}
+
+/// Text in shared memory: UTF-8, filled up with zeros.
+#[derive(Clone, Copy, PartialEq, Eq, ZeroCopySend)]
+#[type_name("firsthand.Words")]
+#[repr(C)]
+pub struct Words {
+    bytes: [u8; 400],
+}
+
+impl Default for Words {
+    fn default() -> Self {
+        Self { bytes: [0; 400] }
+    }
+}
+
+impl std::fmt::Debug for Words {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(to, "{:?}", self.text())
+    }
+}
+
+/// `text` as [`Words`], cut at 400 bytes.
+#[must_use]
+pub fn words(text: &str) -> Words {
+    let mut words = Words::default();
+    for (slot, byte) in words.bytes.iter_mut().zip(text.bytes()) {
+        *slot = byte;
+    }
+    words
+}
+
+impl Words {
+    /// What they say; a character that was cut is replaced.
+    #[must_use]
+    pub fn text(&self) -> std::borrow::Cow<'_, str> {
+        let text = self.bytes.split(|&byte| byte == 0).next();
+        String::from_utf8_lossy(text.unwrap_or_default())
+    }
+}
+
+/// Topic `deaths`: a stage's process ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Death")]
+#[repr(C)]
+pub struct DeathSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The stage.
+    pub stage: Name,
+    /// Its process.
+    pub pid: u32,
+    /// Which life.
+    pub generation: u32,
+    /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
+    pub beat_age_ns: u64,
+    /// Length of its life, nanoseconds.
+    pub uptime_ns: u64,
+    /// Pause before its successor, nanoseconds.
+    pub next_after_ns: u64,
+    /// Exit code or signal number.
+    pub code: i32,
+    /// Deaths of this stage within the last ten seconds, this one among them.
+    pub deaths_in_window: u32,
+    /// A [`DeathCause`].
+    pub cause: u8,
+    /// A [`NextStep`].
+    pub next: u8,
+    /// 1: it hung, or was never ready, and the supervisor ended it.
+    pub hung: u8,
+    /// The end of its log.
+    pub last_words: Words,
+}
+
+wire_enum! {
+    /// What a robot that stalls is tried to be freed by.
+    #[derive(Serialize)]
+    #[serde(rename_all = "snake_case")]
+    StallRung, unknown = GiveUp {
+        /// A fresh planner, which solves the full field.
+        Replan = 0,
+        /// What was sensed is forgotten.
+        Forget = 1,
+        /// The mission ends: the target is unreachable.
+        GiveUp = 2,
+    }
+}
+
+wire_enum! {
+    /// How a robot that should get on does not.
+    #[derive(Serialize)]
+    #[serde(rename_all = "snake_case")]
+    StallCause, unknown = Still {
+        /// It neither drives nor turns.
+        Still = 0,
+        /// It moves, and stays where it is.
+        Pinned = 1,
+        /// It stands in hazard, u = 0, and drives without coming out.
+        Buried = 2,
+        /// It stands where the belief has no way to the target, u = 0.
+        CutOff = 3,
+    }
+}
+
+/// Topic `stalls`: the robot should get on and does not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Stall")]
+#[repr(C)]
+pub struct StallSample {
+    /// Which sample; its tick and time are those of the pose it was seen at.
+    pub stamp: Stamp,
+    /// Where the robot believes it is, metres.
+    pub x_m: f64,
+    /// Where the robot believes it is, metres.
+    pub y_m: f64,
+    /// The belief's epoch from now on.
+    pub epoch: u64,
+    /// Fresh planners tried so far in this mission, this one among them.
+    pub replans: u32,
+    /// Beliefs forgotten so far in this mission, this one among them.
+    pub resets: u64,
+    /// A [`StallCause`].
+    pub cause: u8,
+    /// A [`StallRung`]: what is done about it.
+    pub rung: u8,
+}
+
+wire_enum! {
+    /// What an operator asks of the supervisor.
+    RequestKind, unknown = Nothing {
+        /// Nothing.
+        Nothing = 0,
+        /// A fresh life of a stage; one that is held is released.
+        Restart = 1,
+        /// Let the robot stand.
+        Stop = 2,
+        /// Let it go on.
+        Resume = 3,
+    }
+}
+
+/// Topic `requests`: an operator's word to the supervisor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Request")]
+#[repr(C)]
+pub struct RequestSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Names the request: the roster's `last_request` says that it was taken. Never 0.
+    pub id: u64,
+    /// The stage it is about; empty for none.
+    pub stage: Name,
+    /// A [`RequestKind`].
+    pub kind: u8,
+}
+
+wire_enum! {
+    /// What can be broken in a running stage on purpose; [`crate::faults::TABLE`] says where and how.
+    #[derive(Serialize, Deserialize)]
+    FaultKind, unknown = Nothing {
+        /// Nothing.
+        Nothing = 0,
+        /// A turn of the work loop that does not end.
+        Spin = 1,
+        /// A live field whose ways all lead to where the robot is.
+        CorruptField = 2,
+        /// No direction, as where the gradient is zero.
+        Saddle = 3,
+        /// Hazard believed wherever the robot is.
+        BuryRobot = 4,
+        /// A closed wall believed around the target, whatever is forgotten.
+        CutOff = 5,
+    }
+}
+
+wire_enum! {
+    /// What a stage made of a fault it was asked for.
+    FaultAnswer, unknown = Refused {
+        /// Asked for none.
+        None = 0,
+        /// It is broken now.
+        Taken = 1,
+        /// Not done: the robot is a real one, and the request does not say that it is meant all the same.
+        Refused = 2,
+        /// Not done: the stage has no such fault, or nothing yet to break.
+        Impossible = 3,
+    }
+}
+
+/// Topic `faults`: break something in a stage, to see the rest cope.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Fault")]
+#[repr(C)]
+pub struct FaultSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Names the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
+    pub id: u64,
+    /// The stage it is for.
+    pub stage: Name,
+    /// A [`FaultKind`].
+    pub kind: u8,
+    /// 1: meant although the robot is a real one.
+    pub although_real: u8,
+}
