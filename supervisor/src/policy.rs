@@ -26,9 +26,9 @@ const FIRST_BACKOFF: Duration = Duration::from_millis(10);
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
 /// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been well, is held: one that
 /// cannot live at all gets here in five seconds, and no person or test kills the same stage that fast.
-const HOLD_AFTER: usize = 12;
+pub(crate) const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
-const HOLD_WINDOW: Duration = Duration::from_secs(10);
+pub(crate) const HOLD_WINDOW: Duration = Duration::from_secs(10);
 /// Starts in a row that the bus may be to blame for, before it is made anew: one may have met what the life before
 /// left half made, which is removed when it ends.
 const JAMMED_AFTER: u32 = 2;

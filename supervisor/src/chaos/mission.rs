@@ -29,6 +29,7 @@ use super::{
     victim::{Chance, Kind},
 };
 use crate::{
+    policy::{HOLD_AFTER, HOLD_WINDOW},
     process::{Process, firsthand},
     simulator::Simulator,
     stages,
@@ -43,6 +44,9 @@ const AFTER_ANY: Stamp = Stamp {
     generation: u32::MAX,
     sequence: 0,
 };
+/// A stage that dies too often is held until an operator releases it, and here there is none: so often none is hit.
+/// A hit may bring another in the start-up, and one of each may die of an earlier one.
+const MOST_HITS: usize = HOLD_AFTER - 4;
 /// How often the child is looked at while the bus is silent.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -193,6 +197,8 @@ struct Attack {
     supervisor: u32,
     driving: bool,
     wounds: Vec<Wound>,
+    /// Who was hit lately.
+    hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
     /// Of the supervisor that lives: when its robot began to drive, and when it was last looked at.
     held: Option<[Possessions; 2]>,
@@ -371,10 +377,13 @@ impl Attack {
             return;
         };
         let hurt = self.wounds.iter().any(|wound| wound.stage == stage);
-        if hurt || !send(entry.pid, kind) {
+        self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
+        let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
+        if hurt || lately >= MOST_HITS || !send(entry.pid, kind) {
             return;
         }
         report.hit(stage, kind);
+        self.hits.push((stage, Instant::now()));
         self.wounds.push(Wound {
             stage,
             kind,
@@ -401,6 +410,7 @@ impl Attack {
             }
             if entry.pid != 0 && send(entry.pid, Kind::KillAtStart) {
                 report.hit(wound.stage, Kind::KillAtStart);
+                self.hits.push((wound.stage, Instant::now()));
                 wound.generation = entry.generation;
                 wound.kind = Kind::KillAtStart;
                 wound.at = Instant::now();
