@@ -16,6 +16,9 @@ const PLAUSIBLE: f64 = 2.0;
 /// Counts always believed, whatever the time between: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
 
+/// No robot is switched off and on again and answers sooner, seconds; a link that was killed is back in a tenth.
+const BOOTS_IN_S: f64 = 2.0;
+
 /// What must survive the process: the pose, and the counts it was computed at.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
@@ -144,7 +147,7 @@ impl DeadReckoning {
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
-        if f64::from(left.abs().max(right.abs())) > limit || restarted(last, wheels) {
+        if f64::from(left.abs().max(right.abs())) > limit || restarted(last, wheels, elapsed) {
             self.disbelieved += 1;
             return WheelSpeeds::default();
         }
@@ -180,14 +183,16 @@ impl DeadReckoning {
 
 /// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only
 /// what happened between two lives of it has to be told from the counts themselves.
-fn restarted(last: Last, wheels: &WheelSample) -> bool {
+fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
     if last.generation == wheels.stamp.generation {
         return last.restarts != wheels.restarts;
     }
-    counts_restarted(
-        [last.left, last.right],
-        [wheels.left_counts, wheels.right_counts],
-    )
+    // A robot that turns back through its start while the link is killed looks the same, but for the time.
+    elapsed >= BOOTS_IN_S
+        && counts_restarted(
+            [last.left, last.right],
+            [wheels.left_counts, wheels.right_counts],
+        )
 }
 
 #[cfg(test)]
@@ -334,5 +339,20 @@ mod tests {
         close(pose.x_m, 0.1 * PI);
         close(reckoning.step(&by(3, wheels(9, 0, 0))).x_m, pose.x_m);
         assert_eq!(reckoning.disbelieved(), 1);
+    }
+
+    #[test]
+    fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_turn() {
+        let mut reckoning = reckoning("");
+        let by = |generation, mut sample: WheelSample| {
+            sample.stamp.generation = generation;
+            sample
+        };
+        reckoning.step(&by(1, wheels(0, 0, 0)));
+        // A tenth of a turn of each wheel, against each other, and back.
+        reckoning.step(&by(1, wheels(1, COUNT_CYCLE - 100, 100)));
+        let turned = reckoning.step(&by(2, wheels(2, COUNT_CYCLE - 3, 2)));
+        close(turned.heading_rad, 5.0 * 2e-4 * PI / 0.4);
+        assert_eq!(reckoning.disbelieved(), 0);
     }
 }
