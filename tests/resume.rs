@@ -36,7 +36,7 @@ fn pose_error(summary: &Value) -> f64 {
 fn a_run_whose_supervisor_was_killed_again_and_again_is_gone_on_with_and_loses_no_pose() {
     const PACE: [&str; 2] = ["--pace", "4"];
     let (_, undisturbed) = run("res-calm", "obstacle-course", &PACE);
-    let mut first = Run::start("res", "obstacle-course", &PACE);
+    let mut first = Run::start("res-again", "obstacle-course", &PACE);
     first.wait_until_under_way(6.0);
     first.signal(Signal::KILL);
     first.reap();
@@ -47,7 +47,7 @@ fn a_run_whose_supervisor_was_killed_again_and_again_is_gone_on_with_and_loses_n
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        support::wait_for_status("res", |status| {
+        support::wait_for_status("res-again", |status| {
             status["order"] == "driving" && status["mission_time_s"].as_f64().unwrap() > seconds
         });
         signal_process(next.id(), Signal::KILL);
@@ -61,7 +61,7 @@ fn a_run_whose_supervisor_was_killed_again_and_again_is_gone_on_with_and_loses_n
         pose_error(&summary) <= pose_error(&undisturbed) + 0.005,
         "{summary} against {undisturbed}"
     );
-    assert_nothing_left("res");
+    assert_nothing_left("res-again");
 }
 
 #[test]

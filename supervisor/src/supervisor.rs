@@ -99,17 +99,12 @@ fn bus_of(held: &Held) -> Result<Rc<Bus>, SupervisorError> {
 
 struct Supervisor<'a> {
     options: &'a Options,
-    bus: Rc<Bus>,
     // Dropped in this order: the stages go before the robot they speak to.
     fleet: Fleet,
     simulator: Option<Simulator>,
     observer: Observer,
     waiter: Waiter,
-    directive: Writer<DirectiveSample>,
-    roster: SliceWriter<RosterHeader, RosterEntry>,
-    deaths: Writer<DeathSample>,
-    stalls: Writer<StallSample>,
-    requests: Reader<RequestSample>,
+    ends: Ends,
     last_request: u64,
     keeper: Keeper,
     /// The first tick that is not made yet, and mission time by then, as long as none was heard of.
@@ -129,6 +124,31 @@ struct Supervisor<'a> {
     clock: MissionClock,
     address: Address,
     service: ServiceManager,
+}
+
+/// The supervisor's own ends on the bus.
+struct Ends {
+    bus: Rc<Bus>,
+    directive: Writer<DirectiveSample>,
+    roster: SliceWriter<RosterHeader, RosterEntry>,
+    deaths: Writer<DeathSample>,
+    stalls: Writer<StallSample>,
+    requests: Reader<RequestSample>,
+}
+
+impl Ends {
+    /// All of them; `waiter` wakes for requests.
+    fn open(bus: Rc<Bus>, waiter: &mut Waiter) -> Result<Self, SupervisorError> {
+        waiter.on(bus.alarm(&topics::REQUESTS)?);
+        Ok(Self {
+            directive: bus.writer(&topics::DIRECTIVE, 1)?,
+            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
+            deaths: bus.writer(&topics::DEATHS, 1)?,
+            stalls: bus.writer(&topics::STALLS, 1)?,
+            requests: bus.reader(&topics::REQUESTS)?,
+            bus,
+        })
+    }
 }
 
 impl<'a> Supervisor<'a> {
@@ -181,19 +201,14 @@ impl<'a> Supervisor<'a> {
         run.save(directory)?;
         let mut waiter = Waiter::default();
         let observer = Observer::new(&bus, &mut waiter)?;
-        waiter.on(bus.alarm(&topics::REQUESTS)?);
+        let ends = Ends::open(bus, &mut waiter)?;
         let mut supervisor = Self {
             options,
             fleet: Fleet::new(directory.clone(), options.starter),
             simulator,
             observer,
             waiter,
-            directive: bus.writer(&topics::DIRECTIVE, 1)?,
-            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
-            deaths: bus.writer(&topics::DEATHS, 1)?,
-            stalls: bus.writer(&topics::STALLS, 1)?,
-            requests: bus.reader(&topics::REQUESTS)?,
-            bus,
+            ends,
             last_request: 0,
             keeper,
             beginning,
@@ -302,11 +317,12 @@ impl<'a> Supervisor<'a> {
 
     /// Reap and restart; tell each death once, on the bus, in the log and in the run directory. Says whether one was.
     fn tend(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
-        let deaths = self.fleet.tend(&self.bus, first_tick)?;
+        let deaths = self.fleet.tend(&self.ends.bus, first_tick)?;
         let pose = self.observer.record.pose.unwrap_or_default();
         for death in &deaths {
             death.log();
-            self.deaths
+            self.ends
+                .deaths
                 .publish(pose.stamp.tick, pose.stamp.time(), death.sample())?;
             let file = self.options.directory.join(death::FILE_NAME);
             death
@@ -323,7 +339,7 @@ impl<'a> Supervisor<'a> {
     /// Free what the dead held, while their successors start; what cannot be freed makes the bus slower, not wrong.
     fn clear_up(&mut self) {
         self.cleared_up = Instant::now();
-        match self.bus.clear_up(&self.unburied) {
+        match self.ends.bus.clear_up(&self.unburied) {
             Ok(true) => self.unburied.clear(),
             Ok(false) => {}
             Err(error) => {

@@ -4,16 +4,14 @@ use std::time::{Duration, Instant};
 
 use common::{
     samples::{HoldReason, Order},
-    topics,
     waiter::Waiter,
 };
 
-use super::{Supervisor, SupervisorError, bus_of};
+use super::{Ends, Supervisor, SupervisorError, bus_of};
 use crate::{
     domain::Held,
     observer::{Observer, Record},
     report::{Ending, Outcome, Summary},
-    stages,
 };
 
 /// Time the link has to say that the robot was told to stand, before it is asked to go.
@@ -57,24 +55,18 @@ impl Supervisor<'_> {
         self.stand()?;
         self.stop_stages()?;
         // The old ends go before the new bus is made: they would take its files for theirs.
-        drop((self.waiter, self.directive, self.roster));
-        drop((self.deaths, self.stalls, self.requests, self.bus));
+        drop((self.waiter, self.ends));
         let record = self.observer.close();
         held.renew()?;
         let bus = bus_of(held)?;
         let mut waiter = Waiter::default();
         let mut observer = Observer::new(&bus, &mut waiter)?;
         observer.record = record;
-        waiter.on(bus.alarm(&topics::REQUESTS)?);
+        let ends = Ends::open(bus, &mut waiter)?;
         let mut supervisor = Self {
             observer,
             waiter,
-            directive: bus.writer(&topics::DIRECTIVE, 1)?,
-            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
-            deaths: bus.writer(&topics::DEATHS, 1)?,
-            stalls: bus.writer(&topics::STALLS, 1)?,
-            requests: bus.reader(&topics::REQUESTS)?,
-            bus,
+            ends,
             ..self
         };
         supervisor.restate()?;

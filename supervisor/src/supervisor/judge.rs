@@ -118,7 +118,8 @@ impl Supervisor<'_> {
         };
         let record = StallRecord::new(stall, &pose, &self.stall);
         record.log();
-        self.stalls
+        self.ends
+            .stalls
             .publish(pose.stamp.tick, pose.stamp.time(), record.sample())?;
         let directory = &self.options.directory;
         record.append_to(directory).map_err(system(format!(

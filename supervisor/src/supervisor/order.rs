@@ -13,7 +13,7 @@ impl Supervisor<'_> {
     /// Do what operators ask. Says whether anything was asked.
     pub(super) fn take_requests(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
         let mut asked = false;
-        while let Some(request) = self.requests.take()? {
+        while let Some(request) = self.ends.requests.take()? {
             asked = true;
             self.last_request = request.id;
             let stage = name_str(&request.stage);
@@ -109,7 +109,7 @@ impl Supervisor<'_> {
             epoch: self.stall.epoch(),
             ..DirectiveSample::default()
         };
-        self.directive.publish(tick, time, directive)?;
+        self.ends.directive.publish(tick, time, directive)?;
         let header = RosterHeader {
             supervisor_pid: std::process::id(),
             order: self.order.into(),
@@ -118,7 +118,8 @@ impl Supervisor<'_> {
             last_request: self.last_request,
             ..RosterHeader::default()
         };
-        self.roster
+        self.ends
+            .roster
             .publish(tick, time, header, self.fleet.roster().into_iter())?;
         Ok(())
     }
