@@ -16,11 +16,11 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::checkpoint::{Checkpoint, CheckpointError, failed};
 
-/// Entries after which a snapshot is due at the soonest and at the latest: a new life folds a dozen entries in a
-/// millisecond.
-const SNAPSHOT_AFTER: (u64, u64) = (32, 128);
-/// In between, an entry more for so many bytes of the state: a large one takes long to write.
-const BYTES_FOR_AN_ENTRY: u64 = 4096;
+/// Entries after which a snapshot is due at the soonest and at the latest.
+const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
+/// In between, an entry more for so many bytes of the state: to write them takes about as long as to fold an entry,
+/// which a new life must do with each before it is ready.
+const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
 /// No entry is longer, bytes.

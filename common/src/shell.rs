@@ -139,6 +139,15 @@ pub trait Process: Sized {
     /// When the stage cannot go on; it will be restarted.
     fn turn(&mut self) -> Result<Progress, StageError>;
 
+    /// Open what nobody waits for. Called once, after the first beat that says ready.
+    ///
+    /// # Errors
+    /// When it cannot be had.
+    fn furnish(&mut self, context: &Context) -> Result<(), StageError> {
+        let _ = context;
+        Ok(())
+    }
+
     /// Do what nobody waits for: a map told whole again, a snapshot. The scheduler may let a stage that
     /// goes on computing keep the processor from the one it has just woken, so on a wall clock this waits
     /// for a lull; on a clock of ticks, where ticks follow each other without one, it comes after each turn.
@@ -259,7 +268,7 @@ fn work(
     let without_lulls = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
-    // After the first turn: what nobody needs to be ready for.
+    process.furnish(context)?;
     let simulated = context.run.mission.robot.address.is_none();
     let mut faults = Requests::open(&context.bus, &context.life, simulated)?;
     let mut busy = true;

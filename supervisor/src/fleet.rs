@@ -141,6 +141,17 @@ impl Fleet {
         self.members.iter().all(running)
     }
 
+    /// Whether one is on its way there, or will be in a moment.
+    pub(crate) fn any_starting(&self) -> bool {
+        let starting = |member: &Member| {
+            matches!(
+                member.policy.phase(),
+                Phase::Starting { .. } | Phase::BackingOff { .. }
+            )
+        };
+        self.members.iter().any(starting)
+    }
+
     /// How many do, and how many there are.
     pub(crate) fn alive(&self) -> (usize, usize) {
         let running = |member: &&Member| matches!(member.policy.phase(), Phase::Running { .. });

@@ -20,12 +20,13 @@ use crate::stages::Stage;
 
 /// A stage that was ready for so long was well: its next death is a first one.
 const WELL_AFTER: Duration = Duration::from_millis(500);
-/// Wait before the second start in a row; doubles with each further one.
-const FIRST_BACKOFF: Duration = Duration::from_millis(10);
+/// Wait before the second start in a row; doubles with each further one. Less than a start takes: one that is killed in
+/// it was mostly unlucky.
+const FIRST_BACKOFF: Duration = Duration::from_millis(2);
 /// The most to wait between starts: a person who mends the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
 /// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been well, is held: one that
-/// cannot live at all gets here in five seconds, and no person or test kills the same stage that fast.
+/// cannot live at all gets here in two seconds, and no person or test kills the same stage that fast.
 pub(crate) const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
 pub(crate) const HOLD_WINDOW: Duration = Duration::from_secs(10);
@@ -321,6 +322,10 @@ impl Policy {
         self.recent
             .retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
         self.recent.push_back(now);
+        // One that is held, stopped and started anew: no more are counted than make the difference.
+        if self.recent.len() > HOLD_AFTER {
+            self.recent.pop_front();
+        }
         if self.recent.len() >= HOLD_AFTER || self.deaths >= HOLD_AFTER {
             self.phase = Phase::Held;
             return None;

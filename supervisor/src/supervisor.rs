@@ -47,8 +47,11 @@ use common::{
     waiter::Waiter,
 };
 
-/// How often the bus is cleared of consumers that died.
+/// How often the bus is cleared at least: of consumers that died.
 const CLEAR_UP: Duration = Duration::from_secs(1);
+
+/// One death brings another within this more often than not: its successor's, or a sibling's.
+const MOURNING: Duration = Duration::from_millis(50);
 
 /// What a run is made from.
 pub(crate) struct Options {
@@ -119,6 +122,8 @@ struct Supervisor<'a> {
     restated: Option<Instant>,
     progressed: (Option<u64>, Instant),
     cleared_up: Instant,
+    /// Stages that died since, and when the last one did.
+    died: (usize, Instant),
     /// Processes whose remains are not cleared up yet.
     unburied: Vec<u32>,
     clock: MissionClock,
@@ -220,6 +225,7 @@ impl<'a> Supervisor<'a> {
             restated: None,
             progressed: (None, Instant::now()),
             cleared_up: Instant::now(),
+            died: (0, Instant::now()),
             unburied: Vec::new(),
             clock,
             address,
@@ -266,11 +272,8 @@ impl<'a> Supervisor<'a> {
                 };
                 watch(&progress);
                 self.service.show(|| progress.to_string());
-                // Consumers die, too, and nobody tells us.
-                if self.cleared_up.elapsed() >= CLEAR_UP {
-                    self.clear_up();
-                }
             }
+            self.clear_up_if_due();
             self.service.feed();
             self.wait()?;
         }
@@ -329,16 +332,29 @@ impl<'a> Supervisor<'a> {
                 .append_to(&self.options.directory)
                 .map_err(system(format!("write {}", file.display())))?;
         }
+        self.unburied.extend(deaths.iter().map(|death| death.pid));
         if !deaths.is_empty() {
-            self.unburied.extend(deaths.iter().map(|death| death.pid));
-            self.clear_up();
+            self.died = (self.died.0 + deaths.len(), Instant::now());
         }
         Ok(!deaths.is_empty())
     }
 
-    /// Free what the dead held, while their successors start; what cannot be freed makes the bus slower, not wrong.
+    /// Free what the dead held once their successors work and nobody dies any more: a start takes about as long, and
+    /// would wait for it. But sooner when so many are dead that places on the bus may run out. And free what consumers
+    /// held that died, of which nobody tells us.
+    fn clear_up_if_due(&mut self) {
+        let (died, last) = self.died;
+        let quiet = died > 0 && last.elapsed() >= MOURNING && !self.fleet.any_starting();
+        let many = died >= stages::TABLE.len();
+        if quiet || many || self.cleared_up.elapsed() >= CLEAR_UP {
+            self.clear_up();
+        }
+    }
+
+    /// What cannot be freed makes the bus slower, not wrong.
     fn clear_up(&mut self) {
         self.cleared_up = Instant::now();
+        self.died.0 = 0;
         match self.ends.bus.clear_up(&self.unburied) {
             Ok(true) => self.unburied.clear(),
             Ok(false) => {}

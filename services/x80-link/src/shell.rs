@@ -32,6 +32,14 @@ struct Pending {
     surroundings: Option<SurroundingsSample>,
 }
 
+/// Where it goes.
+#[derive(Debug)]
+struct Telemetry {
+    infrared: Writer<InfraredSample>,
+    power: Writer<PowerSample>,
+    surroundings: Writer<SurroundingsSample>,
+}
+
 /// The link process.
 #[derive(Debug)]
 pub struct Shell {
@@ -41,11 +49,10 @@ pub struct Shell {
     range: Writer<RangeSample>,
     wheels: Writer<WheelSample>,
     state: Writer<LinkSample>,
-    infrared: Writer<InfraredSample>,
-    power: Writer<PowerSample>,
-    surroundings: Writer<SurroundingsSample>,
     /// What nobody in the pipeline waits for: published when it has a lull.
     pending: Pending,
+    /// Opened once the link works.
+    telemetry: Option<Telemetry>,
     link: Link,
     latency: Histogram,
     latency_ns: u64,
@@ -68,10 +75,8 @@ impl Process for Shell {
             range: context.bus.writer(&topics::RANGE, generation)?,
             wheels: context.bus.writer(&topics::WHEELS, generation)?,
             state: context.bus.writer(&topics::LINK, generation)?,
-            infrared: context.bus.writer(&topics::INFRARED, generation)?,
-            power: context.bus.writer(&topics::POWER, generation)?,
-            surroundings: context.bus.writer(&topics::SURROUNDINGS, generation)?,
             pending: Pending::default(),
+            telemetry: None,
             link: Link::new(&run.mission, run.clock, context.life.first_tick),
             latency: Histogram::default(),
             latency_ns: 0,
@@ -109,16 +114,29 @@ impl Process for Shell {
         Ok(self.progress)
     }
 
+    fn furnish(&mut self, context: &Context) -> Result<(), StageError> {
+        let (bus, generation) = (&context.bus, context.life.generation);
+        self.telemetry = Some(Telemetry {
+            infrared: bus.writer(&topics::INFRARED, generation)?,
+            power: bus.writer(&topics::POWER, generation)?,
+            surroundings: bus.writer(&topics::SURROUNDINGS, generation)?,
+        });
+        Ok(())
+    }
+
     fn idle(&mut self) -> Result<(), StageError> {
+        let Some(telemetry) = &mut self.telemetry else {
+            return Ok(());
+        };
         let Progress { tick, time } = self.progress;
         if let Some(infrared) = self.pending.infrared.take() {
-            self.infrared.publish(tick, time, infrared)?;
+            telemetry.infrared.publish(tick, time, infrared)?;
         }
         if let Some(power) = self.pending.power.take() {
-            self.power.publish(tick, time, power)?;
+            telemetry.power.publish(tick, time, power)?;
         }
         if let Some(surroundings) = self.pending.surroundings.take() {
-            self.surroundings.publish(tick, time, surroundings)?;
+            telemetry.surroundings.publish(tick, time, surroundings)?;
         }
         Ok(())
     }

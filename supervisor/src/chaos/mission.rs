@@ -50,11 +50,11 @@ const MOST_HITS: usize = HOLD_AFTER - 4;
 /// How often the child is looked at while the bus is silent.
 const LOOK: Duration = Duration::from_millis(50);
 
-fn command(options: &Options, seed: u64, pace: &str, out: &str) -> Command {
+fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
     command.args(["--robot", &options.robot.to_string()]);
     command.args(["--seed", &seed.to_string(), "--out"]);
-    command.arg(options.directory.join(out));
+    command.arg(out);
     for setting in &options.set {
         command.args(["--set", setting]);
     }
@@ -82,14 +82,15 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
 
 /// The same mission left alone: what there is to compare with.
 pub(super) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
-    let output = command(options, seed, "max", "calm")
+    let directory = options.directory.join("calm");
+    let output = command(options, seed, "max", &directory)
         .output()
         .map_err(system("start a mission"))?;
-    fs::remove_dir_all(options.directory.join("calm")).map_err(system("remove its directory"))?;
+    fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
     parse(&output.stdout)
 }
 
-/// The same mission under attack; what happened goes into `report`.
+/// The same mission under attack; what happened goes into `report`. What the mission wrote is kept if it went wrong.
 pub(super) fn attack(
     options: &Options,
     seed: u64,
@@ -98,12 +99,14 @@ pub(super) fn attack(
     calm: &Value,
 ) -> Result<(), ChaosError> {
     let before = report.kills();
-    let directory = options.directory.join("attacked");
+    let place = options.directory.join(format!("seed-{seed}"));
+    fs::create_dir(&place).map_err(system("make a directory"))?;
+    let directory = place.join("run");
     let mut robot = options
         .supervisor
-        .then(|| robot(options, seed))
+        .then(|| robot(options, seed, &place.join("robot")))
         .transpose()?;
-    let mut start = command(options, seed, &options.pace.to_string(), "attacked");
+    let mut start = command(options, seed, &options.pace.to_string(), &directory);
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
@@ -118,15 +121,18 @@ pub(super) fn attack(
         }
         start = resume(&directory);
     };
-    fs::remove_dir_all(&directory).map_err(system("remove its directory"))?;
     let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
+    let kills = report.kills() - before;
     let mut end = End {
+        seed,
         outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
         reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
         collisions: summary["collisions"].as_u64().unwrap_or_default(),
         pose_excess_m: number(&summary, "pose_error_m") - number(calm, "pose_error_m"),
         unattended_s: number(&summary, "unattended_s"),
-        kills: report.kills() - before,
+        // What a count that was lost may cost, for each of them.
+        pose_allowance_m: f64::from(kills) * options.loaded.body().metres_per_count(),
+        kills,
     };
     if let Some(mut robot) = robot {
         robot.stop()?;
@@ -136,22 +142,21 @@ pub(super) fn attack(
         end.unattended_s = last.map_or(0.0, |tick| tick.unattended_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - number(calm, "pose_error_m");
-        fs::remove_dir_all(options.directory.join("robot"))
-            .map_err(system("remove its directory"))?;
     }
-    report.ended(&end);
+    if report.ended(&end) {
+        fs::remove_dir_all(&place).map_err(system("remove its directory"))?;
+    }
     Ok(())
 }
 
 /// A robot that does not die with its supervisor.
-fn robot(options: &Options, seed: u64) -> Result<Simulator, ChaosError> {
-    let directory = options.directory.join("robot");
-    fs::create_dir(&directory).map_err(system("make a directory"))?;
+fn robot(options: &Options, seed: u64, directory: &Path) -> Result<Simulator, ChaosError> {
+    fs::create_dir(directory).map_err(system("make a directory"))?;
     let mission = Mission {
         seed,
         ..options.loaded.clone()
     };
-    Ok(Simulator::start(&directory, &mission, options.pace)?)
+    Ok(Simulator::start(directory, &mission, options.pace)?)
 }
 
 /// One life of a supervisor under attack; what it says at its end.
@@ -186,8 +191,22 @@ struct Wound {
     generation: u32,
     at: Instant,
     ready: bool,
-    /// To hit the successor so long after its start.
-    again: Option<Duration>,
+    again: Again,
+}
+
+/// Whether the successor is to be hit in its first milliseconds.
+#[derive(Clone, Copy)]
+enum Again {
+    /// It may live.
+    No,
+    /// So long after its start.
+    After(Duration),
+    /// It has started: then.
+    At {
+        when: Instant,
+        process: u32,
+        generation: u32,
+    },
 }
 
 /// What the attacker knows of a mission.
@@ -245,11 +264,13 @@ impl Attack {
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < PATIENCE {
             // A hit that is overdue waits for the robot to drive, which is heard.
             let due = next.checked_duration_since(Instant::now());
-            ears.waiter.wait(due.unwrap_or(LOOK).min(LOOK))?;
+            let patience = due.unwrap_or(LOOK).min(self.time_to_successor());
+            ears.waiter.wait(patience.min(LOOK))?;
             if let Some(robot) = &mut robot {
                 robot.tend()?;
             }
             self.listen(&mut ears, report)?;
+            self.await_successors();
             self.hit_successors(report);
             let enough = report.kills() >= options.kills;
             if Instant::now() >= next && self.driving && !enough {
@@ -288,7 +309,10 @@ impl Attack {
             self.entries = entries.to_vec();
             if self.driving {
                 self.heal(SUPERVISOR, AFTER_ANY, true, report);
-                if let Some(held) = Possessions::of(self.supervisor) {
+                // What the dead held is given back once their successors work.
+                if self.wounds.is_empty()
+                    && let Some(held) = Possessions::of(self.supervisor)
+                {
                     let [first, _] = self.held.unwrap_or([held; 2]);
                     self.held = Some([first, held]);
                 }
@@ -359,7 +383,7 @@ impl Attack {
                     generation: 0,
                     at: Instant::now(),
                     ready: false,
-                    again: None,
+                    again: Again::No,
                 });
                 self.driving = false;
             }
@@ -390,28 +414,60 @@ impl Attack {
             generation: entry.generation,
             at: Instant::now(),
             ready: false,
-            again: again.filter(|_| options.startup && kind != Kind::Freeze),
+            again: match again {
+                Some(after) if options.startup && kind != Kind::Freeze => Again::After(after),
+                _ => Again::No,
+            },
         });
     }
 
-    /// Hit the successors that are to be hit in their first milliseconds.
-    fn hit_successors(&mut self, report: &mut Report) {
+    /// Find the successors that are to be hit, once they have started.
+    fn await_successors(&mut self) {
         for wound in &mut self.wounds {
             let successor = self.entries.iter().find(|entry| {
-                name_str(&entry.stage) == wound.stage && entry.generation > wound.generation
+                name_str(&entry.stage) == wound.stage
+                    && entry.generation > wound.generation
+                    && entry.pid != 0
             });
-            let (Some(entry), Some(after)) = (successor, wound.again) else {
+            if let (Again::After(after), Some(entry)) = (wound.again, successor) {
+                let age = Duration::from_nanos(entry.uptime_ns);
+                wound.again = Again::At {
+                    when: Instant::now() + after.saturating_sub(age),
+                    process: entry.pid,
+                    generation: entry.generation,
+                };
+            }
+        }
+    }
+
+    /// Until one of them is to be hit.
+    fn time_to_successor(&self) -> Duration {
+        let times = self.wounds.iter().filter_map(|wound| match wound.again {
+            Again::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
+            Again::No | Again::After(_) => None,
+        });
+        times.min().unwrap_or(Duration::MAX)
+    }
+
+    /// Hit those whose time has come.
+    fn hit_successors(&mut self, report: &mut Report) {
+        for wound in &mut self.wounds {
+            let Again::At {
+                when,
+                process,
+                generation,
+            } = wound.again
+            else {
                 continue;
             };
-            wound.again = None;
-            let age = Duration::from_nanos(entry.uptime_ns);
-            if let Some(rest) = after.checked_sub(age) {
-                std::thread::park_timeout(rest);
+            if Instant::now() < when {
+                continue;
             }
-            if entry.pid != 0 && send(entry.pid, Kind::KillAtStart) {
+            wound.again = Again::No;
+            if send(process, Kind::KillAtStart) {
                 report.hit(wound.stage, Kind::KillAtStart);
                 self.hits.push((wound.stage, Instant::now()));
-                wound.generation = entry.generation;
+                wound.generation = generation;
                 wound.kind = Kind::KillAtStart;
                 wound.at = Instant::now();
                 wound.ready = false;

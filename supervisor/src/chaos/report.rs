@@ -18,7 +18,8 @@ pub(crate) struct Report {
     missions: u64,
     reached: u64,
     collisions: u64,
-    other_ends: Vec<String>,
+    /// Missions that were not reached untouched, or lost pose: their seeds and what was wrong.
+    wrong: Vec<String>,
     /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(serialize_with = "recoveries")]
@@ -79,10 +80,13 @@ pub(crate) struct Recovery {
 /// One mission's end.
 #[derive(Debug)]
 pub(crate) struct End {
+    pub(crate) seed: u64,
     pub(crate) outcome: String,
     pub(crate) reason: String,
     pub(crate) collisions: u64,
     pub(crate) pose_excess_m: f64,
+    /// The most that may be.
+    pub(crate) pose_allowance_m: f64,
     pub(crate) unattended_s: f64,
     pub(crate) kills: u32,
 }
@@ -93,7 +97,7 @@ impl Report {
             missions: 0,
             reached: 0,
             collisions: 0,
-            other_ends: Vec::new(),
+            wrong: Vec::new(),
             kills: BTreeMap::new(),
             recovery_ms: BTreeMap::new(),
             worst_pose_excess_m: 0.0,
@@ -127,20 +131,35 @@ impl Report {
         self.recovery_ms.entry(stage).or_default()
     }
 
-    pub(crate) fn ended(&mut self, end: &End) {
+    /// Says whether the mission arrived untouched, and knew where it was.
+    pub(crate) fn ended(&mut self, end: &End) -> bool {
         self.missions += 1;
-        if end.outcome == "reached" {
-            self.reached += 1;
-        } else {
-            self.other_ends
-                .push(format!("{}: {}", end.outcome, end.reason));
-        }
         self.collisions += end.collisions;
         self.longest_unattended_s = self.longest_unattended_s.max(end.unattended_s);
         if end.pose_excess_m > self.worst_pose_excess_m {
             self.worst_pose_excess_m = end.pose_excess_m;
             self.worst_pose_kills = end.kills;
         }
+        let reached = end.outcome == "reached";
+        self.reached += u64::from(reached);
+        let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
+        let before = self.wrong.len();
+        if !reached {
+            let (outcome, reason) = (&end.outcome, &end.reason);
+            self.wrong.push(format!("seed {seed}: {outcome}: {reason}"));
+        }
+        if end.collisions > 0 {
+            self.wrong.push(format!(
+                "seed {seed}: touched something {} times",
+                end.collisions
+            ));
+        }
+        if excess > allowance {
+            self.wrong.push(format!(
+                "seed {seed}: pose off by {excess:.4} m more than undisturbed, of {allowance:.4} m allowed"
+            ));
+        }
+        self.wrong.len() == before
     }
 
     /// A supervisor held `first` when its robot began to drive, and `last` when it was last looked at.
@@ -154,9 +173,14 @@ impl Report {
         self.took_s = self.began.elapsed().as_secs_f64();
     }
 
-    /// Whether every mission arrived untouched and left nothing.
+    /// Whether every mission arrived untouched and knew where it was. What one wrote that did not is kept.
+    pub(crate) fn is_right(&self) -> bool {
+        self.wrong.is_empty()
+    }
+
+    /// Whether every mission did, and left nothing.
     pub(crate) fn is_clean(&self) -> bool {
-        self.reached == self.missions && self.collisions == 0 && self.leftovers == 0
+        self.is_right() && self.leftovers == 0
     }
 }
 
@@ -203,8 +227,8 @@ impl fmt::Display for Report {
             self.collisions,
             self.leftovers
         )?;
-        for end in &self.other_ends {
-            writeln!(to, "  {end}")?;
+        for wrong in &self.wrong {
+            writeln!(to, "  {wrong}")?;
         }
         writeln!(
             to,

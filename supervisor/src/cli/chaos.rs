@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// What it ends with when a mission was lost, touched something, or left something.
+/// What it ends with when a mission was lost, touched something, lost its pose, or left something.
 const NOT_CLEAN: u8 = 8;
 
 #[allow(clippy::print_stdout, clippy::print_stderr)]
@@ -82,7 +82,12 @@ pub(super) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             return Err(format!("{error}; see {}", directory.display()).into());
         }
     };
-    std::fs::remove_dir_all(&directory)?;
+    if report.is_right() {
+        std::fs::remove_dir_all(&directory)?;
+    } else {
+        let kept = directory.display();
+        eprintln!("firsthand: what the missions wrote that went wrong is kept in {kept}");
+    }
     if arguments.json {
         println!("{}", serde_json::to_string(&report)?);
     } else {

@@ -55,7 +55,7 @@ pub(super) struct Restart {
 pub(super) struct Kill {
     /// The stage (`firsthand stages`), or `supervisor`.
     stage: String,
-    /// KILL, TERM, INT, ABRT, SEGV, STOP or CONT.
+    /// KILL, TERM, INT, ABRT, STOP or CONT.
     #[arg(long, default_value = "KILL", value_parser = signal)]
     signal: Signal,
     #[command(flatten)]
@@ -205,9 +205,8 @@ fn signal(text: &str) -> Result<Signal, String> {
         "TERM" => Signal::TERM,
         "INT" => Signal::INT,
         "ABRT" => Signal::ABORT,
-        "SEGV" => Signal::SEGV,
         "STOP" => Signal::STOP,
         "CONT" => Signal::CONT,
-        _ => return Err("give KILL, TERM, INT, ABRT, SEGV, STOP or CONT".to_owned()),
+        _ => return Err("give KILL, TERM, INT, ABRT, STOP or CONT".to_owned()),
     })
 }
