@@ -5,8 +5,7 @@
 mod support;
 
 use std::{
-    fs::{self, File, Permissions},
-    os::unix::fs::PermissionsExt as _,
+    fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -14,17 +13,13 @@ use std::{
 use common::{bus::Bus, domain::Domain, topics};
 use rustix::process::Signal;
 use serde_json::Value;
-use support::{PATIENCE, Run, STAGES, assert_nothing_left, find, signal_process};
+use support::{PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, pid, signal_process};
 
 /// Mission time runs so many times as fast as the wall's.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 fn domain(robot: &str) -> Domain {
     Domain::of(robot.parse().unwrap())
-}
-
-fn pid(status: &Value, stage: &str) -> u32 {
-    find(status, stage)["pid"].as_u64().unwrap() as u32
 }
 
 /// The process in a port's or a node's number.
@@ -51,14 +46,6 @@ fn shared(domain: &Domain, suffix: &str) -> Vec<String> {
         .collect()
 }
 
-/// A file as it is between its creation and its completion.
-fn half_make(path: &Path) {
-    // One that is there may not be writable.
-    let _ = fs::remove_file(path);
-    let file = File::create(path).unwrap();
-    file.set_permissions(Permissions::from_mode(0o200)).unwrap();
-}
-
 /// A connection of port `port` to another, half made.
 fn half_make_connection(domain: &Domain, port: u128) {
     let made = shared(domain, ".connection");
@@ -67,16 +54,6 @@ fn half_make_connection(domain: &Domain, port: u128) {
     half_make(Path::new(&format!(
         "/dev/shm/{start}_{port}_{port}.connection"
     )));
-}
-
-/// Kill `stage`, as it was in the status `before`, and wait until it lives again.
-fn kill_and_await(run: &mut Run, stage: &str, before: &Value) -> Value {
-    let generation = find(before, stage)["generation"].as_u64();
-    signal_process(pid(before, stage), Signal::KILL);
-    run.wait_until("it lives again", |status| {
-        let stage = find(status, stage);
-        stage["generation"].as_u64() > generation && stage["state"] == "running"
-    })
 }
 
 /// The mission is finished as if nothing had happened, and leaves nothing.
@@ -116,7 +93,7 @@ fn a_connection_half_made_by_a_stage_that_was_killed_is_in_nobodys_way() {
     });
     half_make_connection(&domain, port.unwrap());
     let began = Instant::now();
-    kill_and_await(&mut run, "mapper", &status);
+    run.kill_and_await_successor("mapper", Signal::KILL);
     // Not after a start-up that was too late.
     assert!(began.elapsed().as_secs() < 3, "{:?}", began.elapsed());
     let summary = assert_arrives("jam-own", run);
@@ -135,7 +112,7 @@ fn a_connection_half_made_by_who_knows_whom_jams_one_start_at_most() {
     let tag = format!("{}{port}.port_tag", domain.shared_memory_prefix());
     fs::write(node.join(tag), "").unwrap();
     half_make_connection(&domain, port);
-    kill_and_await(&mut run, "mapper", &status);
+    run.kill_and_await_successor("mapper", Signal::KILL);
     let began = Instant::now();
     while !shared(&domain, "_7.connection").is_empty() {
         assert!(began.elapsed() < PATIENCE, "it stays");
@@ -150,12 +127,12 @@ fn a_connection_half_made_by_who_knows_whom_jams_one_start_at_most() {
 #[test]
 fn a_half_made_service_jams_starts_until_the_bus_is_made_anew() {
     let mut run = Run::start("jam-service", "obstacle-course", &PACE);
-    let status = run.wait_until_under_way(1.0);
+    run.wait_until_under_way(1.0);
     let services = domain("jam-service").middleware_root().join("services");
     for service in fs::read_dir(services).unwrap() {
         half_make(&service.unwrap().path());
     }
-    kill_and_await(&mut run, "planner", &status);
+    run.kill_and_await_successor("planner", Signal::KILL);
     assert_renewed(&assert_arrives("jam-service", run));
 }
 
@@ -210,7 +187,7 @@ fn node_files_of_the_dead_are_swept() {
         let monitor = format!("{}{id}.node_monitor_context", domain.shared_memory_prefix());
         fs::write(nodes.join(monitor), [0; 16]).unwrap();
     }
-    let status = kill_and_await(&mut run, "mapper", &status);
+    let status = run.kill_and_await_successor("mapper", Signal::KILL);
     let living: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
     let began = Instant::now();
     while !nodes_of(&domain, mapper).is_empty() {

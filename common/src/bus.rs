@@ -2,7 +2,7 @@
 //!
 //! Rules it keeps, each paid for by experiment:
 //! - the domain's configuration is made the process-wide one before anything else is called;
-//! - services are created by the supervisor alone ([`Bus::create_all`]) and opened by everyone else, so
+//! - services are created by the supervisor alone ([`Bus::make`]) and opened by everyone else, so
 //!   that no stage killed while starting leaves one half made;
 //! - limits have slack, so authorship is checked here: readers drop samples of a writer's older lives;
 //! - events only wake; data come from receiving until there is none.
@@ -23,7 +23,7 @@ use std::{
     ops::Deref,
     os::{
         fd::{AsFd, BorrowedFd},
-        unix::ffi::OsStrExt as _,
+        unix::{ffi::OsStrExt as _, fs::MetadataExt as _},
     },
     path::{Path, PathBuf},
     time::Duration,
@@ -198,21 +198,66 @@ fn service_name(spec: &Spec) -> Result<ServiceName, BusError> {
 #[derive(Debug)]
 pub struct Bus {
     node: Node<ipc::Service>,
+    config: PathBuf,
+    made: Made,
 }
 
 /// The services of every topic, existing as long as this is held.
 pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
 
+/// Which making of the bus a configuration is of: a file's number may be given to the next, but not its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Made {
+    file: u64,
+    seconds: i64,
+    nanoseconds: i64,
+}
+
+impl Made {
+    fn of(config: &Path) -> io::Result<Self> {
+        let file = config.metadata()?;
+        Ok(Self {
+            file: file.ino(),
+            seconds: file.mtime(),
+            nanoseconds: file.mtime_nsec(),
+        })
+    }
+}
+
+fn no_join(domain: &Domain) -> impl Fn(String) -> BusError {
+    move |detail| BusError::Join {
+        robot: domain.robot.to_string(),
+        detail,
+    }
+}
+
 impl Bus {
-    /// Write the configuration that [`Bus::join`], and consumers in other languages, load.
+    /// Make the bus of a robot: its configuration, which consumers in other languages load, too, and the services of
+    /// every topic of the table. Nobody can join before all are there. The supervisor's business alone; there must be
+    /// no other.
     ///
     /// # Errors
-    /// When the file cannot be written.
-    pub fn write_config(domain: &Domain) -> Result<(), BusError> {
-        let failed = |detail: String| BusError::Join {
-            robot: domain.robot.to_string(),
-            detail,
-        };
+    /// When a file cannot be written, a service exists already, or shared memory is full.
+    pub fn make(domain: &Domain, name: &str) -> Result<(Self, Services), BusError> {
+        let (unfinished, config) = (
+            domain.middleware_config_unfinished(),
+            domain.middleware_config(),
+        );
+        Self::write_config(domain, &unfinished)?;
+        let mut bus = Self::join_by(&unfinished, domain, name)?;
+        let services = crate::topics::TABLE
+            .iter()
+            .map(|topic| topic.create(&bus))
+            .collect::<Result<_, _>>()?;
+        let failed = |error: io::Error| no_join(domain)(error.to_string());
+        leftovers::keep(&bus.services(), &bus.kept()).map_err(failed)?;
+        std::fs::rename(&unfinished, &config).map_err(failed)?;
+        bus.config = config;
+        Ok((bus, Services(services)))
+    }
+
+    fn write_config(domain: &Domain, file: &Path) -> Result<(), BusError> {
+        let failed = no_join(domain);
         let mut config = Config::default();
         let root = domain.middleware_root();
         let prefix = domain.shared_memory_prefix();
@@ -226,8 +271,7 @@ impl Bus {
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
-        let file = domain.middleware_config();
-        std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
+        std::fs::write(file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
     /// Join the bus of a robot under a name that `iox2 node list` shows.
@@ -237,19 +281,18 @@ impl Bus {
     /// # Errors
     /// When the robot does not run here, is another user's, or shared memory is full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
+        Self::join_by(&domain.middleware_config(), domain, name)
+    }
+
+    fn join_by(file: &Path, domain: &Domain, name: &str) -> Result<Self, BusError> {
         // The middleware reports what we report anyway; IOX2_LOG_LEVEL brings its own words back.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let join = |detail: String| BusError::Join {
+        let join = no_join(domain);
+        // Looked at first: should it be replaced meanwhile, that is seen.
+        let made = Made::of(file).map_err(|error| BusError::NotRunning {
             robot: domain.robot.to_string(),
-            detail,
-        };
-        let file: PathBuf = domain.middleware_config();
-        if !file.exists() {
-            return Err(BusError::NotRunning {
-                robot: domain.robot.to_string(),
-                detail: format!("no {}", file.display()),
-            });
-        }
+            detail: format!("{}: {error}", file.display()),
+        })?;
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
         let config = Config::setup_global_config_from_file(&path)
@@ -265,38 +308,55 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| join(format!("{error:?}")))?;
-        Ok(Self { node })
+        Ok(Self {
+            node,
+            config: file.to_owned(),
+            made,
+        })
     }
 
-    /// Create the services of every topic of the table. The supervisor's business alone.
-    ///
-    /// # Errors
-    /// When one exists already or shared memory is full.
-    pub fn create_all(&self) -> Result<Services, BusError> {
-        crate::topics::TABLE
-            .iter()
-            .map(|topic| topic.create(self))
-            .collect::<Result<_, _>>()
-            .map(Services)
+    /// Whether another bus has taken its place, of this run or of the robot's next: on this one nobody speaks any
+    /// more. Whoever listens drops all he has of it, and joins again.
+    #[must_use]
+    pub fn is_replaced(&self) -> bool {
+        Made::of(&self.config).is_ok_and(|now| now != self.made)
     }
 
-    /// Remove what `process`, which must be gone, was just making: its successor could wait for it for ever. The
-    /// supervisor's business alone. Says whether somebody else is just making something, or died of it.
+    /// Where the services' files are.
+    fn services(&self) -> PathBuf {
+        let services = self.node.config().global.service_dir();
+        PathBuf::from(OsStr::from_bytes(services.as_bytes()))
+    }
+
+    /// Where they are kept under a second name.
+    fn kept(&self) -> PathBuf {
+        self.services().with_extension("kept")
+    }
+
+    /// Make way for the successor of `process`, which must be gone: remove what it was just making, for which the
+    /// successor could wait for ever, and put back what it must find. The supervisor's business alone. Says whether
+    /// somebody else is just making something, or died of it.
     ///
     /// # Errors
     /// When files of the dead cannot be removed.
-    pub fn remove_unfilled(&self, process: u32) -> io::Result<bool> {
+    pub fn make_way(&self, process: u32) -> io::Result<bool> {
+        leftovers::put_back(&self.kept(), &self.services())?;
+        self.remove_unfilled(process)
+    }
+
+    fn remove_unfilled(&self, process: u32) -> io::Result<bool> {
         let prefix = String::from_utf8_lossy(self.node.config().global.prefix.as_bytes());
         leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
     }
 
     /// Free what the dead held: their places on the topics, their memory; and what the processes `killed`, which
-    /// must be gone, left of a start that was cut off. The supervisor's business alone; a few milliseconds for each.
+    /// must be gone, left of a start that was cut off. Put back what joiners must find. The supervisor's business alone; a few milliseconds for each.
     /// Says whether all that could be done: else it is to be tried again, with the same processes.
     ///
     /// # Errors
     /// When files of the dead cannot be removed.
     pub fn clear_up(&self, killed: &[u32]) -> io::Result<bool> {
+        leftovers::put_back(&self.kept(), &self.services())?;
         let config = self.node.config();
         let nodes = config.global.node_dir();
         let nodes = Path::new(OsStr::from_bytes(nodes.as_bytes()));

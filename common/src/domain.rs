@@ -138,6 +138,12 @@ impl Domain {
         self.directory.join("iceoryx2.toml")
     }
 
+    /// The same while the bus is being made: nobody joins before it is whole.
+    #[must_use]
+    pub fn middleware_config_unfinished(&self) -> PathBuf {
+        self.directory.join("iceoryx2.toml.unfinished")
+    }
+
     /// Starts the name of every file of this domain in [`SHARED_MEMORY`]. No other domain's prefix
     /// starts with it: names hold no `_`.
     #[must_use]

@@ -109,9 +109,7 @@ impl Held {
             SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
         )?;
         make_own_directory(&self.domain.middleware_root())?;
-        Bus::write_config(&self.domain)?;
-        let bus = Bus::join(&self.domain, "supervisor")?;
-        let services = bus.create_all()?;
+        let (bus, services) = Bus::make(&self.domain, "supervisor")?;
         self.bus = Some((services, Rc::new(bus)));
         self.shut = None;
         Ok(())
@@ -219,9 +217,12 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
 /// Remove every trace of the middleware in this domain.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // Without a configuration nobody joins.
-    for file in [domain.middleware_config(), domain.run_link()] {
-        remove_file(&file)?;
-    }
+    let files = [
+        domain.middleware_config(),
+        domain.middleware_config_unfinished(),
+        domain.run_link(),
+    ];
+    files.iter().try_for_each(|file| remove_file(file))?;
     // Out of the way first: a consumer that is joining would fill it while it is emptied.
     let (root, aside) = (domain.middleware_root(), domain.middleware_root_aside());
     remove_directory(&aside)?;

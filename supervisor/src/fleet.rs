@@ -264,8 +264,8 @@ impl Fleet {
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
                 let mut death = self.record(index, Cause::of(status));
-                if let Err(error) = bus.remove_unfilled(death.pid) {
-                    tracing::warn!(stage = death.stage, %error, "cannot remove what it was just making");
+                if let Err(error) = bus.make_way(death.pid) {
+                    tracing::warn!(stage = death.stage, %error, "cannot make way for its successor");
                 }
                 let member = &mut self.members[index];
                 (member.process, member.beat) = (None, None);

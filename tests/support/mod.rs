@@ -8,7 +8,9 @@
 )]
 
 use std::{
+    fs,
     io::Read as _,
+    os::unix::fs::PermissionsExt as _,
     path::Path,
     process::{Child, Command, Output, Stdio},
     time::{Duration, Instant},
@@ -117,17 +119,17 @@ impl Run {
         signal_process(self.pid(), signal);
     }
 
-    /// Kill a stage and wait until its successor runs.
-    pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) {
+    /// Kill a stage and wait until its successor runs; the status then.
+    pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
         let status = self.wait_until("the stage runs", |status| {
             find(status, stage)["state"] == "running"
         });
         let generation = find(&status, stage)["generation"].as_u64().unwrap();
-        signal_process(find(&status, stage)["pid"].as_u64().unwrap() as u32, signal);
+        signal_process(pid(&status, stage), signal);
         self.wait_until("its successor runs", |status| {
             let stage = find(status, stage);
             stage["generation"].as_u64() > Some(generation) && stage["state"] == "running"
-        });
+        })
     }
 
     /// Wait for the end: exit code, and the JSON of the last line.
@@ -178,6 +180,20 @@ pub fn find<'a>(status: &'a Value, stage: &str) -> &'a Value {
     stages.iter().find(|entry| entry["name"] == stage).unwrap()
 }
 
+/// Its process.
+pub fn pid(status: &Value, stage: &str) -> u32 {
+    find(status, stage)["pid"].as_u64().unwrap() as u32
+}
+
+/// A file of the middleware as it is between its creation and its completion.
+pub fn half_make(path: &Path) {
+    // One that is there may not be writable.
+    let _ = fs::remove_file(path);
+    let file = fs::File::create(path).unwrap();
+    file.set_permissions(fs::Permissions::from_mode(0o200))
+        .unwrap();
+}
+
 /// `firsthand status --json`; none before the robot has a bus.
 pub fn status_of(robot: &str) -> Option<Value> {
     let output = output(&["status", "--robot", robot, "--json"]);
@@ -206,7 +222,7 @@ pub fn directory_of(robot: &str) -> TempDir {
 pub fn assert_nothing_left(robot: &str) {
     let user = rustix::process::geteuid().as_raw();
     let prefix = format!("fh{user}_{robot}_");
-    let shared: Vec<_> = std::fs::read_dir("/dev/shm")
+    let shared: Vec<_> = fs::read_dir("/dev/shm")
         .unwrap()
         .flatten()
         .map(|entry| entry.file_name())
@@ -235,10 +251,10 @@ pub fn pids_of(robot: &str) -> Vec<u32> {
 
 fn found(robot: &str) -> impl Iterator<Item = (u32, String)> {
     let mark = mark(robot);
-    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    let entries = fs::read_dir("/proc").unwrap().flatten();
     entries.filter_map(move |entry| {
         let pid = entry.file_name().to_str()?.parse().ok()?;
-        let line = std::fs::read(entry.path().join("cmdline")).ok()?;
+        let line = fs::read(entry.path().join("cmdline")).ok()?;
         let line = String::from_utf8_lossy(&line).replace('\0', " ");
         line.contains(&mark).then_some((pid, line))
     })

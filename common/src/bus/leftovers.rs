@@ -5,6 +5,9 @@
 //! - Files of a node that is not yet one: they would be looked at, and not removed, at each start from then on.
 //!
 //! Both are found by their names: these hold ids of nodes and ports, and an id tells the process that made it.
+//!
+//! And what is missing because of the living: a consumer that leaves a bus which was replaced, as the last one,
+//! removes the file of each service by its name. That is the new one's file.
 
 use std::{
     fs::{self, DirEntry},
@@ -73,6 +76,34 @@ pub(super) fn remove_nodes(nodes: &Path, dead: u32) -> io::Result<()> {
     Ok(())
 }
 
+/// Give each file in `services` a second name in `kept`, which must not be there.
+///
+/// # Errors
+/// When the directory cannot be made, or a file not be linked.
+pub(super) fn keep(services: &Path, kept: &Path) -> io::Result<()> {
+    fs::create_dir(kept)?;
+    for entry in fs::read_dir(services)? {
+        let entry = entry?;
+        fs::hard_link(entry.path(), kept.join(entry.file_name()))?;
+    }
+    Ok(())
+}
+
+/// Give each file in `kept` its name in `services` again, if that is free.
+///
+/// # Errors
+/// When the directory cannot be read, or a file not be linked.
+pub(super) fn put_back(kept: &Path, services: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(kept)? {
+        let entry = entry?;
+        match fs::hard_link(entry.path(), services.join(entry.file_name())) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            other => other?,
+        }
+    }
+    Ok(())
+}
+
 /// Somebody else may have removed it.
 fn gone(removed: io::Result<()>) -> io::Result<()> {
     match removed {
@@ -126,6 +157,25 @@ mod tests {
         remove_nodes(nodes, DEAD).unwrap();
         let monitor = format!("fh0_x80_{}.node_monitor", id(LIVING));
         assert_eq!(left(nodes), [id(LIVING).to_string(), monitor]);
+    }
+
+    #[test]
+    fn a_file_that_was_removed_gets_its_name_back_and_one_that_is_there_is_left() {
+        let directory = tempfile::tempdir().unwrap();
+        let [services, kept] = ["services", "kept"].map(|name| directory.path().join(name));
+        fs::create_dir(&services).unwrap();
+        for name in ["pose.service", "grid.service"] {
+            fs::write(services.join(name), name).unwrap();
+        }
+        keep(&services, &kept).unwrap();
+        fs::remove_file(services.join("pose.service")).unwrap();
+        fs::remove_file(services.join("grid.service")).unwrap();
+        fs::write(services.join("grid.service"), "another").unwrap();
+        put_back(&kept, &services).unwrap();
+        let said = |name| fs::read_to_string(services.join(name)).unwrap();
+        assert_eq!(said("pose.service"), "pose.service");
+        assert_eq!(said("grid.service"), "another");
+        assert_eq!(left(&services).len(), 2);
     }
 
     #[test]

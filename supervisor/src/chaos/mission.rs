@@ -1,7 +1,7 @@
 //! One mission under attack.
 
 use std::{
-    fs,
+    fs::{self, File},
     path::Path,
     process::{Command, Stdio},
     time::{Duration, Instant},
@@ -50,7 +50,7 @@ const MOST_HITS: usize = HOLD_AFTER - 4;
 /// How often the child is looked at while the bus is silent.
 const LOOK: Duration = Duration::from_millis(50);
 
-fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
+fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
     command.args(["--robot", &options.robot.to_string()]);
     command.args(["--seed", &seed.to_string(), "--out"]);
@@ -58,21 +58,25 @@ fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
     for setting in &options.set {
         command.args(["--set", setting]);
     }
-    ours(command)
+    ours(command, out)
 }
 
 /// The run whose supervisor was hit, once more.
-fn resume(directory: &Path) -> Command {
+fn resume(directory: &Path) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
-    ours(command)
+    ours(command, directory)
 }
 
-/// A run that ends with us, and tells us alone.
-fn ours(mut command: Command) -> Command {
+/// A run that ends with us, and tells us alone; what it says on the way, and at last should it fall over, beside its
+/// directory.
+fn ours(mut command: Command, directory: &Path) -> Result<Command, ChaosError> {
+    let said = directory.with_extension("stderr");
+    let said = File::options().create(true).append(true).open(said);
+    let said = said.map_err(system("keep what a mission says"))?;
     command.args(["--parent", &std::process::id().to_string()]);
-    command.stdout(Stdio::piped()).stderr(Stdio::null());
-    command
+    command.stdout(Stdio::piped()).stderr(said);
+    Ok(command)
 }
 
 fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
@@ -83,7 +87,7 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
 /// The same mission left alone: what there is to compare with.
 pub(super) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
     let directory = options.directory.join("calm");
-    let output = command(options, seed, "max", &directory)
+    let output = command(options, seed, "max", &directory)?
         .output()
         .map_err(system("start a mission"))?;
     fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
@@ -106,7 +110,7 @@ pub(super) fn attack(
         .supervisor
         .then(|| robot(options, seed, &place.join("robot")))
         .transpose()?;
-    let mut start = command(options, seed, &options.pace.to_string(), &directory);
+    let mut start = command(options, seed, &options.pace.to_string(), &directory)?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
@@ -119,7 +123,7 @@ pub(super) fn attack(
         if attack.supervisor_hit().is_none() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
-        start = resume(&directory);
+        start = resume(&directory)?;
     };
     let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
     let kills = report.kills() - before;
@@ -214,6 +218,8 @@ enum Again {
 struct Attack {
     entries: Vec<RosterEntry>,
     supervisor: u32,
+    /// It was hit: what it said before, and its stages until they follow it, is no sign of its successor.
+    felled: bool,
     driving: bool,
     wounds: Vec<Wound>,
     /// Who was hit lately.
@@ -245,6 +251,7 @@ impl Attack {
         report: &mut Report,
     ) -> Result<(), ChaosError> {
         let began = Instant::now();
+        self.felled = false;
         self.driving = false;
         self.entries.clear();
         self.held = None;
@@ -308,7 +315,7 @@ impl Attack {
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
             if self.driving {
-                self.heal(SUPERVISOR, AFTER_ANY, true, report);
+                self.heal_supervisor(true, report);
                 // What the dead held is given back once their successors work.
                 if self.wounds.is_empty()
                     && let Some(held) = Possessions::of(self.supervisor)
@@ -341,9 +348,15 @@ impl Attack {
         while let Some(sample) = ears.command.take()? {
             let writer = topics::COMMAND.spec().writer;
             self.heal(writer, *sample.stamp(), false, report);
-            self.heal(SUPERVISOR, AFTER_ANY, false, report);
+            self.heal_supervisor(false, report);
         }
         Ok(())
+    }
+
+    fn heal_supervisor(&mut self, beat: bool, report: &mut Report) {
+        if !self.felled {
+            self.heal(SUPERVISOR, AFTER_ANY, beat, report);
+        }
     }
 
     /// A sign of life of `stage`: a beat that says ready, or a sample of a tick.
@@ -385,6 +398,7 @@ impl Attack {
                     ready: false,
                     again: Again::No,
                 });
+                self.felled = true;
                 self.driving = false;
             }
             return;
