@@ -1,0 +1,172 @@
+use super::*;
+use common::samples::Stamp;
+use std::{f64::consts::FRAC_PI_2, path::Path};
+
+/// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). Sensor 0.2 m ahead.
+fn mapper(extra: &str) -> Mapper {
+    let text = format!(
+        "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = 50 }}\n\
+         sonar = {{ forward_m = 0.2 }}\nmapper = {{ margin_m = 0.15, map_within_m = 2.0 }}\n{extra}"
+    );
+    Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+}
+
+fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
+    PoseSample {
+        stamp: Stamp {
+            tick,
+            ..Stamp::default()
+        },
+        x_m: x,
+        y_m: y,
+        heading_rad: heading,
+        ..PoseSample::default()
+    }
+}
+
+fn reading(status: RangeStatus, range_m: f64) -> RangeSample {
+    RangeSample {
+        range_m,
+        status: status.into(),
+        ..RangeSample::default()
+    }
+}
+
+fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
+    let cells = mapper.frame().cells;
+    let marked = |(index, _): (usize, _)| (index as u32 % cells, index as u32 / cells);
+    let is_sensed = |(_, cell): &(usize, &u8)| **cell == CellState::Sensed as u8;
+    let all = mapper.belief().cells().iter().enumerate();
+    all.filter(is_sensed).map(marked).collect()
+}
+
+#[test]
+fn equation_18_blocks_the_border_and_nothing_else() {
+    let mapper = mapper("");
+    let blocked = mapper.belief().cells().iter().filter(|&&cell| cell != 0);
+    assert_eq!(blocked.count(), 4 * 49);
+}
+
+#[test]
+fn equation_19_by_hand() {
+    // From (0.3, -0.2) facing y: S + offset = 0.5 + 0.2: the hit is at (0.3, 0.5), cell (28, 30).
+    let mut mapper = mapper("");
+    let window = mapper.step(
+        &at(0, 0.3, -0.2, FRAC_PI_2),
+        Some(&reading(RangeStatus::Measured, 0.5)),
+    );
+    let want: Vec<_> = (29..=31)
+        .flat_map(|row| (27..=29).map(move |col| (col, row)))
+        .collect();
+    assert_eq!(sensed(&mapper), want);
+    assert_eq!(
+        (window.col, window.row, window.width, window.height),
+        (27, 29, 3, 3)
+    );
+    assert_eq!(mapper.belief().safety_events(), 1);
+    assert_eq!(mapper.belief().version(), 2);
+}
+
+#[test]
+fn a_reading_that_shows_nothing_leaves_the_map_alone() {
+    let mut mapper = mapper("");
+    for (tick, status) in [
+        RangeStatus::Nothing,
+        RangeStatus::Invalid,
+        RangeStatus::Absent,
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        mapper.step(&at(tick as u64, 0.0, 0.0, 0.0), Some(&reading(status, 0.5)));
+    }
+    mapper.step(&at(8, 0.0, 0.0, 0.0), None);
+    mapper.step(
+        &at(9, 0.0, 0.0, 0.0),
+        Some(&reading(RangeStatus::Measured, 2.1)),
+    );
+    assert_eq!(sensed(&mapper), []);
+    assert_eq!(mapper.belief().version(), 1);
+}
+
+#[test]
+fn four_centimetres_or_nearer_is_mapped_just_ahead() {
+    let mut mapper = mapper("");
+    mapper.step(
+        &at(0, 0.0, 0.0, 0.0),
+        Some(&reading(RangeStatus::AtContact, 0.0)),
+    );
+    assert!(sensed(&mapper).contains(&(27, 25)), "{:?}", sensed(&mapper));
+}
+
+#[test]
+fn the_targets_cell_is_never_marked() {
+    let mut mapper = mapper("");
+    mapper.step(
+        &at(0, 0.8, 0.0, 0.0),
+        Some(&reading(RangeStatus::Measured, 0.5)),
+    );
+    let marked = sensed(&mapper);
+    assert!(
+        marked.contains(&(39, 25)) && !marked.contains(&(40, 25)),
+        "{marked:?}"
+    );
+}
+
+#[test]
+fn the_robots_own_cells_are_never_marked() {
+    let mut mapper = mapper("");
+    mapper.step(
+        &at(0, 0.0, 0.0, 0.0),
+        Some(&reading(RangeStatus::AtContact, 0.0)),
+    );
+    let radius = 0.19;
+    for (col, row) in sensed(&mapper) {
+        let centre = mapper.frame().centre_of(Cell { col, row });
+        assert!(
+            centre.length() > radius,
+            "({col}, {row}) lies under the robot"
+        );
+    }
+}
+
+#[test]
+fn the_border_stays_border_when_a_margin_falls_on_it() {
+    let mut mapper = mapper("");
+    mapper.step(
+        &at(0, 1.9, 0.0, 0.0),
+        Some(&reading(RangeStatus::Measured, 0.2)),
+    );
+    let cells = mapper.belief().cells();
+    assert_eq!(cells[25 * 50 + 49], CellState::Perimeter as u8);
+}
+
+#[test]
+fn a_priori_shapes_are_hazard_from_the_start_and_outlive_a_reset() {
+    let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
+    let known = |mapper: &Mapper| {
+        let cells = mapper.belief().cells();
+        cells
+            .iter()
+            .filter(|&&cell| cell == CellState::Known as u8)
+            .count()
+    };
+    let before = known(&mapper);
+    // A disc of 0.2 + 0.15 m has about pi 3.5^2 = 38 cells.
+    assert!((34..=42).contains(&before), "{before} cells");
+    mapper.step(
+        &at(0, 0.0, 0.0, 0.0),
+        Some(&reading(RangeStatus::Measured, 0.5)),
+    );
+    assert!(mapper.forget(1) && !mapper.forget(1));
+    assert_eq!((known(&mapper), sensed(&mapper).len()), (before, 0));
+}
+
+#[test]
+fn a_tick_given_twice_is_one_safety_event() {
+    let mut mapper = mapper("");
+    let (pose, range) = (at(3, 0.0, 0.0, 0.0), reading(RangeStatus::Measured, 0.5));
+    mapper.step(&pose, Some(&range));
+    assert_eq!(mapper.step(&pose, Some(&range)).area(), 0);
+    assert_eq!(mapper.belief().safety_events(), 1);
+}

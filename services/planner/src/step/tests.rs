@@ -1,0 +1,295 @@
+use super::*;
+use common::grid::Revision;
+use std::path::Path;
+
+fn mission() -> Mission {
+    mission_of(40)
+}
+
+/// A perimeter of 4 m in so many cells a side.
+fn mission_of(cells: u32) -> Mission {
+    let text = format!(
+        "target = [1.5, 0]\nmethod = 'paper'\nperimeter = {{ width_m = 4, cells = {cells} }}"
+    );
+    Mission::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+/// A keyframe with the perimeter, and `hazard` where it says so.
+fn keyframe(version: u64, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
+    keyframe_of(mission().grid_frame(), version, hazard)
+}
+
+fn keyframe_of(
+    frame: GridFrame,
+    version: u64,
+    hazard: impl Fn(DVec2) -> bool,
+) -> (GridHeader, Vec<u8>) {
+    let cells = (0..frame.area() as u32).map(|index| {
+        let cell = common::grid::Cell {
+            col: index % frame.cells,
+            row: index / frame.cells,
+        };
+        u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell)))
+    });
+    let header = GridHeader {
+        part: Revision {
+            frame,
+            window: frame.whole(),
+            version,
+            keyframe: true,
+        }
+        .into(),
+        ..GridHeader::default()
+    };
+    (header, cells.collect())
+}
+
+fn status(sample: &GuidanceSample) -> GuidanceStatus {
+    GuidanceStatus::from_byte(sample.status)
+}
+
+fn at(x: f64, y: f64) -> Pose2 {
+    Pose2 {
+        position: DVec2::new(x, y),
+        heading: 0.0,
+    }
+}
+
+#[test]
+fn before_the_first_keyframe_there_is_no_guidance() {
+    let planner = Planner::new(&mission());
+    assert_eq!(
+        status(&planner.guide(&at(0.0, 0.0))),
+        GuidanceStatus::Waiting
+    );
+    assert!(planner.policy().is_none());
+}
+
+#[test]
+fn an_empty_room_is_crossed_straight() {
+    let mut planner = Planner::new(&mission());
+    let (header, cells) = keyframe(1, |_| false);
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::FullSolve);
+    let guidance = planner.guide(&at(0.0, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert!(
+        guidance.ex > 0.999 && guidance.ey.abs() < 0.03,
+        "{guidance:?}"
+    );
+    assert_eq!(guidance.distance_m, 1.5);
+}
+
+#[test]
+fn a_wall_that_appears_turns_the_guidance_aside() {
+    let mut planner = Planner::new(&mission());
+    let (header, cells) = keyframe(1, |_| false);
+    planner.take_grid(&header, &cells).unwrap();
+    // Open only above y = 1.
+    let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
+    let (header, cells) = keyframe(2, wall);
+    assert_eq!(
+        planner.take_grid(&header, &cells).unwrap(),
+        Work::LocalUpdate
+    );
+    let guidance = planner.guide(&at(0.3, 0.0));
+    assert!(guidance.ey > 0.7, "{guidance:?}");
+    assert_eq!((guidance.full_solves, guidance.local_updates), (1, 1));
+}
+
+#[test]
+fn a_robot_walled_in_is_told_that_the_target_is_unreachable() {
+    let mut planner = Planner::new(&mission());
+    let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
+    let (header, cells) = keyframe(1, ring);
+    planner.take_grid(&header, &cells).unwrap();
+    assert_eq!(
+        status(&planner.guide(&at(0.0, 0.0))),
+        GuidanceStatus::Unreachable
+    );
+}
+
+#[test]
+fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
+    let mut planner = Planner::new(&mission());
+    let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
+    let (header, cells) = keyframe(1, block);
+    planner.take_grid(&header, &cells).unwrap();
+    let guidance = planner.guide(&at(-0.15, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::WayOut);
+    assert!(
+        guidance.ex < -0.9,
+        "the nearest free cell lies to the left: {guidance:?}"
+    );
+}
+
+#[test]
+fn in_the_targets_cell_the_rest_is_straight() {
+    let mut planner = Planner::new(&mission());
+    let (header, cells) = keyframe(1, |_| false);
+    planner.take_grid(&header, &cells).unwrap();
+    let guidance = planner.guide(&at(1.48, 0.02));
+    assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
+}
+
+/// A careful planner in a room where only what `swept` says was looked at.
+fn careful(swept: impl Fn(DVec2) -> bool) -> Planner {
+    let mission = Mission {
+        method: Method::Careful,
+        ..mission()
+    };
+    let (header, mut cells) = keyframe(1, |_| false);
+    let frame = mission.grid_frame();
+    for (index, state) in cells.iter_mut().enumerate() {
+        let cell = common::grid::Cell {
+            col: index as u32 % frame.cells,
+            row: index as u32 / frame.cells,
+        };
+        if *state == CellState::Free as u8 && swept(frame.centre_of(cell)) {
+            *state = CellState::Swept as u8;
+        }
+    }
+    let mut planner = Planner::new(&mission);
+    planner.take_grid(&header, &cells).unwrap();
+    planner
+}
+
+#[test]
+fn a_careful_robot_looks_where_nobody_looked_before_it_goes_there() {
+    // All but what lies to the left of the way ahead.
+    let planner = careful(|at| at.x < 0.2 || at.y < 0.1);
+    let guidance = planner.guide(&at(0.0, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Look);
+    assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
+    assert_eq!(guidance.speed_limit_m_s, 0.0);
+}
+
+#[test]
+fn over_swept_ground_a_careful_robot_goes_at_full_speed() {
+    let guidance = careful(|_| true).guide(&at(0.0, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
+}
+
+#[test]
+fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
+    let swept = |at: DVec2| at.x < 0.2 || at.y < 0.1;
+    let (one, other) = (careful(swept), careful(swept));
+    for heading in [0.0, 0.2, 0.4] {
+        let pose = Pose2 {
+            heading,
+            ..at(0.0, 0.0)
+        };
+        assert_eq!(one.guide(&pose), other.guide(&pose));
+    }
+}
+
+/// A room of 200 x 200 cells with a wall across it and a door in the wall.
+fn large_room(version: u64, door_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
+    let mission = mission_of(200);
+    let hazard = |at: DVec2| {
+        let wall = (at.x - 0.8).abs() < 0.03;
+        let far_door = (1.0..1.4).contains(&at.y);
+        let near_door = !door_closed && at.y.abs() < 0.2;
+        wall && !far_door && !near_door
+    };
+    let (header, cells) = keyframe_of(mission.grid_frame(), version, hazard);
+    (mission, header, cells)
+}
+
+#[test]
+fn a_door_that_closes_halts_the_robot_until_the_full_solve_beside_is_swapped_in() {
+    let (mission, header, cells) = large_room(1, false);
+    let mut planner = Planner::new(&mission);
+    planner.take_grid(&header, &cells).unwrap();
+    assert!(
+        planner.begin_beside().is_none(),
+        "nothing calls for a solve"
+    );
+    let (_, header, cells) = large_room(2, true);
+    planner.take_grid(&header, &cells).unwrap();
+    let job = planner.begin_beside().unwrap();
+    assert!(job.urgent);
+    assert_eq!(
+        status(&planner.guide(&at(0.0, 0.0))),
+        GuidanceStatus::Waiting
+    );
+    assert!(planner.begin_beside().is_none(), "one at a time");
+    let field = Solver::default()
+        .solve(&job.domain, &Cancellation::default())
+        .unwrap();
+    assert!(planner.swap_in(job.number, job.domain, field).unwrap());
+    let guidance = planner.guide(&at(0.5, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert!(guidance.ey > 0.4, "to the other door: {guidance:?}");
+}
+
+#[test]
+fn the_result_of_a_stale_job_changes_nothing() {
+    let (mission, header, cells) = large_room(1, false);
+    let mut planner = Planner::new(&mission);
+    planner.take_grid(&header, &cells).unwrap();
+    let (_, header, closed) = large_room(2, true);
+    planner.take_grid(&header, &closed).unwrap();
+    let job = planner.begin_beside().unwrap();
+    let field = Solver::default()
+        .solve(&job.domain, &Cancellation::default())
+        .unwrap();
+    assert!(!planner.swap_in(job.number + 1, job.domain, field).unwrap());
+    assert_eq!(
+        status(&planner.guide(&at(0.0, 0.0))),
+        GuidanceStatus::Waiting
+    );
+}
+
+#[test]
+fn what_changes_while_a_job_runs_is_in_the_field_it_brings() {
+    let (mission, header, cells) = large_room(1, false);
+    let mut planner = Planner::new(&mission);
+    planner.take_grid(&header, &cells).unwrap();
+    let (_, header, mut cells) = large_room(2, true);
+    planner.take_grid(&header, &cells).unwrap();
+    let job = planner.begin_beside().unwrap();
+    // A post between the robot and the other door.
+    let frame = mission.grid_frame();
+    let post = frame.cell_at(DVec2::new(0.4, 0.6)).unwrap();
+    cells[frame.index(post)] = 1;
+    let mut later = header;
+    later.part.version = 3;
+    planner.take_grid(&later, &cells).unwrap();
+    let field = Solver::default()
+        .solve(&job.domain, &Cancellation::default())
+        .unwrap();
+    planner.swap_in(job.number, job.domain, field).unwrap();
+    assert_eq!(
+        status(&planner.guide(&at(0.4, 0.6))),
+        GuidanceStatus::WayOut
+    );
+}
+
+#[test]
+fn a_missing_version_waits_for_a_keyframe() {
+    let mut planner = Planner::new(&mission());
+    let (mut header, _) = keyframe(5, |_| false);
+    header.part.keyframe = 0;
+    (header.part.width, header.part.height) = (1, 1);
+    assert_eq!(planner.take_grid(&header, &[1]).unwrap(), Work::Missed);
+}
+
+#[test]
+fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
+    let mut planner = Planner::new(&mission());
+    let (header, cells) = keyframe(1, |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
+    planner.take_grid(&header, &cells).unwrap();
+    let (header, _, policy) = planner.policy().unwrap();
+    assert_eq!((policy.len(), header.grid_version), (1600, 1));
+    for (cell, &state) in policy.iter().zip(&cells) {
+        let length = f64::from(cell.ex).hypot(f64::from(cell.ey));
+        let directed = (length - 1.0).abs() < 1e-6;
+        let target = cell.log2_u == 0.0;
+        assert_eq!(
+            directed || target,
+            state == 0,
+            "{cell:?} where the grid says {state}"
+        );
+    }
+}
