@@ -6,6 +6,8 @@
 //! moves on, so an unanswered tick is abandoned for the next.
 
 mod event;
+mod stop;
+mod wire;
 
 use std::time::Duration;
 
@@ -16,15 +18,12 @@ use common::{
         Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, RangeStatus,
         WheelSample,
     },
-    wire::{
-        Command, CustomSensors, Decoder, DecoderTally, Echo, MotorSensors, Report, StandardSensors,
-        SystemSignal,
-    },
+    wire::{Decoder, DecoderTally, Echo, MotorSensors},
 };
 
 use crate::{
-    drive::{Drive, encoded},
-    failsafe::{self, Ages, Decision, Directive, Flags, SLOW_SHARE},
+    drive::Drive,
+    failsafe::{Decision, SLOW_SHARE},
     presence::{Absence, Presence},
     restart::RestartWatch,
     telemetry::Telemetry,
@@ -214,104 +213,6 @@ impl Link {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
 
-    fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.presence.wire(open);
-        // Half a frame of one connection does not go on in the next.
-        self.decoder.forget();
-        if !open {
-            self.lose(now_ns, effects);
-        }
-    }
-
-    fn take_frames(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let (mut motor, mut standard, mut custom) = (None, None, None);
-        let (mut heard, mut ping) = (false, false);
-        while let Some(frame) = self.decoder.next_frame() {
-            match Report::parse(&frame) {
-                Ok(Report::Standard(sensors)) => {
-                    self.sonar = sensors.ultrasonic.get(self.sonar_index).copied();
-                    standard = Some(sensors);
-                }
-                Ok(Report::Custom(sensors)) => custom = Some(sensors),
-                Ok(Report::Motor(sensors)) => motor = Some(sensors),
-                Ok(Report::System(SystemSignal::Ping)) => ping = true,
-                // An ACK only says that the robot is there; so does a frame nobody here needs.
-                Ok(Report::System(SystemSignal::Ack)) | Err(_) => {}
-            }
-            heard = true;
-        }
-        if ping {
-            effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ack))));
-        }
-        if let Some(sensors) = &motor
-            && self.notice_restart(sensors, now_ns)
-        {
-            effects.push(Effect::Restarted);
-            if self.presence.connected() {
-                // It is as it was when it booted.
-                effects.push(Effect::Send(self.drive.greeting()));
-            }
-        }
-        let now = self.clock.at(self.next_tick, now_ns);
-        self.tell_the_rest(
-            motor.as_ref(),
-            standard.as_ref(),
-            custom.as_ref(),
-            now,
-            effects,
-        );
-        if heard && self.presence.heard(now_ns) {
-            effects.push(Effect::Connected(true));
-            effects.push(Effect::Send(self.drive.greeting()));
-            // It may be driving still on the word of an earlier link.
-            self.stop_sent_ns = None;
-            if self.in_ticks() {
-                // Those frames belong to the greeting: how many there are depends on how long the robot
-                // took to start. Ticks begin with the frames that answer the order.
-                if motor.is_some() {
-                    self.due = self.due.saturating_sub(1);
-                }
-                if self.ordered_to_drive() {
-                    self.ping(now_ns, effects);
-                }
-                return;
-            }
-        }
-        if let Some(sensors) = motor {
-            self.begin_tick(&sensors, now_ns, effects);
-        }
-    }
-
-    /// Whether the counts began anew. On a clock of ticks the robot is a simulated one that lives as long as
-    /// its mission, and no time passes that could tell.
-    fn notice_restart(&mut self, sensors: &MotorSensors, now_ns: u64) -> bool {
-        let now = self.clock.at(self.next_tick, now_ns);
-        let counts = sensors.encoders.map(|encoder| encoder.position);
-        !self.in_ticks() && self.restart.step(counts, now)
-    }
-
-    /// What the frames carry besides the tick.
-    fn tell_the_rest(
-        &mut self,
-        motor: Option<&MotorSensors>,
-        standard: Option<&StandardSensors>,
-        custom: Option<&CustomSensors>,
-        now: MissionTime,
-        effects: &mut Vec<Effect>,
-    ) {
-        if let Some(motor) = motor {
-            self.telemetry.take_motor(motor);
-        }
-        if let Some(standard) = standard {
-            let (power, surroundings, changes) = self.telemetry.take_standard(standard, now);
-            effects.push(Effect::Power(power));
-            effects.push(Effect::Surroundings(surroundings));
-            effects.extend(changes.into_iter().map(Effect::Battery));
-        }
-        let infrared = custom.and_then(|custom| self.telemetry.take_custom(custom));
-        effects.extend(infrared.map(Effect::Infrared));
-    }
-
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
         if !self.ordered_to_drive() {
             return;
@@ -426,40 +327,6 @@ impl Link {
         }
     }
 
-    fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.pinged_ns = Some(now_ns);
-        self.presence.pinged(now_ns);
-        if self.ordered_to_drive() {
-            self.due += 1;
-        }
-        effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ping))));
-    }
-
-    fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let silent = self.presence.is_silent(now_ns);
-        // A robot that waits for a command is not lost; at most a datagram is, if it owes us a tick.
-        let owes = self.ordered_to_drive() && self.open.is_none();
-        if silent && !self.in_ticks() {
-            self.lose(now_ns, effects);
-        }
-        let owing = self.in_ticks() && owes && silent && self.presence.connected();
-        if self.presence.wants_ping(now_ns) {
-            self.ping(now_ns, effects);
-        } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
-            // What was due is lost.
-            self.due = 0;
-            self.ping(now_ns, effects);
-        }
-    }
-
-    fn lose(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        if !self.presence.lose(now_ns) {
-            return;
-        }
-        self.restart.lost();
-        effects.push(Effect::Connected(false));
-    }
-
     fn repeat_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if !self.in_ticks() {
             return;
@@ -493,73 +360,6 @@ impl Link {
         }
         effects.push(Effect::Send(self.drive.velocity(repeat.counts, left)));
         self.tally.repeated_commands += 1;
-    }
-
-    fn decide(&self, now_ns: u64) -> Decision {
-        let directive = |word: Word| Directive {
-            order: word.order,
-            reason: word.reason,
-            age: Duration::from_nanos(now_ns.saturating_sub(word.heard_ns)),
-        };
-        let flags = Flags {
-            directive: self.word.map(directive),
-            connected: self.presence.connected(),
-            command: self
-                .newest_command
-                .map(|command| self.ages(&command, now_ns)),
-            battery: self.telemetry.charge(),
-        };
-        failsafe::decide(&flags, self.drive.limit())
-    }
-
-    fn ages(&self, command: &CommandSample, now_ns: u64) -> Ages {
-        let stamp = command.stamp.time();
-        let now = match self.clock {
-            // On a clock of ticks no time passes until the command has come.
-            MissionClock::Ticks { .. } => stamp,
-            MissionClock::Wall { .. } => self.clock.at(self.next_tick, now_ns),
-        };
-        // A stamp from the future would never grow old.
-        let age = |then: MissionTime| {
-            if then <= now {
-                now.since(then)
-            } else {
-                Duration::MAX
-            }
-        };
-        Ages {
-            command: age(stamp),
-            pose: age(MissionTime(command.pose_ns)),
-            guidance: age(MissionTime(command.guidance_ns)),
-        }
-    }
-
-    /// Stop the robot when it must not move. On a clock of ticks it waits for commands, and to let none pass
-    /// stops its time, too: a run that was held goes on as if it had not been.
-    fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let now = self.decide(now_ns);
-        let before = std::mem::replace(&mut self.decision, now);
-        if now.stops() {
-            self.repeat = None;
-            if !self.in_ticks() {
-                self.tell_to_stand(!before.stops(), now_ns, effects);
-            }
-        }
-        if now != before {
-            effects.push(Effect::Decided { before, now });
-        }
-    }
-
-    /// Several times when the stop is new, then again now and then.
-    fn tell_to_stand(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
-        if new {
-            effects.extend(self.farewell().into_iter().map(Effect::Send));
-        } else if self.presence.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
-            effects.push(Effect::Send(self.drive.stop()));
-        } else {
-            return;
-        }
-        self.stop_sent_ns = Some(now_ns);
     }
 }
 

@@ -1,7 +1,9 @@
 use super::*;
 use common::{
     samples::Stamp,
-    wire::{Addressing, Mode, Parameter, StandardSensors},
+    wire::{
+        Addressing, Command, CustomSensors, Mode, Parameter, Report, StandardSensors, SystemSignal,
+    },
 };
 use std::path::Path;
 

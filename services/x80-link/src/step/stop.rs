@@ -1,0 +1,80 @@
+//! Whether the robot may move, and how it is made to stand.
+
+use std::time::Duration;
+
+use common::{
+    clock::{MissionClock, MissionTime},
+    samples::CommandSample,
+};
+
+use super::{Effect, Link, STOP_AGAIN, Word, passed};
+use crate::failsafe::{self, Ages, Decision, Directive, Flags};
+
+impl Link {
+    pub(super) fn decide(&self, now_ns: u64) -> Decision {
+        let directive = |word: Word| Directive {
+            order: word.order,
+            reason: word.reason,
+            age: Duration::from_nanos(now_ns.saturating_sub(word.heard_ns)),
+        };
+        let flags = Flags {
+            directive: self.word.map(directive),
+            connected: self.presence.connected(),
+            command: self
+                .newest_command
+                .map(|command| self.ages(&command, now_ns)),
+            battery: self.telemetry.charge(),
+        };
+        failsafe::decide(&flags, self.drive.limit())
+    }
+
+    pub(super) fn ages(&self, command: &CommandSample, now_ns: u64) -> Ages {
+        let stamp = command.stamp.time();
+        let now = match self.clock {
+            // On a clock of ticks no time passes until the command has come.
+            MissionClock::Ticks { .. } => stamp,
+            MissionClock::Wall { .. } => self.clock.at(self.next_tick, now_ns),
+        };
+        // A stamp from the future would never grow old.
+        let age = |then: MissionTime| {
+            if then <= now {
+                now.since(then)
+            } else {
+                Duration::MAX
+            }
+        };
+        Ages {
+            command: age(stamp),
+            pose: age(MissionTime(command.pose_ns)),
+            guidance: age(MissionTime(command.guidance_ns)),
+        }
+    }
+
+    /// Stop the robot when it must not move. On a clock of ticks it waits for commands, and to let none pass
+    /// stops its time, too: a run that was held goes on as if it had not been.
+    pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+        let now = self.decide(now_ns);
+        let before = std::mem::replace(&mut self.decision, now);
+        if now.stops() {
+            self.repeat = None;
+            if !self.in_ticks() {
+                self.tell_to_stand(!before.stops(), now_ns, effects);
+            }
+        }
+        if now != before {
+            effects.push(Effect::Decided { before, now });
+        }
+    }
+
+    /// Several times when the stop is new, then again now and then.
+    pub(super) fn tell_to_stand(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
+        if new {
+            effects.extend(self.farewell().into_iter().map(Effect::Send));
+        } else if self.presence.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
+            effects.push(Effect::Send(self.drive.stop()));
+        } else {
+            return;
+        }
+        self.stop_sent_ns = Some(now_ns);
+    }
+}
