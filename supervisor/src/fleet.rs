@@ -1,5 +1,7 @@
 //! The stages of a run: their processes, each under its own policy.
 
+mod roll;
+
 use std::{
     fs::File,
     io,
@@ -12,13 +14,13 @@ use std::{
 use common::{
     bus::Bus,
     run,
-    samples::{HealthSample, HealthState, RosterEntry, StageState, name, name_str},
+    samples::{HealthSample, HealthState, name_str},
 };
 use rustix::process::Signal;
 use thiserror::Error;
 
 use crate::{
-    death::{self, Cause, Death, Next},
+    death::{Cause, Death},
     flow::Flow,
     policy::{Action, Event, Now, Phase, Policy},
     process::{Ended, Process, firsthand},
@@ -135,46 +137,6 @@ impl Fleet {
         deadlines.min().map(|deadline| deadline.saturating_sub(now))
     }
 
-    /// Whether every stage beats as ready.
-    pub(crate) fn all_running(&self) -> bool {
-        let running = |member: &Member| matches!(member.policy.phase(), Phase::Running { .. });
-        self.members.iter().all(running)
-    }
-
-    /// Whether one is on its way there, or will be in a moment.
-    pub(crate) fn any_starting(&self) -> bool {
-        let starting = |member: &Member| {
-            matches!(
-                member.policy.phase(),
-                Phase::Starting { .. } | Phase::BackingOff { .. }
-            )
-        };
-        self.members.iter().any(starting)
-    }
-
-    /// How many do, and how many there are.
-    pub(crate) fn alive(&self) -> (usize, usize) {
-        let running = |member: &&Member| matches!(member.policy.phase(), Phase::Running { .. });
-        (
-            self.members.iter().filter(running).count(),
-            self.members.len(),
-        )
-    }
-
-    /// Times each stage was started again.
-    pub(crate) fn restarts(&self) -> impl Iterator<Item = (&'static str, u32)> + '_ {
-        self.members
-            .iter()
-            .map(|member| (member.stage.name, member.generation.saturating_sub(1)))
-    }
-
-    /// The stages that do not.
-    pub(crate) fn missing(&self) -> Vec<&'static str> {
-        let missing = |member: &&Member| !matches!(member.policy.phase(), Phase::Running { .. });
-        let members = self.members.iter().filter(missing);
-        members.map(|member| member.stage.name).collect()
-    }
-
     /// A guest that was not known beats: from now on it is watched like a child.
     fn meet(&mut self, health: &HealthSample) -> bool {
         let now = self.now();
@@ -208,7 +170,7 @@ impl Fleet {
             return false;
         };
         member.beat = Some(now);
-        let was_running = matches!(member.policy.phase(), Phase::Running { .. });
+        let was_running = member.is_running();
         let event = match HealthState::from_byte(health.state) {
             HealthState::Ready => Event::BeatReady,
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
@@ -301,54 +263,6 @@ impl Fleet {
             stage: member.stage.name,
             source,
         })
-    }
-
-    /// What is known of the life that has just ended, besides what follows.
-    fn record(&self, index: usize, cause: Cause) -> Death {
-        let member = &self.members[index];
-        let now = self.now();
-        let age = |then: Now| now.saturating_sub(then).as_secs_f64();
-        let log = log_file(&self.directory, member.stage.name);
-        Death {
-            stage: member.stage.name,
-            pid: member.process.as_ref().map_or(0, Process::id),
-            generation: member.generation,
-            cause,
-            hung: member.hung.is_some(),
-            noticed_after_s: member
-                .hung
-                .zip(member.beat)
-                .map(|(seen, beat)| seen.saturating_sub(beat).as_secs_f64()),
-            beat_age_s: member.beat.map(age),
-            uptime_s: age(member.started),
-            deaths_in_window: 0,
-            next: Next::Nothing,
-            last_words: death::last_words(&log, member.log_began),
-        }
-    }
-
-    /// What the policy has in mind for a stage that has just died.
-    fn next(&self, index: usize) -> Next {
-        match self.members[index].policy.phase() {
-            Phase::BackingOff { until } => Next::StartLater {
-                after_s: until.saturating_sub(self.now()).as_secs_f64(),
-            },
-            Phase::Held => Next::Hold,
-            Phase::Down | Phase::Stopping { .. } => Next::Nothing,
-            Phase::Starting { .. }
-            | Phase::Running { .. }
-            | Phase::Late { .. }
-            | Phase::Replaced { .. } => Next::StartNow,
-        }
-    }
-
-    /// The stages that only an operator's word starts again.
-    pub(crate) fn held(&self) -> impl Iterator<Item = &'static str> + '_ {
-        let held = |member: &&Member| member.policy.phase() == Phase::Held;
-        self.members
-            .iter()
-            .filter(held)
-            .map(|member| member.stage.name)
     }
 
     /// Whether, since this was last asked, it was seen that the bus must be made anew.
@@ -456,25 +370,6 @@ impl Fleet {
         }
         Ok(())
     }
-
-    /// The rows of the `roster` topic.
-    pub(crate) fn roster(&self) -> Vec<RosterEntry> {
-        let now = self.now();
-        let age = |then: Option<Now>| {
-            then.map_or(u64::MAX, |then| now.saturating_sub(then).as_nanos() as u64)
-        };
-        let entry = |member: &Member| RosterEntry {
-            stage: name(member.stage.name),
-            pid: member.process.as_ref().map_or(0, Process::id),
-            generation: member.generation,
-            state: state(member.policy.phase()).into(),
-            restarts: member.generation.saturating_sub(1),
-            uptime_ns: age(member.process.as_ref().map(|_| member.started)),
-            beat_age_ns: age(member.beat),
-            output_age_ns: age(member.output),
-        };
-        self.members.iter().map(entry).collect()
-    }
 }
 
 /// Should a supervisor end without its orderly stop, the stages still go in reverse order, each asked
@@ -486,19 +381,6 @@ impl Drop for Fleet {
                 process.end(GOODBYE);
             }
         }
-    }
-}
-
-const fn state(phase: Phase) -> StageState {
-    match phase {
-        Phase::Down => StageState::Down,
-        Phase::BackingOff { .. } => StageState::BackingOff,
-        Phase::Starting { .. } => StageState::Starting,
-        Phase::Running { .. } => StageState::Running,
-        Phase::Late { .. } | Phase::Replaced { .. } | Phase::Stopping { .. } => {
-            StageState::Stopping
-        }
-        Phase::Held => StageState::Held,
     }
 }
 
