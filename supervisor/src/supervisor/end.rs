@@ -46,8 +46,7 @@ impl Supervisor<'_> {
     /// Make the bus anew under all stages: what the middleware keeps of it lets one of them begin no life. The mission
     /// goes on from what the stages have kept.
     ///
-    /// A consumer of the old bus hears nothing more, and one that leaves it as its topic's last takes the topic's file
-    /// of the new one for its own: then that topic takes in nobody until the bus is made anew again.
+    /// A consumer of the old bus hears nothing more: [`Bus::is_replaced`](common::bus::Bus::is_replaced) tells it.
     pub(super) fn renew(mut self, held: &mut Held) -> Result<Self, SupervisorError> {
         tracing::error!("the bus is made anew; consumers must join it again");
         (self.order, self.reason) = (Order::Hold, HoldReason::Starting);
