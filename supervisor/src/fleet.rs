@@ -77,11 +77,11 @@ pub(crate) enum Starter {
 }
 
 impl Fleet {
-    /// None running yet; they will live in the run directory.
-    pub(crate) fn new(directory: PathBuf, starter: Starter) -> Self {
-        let member = |stage| Member {
+    /// None running yet; they will live in the run directory, with a map of so many `cells`.
+    pub(crate) fn new(directory: PathBuf, starter: Starter, cells: usize) -> Self {
+        let member = |stage: &'static Stage| Member {
             stage,
-            policy: Policy::new(stage),
+            policy: Policy::new(stage.deadlines_on(cells)),
             process: None,
             generation: 0,
             started: Now::ZERO,
@@ -92,7 +92,7 @@ impl Fleet {
         };
         Self {
             members: start_order().into_iter().map(member).collect(),
-            flow: Flow::new(),
+            flow: Flow::new(cells),
             directory,
             clock: Instant::now(),
             starter,

@@ -16,6 +16,8 @@ pub(crate) struct Flow(Vec<Account>);
 /// What one stage has said, and owes.
 struct Account {
     stage: &'static Stage,
+    /// How long it may owe an answer.
+    patience: Now,
     /// The stages whose output of a tick it answers.
     reads: Vec<&'static str>,
     /// The newest tick it has spoken of.
@@ -27,10 +29,11 @@ struct Account {
 }
 
 impl Flow {
-    /// Nothing said yet.
-    pub(crate) fn new() -> Self {
+    /// Nothing said yet; on a map of so many `cells`.
+    pub(crate) fn new(cells: usize) -> Self {
         let account = |stage: &'static Stage| Account {
             stage,
+            patience: stage.deadlines_on(cells).answers,
             reads: stage
                 .inputs
                 .iter()
@@ -83,7 +86,7 @@ impl Flow {
         }
         let stale = |account: &&Account| {
             let waited = account.owes.map(|since| now.saturating_sub(since));
-            waited.is_some_and(|waited| waited >= account.stage.answers)
+            waited.is_some_and(|waited| waited >= account.patience)
         };
         self.0.iter().find(stale).map(|account| account.stage.name)
     }
@@ -102,7 +105,7 @@ mod tests {
     const MINUTE: Duration = Duration::from_secs(60);
 
     fn said(outputs: &[(&str, u64)]) -> Flow {
-        let mut flow = Flow::new();
+        let mut flow = Flow::new(0);
         for &(stage, tick) in outputs {
             flow.on_output(stage, tick);
         }
@@ -148,24 +151,24 @@ mod tests {
             let mut flow = said(&[("x80-link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
             flow.on_output("planner", 1);
             flow.on_output("controller", 1);
-            for reads in Flow::new().find(stage.name).unwrap().reads.clone() {
+            for reads in Flow::new(0).find(stage.name).unwrap().reads.clone() {
                 flow.on_output(reads, 2);
             }
             assert_eq!(flow.stale(MINUTE), None, "{}", stage.name);
-            let early = MINUTE + stage.answers - Duration::from_millis(1);
+            let early = MINUTE + stage.deadlines.answers - Duration::from_millis(1);
             assert_ne!(flow.stale(early), Some(stage.name));
             let all_others_answered = TABLE.iter().filter(|other| other.name != stage.name);
             for other in all_others_answered {
                 flow.on_output(other.name, 2);
             }
-            let late = MINUTE + stage.answers;
+            let late = MINUTE + stage.deadlines.answers;
             assert_eq!(flow.stale(late), Some(stage.name));
         }
     }
 
     #[test]
     fn a_stage_that_lags_but_answers_is_left_alone() {
-        let mut flow = Flow::new();
+        let mut flow = Flow::new(0);
         for tick in 1..100 {
             for stage in &TABLE {
                 let ahead = u64::from(stage.name == "x80-link");

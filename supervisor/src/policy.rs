@@ -16,7 +16,7 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use crate::stages::Stage;
+use crate::stages::Deadlines;
 
 /// A stage that was ready for so long was well: its next death is a first one.
 const WELL_AFTER: Duration = Duration::from_millis(500);
@@ -149,8 +149,7 @@ impl Lived {
 /// The policy for one stage.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Policy {
-    startup: Duration,
-    heartbeat: Duration,
+    deadlines: Deadlines,
     phase: Phase,
     /// Deaths in a row, none of a life long enough to be well.
     deaths: usize,
@@ -161,11 +160,10 @@ pub(crate) struct Policy {
 }
 
 impl Policy {
-    /// For a stage that has never run.
-    pub(crate) fn new(stage: &Stage) -> Self {
+    /// For a stage that has never run and may be silent for so long.
+    pub(crate) fn new(deadlines: Deadlines) -> Self {
         Self {
-            startup: stage.startup,
-            heartbeat: stage.heartbeat,
+            deadlines,
             phase: Phase::Down,
             deaths: 0,
             recent: VecDeque::with_capacity(HOLD_AFTER),
@@ -188,8 +186,8 @@ impl Policy {
         match self.phase {
             Phase::Down | Phase::Held => None,
             Phase::BackingOff { until } => Some(until),
-            Phase::Starting { since } => Some(since + self.startup),
-            Phase::Running { beat, .. } => Some(beat + self.heartbeat),
+            Phase::Starting { since } => Some(since + self.deadlines.startup),
+            Phase::Running { beat, .. } => Some(beat + self.deadlines.heartbeat),
             Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } => {
                 Some(kill)
             }

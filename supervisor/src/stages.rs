@@ -22,16 +22,37 @@ pub(crate) struct Stage {
     pub(crate) feedback: &'static [&'static dyn AnyTopic],
     /// Topics it alone writes.
     pub(crate) outputs: &'static [&'static dyn AnyTopic],
+    /// How long it may be silent, whatever the map.
+    pub(crate) deadlines: Deadlines,
+    /// What each deadline grows by for a million cells of the map.
+    pub(crate) million_cells: Duration,
+    /// What the robot does while the stage is down.
+    pub(crate) while_down: &'static str,
+    /// Its process.
+    pub(crate) live: fn(&Start) -> Result<(), StageError>,
+}
+
+/// How long a stage may be silent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Deadlines {
     /// From its start to its first beat as ready.
     pub(crate) startup: Duration,
     /// From beat to beat; they come every 20 ms.
     pub(crate) heartbeat: Duration,
     /// From a tick on its inputs to its output of that tick, or of a later one.
     pub(crate) answers: Duration,
-    /// What the robot does while the stage is down.
-    pub(crate) while_down: &'static str,
-    /// Its process.
-    pub(crate) live: fn(&Start) -> Result<(), StageError>,
+}
+
+impl Stage {
+    /// Its deadlines on a map of so many `cells`.
+    pub(crate) fn deadlines_on(&self, cells: usize) -> Deadlines {
+        let more = self.million_cells.mul_f64(cells as f64 * 1e-6);
+        Deadlines {
+            startup: self.deadlines.startup + more,
+            heartbeat: self.deadlines.heartbeat + more,
+            answers: self.deadlines.answers + more,
+        }
+    }
 }
 
 /// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded
@@ -40,12 +61,24 @@ const STARTUP: Duration = Duration::from_secs(3);
 /// Twenty-five beats: a loaded machine with more stages than cores delays one by ten times 20 ms now and
 /// then. The robot does not wait for it: the link stops it when the command is stale.
 const HEARTBEAT: Duration = Duration::from_millis(500);
-/// The planner beats between solves, and the costliest solve of the largest map takes its time.
-const PLANNER_HEARTBEAT: Duration = Duration::from_secs(2);
 /// An answer takes a hundredth of that where it takes long.
 const ANSWERS: Duration = Duration::from_secs(1);
-/// The planner may owe some answers while it solves: it is rather seen to hang.
-const PLANNER_ANSWERS: Duration = Duration::from_secs(4);
+/// What most stages keep to.
+const DEADLINES: Deadlines = Deadlines {
+    startup: STARTUP,
+    heartbeat: HEARTBEAT,
+    answers: ANSWERS,
+};
+/// The planner beats between solves, and may owe some answers while it solves: it is rather seen to hang.
+const PLANNER_DEADLINES: Deadlines = Deadlines {
+    startup: STARTUP,
+    heartbeat: Duration::from_secs(2),
+    answers: Duration::from_secs(4),
+};
+/// Reading a map back, or telling it whole, took a tenth of that a million cells.
+const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
+/// A turn with a full solve, the field told whole and what came meanwhile took up to a third of that a million cells.
+const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
 /// What a stage's process ends with when the bus would not have it.
 pub(crate) const REFUSED: u8 = 8;
@@ -57,9 +90,8 @@ pub(crate) static TABLE: [Stage; 5] = [
         inputs: &[&DIRECTIVE],
         feedback: &[&COMMAND],
         outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
-        startup: STARTUP,
-        heartbeat: HEARTBEAT,
-        answers: ANSWERS,
+        deadlines: DEADLINES,
+        million_cells: Duration::ZERO,
         while_down: "stands when its timed command ends",
         live: live::<x80_link::shell::Shell>,
     },
@@ -68,9 +100,8 @@ pub(crate) static TABLE: [Stage; 5] = [
         inputs: &[&WHEELS],
         feedback: &[],
         outputs: &[&POSE],
-        startup: STARTUP,
-        heartbeat: HEARTBEAT,
-        answers: ANSWERS,
+        deadlines: DEADLINES,
+        million_cells: Duration::ZERO,
         while_down: "stopped by the link when the command is stale",
         live: live::<dead_reckoning::shell::Shell>,
     },
@@ -79,9 +110,8 @@ pub(crate) static TABLE: [Stage; 5] = [
         inputs: &[&RANGE, &POSE, &DIRECTIVE],
         feedback: &[],
         outputs: &[&GRID],
-        startup: STARTUP,
-        heartbeat: HEARTBEAT,
-        answers: ANSWERS,
+        deadlines: DEADLINES,
+        million_cells: MAPPER_MILLION_CELLS,
         while_down: "stopped by the link when the command is stale",
         live: live::<mapper::shell::Shell>,
     },
@@ -90,9 +120,8 @@ pub(crate) static TABLE: [Stage; 5] = [
         inputs: &[&POSE, &GRID],
         feedback: &[],
         outputs: &[&GUIDANCE, &FIELD],
-        startup: STARTUP,
-        heartbeat: PLANNER_HEARTBEAT,
-        answers: PLANNER_ANSWERS,
+        deadlines: PLANNER_DEADLINES,
+        million_cells: PLANNER_MILLION_CELLS,
         while_down: "stopped by the link when the command is stale",
         live: live::<planner::shell::Shell>,
     },
@@ -101,9 +130,8 @@ pub(crate) static TABLE: [Stage; 5] = [
         inputs: &[&POSE, &GUIDANCE],
         feedback: &[],
         outputs: &[&COMMAND],
-        startup: STARTUP,
-        heartbeat: HEARTBEAT,
-        answers: ANSWERS,
+        deadlines: DEADLINES,
+        million_cells: Duration::ZERO,
         while_down: "stopped by the link when the command is stale",
         live: live::<controller::shell::Shell>,
     },

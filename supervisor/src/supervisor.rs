@@ -209,7 +209,11 @@ impl<'a> Supervisor<'a> {
         let ends = Ends::open(bus, &mut waiter)?;
         let mut supervisor = Self {
             options,
-            fleet: Fleet::new(directory.clone(), options.starter),
+            fleet: Fleet::new(
+                directory.clone(),
+                options.starter,
+                mission.grid_frame().area(),
+            ),
             simulator,
             observer,
             waiter,

@@ -84,7 +84,7 @@ pub(crate) fn topic_table() -> String {
 /// The stages as a Markdown table.
 pub(crate) fn stage_table() -> String {
     let mut table = String::from(
-        "| stage | reads | writes | ready within | beats within | answers within | while it is down the robot |\n|---|---|---|---|---|---|---|\n",
+        "| stage | reads | writes | ready within | beats within | answers within | each, for a million cells more | while it is down the robot |\n|---|---|---|---|---|---|---|---|\n",
     );
     for stage in &stages::TABLE {
         let list = |topics: &[&dyn AnyTopic]| {
@@ -98,13 +98,14 @@ pub(crate) fn stage_table() -> String {
             stage.inputs.iter().chain(stage.feedback).copied().collect();
         let _ = writeln!(
             table,
-            "| `{}` | {} | {} | {} ms | {} ms | {} ms | {} |",
+            "| `{}` | {} | {} | {} ms | {} ms | {} ms | {} ms | {} |",
             stage.name,
             list(&reads),
             list(stage.outputs),
-            stage.startup.as_millis(),
-            stage.heartbeat.as_millis(),
-            stage.answers.as_millis(),
+            stage.deadlines.startup.as_millis(),
+            stage.deadlines.heartbeat.as_millis(),
+            stage.deadlines.answers.as_millis(),
+            stage.million_cells.as_millis(),
             stage.while_down
         );
     }

@@ -14,7 +14,7 @@ const fn ms(count: u64) -> Duration {
 
 /// Of the link: beats due every 500 ms, ready due after 3 s.
 fn running() -> Policy {
-    let mut policy = Policy::new(&TABLE[0]);
+    let mut policy = Policy::new(TABLE[0].deadlines);
     assert_eq!(policy.step(Event::Start, ms(0)), Some(Action::Start));
     assert_eq!(policy.step(Event::BeatStarting, ms(5)), None);
     assert_eq!(policy.step(Event::BeatReady, ms(10)), None);
@@ -72,7 +72,7 @@ fn a_stage_that_cannot_live_is_held_within_ten_seconds() {
 
 #[test]
 fn a_stage_that_never_becomes_ready_is_held_after_twelve_starts() {
-    let mut policy = Policy::new(&TABLE[0]);
+    let mut policy = Policy::new(TABLE[0].deadlines);
     policy.step(Event::Start, ms(0));
     let mut starts = 1;
     for _ in 0..100 {
@@ -154,7 +154,7 @@ fn a_stage_that_beats_without_output_is_aborted() {
 
 #[test]
 fn a_stage_that_never_becomes_ready_is_aborted() {
-    let mut policy = Policy::new(&TABLE[0]);
+    let mut policy = Policy::new(TABLE[0].deadlines);
     policy.step(Event::Start, ms(0));
     policy.step(Event::BeatStarting, ms(2999));
     assert_eq!(policy.step(Event::Time, ms(2999)), None);
@@ -228,7 +228,7 @@ fn a_replaced_stage_that_stays_is_killed() {
 
 #[test]
 fn a_stage_that_got_no_process_is_tried_again_but_not_at_once() {
-    let mut policy = Policy::new(&TABLE[0]);
+    let mut policy = Policy::new(TABLE[0].deadlines);
     policy.step(Event::Start, ms(0));
     assert_eq!(policy.step(Event::StartFailed, ms(0)), None);
     assert_eq!(policy.deadline(), Some(ms(2)));
@@ -292,7 +292,7 @@ const EVENTS: [Event; 10] = [
 impl Account {
     fn new() -> Self {
         Self {
-            policy: Policy::new(&TABLE[0]),
+            policy: Policy::new(TABLE[0].deadlines),
             now: ms(0),
             life: None,
             wanted: false,
