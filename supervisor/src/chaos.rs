@@ -2,8 +2,11 @@
 //!
 //! - [`victim`]: who, how and when.
 //! - [`mission`]: one mission under attack.
+//! - [`attack`], [`ears`]: the attacker, and what it hears.
 //! - [`report`]: the sum of them.
 
+mod attack;
+mod ears;
 mod mission;
 mod report;
 mod victim;

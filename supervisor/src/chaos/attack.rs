@@ -1,0 +1,335 @@
+//! The attacker: hears who lives, and hits.
+
+use std::time::{Duration, Instant};
+
+use common::{
+    samples::{
+        HealthState, Order, PoseSample, RosterEntry, StageState, Stamp, Stamped as _, name_str,
+    },
+    topics::{self, AnyTopic as _, SUPERVISOR},
+    truth::TruthTick,
+};
+use rustix::process::{Pid, kill_process};
+
+use super::{
+    ChaosError, Options,
+    ears::Ears,
+    mission::PATIENCE,
+    report::{Possessions, Report},
+    system,
+    victim::{Chance, Kind},
+};
+use crate::{
+    policy::{HOLD_AFTER, HOLD_WINDOW},
+    process::Process,
+    simulator::Simulator,
+    stages,
+};
+
+/// What a supervisor says is always of its newest life: it has the bus made anew.
+const AFTER_ANY: Stamp = Stamp {
+    tick: 0,
+    stamp_ns: 0,
+    generation: u32::MAX,
+    sequence: 0,
+};
+/// A stage that dies too often is held until an operator releases it, and here there is none: so often none is hit.
+/// A hit may bring another in the start-up, and one of each may die of an earlier one.
+const MOST_HITS: usize = HOLD_AFTER - 4;
+/// How often the child is looked at while the bus is silent.
+pub(super) const LOOK: Duration = Duration::from_millis(50);
+
+/// A stage that was hit, until its successor works.
+struct Wound {
+    stage: &'static str,
+    kind: Kind,
+    generation: u32,
+    at: Instant,
+    ready: bool,
+    again: Again,
+}
+
+/// Whether the successor is to be hit in its first milliseconds.
+#[derive(Clone, Copy)]
+enum Again {
+    /// It may live.
+    No,
+    /// So long after its start.
+    After(Duration),
+    /// It has started: then.
+    At {
+        when: Instant,
+        process: u32,
+        generation: u32,
+    },
+}
+
+/// What the attacker knows of a mission.
+#[derive(Default)]
+pub(super) struct Attack {
+    entries: Vec<RosterEntry>,
+    supervisor: u32,
+    /// It was hit: what it said before, and its stages until they follow it, is no sign of its successor.
+    felled: bool,
+    driving: bool,
+    wounds: Vec<Wound>,
+    /// Who was hit lately.
+    hits: Vec<(&'static str, Instant)>,
+    pose: Option<PoseSample>,
+    /// Of the supervisor that lives: when its robot began to drive, and when it was last looked at.
+    held: Option<[Possessions; 2]>,
+}
+
+impl Attack {
+    pub(super) fn until_the_end(
+        &mut self,
+        options: &Options,
+        child: &mut Process,
+        mut robot: Option<&mut Simulator>,
+        chance: &mut Chance,
+        report: &mut Report,
+    ) -> Result<(), ChaosError> {
+        let began = Instant::now();
+        self.felled = false;
+        self.driving = false;
+        self.entries.clear();
+        self.held = None;
+        // The stages of a supervisor that was hit go with it.
+        self.wounds.retain(|wound| wound.stage == SUPERVISOR);
+        let mut ears = loop {
+            if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= PATIENCE {
+                return Ok(());
+            }
+            match Ears::join(options, child.id()) {
+                Ok(Some(ears)) => break ears,
+                // Not up yet.
+                Ok(None) | Err(_) => std::thread::park_timeout(LOOK),
+            }
+        };
+        let mut next = Instant::now() + chance.pause();
+        while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < PATIENCE {
+            // A hit that is overdue waits for the robot to drive, which is heard.
+            let due = next.checked_duration_since(Instant::now());
+            let patience = due.unwrap_or(LOOK).min(self.time_to_successor());
+            ears.waiter.wait(patience.min(LOOK))?;
+            if let Some(robot) = &mut robot {
+                robot.tend()?;
+            }
+            self.listen(&mut ears, report)?;
+            self.await_successors();
+            self.hit_successors(report);
+            let enough = report.kills() >= options.kills;
+            if Instant::now() >= next && self.driving && !enough {
+                next = Instant::now() + chance.pause();
+                self.hit(options, chance, report);
+            }
+        }
+        if let Some([first, last]) = self.held {
+            report.held(first, last);
+        }
+        Ok(())
+    }
+
+    /// When the supervisor was hit, unless its successor works already.
+    pub(super) fn supervisor_hit(&self) -> Option<Instant> {
+        let mut wounds = self.wounds.iter();
+        wounds
+            .find(|wound| wound.stage == SUPERVISOR)
+            .map(|wound| wound.at)
+    }
+
+    /// How far the last pose heard of was from the truth of its tick, metres. Wheel counts are what both know.
+    pub(super) fn pose_error(&self, truth: &[TruthTick]) -> Option<f64> {
+        let pose = self.pose?;
+        let counts = (pose.left_counts, pose.right_counts);
+        let same = |tick: &&TruthTick| (tick.left_counts, tick.right_counts) == counts;
+        let tick = truth.iter().rev().find(same)?;
+        Some((pose.x_m - tick.x).hypot(pose.y_m - tick.y))
+    }
+
+    /// Take what came: who runs, who beats, who speaks.
+    fn listen(&mut self, ears: &mut Ears, report: &mut Report) -> Result<(), ChaosError> {
+        while let Some(entries) = ears.roster.take()? {
+            self.driving = Order::from_byte(entries.header().order) == Order::Drive;
+            self.supervisor = entries.header().supervisor_pid;
+            self.entries = entries.to_vec();
+            if self.driving {
+                self.heal_supervisor(true, report);
+                // What the dead held is given back once their successors work.
+                if self.wounds.is_empty()
+                    && let Some(held) = Possessions::of(self.supervisor)
+                {
+                    let [first, _] = self.held.unwrap_or([held; 2]);
+                    self.held = Some([first, held]);
+                }
+            }
+        }
+        while let Some(health) = ears.health.take()? {
+            if HealthState::from_byte(health.state) == HealthState::Ready {
+                self.heal(name_str(&health.stage), health.stamp, true, report);
+            }
+        }
+        while let Some(sample) = ears.wheels.take()? {
+            self.heal(topics::WHEELS.spec().writer, *sample.stamp(), false, report);
+        }
+        while let Some(sample) = ears.pose.take()? {
+            self.heal(topics::POSE.spec().writer, *sample.stamp(), false, report);
+            self.pose = Some(sample);
+        }
+        while let Some(sample) = ears.grid.take()? {
+            let stamp = *sample.header().stamp();
+            self.heal(topics::GRID.spec().writer, stamp, false, report);
+        }
+        while let Some(sample) = ears.guidance.take()? {
+            let writer = topics::GUIDANCE.spec().writer;
+            self.heal(writer, *sample.stamp(), false, report);
+        }
+        while let Some(sample) = ears.command.take()? {
+            let writer = topics::COMMAND.spec().writer;
+            self.heal(writer, *sample.stamp(), false, report);
+            self.heal_supervisor(false, report);
+        }
+        Ok(())
+    }
+
+    fn heal_supervisor(&mut self, beat: bool, report: &mut Report) {
+        if !self.felled {
+            self.heal(SUPERVISOR, AFTER_ANY, beat, report);
+        }
+    }
+
+    /// A sign of life of `stage`: a beat that says ready, or a sample of a tick.
+    fn heal(&mut self, stage: &str, stamp: Stamp, beat: bool, report: &mut Report) {
+        let is_it = |wound: &Wound| wound.stage == stage && stamp.generation > wound.generation;
+        let Some(at) = self.wounds.iter().position(is_it) else {
+            return;
+        };
+        let wound = &mut self.wounds[at];
+        let took = wound.at.elapsed().as_nanos() as u64;
+        let recovery = report.recovery(wound.stage);
+        if !wound.ready {
+            wound.ready = true;
+            if wound.kind == Kind::Freeze {
+                recovery.thawless.record(took);
+            } else {
+                recovery.ready.record(took);
+            }
+        }
+        if !beat {
+            if wound.kind != Kind::Freeze {
+                recovery.output.record(took);
+            }
+            self.wounds.remove(at);
+        }
+    }
+
+    /// Hit a stage that runs and has no open wound, or the supervisor.
+    fn hit(&mut self, options: &Options, chance: &mut Chance, report: &mut Report) {
+        if options.supervisor && chance.supervisor() {
+            let kind = chance.supervisor_kind();
+            if self.supervisor_hit().is_none() && send(self.supervisor, kind) {
+                report.hit(SUPERVISOR, kind);
+                self.wounds.push(Wound {
+                    stage: SUPERVISOR,
+                    kind,
+                    generation: 0,
+                    at: Instant::now(),
+                    ready: false,
+                    again: Again::No,
+                });
+                self.felled = true;
+                self.driving = false;
+            }
+            return;
+        }
+        let Some(stage) = stages::find(chance.stage()).map(|stage| stage.name) else {
+            return;
+        };
+        let (kind, again) = (chance.kind(), chance.again());
+        let running = |entry: &&RosterEntry| {
+            name_str(&entry.stage) == stage
+                && StageState::from_byte(entry.state) == StageState::Running
+        };
+        let Some(entry) = self.entries.iter().find(running) else {
+            return;
+        };
+        let hurt = self.wounds.iter().any(|wound| wound.stage == stage);
+        self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
+        let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
+        if hurt || lately >= MOST_HITS || !send(entry.pid, kind) {
+            return;
+        }
+        report.hit(stage, kind);
+        self.hits.push((stage, Instant::now()));
+        self.wounds.push(Wound {
+            stage,
+            kind,
+            generation: entry.generation,
+            at: Instant::now(),
+            ready: false,
+            again: match again {
+                Some(after) if options.startup && kind != Kind::Freeze => Again::After(after),
+                _ => Again::No,
+            },
+        });
+    }
+
+    /// Find the successors that are to be hit, once they have started.
+    fn await_successors(&mut self) {
+        for wound in &mut self.wounds {
+            let successor = self.entries.iter().find(|entry| {
+                name_str(&entry.stage) == wound.stage
+                    && entry.generation > wound.generation
+                    && entry.pid != 0
+            });
+            if let (Again::After(after), Some(entry)) = (wound.again, successor) {
+                let age = Duration::from_nanos(entry.uptime_ns);
+                wound.again = Again::At {
+                    when: Instant::now() + after.saturating_sub(age),
+                    process: entry.pid,
+                    generation: entry.generation,
+                };
+            }
+        }
+    }
+
+    /// Until one of them is to be hit.
+    fn time_to_successor(&self) -> Duration {
+        let times = self.wounds.iter().filter_map(|wound| match wound.again {
+            Again::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
+            Again::No | Again::After(_) => None,
+        });
+        times.min().unwrap_or(Duration::MAX)
+    }
+
+    /// Hit those whose time has come.
+    fn hit_successors(&mut self, report: &mut Report) {
+        for wound in &mut self.wounds {
+            let Again::At {
+                when,
+                process,
+                generation,
+            } = wound.again
+            else {
+                continue;
+            };
+            if Instant::now() < when {
+                continue;
+            }
+            wound.again = Again::No;
+            if send(process, Kind::KillAtStart) {
+                report.hit(wound.stage, Kind::KillAtStart);
+                self.hits.push((wound.stage, Instant::now()));
+                wound.generation = generation;
+                wound.kind = Kind::KillAtStart;
+                wound.at = Instant::now();
+                wound.ready = false;
+            }
+        }
+    }
+}
+
+/// Whether the signal reached a process.
+fn send(pid: u32, kind: Kind) -> bool {
+    Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, kind.signal()).is_ok())
+}
