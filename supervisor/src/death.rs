@@ -12,7 +12,7 @@ use common::samples::{DeathCause, DeathSample, NextStep, Words, name, words};
 use rustix::process::Signal;
 use serde::Serialize;
 
-use crate::{process::Ended, report::append_line};
+use crate::{process::Ended, report::append_line, stages::REFUSED};
 
 /// The file of a run's deaths, a JSON object a line.
 pub(crate) const FILE_NAME: &str = "deaths.jsonl";
@@ -113,6 +113,11 @@ impl std::fmt::Display for Cause {
 }
 
 impl Death {
+    /// Whether the bus would not have it.
+    pub(crate) fn was_refused(&self) -> bool {
+        self.cause == Cause::Exited(REFUSED.into())
+    }
+
     /// For the log: one line that says all but the last words.
     pub(crate) fn log(&self) {
         let Self {

@@ -24,7 +24,7 @@ use crate::{
     flow::Flow,
     policy::{Action, Event, Now, Phase, Policy},
     process::{Ended, Process, firsthand},
-    stages::{self, Stage, start_order},
+    stages::{Stage, start_order},
 };
 
 /// A stage's process could not be started or watched.
@@ -231,8 +231,7 @@ impl Fleet {
                 }
                 let member = &mut self.members[index];
                 (member.process, member.beat) = (None, None);
-                let refused = death.cause == Cause::Exited(stages::REFUSED.into());
-                let event = if refused {
+                let event = if death.was_refused() {
                     Event::Refused
                 } else {
                     Event::Exited

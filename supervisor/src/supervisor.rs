@@ -20,7 +20,7 @@ use std::{
 pub(crate) use self::{end::Finished, error::SupervisorError, progress::Progress};
 use self::{error::system, judge::fault};
 use crate::{
-    death,
+    death::{self, Death},
     domain::Held,
     fleet::{Fleet, Starter},
     kept::{Interrupted, Keeper},
@@ -339,6 +339,10 @@ impl<'a> Supervisor<'a> {
         self.unburied.extend(deaths.iter().map(|death| death.pid));
         if !deaths.is_empty() {
             self.died = (self.died.0 + deaths.len(), Instant::now());
+        }
+        if deaths.iter().any(Death::was_refused) {
+            // Its place may be one that the dead still hold.
+            self.clear_up();
         }
         Ok(!deaths.is_empty())
     }

@@ -124,8 +124,13 @@ impl Run {
         let status = self.wait_until("the stage runs", |status| {
             find(status, stage)["state"] == "running"
         });
-        let generation = find(&status, stage)["generation"].as_u64().unwrap();
-        signal_process(pid(&status, stage), signal);
+        self.kill_and_await(stage, signal, &status)
+    }
+
+    /// The same of a stage that runs in `status`, where nobody can ask any more.
+    pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
+        let generation = find(status, stage)["generation"].as_u64().unwrap();
+        signal_process(pid(status, stage), signal);
         self.wait_until("its successor runs", |status| {
             let stage = find(status, stage);
             stage["generation"].as_u64() > Some(generation) && stage["state"] == "running"
