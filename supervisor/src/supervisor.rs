@@ -50,7 +50,7 @@ use common::{
 /// How often the bus is cleared at least: of consumers that died.
 const CLEAR_UP: Duration = Duration::from_secs(1);
 
-/// One death brings another within this more often than not: its successor's, or a sibling's.
+/// A death is often followed by another within this: its successor's, or a sibling's.
 const MOURNING: Duration = Duration::from_millis(50);
 
 /// What a run is made from.
