@@ -75,9 +75,10 @@ const PLANNER_DEADLINES: Deadlines = Deadlines {
     heartbeat: Duration::from_secs(2),
     answers: Duration::from_secs(4),
 };
-/// Reading a map back, or telling it whole, took a tenth of that a million cells.
+/// The mapper reads its map back, and tells it whole, in one turn. Ample: at 16.8 million cells none was late without it.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
-/// A turn with a full solve, the field told whole and what came meanwhile took up to a third of that a million cells.
+/// At 16.8 million cells the planner was silent for more than 2 s forty times in a mission, and with this allowance never
+/// for too long in a run of 97 s: a full solve, the field told whole and what came meanwhile fall into one turn.
 const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
 /// What a stage's process ends with when the bus would not have it.

@@ -3,9 +3,7 @@
 use std::time::{Duration, Instant};
 
 use common::{
-    samples::{
-        HealthState, Order, PoseSample, RosterEntry, StageState, Stamp, Stamped as _, name_str,
-    },
+    samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
     topics::{self, AnyTopic as _, SUPERVISOR},
     truth::TruthTick,
 };
@@ -27,12 +25,7 @@ use crate::{
 };
 
 /// What a supervisor says is always of its newest life: it has the bus made anew.
-const AFTER_ANY: Stamp = Stamp {
-    tick: 0,
-    stamp_ns: 0,
-    generation: u32::MAX,
-    sequence: 0,
-};
+const NEWEST: u32 = u32::MAX;
 /// A stage that dies too often is held until an operator releases it, and here there is none: so often none is hit.
 /// A hit may bring another in the start-up, and one of each may die of an earlier one.
 const MOST_HITS: usize = HOLD_AFTER - 4;
@@ -47,6 +40,20 @@ struct Wound {
     at: Instant,
     ready: bool,
     again: Again,
+}
+
+impl Wound {
+    /// Dealt now to that life of `stage`.
+    fn new(stage: &'static str, kind: Kind, generation: u32, again: Again) -> Self {
+        Self {
+            stage,
+            kind,
+            generation,
+            at: Instant::now(),
+            ready: false,
+            again,
+        }
+    }
 }
 
 /// Whether the successor is to be hit in its first milliseconds.
@@ -130,12 +137,9 @@ impl Attack {
         Ok(())
     }
 
-    /// When the supervisor was hit, unless its successor works already.
-    pub(super) fn supervisor_hit(&self) -> Option<Instant> {
-        let mut wounds = self.wounds.iter();
-        wounds
-            .find(|wound| wound.stage == SUPERVISOR)
-            .map(|wound| wound.at)
+    /// Whether the supervisor was hit, and no successor works yet.
+    pub(super) fn supervisor_is_down(&self) -> bool {
+        self.wounds.iter().any(|wound| wound.stage == SUPERVISOR)
     }
 
     /// How far the last pose heard of was from the truth of its tick, metres. Wheel counts are what both know.
@@ -166,27 +170,35 @@ impl Attack {
         }
         while let Some(health) = ears.health.take()? {
             if HealthState::from_byte(health.state) == HealthState::Ready {
-                self.heal(name_str(&health.stage), health.stamp, true, report);
+                self.heal(
+                    name_str(&health.stage),
+                    health.stamp.generation,
+                    true,
+                    report,
+                );
             }
         }
         while let Some(sample) = ears.wheels.take()? {
-            self.heal(topics::WHEELS.spec().writer, *sample.stamp(), false, report);
+            let writer = topics::WHEELS.spec().writer;
+            self.heal(writer, sample.stamp.generation, false, report);
         }
         while let Some(sample) = ears.pose.take()? {
-            self.heal(topics::POSE.spec().writer, *sample.stamp(), false, report);
+            let writer = topics::POSE.spec().writer;
+            self.heal(writer, sample.stamp.generation, false, report);
             self.pose = Some(sample);
         }
         while let Some(sample) = ears.grid.take()? {
-            let stamp = *sample.header().stamp();
-            self.heal(topics::GRID.spec().writer, stamp, false, report);
+            let writer = topics::GRID.spec().writer;
+            let generation = sample.header().stamp.generation;
+            self.heal(writer, generation, false, report);
         }
         while let Some(sample) = ears.guidance.take()? {
             let writer = topics::GUIDANCE.spec().writer;
-            self.heal(writer, *sample.stamp(), false, report);
+            self.heal(writer, sample.stamp.generation, false, report);
         }
         while let Some(sample) = ears.command.take()? {
             let writer = topics::COMMAND.spec().writer;
-            self.heal(writer, *sample.stamp(), false, report);
+            self.heal(writer, sample.stamp.generation, false, report);
             self.heal_supervisor(false, report);
         }
         Ok(())
@@ -194,13 +206,13 @@ impl Attack {
 
     fn heal_supervisor(&mut self, beat: bool, report: &mut Report) {
         if !self.felled {
-            self.heal(SUPERVISOR, AFTER_ANY, beat, report);
+            self.heal(SUPERVISOR, NEWEST, beat, report);
         }
     }
 
-    /// A sign of life of `stage`: a beat that says ready, or a sample of a tick.
-    fn heal(&mut self, stage: &str, stamp: Stamp, beat: bool, report: &mut Report) {
-        let is_it = |wound: &Wound| wound.stage == stage && stamp.generation > wound.generation;
+    /// A sign of a life of `stage`: a beat that says ready, or a sample of a tick.
+    fn heal(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
+        let is_it = |wound: &Wound| wound.stage == stage && generation > wound.generation;
         let Some(at) = self.wounds.iter().position(is_it) else {
             return;
         };
@@ -227,16 +239,9 @@ impl Attack {
     fn hit(&mut self, options: &Options, chance: &mut Chance, report: &mut Report) {
         if options.supervisor && chance.supervisor() {
             let kind = chance.supervisor_kind();
-            if self.supervisor_hit().is_none() && send(self.supervisor, kind) {
+            if !self.supervisor_is_down() && send(self.supervisor, kind) {
                 report.hit(SUPERVISOR, kind);
-                self.wounds.push(Wound {
-                    stage: SUPERVISOR,
-                    kind,
-                    generation: 0,
-                    at: Instant::now(),
-                    ready: false,
-                    again: Again::No,
-                });
+                self.wounds.push(Wound::new(SUPERVISOR, kind, 0, Again::No));
                 self.felled = true;
                 self.driving = false;
             }
@@ -261,17 +266,12 @@ impl Attack {
         }
         report.hit(stage, kind);
         self.hits.push((stage, Instant::now()));
-        self.wounds.push(Wound {
-            stage,
-            kind,
-            generation: entry.generation,
-            at: Instant::now(),
-            ready: false,
-            again: match again {
-                Some(after) if options.startup && kind != Kind::Freeze => Again::After(after),
-                _ => Again::No,
-            },
-        });
+        let again = match again {
+            Some(after) if options.startup && kind != Kind::Freeze => Again::After(after),
+            _ => Again::No,
+        };
+        self.wounds
+            .push(Wound::new(stage, kind, entry.generation, again));
     }
 
     /// Find the successors that are to be hit, once they have started.
@@ -320,10 +320,7 @@ impl Attack {
             if send(process, Kind::KillAtStart) {
                 report.hit(wound.stage, Kind::KillAtStart);
                 self.hits.push((wound.stage, Instant::now()));
-                wound.generation = generation;
-                wound.kind = Kind::KillAtStart;
-                wound.at = Instant::now();
-                wound.ready = false;
+                *wound = Wound::new(wound.stage, Kind::KillAtStart, generation, Again::No);
             }
         }
     }

@@ -24,6 +24,7 @@ use crate::{
 
 /// Nothing that is waited for takes longer; a mission at a wall-clock pace takes half a minute.
 pub(super) const PATIENCE: Duration = Duration::from_secs(600);
+
 fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
     command.args(["--robot", &options.robot.to_string()]);
@@ -94,7 +95,7 @@ pub(super) fn attack(
     let summary = loop {
         let summary = life(options, start, robot.as_mut(), &mut attack, chance, report)?;
         // A supervisor that was hit leaves no summary, one that was spared by a hair does.
-        if attack.supervisor_hit().is_none() || !summary.is_empty() || began.elapsed() >= PATIENCE {
+        if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
         start = resume(&directory)?;
