@@ -34,7 +34,7 @@ fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
     let mut grid = bus.slice_reader(&topics::GRID).unwrap();
     let mut field = bus.slice_reader(&topics::FIELD).unwrap();
     let mut waiter = Waiter::default();
-    waiter.on(bus.alarm(&topics::POSE).unwrap());
+    waiter.on(bus.wakeup(&topics::POSE).unwrap());
     let mut heard = Heard::default();
     let began = Instant::now();
     while !enough(&heard) {

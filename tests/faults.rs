@@ -1,4 +1,4 @@
-//! Robots that do not get on, each pinned by a fault put into a running stage: every rung frees one, and the last
+//! Robots that do not get on, each pinned by a fault put into a running stage: every recovery frees one, and the last
 //! says that it could not.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -42,9 +42,9 @@ fn stalls(directory: &Path) -> Vec<Value> {
     lines.collect()
 }
 
-/// How many of them were met by `rung`.
-fn count(stalls: &[Value], rung: &str) -> usize {
-    stalls.iter().filter(|stall| stall["rung"] == rung).count()
+/// How many of them were met by `recovery`.
+fn count(stalls: &[Value], recovery: &str) -> usize {
+    stalls.iter().filter(|stall| stall["recovery"] == recovery).count()
 }
 
 /// A mission of open-room in which `stage` is broken on the way: summary, stalls, and what the supervisor logged.
@@ -79,7 +79,7 @@ fn a_robot_on_a_saddle_comes_free_by_a_fresh_planner() {
     let (summary, stalls, _) = broken("saddle", "planner", "saddle", &[]);
     assert_eq!(summary["outcome"], "reached", "{summary}");
     assert_eq!(
-        (&stalls[0]["cause"], &stalls[0]["rung"]),
+        (&stalls[0]["cause"], &stalls[0]["recovery"]),
         (&"still".into(), &"replan".into())
     );
     assert_eq!(count(&stalls, "forget"), 0, "{stalls:?}");
@@ -90,7 +90,7 @@ fn a_robot_pinned_by_a_corrupted_field_comes_free_by_a_fresh_planner_by_either_m
     for (robot, method) in [("astray", &[][..]), ("astray-p", &PAPER[..])] {
         let (summary, stalls, _) = broken(robot, "planner", "corrupt-field", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
-        assert_eq!(stalls[0]["rung"], "replan", "{stalls:?}");
+        assert_eq!(stalls[0]["recovery"], "replan", "{stalls:?}");
         assert_eq!(count(&stalls, "forget"), 0, "{stalls:?}");
     }
 }
@@ -100,7 +100,7 @@ fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_forgotten_belief_
     for (robot, method) in [("buried", &[][..]), ("buried-p", &PAPER[..])] {
         let (summary, stalls, _) = broken(robot, "mapper", "bury-robot", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
-        let first = stalls.iter().find(|stall| stall["rung"] == "forget");
+        let first = stalls.iter().find(|stall| stall["recovery"] == "forget");
         assert_eq!(first.unwrap()["cause"], "buried", "{stalls:?}");
     }
 }
@@ -118,9 +118,9 @@ fn a_robot_cut_off_for_good_ends_unreachable_with_a_picture_that_says_so() {
     );
     let directory = kept.path().join("run");
     let stalls = stalls(&directory);
-    let rungs: Vec<_> = stalls.iter().map(|stall| &stall["rung"]).collect();
+    let recoveries: Vec<_> = stalls.iter().map(|stall| &stall["recovery"]).collect();
     assert_eq!(
-        rungs,
+        recoveries,
         ["forget", "forget", "forget", "give_up"],
         "{stalls:?}"
     );
@@ -169,7 +169,7 @@ fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
     let bus = Bus::join(&Domain::of(robot.parse().unwrap()), "careless").unwrap();
     let mut health = bus.reader(&topics::HEALTH).unwrap();
     let mut waiter = Waiter::default();
-    waiter.on(bus.alarm(&topics::HEALTH).unwrap());
+    waiter.on(bus.wakeup(&topics::HEALTH).unwrap());
     let request = FaultSample {
         id: 1 + u64::from(although_real),
         stage: name("planner"),

@@ -84,7 +84,7 @@ fn frozen_stages_are_noticed_when_their_beat_is_due() {
 }
 
 /// Ten minutes, on a machine that does nothing else:
-/// `cargo test --release -p supervisor --test freezes -- --ignored --nocapture`.
+/// `cargo test --release -p firsthand --test freezes -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes ten minutes and a quiet machine"]
 fn five_hundred_frozen_stages_are_noticed_within_20_ms() {

@@ -17,7 +17,7 @@ const ROBOT: &str = "anew";
 fn next_pose(bus: &Bus) -> PoseSample {
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut waiter = Waiter::default();
-    waiter.on(bus.alarm(&topics::POSE).unwrap());
+    waiter.on(bus.wakeup(&topics::POSE).unwrap());
     let began = Instant::now();
     loop {
         if let Some(pose) = poses.take().unwrap() {

@@ -27,9 +27,9 @@ fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_on
     let mut powers = bus.reader(&topics::POWER).unwrap();
     let mut surroundings = bus.reader(&topics::SURROUNDINGS).unwrap();
     let mut waiter = Waiter::default();
-    waiter.on(bus.alarm(&topics::INFRARED).unwrap());
-    waiter.on(bus.alarm(&topics::POWER).unwrap());
-    waiter.on(bus.alarm(&topics::SURROUNDINGS).unwrap());
+    waiter.on(bus.wakeup(&topics::INFRARED).unwrap());
+    waiter.on(bus.wakeup(&topics::POWER).unwrap());
+    waiter.on(bus.wakeup(&topics::SURROUNDINGS).unwrap());
     let began = Instant::now();
     let (mut infrared, mut power, mut around) = (None, None, None);
     let (infrared, power, around) = loop {

@@ -516,12 +516,12 @@ impl Bus {
     ///
     /// # Errors
     /// When the topic is missing or has no place left.
-    pub fn alarm(&self, topic: &dyn AnyTopic) -> Result<Alarm, BusError> {
+    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
         let spec = topic.spec();
         self.open_event(spec)?
             .listener_builder()
             .create()
-            .map(|listener| Alarm { listener })
+            .map(|listener| Wakeup { listener })
             .map_err(refused("listen to", spec.name))
     }
 }
@@ -756,13 +756,13 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
 
 /// Rings when a topic speaks.
 #[derive(Debug)]
-pub struct Alarm {
+pub struct Wakeup {
     listener: Listener<ipc::Service>,
 }
 
-impl Alarm {
+impl Wakeup {
     /// Level-triggered: silence it before looking at the data, or waiting never waits again.
-    pub(crate) fn silence(&self) -> Result<(), BusError> {
+    pub(crate) fn drain(&self) -> Result<(), BusError> {
         self.listener
             .try_wait(|_| {})
             .map(drop)
@@ -770,7 +770,7 @@ impl Alarm {
     }
 }
 
-impl AsFd for Alarm {
+impl AsFd for Wakeup {
     fn as_fd(&self) -> BorrowedFd<'_> {
         // SAFETY: the descriptor belongs to the listener that `self` owns and stays open until it is
         // dropped; the borrow ends before that, and nobody closes it.

@@ -99,18 +99,18 @@ impl Domain {
 
     /// Held, shared, by every stage as long as it lives: a new supervisor waits for the last one's.
     #[must_use]
-    pub fn tenants_file(&self) -> PathBuf {
-        self.directory.join("tenants")
+    pub fn stages_lock_file(&self) -> PathBuf {
+        self.directory.join("stages.lock")
     }
 
-    /// Be a tenant of this domain until the result is dropped, or the process dies.
+    /// Count as a process of this domain until the result is dropped, or the process dies.
     ///
     /// # Errors
     /// When there is no domain.
     pub fn enter(&self) -> io::Result<File> {
-        let tenants = File::open(self.tenants_file())?;
-        tenants.lock_shared()?;
-        Ok(tenants)
+        let lock = File::open(self.stages_lock_file())?;
+        lock.lock_shared()?;
+        Ok(lock)
     }
 
     /// Leads to the run directory where a supervisor leaves it to others to start its stages.

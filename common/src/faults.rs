@@ -6,7 +6,7 @@
 use crate::{
     bus::{Bus, BusError, Reader},
     samples::{FaultAnswer, FaultKind, FaultSample, name_str},
-    shell::Life,
+    shell::Generation,
     topics,
 };
 
@@ -114,10 +114,14 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    pub(crate) fn open(bus: &Bus, life: &Life, simulated: bool) -> Result<Self, BusError> {
+    pub(crate) fn open(
+        bus: &Bus,
+        generation: &Generation,
+        simulated: bool,
+    ) -> Result<Self, BusError> {
         Ok(Self {
             requests: bus.reader(&topics::FAULTS)?,
-            stage: life.stage,
+            stage: generation.stage,
             simulated,
         })
     }

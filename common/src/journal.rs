@@ -1,7 +1,7 @@
 //! A large state that outlives a SIGKILL: a snapshot now and then, and what happened since.
 //!
 //! The state is the fold of its entries. An entry is appended when it happens, which takes the time of a
-//! small write however large the state is; a life that begins takes the snapshot and folds into it what
+//! small write however large the state is; a restart that begins takes the snapshot and folds into it what
 //! came after. An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an
 //! append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
 //! leaves entries that the snapshot holds already, which their numbers tell.
@@ -19,7 +19,7 @@ use crate::checkpoint::{Checkpoint, CheckpointError, failed};
 /// Entries after which a snapshot is due at the soonest and at the latest.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
 /// In between, an entry more for so many bytes of the state: to write them takes about as long as to fold an entry,
-/// which a new life must do with each before it is ready.
+/// which a new restart must do with each before it is ready.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
@@ -44,7 +44,7 @@ pub struct Journal {
     snapshot_after: u64,
 }
 
-/// What an earlier life left.
+/// What an earlier restart left.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Kept<S, E> {
     /// The last snapshot.
@@ -215,7 +215,7 @@ mod tests {
         Journal::open(path, 64).unwrap()
     }
 
-    /// The state as a new life sees it.
+    /// The state as a new restart sees it.
     fn folded(path: &Path) -> Sum {
         let kept = open(path).1;
         kept.state.unwrap_or_default() + kept.entries.iter().sum::<u64>()
@@ -226,16 +226,16 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("map.checkpoint");
         let mut sum = 0;
-        for life in 0..5 {
+        for restart in 0..5 {
             let (mut journal, _) = open(&path);
             for entry in 1..=3 {
                 journal.append(&entry).unwrap();
                 sum += entry;
-                if life == 2 && entry == 2 {
+                if restart == 2 && entry == 2 {
                     journal.snapshot(&sum).unwrap();
                 }
             }
-            assert_eq!(folded(&path), sum, "life {life}");
+            assert_eq!(folded(&path), sum, "restart {restart}");
         }
     }
 
@@ -253,7 +253,7 @@ mod tests {
             std::fs::write(&file, &whole[..cut]).unwrap();
             let mut sum = if cut == whole.len() { 300 } else { 100 };
             assert_eq!(folded(&path), sum, "cut at {cut}");
-            // The next life writes over the torn tail.
+            // The next restart writes over the torn tail.
             open(&path).0.append(&7_u64).unwrap();
             sum += 7;
             assert_eq!(folded(&path), sum, "cut at {cut}");

@@ -20,7 +20,7 @@
 //! | [`run`] | what the supervisor tells the stages of a run |
 //! | [`signals`] | signals as something to wait for |
 //! | [`shell`] | the process shell every stage runs in |
-//! | `guest` | how a stage that the supervisor did not start finds its place |
+//! | `external` | how a stage that the supervisor did not start finds its place |
 //! | [`wire`] | the X80's protocol: frames and messages |
 //! | [`truth`] | what a simulated robot tells of itself |
 
@@ -29,10 +29,10 @@ pub mod bus;
 pub mod checkpoint;
 pub mod clock;
 pub mod domain;
+mod external;
 pub mod faults;
 pub mod geometry;
 pub mod grid;
-mod guest;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;

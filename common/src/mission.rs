@@ -92,7 +92,8 @@ pub enum Method {
     /// It looks before it goes: evidence for and against hazard, ground that was swept, speed that fits
     /// what is known of the way ahead.
     #[default]
-    Careful,
+    #[serde(alias = "careful")]
+    Evidential,
     /// As printed: every hit is a hazard with its margin, (19), the map only grows, (10), the robot goes
     /// where the field points, (15), (16).
     Paper,
@@ -145,7 +146,7 @@ pub struct Mapper {
     /// [`Mission::margin_cells`] is Im of (19).
     pub margin_m: f64,
     /// The careful method: what is left free between the body and a hit, metres.
-    pub spare_m: f64,
+    pub clearance_m: f64,
     /// Hits farther than this are no safety event yet, metres.
     pub map_within_m: f64,
 }
@@ -156,7 +157,7 @@ pub struct Mapper {
 pub struct Planner {
     /// How far a random walk gets before it dies, metres: lambda of laplacian u = u / lambda^2. Without
     /// it the paper's method lets no walk die, which is exactly (11), and the careful one takes
-    /// [`Planner::CAREFUL_SCREENING_M`].
+    /// [`Planner::EVIDENTIAL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
 }
@@ -164,7 +165,7 @@ pub struct Planner {
 impl Planner {
     /// What the careful method takes where a mission says nothing: short enough that the field keeps
     /// heading for a gap that an echo narrows.
-    pub const CAREFUL_SCREENING_M: f64 = 0.35;
+    pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
 /// How guidance becomes wheel speeds, (14)-(17).
@@ -212,7 +213,7 @@ impl Default for Mapper {
     fn default() -> Self {
         Self {
             margin_m: 0.25,
-            spare_m: 0.03,
+            clearance_m: 0.03,
             map_within_m: 1.0,
         }
     }
@@ -279,7 +280,7 @@ impl Mission {
         let per_cell = |lambda: f64| (resolution / (2.0 * lambda)).powi(2);
         let unsaid = match self.method {
             // No shorter than the grid resolves.
-            Method::Careful => Some(Planner::CAREFUL_SCREENING_M.max(resolution / 2.0)),
+            Method::Evidential => Some(Planner::EVIDENTIAL_SCREENING_M.max(resolution / 2.0)),
             Method::Paper => None,
         };
         self.planner.screening_m.or(unsaid).map_or(0.0, per_cell)

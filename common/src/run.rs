@@ -94,7 +94,7 @@ impl Run {
 ///
 /// # Errors
 /// When the count can be neither read nor written.
-pub fn next_life(directory: &Path, stage: &str) -> Result<u32, RunError> {
+pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.lives"));
     let counted = || {
         let mut lives = File::options().create(true).append(true).open(&file)?;
@@ -131,9 +131,9 @@ mod tests {
     fn lives_are_counted_over_the_lives_of_processes() {
         let directory = tempfile::tempdir().unwrap();
         let lives: Vec<_> = (0..3)
-            .map(|_| next_life(directory.path(), "mapper").unwrap())
+            .map(|_| next_generation(directory.path(), "mapper").unwrap())
             .collect();
         assert_eq!(lives, [1, 2, 3]);
-        assert_eq!(next_life(directory.path(), "planner").unwrap(), 1);
+        assert_eq!(next_generation(directory.path(), "planner").unwrap(), 1);
     }
 }

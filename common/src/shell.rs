@@ -12,8 +12,8 @@ use crate::{
     checkpoint::CheckpointError,
     clock::{MissionClock, MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
+    external,
     faults::{Asked, Requests},
-    guest,
     run::{self, Run, RunError},
     samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
     signals::{SIGTERM, Signals},
@@ -30,13 +30,13 @@ const LULL: Duration = Duration::from_millis(5);
 
 /// Which life of which stage this process is.
 #[derive(Clone, Debug)]
-pub struct Life {
+pub struct Generation {
     /// The stage's name in the table.
     pub stage: &'static str,
     /// Where `run.toml` and the checkpoints lie.
     pub directory: PathBuf,
-    /// 1 for the first life.
-    pub generation: u32,
+    /// 1 for the first generation.
+    pub number: u32,
     /// Ticks before this one are another life's.
     pub first_tick: u64,
 }
@@ -47,12 +47,12 @@ pub enum Start {
     /// The supervisor started it.
     Child {
         /// Which life it is.
-        life: Life,
+        generation: Generation,
         /// The supervisor's process, which must live for this one to live.
         supervisor: u32,
     },
     /// Somebody else started it, for a supervisor that only watches; the rest it finds itself.
-    Guest {
+    External {
         /// Which stage to be.
         stage: &'static str,
         /// For whom.
@@ -62,12 +62,12 @@ pub enum Start {
 
 /// A process in its place.
 pub(crate) struct Joined {
-    pub(crate) life: Life,
+    pub(crate) generation: Generation,
     pub(crate) run: Run,
     pub(crate) bus: Bus,
     /// Becomes readable when the supervisor is gone; a child is signalled instead.
     pub(crate) supervisor: Option<OwnedFd>,
-    pub(crate) tenancy: File,
+    pub(crate) stage_lock: File,
 }
 
 /// Why a stage's process ended.
@@ -98,8 +98,8 @@ pub enum StageError {
 /// What a stage's process is opened with.
 #[derive(Debug)]
 pub struct Context {
-    /// Which life.
-    pub life: Life,
+    /// Which generation.
+    pub generation: Generation,
     /// The run.
     pub run: Run,
     /// The robot's bus.
@@ -112,7 +112,7 @@ impl Context {
     /// Where this stage's checkpoint lies.
     #[must_use]
     pub fn checkpoint_file(&self) -> PathBuf {
-        run::checkpoint_file(&self.life.directory, self.life.stage)
+        run::checkpoint_file(&self.generation.directory, self.generation.stage)
     }
 }
 
@@ -143,7 +143,7 @@ pub trait Process: Sized {
     ///
     /// # Errors
     /// When it cannot be had.
-    fn furnish(&mut self, context: &Context) -> Result<(), StageError> {
+    fn after_ready(&mut self, context: &Context) -> Result<(), StageError> {
         let _ = context;
         Ok(())
     }
@@ -177,21 +177,24 @@ pub trait Process: Sized {
     }
 }
 
-/// Live the life of a stage until told to stop.
+/// Run a stage until told to stop.
 ///
 /// # Errors
 /// What [`Process`] says, or what keeps it from being opened.
-pub fn live<P: Process>(start: &Start) -> Result<(), StageError> {
+pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     let Joined {
-        life,
+        generation,
         run,
         bus,
         supervisor,
-        tenancy: _tenancy,
+        stage_lock: _stage_lock,
     } = match start {
-        Start::Child { life, supervisor } => join_as_child(life, *supervisor)?,
-        Start::Guest { stage, robot } => guest::join(stage, robot)?,
+        Start::Child {
+            generation,
+            supervisor,
+        } => join_as_child(generation, *supervisor)?,
+        Start::External { stage, robot } => external::join(stage, robot)?,
     };
     let mut waiter = Waiter::default();
     waiter.on_readable(&terminated)?;
@@ -202,17 +205,17 @@ pub fn live<P: Process>(start: &Start) -> Result<(), StageError> {
         terminated,
         supervisor,
     };
-    let mut heart = Heart::new(&bus, &life)?;
+    let mut heart = Heart::new(&bus, &generation)?;
     heart.beat(HealthState::Starting, Progress::default())?;
-    let generation = life.generation;
+    let number = generation.number;
     let mut context = Context {
-        life,
+        generation,
         run,
         bus,
         waiter,
     };
     let mut process = P::open(&mut context)?;
-    tracing::info!(generation, "ready");
+    tracing::info!(generation = number, "ready");
     let worked = work(&mut process, &mut heart, &context, &mut end);
     // Whatever went wrong, goodbye is said: the link's stops the robot.
     let stopped = process.stop();
@@ -220,18 +223,18 @@ pub fn live<P: Process>(start: &Start) -> Result<(), StageError> {
     worked.and(stopped)
 }
 
-fn join_as_child(life: &Life, supervisor: u32) -> Result<Joined, StageError> {
-    become_child(life.stage, supervisor)?;
-    let run = Run::load(&life.directory)?;
+fn join_as_child(generation: &Generation, supervisor: u32) -> Result<Joined, StageError> {
+    become_child(generation.stage, supervisor)?;
+    let run = Run::load(&generation.directory)?;
     let domain = Domain::of(run.robot.clone());
-    let tenancy = enter(&domain)?;
-    let bus = Bus::join(&domain, life.stage)?;
+    let stage_lock = enter(&domain)?;
+    let bus = Bus::join(&domain, generation.stage)?;
     Ok(Joined {
-        life: life.clone(),
+        generation: generation.clone(),
         run,
         bus,
         supervisor: None,
-        tenancy,
+        stage_lock,
     })
 }
 
@@ -268,9 +271,9 @@ fn work(
     let without_lulls = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     heart.beat(HealthState::Ready, progress)?;
-    process.furnish(context)?;
+    process.after_ready(context)?;
     let simulated = context.run.mission.robot.address.is_none();
-    let mut faults = Requests::open(&context.bus, &context.life, simulated)?;
+    let mut faults = Requests::open(&context.bus, &context.generation, simulated)?;
     let mut busy = true;
     while !end.came() {
         let came = context.waiter.wait(if busy { LULL } else { BEAT })?;
@@ -347,11 +350,11 @@ struct Heart {
 }
 
 impl Heart {
-    fn new(bus: &Bus, life: &Life) -> Result<Self, StageError> {
+    fn new(bus: &Bus, generation: &Generation) -> Result<Self, StageError> {
         Ok(Self {
-            writer: bus.writer(&topics::HEALTH, life.generation)?,
+            writer: bus.writer(&topics::HEALTH, generation.number)?,
             sample: HealthSample {
-                stage: name(life.stage),
+                stage: name(generation.stage),
                 pid: std::process::id(),
                 ..HealthSample::default()
             },

@@ -1,4 +1,4 @@
-//! One wait for everything a process waits for: alarms of topics, sockets, signals, other processes.
+//! One wait for everything a process waits for: wakeups of topics, sockets, signals, other processes.
 
 use std::{
     os::fd::{AsFd, BorrowedFd, OwnedFd},
@@ -7,19 +7,19 @@ use std::{
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use crate::bus::{Alarm, BusError};
+use crate::bus::{BusError, Wakeup};
 
-/// Waits for alarms and foreign descriptors (sockets, signals, processes) at once.
+/// Waits for wakeups and foreign descriptors (sockets, signals, processes) at once.
 #[derive(Debug, Default)]
 pub struct Waiter {
-    alarms: Vec<Alarm>,
+    wakeups: Vec<Wakeup>,
     descriptors: Vec<OwnedFd>,
 }
 
 impl Waiter {
-    /// Wake for `alarm`.
-    pub fn on(&mut self, alarm: Alarm) {
-        self.alarms.push(alarm);
+    /// Wake for `wakeup`.
+    pub fn on(&mut self, wakeup: Wakeup) {
+        self.wakeups.push(wakeup);
     }
 
     /// Wake when `descriptor` is readable; what is read from it is the caller's.
@@ -35,7 +35,7 @@ impl Waiter {
         Ok(())
     }
 
-    /// Wait until something rings, is readable, or `timeout` has passed; silences the alarms. Says whether
+    /// Wait until something rings, is readable, or `timeout` has passed; drains the wakeups. Says whether
     /// anything came.
     ///
     /// # Errors
@@ -53,9 +53,9 @@ impl Waiter {
         others: &[BorrowedFd<'_>],
         timeout: Duration,
     ) -> Result<bool, BusError> {
-        let alarms = self.alarms.iter().map(AsFd::as_fd);
+        let wakeups = self.wakeups.iter().map(AsFd::as_fd);
         let own = self.descriptors.iter().map(AsFd::as_fd);
-        let mut polled: Vec<PollFd<'_>> = alarms
+        let mut polled: Vec<PollFd<'_>> = wakeups
             .chain(own)
             .chain(others.iter().copied())
             .map(|descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
@@ -69,12 +69,12 @@ impl Waiter {
         };
         let rang: Vec<bool> = polled
             .iter()
-            .take(self.alarms.len())
+            .take(self.wakeups.len())
             .map(|entry| !entry.revents().is_empty())
             .collect();
-        for (alarm, rang) in self.alarms.iter().zip(rang) {
+        for (wakeup, rang) in self.wakeups.iter().zip(rang) {
             if rang {
-                alarm.silence()?;
+                wakeup.drain()?;
             }
         }
         Ok(came)

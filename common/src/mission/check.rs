@@ -412,7 +412,12 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         0.0..=perimeter.width_m / 4.0,
         "m",
     )?;
-    within("mapper.spare_m", mission.mapper.spare_m, 0.0..=1.0, "m")?;
+    within(
+        "mapper.clearance_m",
+        mission.mapper.clearance_m,
+        0.0..=1.0,
+        "m",
+    )?;
     if let Some(screening) = mission.planner.screening_m {
         // Shorter than that it would not be resolved by the grid.
         let least = mission.grid_frame().resolution_m / 2.0;

@@ -265,7 +265,7 @@ wire_enum! {
     /// What a robot that stalls is tried to be freed by.
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
-    StallRung, unknown = GiveUp {
+    RecoveryStep, unknown = GiveUp {
         /// A fresh planner, which solves the full field.
         Replan = 0,
         /// What was sensed is forgotten.
@@ -310,8 +310,8 @@ pub struct StallSample {
     pub resets: u64,
     /// A [`StallCause`].
     pub cause: u8,
-    /// A [`StallRung`]: what is done about it.
-    pub rung: u8,
+    /// A [`RecoveryStep`]: what is done about it.
+    pub recovery: u8,
 }
 
 wire_enum! {

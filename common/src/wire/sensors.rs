@@ -83,7 +83,7 @@ pub struct MotorSensors {
 pub struct StandardSensors {
     /// The six ultrasonic rangers, each an [`super::Echo`].
     pub ultrasonic: [u8; 6],
-    /// Two human sensors, alarm and motion each, AD counts.
+    /// Two human sensors, wakeup and motion each, AD counts.
     pub human: [u16; 4],
     /// Tilt along x and y, AD counts.
     pub tilt: [u16; 2],

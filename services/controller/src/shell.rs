@@ -22,13 +22,13 @@ pub struct Shell {
 
 impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        context.waiter.on(context.bus.alarm(&topics::GUIDANCE)?);
+        context.waiter.on(context.bus.wakeup(&topics::GUIDANCE)?);
         Ok(Self {
             guidance: context.bus.reader(&topics::GUIDANCE)?,
             pose: context.bus.reader(&topics::POSE)?,
             command: context
                 .bus
-                .writer(&topics::COMMAND, context.life.generation)?,
+                .writer(&topics::COMMAND, context.generation.number)?,
             controller: Controller::new(&context.run.mission),
             latest_pose: None,
             progress: Progress::default(),

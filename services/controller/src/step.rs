@@ -88,7 +88,7 @@ impl Controller {
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
             modulated: settings.modulated,
-            careful: mission.method == Method::Careful,
+            careful: mission.method == Method::Evidential,
             side: Side::Left,
             arrived: false,
         }

@@ -44,10 +44,12 @@ impl Process for Shell {
             tracing::info!(?state, "pose restored");
             reckoning.restore(state);
         }
-        context.waiter.on(context.bus.alarm(&topics::WHEELS)?);
+        context.waiter.on(context.bus.wakeup(&topics::WHEELS)?);
         Ok(Self {
             wheels: context.bus.reader(&topics::WHEELS)?,
-            pose: context.bus.writer(&topics::POSE, context.life.generation)?,
+            pose: context
+                .bus
+                .writer(&topics::POSE, context.generation.number)?,
             checkpoint,
             reckoning,
             progress: Progress::default(),

@@ -52,7 +52,7 @@ impl Memory {
         let (grid, lattice) = (mission.grid_frame(), lattice(mission));
         let radius = mission.body().radius_m;
         // A position is up to half a cell off the centre that stands for it.
-        let reach = radius + mission.mapper.spare_m + grid.resolution_m / 2.0;
+        let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         Self {
             grid,
             lattice,

@@ -76,9 +76,9 @@ impl Process for Shell {
         if version > 1 {
             tracing::info!(version, "belief restored");
         }
-        context.waiter.on(context.bus.alarm(&topics::POSE)?);
-        context.waiter.on(context.bus.alarm(&topics::DIRECTIVE)?);
-        let generation = context.life.generation;
+        context.waiter.on(context.bus.wakeup(&topics::POSE)?);
+        context.waiter.on(context.bus.wakeup(&topics::DIRECTIVE)?);
+        let generation = context.generation.number;
         Ok(Self {
             pose: context.bus.reader(&topics::POSE)?,
             range: context.bus.reader(&topics::RANGE)?,

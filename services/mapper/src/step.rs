@@ -98,7 +98,7 @@ impl Mapper {
     pub fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
         let margin = mission.margin_cells();
-        let memory = (mission.method == Method::Careful).then(|| Memory::new(mission));
+        let memory = (mission.method == Method::Evidential).then(|| Memory::new(mission));
         // A known surface blocks what a hit on it would: its cell and the margin around.
         let around_a_hit = (f64::from(margin) + 0.5) * frame.resolution_m;
         let mut mapper = Self {

@@ -101,7 +101,7 @@ impl BesideSolver {
 
     /// The next result, if there is one.
     pub fn take(&mut self) -> Option<Solved> {
-        self.silence();
+        self.drain();
         let solved = self.results.try_recv().ok();
         self.taken(solved)
     }
@@ -109,7 +109,7 @@ impl BesideSolver {
     /// The next result; waits for it. None when the thread is gone.
     pub fn wait(&mut self) -> Option<Solved> {
         let solved = self.results.recv().ok();
-        self.silence();
+        self.drain();
         self.taken(solved)
     }
 
@@ -120,7 +120,7 @@ impl BesideSolver {
         solved
     }
 
-    fn silence(&self) {
+    fn drain(&self) {
         use std::io::Read;
         let mut rung = [0; 64];
         while matches!((&self.done).read(&mut rung), Ok(read) if read > 0) {}

@@ -54,10 +54,10 @@ pub struct Shell {
 
 impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        let generation = context.life.generation;
+        let generation = context.generation.number;
         let mission = &context.run.mission;
         let longest = mission.grid_frame().area();
-        context.waiter.on(context.bus.alarm(&topics::GRID)?);
+        context.waiter.on(context.bus.wakeup(&topics::GRID)?);
         let beside = BesideSolver::start().map_err(|error| {
             StageError::Other(format!("cannot start the thread of full solves: {error}"))
         })?;

@@ -92,7 +92,7 @@ impl Planner {
         Self {
             target: mission.target,
             absorption: mission.absorption(),
-            lookout: (mission.method == Method::Careful).then(|| Lookout::new(mission)),
+            lookout: (mission.method == Method::Evidential).then(|| Lookout::new(mission)),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),

@@ -274,7 +274,7 @@ fn where_a_full_solve_is_advised_directions_are_within_ten_degrees_in_9_of_10_ca
 #[test]
 fn a_door_closed_cell_by_cell_is_reported_when_the_last_cell_is() {
     let mut random = Random::new(5);
-    let (mut narrowed, mut alarms) = (0, 0);
+    let (mut narrowed, mut wakeups) = (0, 0);
     for door in [1, 2, 3, 5, 8] {
         for thick in [1, 2, 5] {
             for upright in [false, true] {
@@ -289,7 +289,7 @@ fn a_door_closed_cell_by_cell_is_reported_when_the_last_cell_is() {
                         }
                         narrowed += 1;
                         if verdict == Verdict::PassageClosed {
-                            alarms += 1;
+                            wakeups += 1;
                             case.field = case.full();
                         } else {
                             assert_eq!(follow(&case.field), 1.0, "{door} {thick} {upright}");
@@ -299,7 +299,7 @@ fn a_door_closed_cell_by_cell_is_reported_when_the_last_cell_is() {
             }
         }
     }
-    assert!(alarms * 6 <= narrowed, "{alarms} of {narrowed}");
+    assert!(wakeups * 6 <= narrowed, "{wakeups} of {narrowed}");
 }
 
 /// Two rooms joined by a door.

@@ -45,7 +45,7 @@ impl Presence {
     #[must_use]
     pub fn new(mission: &Mission, clock: MissionClock) -> Self {
         Self {
-            silence: silence(mission, clock),
+            silence: drain(mission, clock),
             wire_open: true,
             connected: false,
             heard_ns: None,
@@ -132,7 +132,7 @@ impl Presence {
 }
 
 /// How long a robot may say nothing, on the machine's clock, before it is lost.
-fn silence(mission: &Mission, clock: MissionClock) -> Duration {
+fn drain(mission: &Mission, clock: MissionClock) -> Duration {
     let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
     match clock {
         MissionClock::Wall { rate, .. } if rate > 0.0 => limit.div_f64(rate).max(LEAST_SILENCE),

@@ -64,9 +64,9 @@ impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let transport = Transport::open(&context.run.address).map_err(wire_broke)?;
         context.waiter.on_readable(&transport)?;
-        context.waiter.on(context.bus.alarm(&topics::COMMAND)?);
-        context.waiter.on(context.bus.alarm(&topics::DIRECTIVE)?);
-        let generation = context.life.generation;
+        context.waiter.on(context.bus.wakeup(&topics::COMMAND)?);
+        context.waiter.on(context.bus.wakeup(&topics::DIRECTIVE)?);
+        let generation = context.generation.number;
         let run = &context.run;
         Ok(Self {
             transport,
@@ -77,7 +77,7 @@ impl Process for Shell {
             state: context.bus.writer(&topics::LINK, generation)?,
             pending: Pending::default(),
             telemetry: None,
-            link: Link::new(&run.mission, run.clock, context.life.first_tick),
+            link: Link::new(&run.mission, run.clock, context.generation.first_tick),
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
@@ -114,8 +114,8 @@ impl Process for Shell {
         Ok(self.progress)
     }
 
-    fn furnish(&mut self, context: &Context) -> Result<(), StageError> {
-        let (bus, generation) = (&context.bus, context.life.generation);
+    fn after_ready(&mut self, context: &Context) -> Result<(), StageError> {
+        let (bus, generation) = (&context.bus, context.generation.number);
         self.telemetry = Some(Telemetry {
             infrared: bus.writer(&topics::INFRARED, generation)?,
             power: bus.writer(&topics::POWER, generation)?,

@@ -134,7 +134,7 @@ fn in_the_targets_cell_the_rest_is_straight() {
 /// A careful planner in a room where only what `swept` says was looked at.
 fn careful(swept: impl Fn(DVec2) -> bool) -> Planner {
     let mission = Mission {
-        method: Method::Careful,
+        method: Method::Evidential,
         ..mission()
     };
     let (header, mut cells) = keyframe(1, |_| false);

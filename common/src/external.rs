@@ -1,0 +1,106 @@
+//! A stage that somebody else started (systemd, a person): it finds the run, its place in it, and the supervisor.
+//!
+//! A supervisor that leaves its stages to others links its run directory into the robot's domain, and says in the
+//! roster which of them are down. A stage takes its place when the roster shows it free.
+
+use std::{
+    fs,
+    os::fd::OwnedFd,
+    time::{Duration, Instant},
+};
+
+use rustix::process::{Pid, PidfdFlags, pidfd_open};
+
+use crate::{
+    bus::Bus,
+    domain::{Domain, RobotName},
+    run::{self, Run},
+    samples::{Order, name_str},
+    shell::{Generation, Joined, StageError, enter, name_process},
+    topics,
+    waiter::Waiter,
+};
+
+/// The roster comes five times a second, and a place whose holder has died is free in the next.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Take the place of `stage` in what `robot` does.
+pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
+    name_process(stage)?;
+    let domain = Domain::of(robot.clone());
+    if !domain.directory().exists() {
+        return Err(StageError::Other(format!(
+            "robot {:?} has no supervisor here; start one first, with `firsthand run --watch-only`",
+            robot.to_string()
+        )));
+    }
+    // Waits while the supervisor makes the bus.
+    let stage_lock = enter(&domain)?;
+    let directory = fs::read_link(domain.run_link()).map_err(|_| {
+        StageError::Other(format!(
+            "the supervisor of robot {:?} starts its stages itself; to start them yourself, give `firsthand run` --watch-only",
+            robot.to_string()
+        ))
+    })?;
+    let run = Run::load(&directory)?;
+    let bus = Bus::join(&domain, stage)?;
+    let place = wait_for_place(&bus, stage)?;
+    let number = run::next_generation(&directory, stage)?;
+    let generation = Generation {
+        stage,
+        directory,
+        number,
+        first_tick: place.first_tick,
+    };
+    Ok(Joined {
+        generation,
+        run,
+        bus,
+        supervisor: Some(place.supervisor),
+        stage_lock,
+    })
+}
+
+/// What the roster says of a free place.
+struct Place {
+    first_tick: u64,
+    supervisor: OwnedFd,
+}
+
+fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
+    let mut roster = bus.slice_reader(&topics::ROSTER)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::ROSTER)?);
+    let began = Instant::now();
+    let mut holder = None;
+    while began.elapsed() < PATIENCE {
+        while let Some(entries) = roster.take()? {
+            let header = entries.header();
+            if Order::from_byte(header.order) == Order::Stop {
+                return Err(StageError::Other("the robot is being stopped".to_owned()));
+            }
+            holder = entries
+                .iter()
+                .find(|entry| name_str(&entry.stage) == stage)
+                .map(|entry| entry.pid);
+            if holder == Some(0) {
+                return Ok(Place {
+                    first_tick: header.stamp.tick + 1,
+                    supervisor: watch(header.supervisor_pid)?,
+                });
+            }
+        }
+        waiter.wait(PATIENCE)?;
+    }
+    Err(StageError::Other(match holder {
+        Some(pid) => format!("{stage} lives already, as process {pid}; end that one first"),
+        None => "no supervisor speaks on the robot's bus; is it frozen?".to_owned(),
+    }))
+}
+
+/// A descriptor that becomes readable when the supervisor ends. It spoke a moment ago: the number is still its own.
+fn watch(pid: u32) -> Result<OwnedFd, StageError> {
+    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+    let gone = || StageError::Other("the supervisor is gone".to_owned());
+    pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())
+}

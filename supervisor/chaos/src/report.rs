@@ -1,0 +1,290 @@
+//! The sum of all missions under attack.
+
+use std::{
+    collections::BTreeMap,
+    fmt, fs,
+    time::{Duration, Instant},
+};
+
+use common::{latency::Histogram, topics::SUPERVISOR};
+use serde::Serialize;
+
+use super::schedule::Kind;
+use supervisor::stages::TABLE;
+
+/// What became of everything. Times in milliseconds.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    missions: u64,
+    reached: u64,
+    collisions: u64,
+    /// Missions that were not reached untouched, or lost pose: their seeds and what was wrong.
+    wrong: Vec<String>,
+    /// Signals by stage and kind.
+    kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
+    #[serde(serialize_with = "recoveries")]
+    recovery_ms: BTreeMap<&'static str, Recovery>,
+    /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and in that mission the
+    /// signals sent.
+    worst_pose_excess_m: f64,
+    worst_pose_kills: u32,
+    /// The longest that a wheel turned after the last command the robot had heard, mission seconds.
+    longest_unattended_s: f64,
+    /// Files, shared memory, processes that outlived a mission.
+    pub leftovers: usize,
+    /// The most that a supervisor held more at the end of its life than when its robot began to drive.
+    most_won: Possessions,
+    took_s: f64,
+    #[serde(skip)]
+    began: Instant,
+}
+
+/// What a process holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Possessions {
+    /// Open descriptors.
+    pub descriptors: i64,
+    /// Memory that is its own, KiB.
+    pub memory_kib: i64,
+}
+
+impl Possessions {
+    /// Of process `pid`; none when it is gone.
+    pub fn of(pid: u32) -> Option<Self> {
+        let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as i64;
+        let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+        // Pages of shared memory come with the samples that were looked at: they are the bus's.
+        let line = status
+            .lines()
+            .find_map(|line| line.strip_prefix("RssAnon:"))?;
+        let memory_kib = line.trim().trim_end_matches(" kB").parse().ok()?;
+        Some(Self {
+            descriptors,
+            memory_kib,
+        })
+    }
+}
+
+/// From the signal to the successor.
+#[derive(Debug, Default)]
+pub(crate) struct Recovery {
+    /// To its first beat that says ready, after which it works; of those that were not frozen, which are noticed
+    /// by their silence.
+    pub ready: Histogram,
+    /// The same of those that were frozen.
+    pub after_freeze: Histogram,
+    /// To its first sample of a tick; up to a tick longer.
+    pub output: Histogram,
+}
+
+/// One mission's end.
+#[derive(Debug)]
+pub struct End {
+    pub seed: u64,
+    pub outcome: String,
+    pub reason: String,
+    pub collisions: u64,
+    pub pose_excess_m: f64,
+    /// The most that may be.
+    pub pose_allowance_m: f64,
+    pub unattended_s: f64,
+    pub kills: u32,
+}
+
+impl Report {
+    pub(crate) fn new() -> Self {
+        Self {
+            missions: 0,
+            reached: 0,
+            collisions: 0,
+            wrong: Vec::new(),
+            kills: BTreeMap::new(),
+            recovery_ms: BTreeMap::new(),
+            worst_pose_excess_m: 0.0,
+            worst_pose_kills: 0,
+            longest_unattended_s: 0.0,
+            leftovers: 0,
+            most_won: Possessions::default(),
+            took_s: 0.0,
+            began: Instant::now(),
+        }
+    }
+
+    /// Missions that ended.
+    pub const fn missions(&self) -> u64 {
+        self.missions
+    }
+
+    /// Signals sent.
+    pub fn kills(&self) -> u32 {
+        self.kills.values().flat_map(BTreeMap::values).sum()
+    }
+
+    pub(crate) fn hit(&mut self, stage: &'static str, kind: Kind) {
+        *self
+            .kills
+            .entry(stage)
+            .or_default()
+            .entry(kind)
+            .or_default() += 1;
+    }
+
+    pub(crate) fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
+        self.recovery_ms.entry(stage).or_default()
+    }
+
+    /// Says whether the mission arrived untouched, and knew where it was.
+    pub fn ended(&mut self, end: &End) -> bool {
+        self.missions += 1;
+        self.collisions += end.collisions;
+        self.longest_unattended_s = self.longest_unattended_s.max(end.unattended_s);
+        if end.pose_excess_m > self.worst_pose_excess_m {
+            self.worst_pose_excess_m = end.pose_excess_m;
+            self.worst_pose_kills = end.kills;
+        }
+        let reached = end.outcome == "reached";
+        self.reached += u64::from(reached);
+        let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
+        let before = self.wrong.len();
+        if !reached {
+            let (outcome, reason) = (&end.outcome, &end.reason);
+            self.wrong.push(format!("seed {seed}: {outcome}: {reason}"));
+        }
+        if end.collisions > 0 {
+            self.wrong.push(format!(
+                "seed {seed}: touched something {} times",
+                end.collisions
+            ));
+        }
+        if excess > allowance {
+            self.wrong.push(format!(
+                "seed {seed}: pose off by {excess:.4} m more than undisturbed, of {allowance:.4} m allowed"
+            ));
+        }
+        self.wrong.len() == before
+    }
+
+    /// A supervisor held `first` when its robot began to drive, and `last` when it was last looked at.
+    pub fn held(&mut self, first: Possessions, last: Possessions) {
+        let most = &mut self.most_won;
+        most.descriptors = most.descriptors.max(last.descriptors - first.descriptors);
+        most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
+    }
+
+    pub(crate) fn end(&mut self) {
+        self.took_s = self.began.elapsed().as_secs_f64();
+    }
+
+    /// Whether every mission arrived untouched and knew where it was. What one wrote that did not is kept.
+    pub fn is_right(&self) -> bool {
+        self.wrong.is_empty()
+    }
+
+    /// Whether every mission did, and left nothing.
+    pub fn is_clean(&self) -> bool {
+        self.is_right() && self.leftovers == 0
+    }
+}
+
+/// Milliseconds of a quantile.
+fn ms(histogram: &Histogram, share: f64) -> Option<f64> {
+    histogram.quantile_us(share).map(|us| us / 1e3)
+}
+
+fn recoveries<S: serde::Serializer>(
+    all: &BTreeMap<&'static str, Recovery>,
+    to: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Quantiles {
+        p50: Option<f64>,
+        p99: Option<f64>,
+        max: Option<f64>,
+    }
+    let quantiles = |histogram: &Histogram| Quantiles {
+        p50: ms(histogram, 0.5),
+        p99: ms(histogram, 0.99),
+        max: ms(histogram, 1.0),
+    };
+    to.collect_map(all.iter().map(|(stage, recovery)| {
+        let parts = [
+            ("ready", quantiles(&recovery.ready)),
+            ("ready_when_frozen", quantiles(&recovery.after_freeze)),
+            ("output", quantiles(&recovery.output)),
+        ];
+        (stage, parts.into_iter().collect::<BTreeMap<_, _>>())
+    }))
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let took = Duration::from_secs_f64(self.took_s);
+        writeln!(
+            to,
+            "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} leftovers",
+            self.kills(),
+            self.missions,
+            took.as_secs_f64(),
+            self.reached,
+            self.collisions,
+            self.leftovers
+        )?;
+        for wrong in &self.wrong {
+            writeln!(to, "  {wrong}")?;
+        }
+        writeln!(
+            to,
+            "{:<16} {:>6} {:>22} {:>22} {:>22}",
+            "stage", "hit", "ready, ms", "frozen, ms", "a tick's output, ms"
+        )?;
+        let nothing = Recovery::default();
+        let stages = TABLE.iter().map(|stage| stage.name);
+        let hit_supervisor = self.kills.contains_key(SUPERVISOR).then_some(SUPERVISOR);
+        for name in stages.chain(hit_supervisor) {
+            let hit: u32 = self.kills.get(name).map_or(0, |kinds| kinds.values().sum());
+            let recovery = self.recovery_ms.get(name).unwrap_or(&nothing);
+            let quantiles = |histogram: &Histogram| match (
+                ms(histogram, 0.5),
+                ms(histogram, 0.99),
+                ms(histogram, 1.0),
+            ) {
+                (Some(p50), Some(p99), Some(max)) => format!("{p50:.1} {p99:.1} {max:.1}"),
+                _ => "-".to_owned(),
+            };
+            writeln!(
+                to,
+                "{name:<16} {hit:>6} {:>22} {:>22} {:>22}",
+                quantiles(&recovery.ready),
+                quantiles(&recovery.after_freeze),
+                quantiles(&recovery.output)
+            )?;
+        }
+        let mut kinds: BTreeMap<Kind, u32> = BTreeMap::new();
+        for (&kind, &count) in self.kills.values().flatten() {
+            *kinds.entry(kind).or_default() += count;
+        }
+        let kinds: Vec<_> = kinds
+            .iter()
+            .map(|(kind, count)| format!("{count} {}", kind.as_str()))
+            .collect();
+        writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
+        writeln!(
+            to,
+            "pose error beyond the undisturbed run at most {:.4} m ({} signals in that mission)",
+            self.worst_pose_excess_m, self.worst_pose_kills
+        )?;
+        writeln!(
+            to,
+            "a wheel turned at most {:.2} s of mission time after the last command",
+            self.longest_unattended_s
+        )?;
+        let Possessions {
+            descriptors,
+            memory_kib,
+        } = self.most_won;
+        writeln!(
+            to,
+            "a supervisor won at most {descriptors} descriptors and {memory_kib} KiB on its way"
+        )
+    }
+}

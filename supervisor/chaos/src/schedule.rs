@@ -1,0 +1,116 @@
+//! Who, how and when.
+
+use std::time::Duration;
+
+use rand_pcg::{Pcg64, rand_core::Rng};
+use rustix::process::Signal;
+use serde::Serialize;
+
+use supervisor::stages::TABLE;
+
+/// Between two signals on average: each stage gets one every two to three seconds, and has lived before.
+const MEAN_PAUSE: Duration = Duration::from_millis(500);
+/// A successor that is hit in its start-up is hit within this of its start: the middleware's fragile time.
+const STARTUP: Duration = Duration::from_millis(12);
+/// Share of the signals that are meant for a successor in its start-up, where that is asked for: a fifth of them, and
+/// half as many that come to nothing because the first left no successor, or one that was ready too soon.
+const STARTUP_SHARE: f64 = 0.3;
+
+/// Share of the signals that hit the supervisor, where that is asked for: a hundred in two thousand.
+const SUPERVISOR_SHARE: f64 = 0.05;
+
+/// How a stage is hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Kind {
+    /// SIGKILL.
+    Kill,
+    /// SIGKILL in the first milliseconds of a life.
+    KillAtStart,
+    /// SIGABRT, as a panic of a program that cannot unwind. Not SIGSEGV: Rust's runtime takes the first for an
+    /// overflow of the stack, finds none, and goes on.
+    Crash,
+    /// SIGTERM.
+    Terminate,
+    /// SIGSTOP: it hangs.
+    Freeze,
+}
+
+impl Kind {
+    /// What is sent.
+    pub(crate) const fn signal(self) -> Signal {
+        match self {
+            Self::Kill | Self::KillAtStart => Signal::KILL,
+            Self::Crash => Signal::ABORT,
+            Self::Terminate => Signal::TERM,
+            Self::Freeze => Signal::STOP,
+        }
+    }
+
+    /// For people.
+    pub(crate) const fn as_str(self) -> &'static str {
+        match self {
+            Self::Kill => "killed",
+            Self::KillAtStart => "killed at start",
+            Self::Crash => "crashed",
+            Self::Terminate => "terminated",
+            Self::Freeze => "frozen",
+        }
+    }
+}
+
+/// Seeded chance.
+#[derive(Debug)]
+pub(crate) struct Chance(Pcg64);
+
+impl Chance {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Pcg64::new(u128::from(seed), 7))
+    }
+
+    /// Uniform in [0, 1).
+    fn uniform(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Until the next signal: exponential, so that it may come at any moment.
+    pub(crate) fn pause(&mut self) -> Duration {
+        MEAN_PAUSE.mul_f64(-(1.0 - self.uniform()).ln())
+    }
+
+    /// The stage to hit.
+    pub(crate) fn stage(&mut self) -> &'static str {
+        let index = (self.uniform() * TABLE.len() as f64) as usize;
+        TABLE[index.min(TABLE.len() - 1)].name
+    }
+
+    /// Whether to hit the supervisor instead.
+    pub(crate) fn supervisor(&mut self) -> bool {
+        self.uniform() < SUPERVISOR_SHARE
+    }
+
+    /// How to hit the supervisor: told to end it would, and one that is frozen is systemd's to notice.
+    pub(crate) fn supervisor_kind(&mut self) -> Kind {
+        match self.uniform() {
+            ..0.8 => Kind::Kill,
+            _ => Kind::Crash,
+        }
+    }
+
+    /// How to hit it.
+    pub(crate) fn kind(&mut self) -> Kind {
+        match self.uniform() {
+            ..0.6 => Kind::Kill,
+            ..0.75 => Kind::Crash,
+            ..0.9 => Kind::Terminate,
+            _ => Kind::Freeze,
+        }
+    }
+
+    /// Whether to hit the successor too, and how long after its start.
+    pub(crate) fn again(&mut self) -> Option<Duration> {
+        // Of those that follow a first one.
+        let second = self.uniform() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
+        second.then(|| STARTUP.mul_f64(self.uniform()))
+    }
+}

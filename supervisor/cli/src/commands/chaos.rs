@@ -1,0 +1,101 @@
+//! `firsthand chaos`: random deaths of random stages, and what became of the missions.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use common::{clock::Pace, domain::RobotName};
+
+use super::{Failure, missions};
+use chaos::Options;
+
+/// Hit random stages with random signals at random times, mission after mission, and report.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// A shipped mission or a mission file.
+    #[arg(default_value = "obstacle-course")]
+    mission: String,
+    /// Signals to send in all; the mission under way is left to end after the last.
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    kills: u32,
+    /// Seed of who, how and when; the missions' own seeds count up from it.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Hit some successors again within their first 12 ms: about a fifth of all signals.
+    #[arg(long)]
+    include_startup: bool,
+    /// Hit the supervisor too, one in twenty signals, and go on with its run each time. The robot is then a process
+    /// of its own, and mission time is wall-clock.
+    #[arg(long, conflicts_with = "pace")]
+    include_supervisor: bool,
+    /// Mission time, R times wall-clock.
+    #[arg(long, default_value = "4")]
+    pace: Pace,
+    /// KEY=VALUE over the mission file, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Name of the robot, and of its corner of shared memory.
+    #[arg(long, default_value = "chaos")]
+    robot: RobotName,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What it ends with when a mission was lost, touched something, lost its pose, or left something.
+const NOT_CLEAN: u8 = 8;
+
+#[allow(clippy::print_stdout, clippy::print_stderr)]
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    // Faults in it are told at once, and once.
+    let loaded = missions::load(&arguments.mission, &arguments.set)?;
+    if arguments.include_supervisor && loaded.robot.address.is_some() {
+        return Err("chaos brings its own robot; leave robot.address out".into());
+    }
+    if arguments.pace == Pace::Max {
+        return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
+    }
+    let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
+    std::fs::create_dir(&directory)?;
+    let options = Options {
+        mission: arguments.mission.clone(),
+        loaded,
+        set: arguments.set.clone(),
+        robot: arguments.robot.clone(),
+        pace: if arguments.include_supervisor {
+            Pace::Rate(1.0)
+        } else {
+            arguments.pace
+        },
+        supervisor: arguments.include_supervisor,
+        kills: arguments.kills,
+        seed: arguments.seed,
+        startup: arguments.include_startup,
+        directory: directory.clone(),
+    };
+    let ended = chaos::run(&options, &mut |report| {
+        let (kills, missions) = (report.kills(), report.missions());
+        eprintln!("{kills} of {} signals, {missions} missions", options.kills);
+    });
+    let report = match ended {
+        Ok(report) => report,
+        Err(error) => {
+            return Err(format!("{error}; see {}", directory.display()).into());
+        }
+    };
+    if report.is_right() {
+        std::fs::remove_dir_all(&directory)?;
+    } else {
+        let kept = directory.display();
+        eprintln!("firsthand: what the missions wrote that went wrong is kept in {kept}");
+    }
+    if arguments.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        print!("{report}");
+    }
+    Ok(ExitCode::from(if report.is_clean() {
+        0
+    } else {
+        NOT_CLEAN
+    }))
+}

@@ -1,0 +1,200 @@
+//! `firsthand install`: what makes a robot a service of this machine, printed or put in place.
+//!
+//! The Debian package brings the same files (`[package.metadata.deb]`); this is for everyone else.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use clap::Args;
+use thiserror::Error;
+
+use super::Failure;
+use supervisor::stages;
+
+/// Make this executable a service of systemd: units, user, configuration.
+///
+/// Nothing is enabled or started.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Only print every file, each after its path.
+    #[arg(long)]
+    print: bool,
+    /// Install below DIR instead of /.
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "/",
+        conflicts_with = "print"
+    )]
+    root: PathBuf,
+}
+
+/// A file that is installed.
+struct Part {
+    /// Where.
+    path: &'static str,
+    /// What is in it, as packaged.
+    text: &'static str,
+    /// Whether it is its user's once it is there.
+    configuration: bool,
+}
+
+macro_rules! part {
+    ($path:literal, $source:literal, $configuration:literal) => {
+        Part {
+            path: $path,
+            text: include_str!(concat!("../../../systemd/", $source)),
+            configuration: $configuration,
+        }
+    };
+}
+
+static PARTS: [Part; 7] = [
+    part!(
+        "etc/systemd/system/firsthand.service",
+        "firsthand.service",
+        false
+    ),
+    part!(
+        "etc/systemd/system/firsthand-watch.service",
+        "firsthand-watch.service",
+        false
+    ),
+    part!(
+        "etc/systemd/system/firsthand-stage@.service",
+        "firsthand-stage@.service",
+        false
+    ),
+    part!("etc/sysusers.d/firsthand.conf", "firsthand.sysusers", false),
+    part!("etc/tmpfiles.d/firsthand.conf", "firsthand.tmpfiles", false),
+    part!("etc/default/firsthand", "firsthand.default", true),
+    part!("etc/firsthand/mission.toml", "mission.toml", true),
+];
+
+/// Where the package puts the executable.
+const PACKAGED: &str = "/usr/bin/firsthand";
+
+/// What remains to be done by hand.
+const THEN: &str = "systemd-sysusers && systemctl daemon-reload
+then, when /etc/firsthand/mission.toml is the robot's mission:
+  systemctl enable --now firsthand          # the supervisor starts the stages, or
+  systemctl enable --now firsthand-watch    # systemd does:";
+
+/// A file could not be put in place.
+#[derive(Debug, Error)]
+#[error("cannot write {file}: {source}; as root, or with --root?", file = file.display())]
+struct InstallError {
+    file: PathBuf,
+    source: io::Error,
+}
+
+#[allow(clippy::print_stdout)]
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let executable = std::env::current_exe()?;
+    for part in &PARTS {
+        let text = part.text_for(&executable);
+        let file = arguments.root.join(part.path);
+        if arguments.print {
+            println!("# {}\n{text}", file.display());
+        } else if part.configuration && file.exists() {
+            println!("{} stays as it is", file.display());
+        } else {
+            put(&file, &text)?;
+            println!("{}", file.display());
+        }
+    }
+    println!("# Then:\n{}", remaining());
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Part {
+    fn text_for(&self, executable: &Path) -> String {
+        self.text.replace(PACKAGED, &executable.to_string_lossy())
+    }
+}
+
+fn put(file: &Path, text: &str) -> Result<(), InstallError> {
+    let written = file
+        .parent()
+        .map_or(Ok(()), fs::create_dir_all)
+        .and_then(|()| fs::write(file, text));
+    written.map_err(|source| InstallError {
+        file: file.to_path_buf(),
+        source,
+    })
+}
+
+/// The commands, and the units they lead to.
+fn remaining() -> String {
+    let units = stages::TABLE
+        .iter()
+        .map(|stage| format!("\n    firsthand-stage@{}", stage.name));
+    format!("{THEN}{}", units.collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser as _;
+
+    fn unit(name: &str) -> &'static str {
+        let found = PARTS.iter().find(|part| part.path.ends_with(name));
+        found.unwrap().text
+    }
+
+    #[test]
+    fn the_watching_unit_wants_every_stage_of_the_table() {
+        let wanted: Vec<_> = unit("firsthand-watch.service")
+            .lines()
+            .filter_map(|line| line.strip_prefix("Wants=firsthand-stage@"))
+            .collect();
+        let stages: Vec<_> = stages::TABLE
+            .iter()
+            .map(|stage| format!("{}.service", stage.name))
+            .collect();
+        assert_eq!(wanted, stages);
+    }
+
+    #[test]
+    fn every_unit_starts_a_command_that_exists() {
+        for part in &PARTS {
+            for line in part.text.lines() {
+                let Some(command) = line.strip_prefix("ExecStart=") else {
+                    continue;
+                };
+                let command = command
+                    .replace("${FIRSTHAND_ROBOT}", "x80")
+                    .replace("%i", "planner");
+                let words = command.split_whitespace();
+                crate::Arguments::try_parse_from(words)
+                    .unwrap_or_else(|error| panic!("{}: {error}", part.path));
+            }
+        }
+    }
+
+    #[test]
+    fn the_packaged_mission_is_valid() {
+        let text = unit("mission.toml");
+        common::mission::Mission::parse(text, Path::new("mission.toml")).unwrap();
+    }
+
+    #[test]
+    fn configuration_that_is_there_is_not_written_over() {
+        let root = tempfile::tempdir().unwrap();
+        let mission = root.path().join("etc/firsthand/mission.toml");
+        put(&mission, "target = [1.0, 0.0]").unwrap();
+        let arguments = Arguments {
+            print: false,
+            root: root.path().to_path_buf(),
+        };
+        main(&arguments).unwrap();
+        assert_eq!(fs::read_to_string(&mission).unwrap(), "target = [1.0, 0.0]");
+        let service = root.path().join("etc/systemd/system/firsthand.service");
+        let service = fs::read_to_string(service).unwrap();
+        let executable = std::env::current_exe().unwrap();
+        assert!(service.contains(&format!("ExecStart={} run", executable.display())));
+    }
+}

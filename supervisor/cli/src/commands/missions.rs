@@ -1,0 +1,178 @@
+//! `firsthand missions`, and the missions that ship with the program.
+
+use std::{path::Path, process::ExitCode};
+
+use clap::Args;
+use common::mission::{Mission, MissionError};
+use thiserror::Error;
+
+use super::Failure;
+
+/// List the missions that ship with the program; with a name, print its file to start your own from.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// A shipped mission.
+    name: Option<String>,
+}
+
+macro_rules! shipped {
+    ($($name:literal),*) => {
+        [$(($name, include_str!(concat!("../../../missions/", $name, ".toml")))),*]
+    };
+}
+
+/// Name and text of every shipped mission.
+pub(crate) static SHIPPED: [(&str, &str); 3] = shipped!("open-room", "obstacle-course", "trap");
+
+/// A mission that cannot be had.
+#[derive(Debug, Error)]
+pub(crate) enum LookupError {
+    #[error("no shipped mission is called {name:?}; shipped are {}", names())]
+    Unknown { name: String },
+    #[error("{name:?} is neither a shipped mission ({}) nor a file", names())]
+    Neither { name: String },
+    #[error(
+        "--set {assignment:?} is not KEY=VALUE with a TOML value: {problem}; for example --set start.heading_deg=90"
+    )]
+    Assignment { assignment: String, problem: String },
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+}
+
+fn names() -> String {
+    SHIPPED.map(|(name, _)| name).join(", ")
+}
+
+fn shipped(name: &str) -> Option<&'static str> {
+    let found = SHIPPED.iter().find(|(shipped, _)| *shipped == name);
+    found.map(|(_, text)| *text)
+}
+
+/// The mission of that name or in that file, with `KEY=VALUE` assignments on top.
+pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    let file = Path::new(name);
+    let (text, origin) = match shipped(name) {
+        Some(text) => (text.to_owned(), format!("{name}.toml")),
+        None if file.extension().is_some() || file.exists() => {
+            let mission = Mission::load(file)?;
+            if assignments.is_empty() {
+                return Ok(mission);
+            }
+            let text = std::fs::read_to_string(file).unwrap_or_default();
+            (text, name.to_owned())
+        }
+        None => {
+            return Err(LookupError::Neither {
+                name: name.to_owned(),
+            });
+        }
+    };
+    if assignments.is_empty() {
+        return Ok(Mission::parse(&text, Path::new(&origin))?);
+    }
+    let text = assign(&text, assignments)?;
+    Ok(Mission::parse(&text, Path::new(&origin))?)
+}
+
+/// `text` with every assignment made. It was parsed before, or ships with the program.
+fn assign(text: &str, assignments: &[String]) -> Result<String, LookupError> {
+    let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
+    for assignment in assignments {
+        let failed = |problem: &str| LookupError::Assignment {
+            assignment: assignment.clone(),
+            problem: problem.trim().replace('\n', " "),
+        };
+        let (path, _) = assignment.split_once('=').ok_or_else(|| failed("no '='"))?;
+        let layer: toml::Table =
+            toml::from_str(assignment).map_err(|error| failed(error.message()))?;
+        if path.trim().is_empty() {
+            return Err(failed("no key"));
+        }
+        merge(&mut table, layer);
+    }
+    toml::to_string(&table).map_err(|error| LookupError::Assignment {
+        assignment: assignments.join(" "),
+        problem: error.to_string(),
+    })
+}
+
+/// Put `layer` over `base`, table by table.
+fn merge(base: &mut toml::Table, layer: toml::Table) {
+    for (key, value) in layer {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => merge(below, above),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+#[allow(clippy::print_stdout)]
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if let Some(name) = &arguments.name {
+        let text = shipped(name).ok_or_else(|| LookupError::Unknown { name: name.clone() })?;
+        print!("{text}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    for (name, _) in SHIPPED {
+        println!("{name:<18} {}", load(name, &[])?.description);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_mission_is_valid_and_says_what_it_is() {
+        for (name, _) in SHIPPED {
+            let mission = load(name, &[]).unwrap();
+            assert_eq!(mission.name, name);
+            assert!(!mission.description.is_empty(), "{name} has no description");
+        }
+    }
+
+    #[test]
+    fn the_mission_in_the_readme_is_valid_and_shows_the_defaults() {
+        let readme = include_str!("../../../../README.md");
+        let text = readme
+            .split("```toml\n")
+            .nth(1)
+            .unwrap()
+            .split("```")
+            .next()
+            .unwrap();
+        let mut shown = Mission::parse(text, Path::new("README.md")).unwrap();
+        shown.known = common::geometry::Shapes::default();
+        shown.world = common::geometry::Shapes::default();
+        let plain = Mission::parse("target = [4.0, 0.0]", Path::new("README.md")).unwrap();
+        assert_eq!(shown, plain);
+    }
+
+    #[test]
+    fn an_assignment_changes_one_key_and_keeps_its_table() {
+        let mission = load(
+            "trap",
+            &["start.heading_deg=90".into(), "perimeter.cells = 60".into()],
+        )
+        .unwrap();
+        assert_eq!(
+            (mission.start.heading_deg, mission.perimeter.cells),
+            (90.0, 60)
+        );
+        assert_eq!(
+            mission.perimeter.width_m, 9.0,
+            "the rest of the table stays"
+        );
+    }
+
+    #[test]
+    fn a_bad_assignment_is_refused_with_its_text() {
+        for bad in ["heading", "start.heading_deg=", "start.headin=3", "=3"] {
+            let error = load("trap", &[bad.to_owned()]).unwrap_err().to_string();
+            assert!(!error.is_empty(), "{bad} was accepted");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! `firsthand sim MISSION`: a simulated X80 to drive with anything that speaks its protocol.
+
+use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
+
+use clap::{Args, ValueEnum};
+use common::{
+    clock::Pace,
+    shell::become_child,
+    signals::{SIGINT, SIGTERM, Signals},
+};
+use x80_sim::SimOptions;
+
+use super::{Failure, missions};
+
+/// Be a simulated X80 in a mission's world, for `run` or for any other software that drives an X80.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// A shipped mission or a mission file.
+    mission: String,
+    /// Where to listen; port 0 takes a free one.
+    #[arg(long, default_value = "127.0.0.1:0")]
+    listen: SocketAddr,
+    /// How to listen: datagrams, one connection at a time, or a pseudo-terminal in place of a serial port.
+    #[arg(long, value_enum, default_value_t)]
+    transport: Transport,
+    /// Mission time: `max` waits for a command each tick, R runs R times wall-clock.
+    #[arg(long, default_value = "1")]
+    pace: Pace,
+    /// Seed of everything random, over the mission's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// KEY=VALUE over the mission file, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Keep in this file how the robot stands; if it is there, go on from it.
+    #[arg(long, value_name = "FILE")]
+    keep: Option<PathBuf>,
+    /// Tell the truth, a JSON object a line, on standard output.
+    #[arg(long)]
+    truth: bool,
+    /// End when this process, the parent, ends.
+    #[arg(long, hide = true)]
+    supervisor: Option<u32>,
+}
+
+/// How the robot is spoken to.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Transport {
+    #[default]
+    Udp,
+    Tcp,
+    Pty,
+}
+
+impl From<Transport> for x80_sim::Transport {
+    fn from(transport: Transport) -> Self {
+        match transport {
+            Transport::Udp => Self::Udp,
+            Transport::Tcp => Self::Tcp,
+            Transport::Pty => Self::Pty,
+        }
+    }
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let mut mission = missions::load(&arguments.mission, &arguments.set)?;
+    if let Some(seed) = arguments.seed {
+        mission.seed = seed;
+    }
+    let signals = Signals::catch(&[SIGINT, SIGTERM])?;
+    if let Some(supervisor) = arguments.supervisor {
+        become_child("x80-sim", supervisor)?;
+    }
+    let options = SimOptions {
+        mission,
+        pace: arguments.pace,
+        listen: arguments.listen,
+        transport: arguments.transport.into(),
+        keep: arguments.keep.clone(),
+        truth: arguments
+            .truth
+            .then(|| Box::new(std::io::stdout()) as Box<_>),
+    };
+    x80_sim::run(options, &signals)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,300 @@
+//! `firsthand status`: what runs, and how the robot is.
+
+use std::{
+    fmt,
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use common::{
+    bus::Bus,
+    domain::{Domain, RobotName},
+    samples::{
+        Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, name_str,
+    },
+    topics,
+    waiter::Waiter,
+};
+
+use serde::Serialize;
+use x80_link::failsafe;
+
+use super::Failure;
+
+/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its wire and its
+/// batteries.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Whose.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// One line of JSON; an age of null is never.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The whole of `status --json`.
+#[derive(Serialize)]
+struct Status<'a> {
+    robot: &'a RobotName,
+    supervisor_pid: u32,
+    order: &'static str,
+    tick: u64,
+    mission_time_s: f64,
+    /// None while no link speaks.
+    link: Option<LinkStatus>,
+    /// None while no robot tells.
+    power: Option<PowerStatus>,
+    stages: Vec<StageStatus<'a>>,
+}
+
+/// The wire to the robot.
+#[derive(Serialize)]
+struct LinkStatus {
+    connected: bool,
+    /// Whether the link holds the robot still.
+    stopped: bool,
+    /// What its failsafe makes of the robot: goes, stands and the like.
+    robot: &'static str,
+    /// Why; none while it goes.
+    cause: Option<&'static str>,
+    /// For how long it has not answered; none while it does.
+    lost_s: Option<f64>,
+    attempts: u64,
+    next_attempt_s: Option<f64>,
+    losses: u64,
+    reboots: u64,
+    unsent: u64,
+    strangers: u64,
+}
+
+/// The robot's batteries.
+#[derive(Serialize)]
+struct PowerStatus {
+    board_v: f64,
+    motor_v: f64,
+    servo_v: f64,
+    low: bool,
+}
+
+/// One stage of it.
+#[derive(Serialize)]
+struct StageStatus<'a> {
+    name: &'a str,
+    state: &'static str,
+    pid: u32,
+    generation: u32,
+    restarts: u32,
+    uptime_s: Option<f64>,
+    beat_age_s: Option<f64>,
+    output_age_s: Option<f64>,
+}
+
+/// The roster comes five times a second.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// The link speaks ten times a second, and a robot that answers several times.
+const WIRE_PATIENCE: Duration = Duration::from_millis(400);
+
+#[allow(clippy::print_stdout)]
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
+    let mut roster = bus.slice_reader(&topics::ROSTER)?;
+    let mut links = bus.reader(&topics::LINK)?;
+    let mut powers = bus.reader(&topics::POWER)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::ROSTER)?);
+    waiter.on(bus.wakeup(&topics::LINK)?);
+    waiter.on(bus.wakeup(&topics::POWER)?);
+    let began = Instant::now();
+    let (mut entries, mut link, mut power) = (None, None, None);
+    let entries = loop {
+        entries = roster.take()?.or(entries);
+        link = links.newest()?.or(link);
+        power = powers.newest()?.or(power);
+        let lost = link.is_some_and(|link| link.connected == 0);
+        let all = link.is_some() && (power.is_some() || lost);
+        if (all || began.elapsed() >= WIRE_PATIENCE)
+            && let Some(entries) = entries.take()
+        {
+            break entries;
+        }
+        if began.elapsed() >= PATIENCE {
+            return Err(format!(
+                "robot {:?} has a bus but no supervisor that speaks; start it anew with `firsthand run`",
+                arguments.robot.to_string()
+            )
+            .into());
+        }
+        waiter.wait(WIRE_PATIENCE)?;
+    };
+    let header = entries.header();
+    let status = Status {
+        robot: &arguments.robot,
+        supervisor_pid: header.supervisor_pid,
+        order: order(
+            Order::from_byte(header.order),
+            HoldReason::from_byte(header.reason),
+        ),
+        tick: header.stamp.tick,
+        mission_time_s: header.stamp.time().seconds(),
+        link: link.as_ref().map(link_status),
+        power: power.as_ref().map(power_status),
+        stages: entries.iter().map(stage_status).collect(),
+    };
+    if arguments.json {
+        println!("{}", serde_json::to_string(&status)?);
+    } else {
+        print!("{status}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
+    StageStatus {
+        name: name_str(&entry.stage),
+        state: state(StageState::from_byte(entry.state)),
+        pid: entry.pid,
+        generation: entry.generation,
+        restarts: entry.restarts,
+        uptime_s: seconds(entry.uptime_ns),
+        beat_age_s: seconds(entry.beat_age_ns),
+        output_age_s: seconds(entry.output_age_ns),
+    }
+}
+
+fn link_status(link: &LinkSample) -> LinkStatus {
+    let connected = link.connected == 1;
+    let while_lost = |nanoseconds: u64| (!connected).then_some(nanoseconds as f64 * 1e-9);
+    LinkStatus {
+        connected,
+        stopped: link.stopped(),
+        robot: failsafe::effect(link.action()),
+        cause: (link.action() != Action::Go).then(|| failsafe::name(link.cause())),
+        lost_s: while_lost(link.lost_ns),
+        attempts: link.attempts,
+        next_attempt_s: while_lost(link.next_attempt_ns),
+        losses: link.losses,
+        reboots: link.reboots,
+        unsent: link.unsent,
+        strangers: link.strangers,
+    }
+}
+
+const fn power_status(power: &PowerSample) -> PowerStatus {
+    PowerStatus {
+        board_v: power.board_v,
+        motor_v: power.motor_v,
+        servo_v: power.servo_v,
+        low: power.is_low(),
+    }
+}
+
+const fn order(order: Order, reason: HoldReason) -> &'static str {
+    match order {
+        Order::Hold => match reason {
+            HoldReason::Operator => "stopped by an operator",
+            HoldReason::StageHeld => "stopped, a stage is held",
+            HoldReason::Starting | HoldReason::None | HoldReason::Ending => "starting",
+        },
+        Order::Drive => "driving",
+        Order::Stop => "stopping",
+    }
+}
+
+const fn state(state: StageState) -> &'static str {
+    match state {
+        StageState::Down => "down",
+        StageState::Starting => "starting",
+        StageState::Running => "running",
+        StageState::BackingOff => "backing off",
+        StageState::Stopping => "stopping",
+        StageState::Held => "held",
+    }
+}
+
+impl fmt::Display for Status<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "robot {}: supervisor {}, {}, {:.1} s into the mission",
+            self.robot, self.supervisor_pid, self.order, self.mission_time_s
+        )?;
+        if let Some(link) = &self.link {
+            writeln!(f, "{link}")?;
+        }
+        if let Some(power) = &self.power {
+            writeln!(f, "{power}")?;
+        }
+        writeln!(
+            f,
+            "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
+            "stage", "state", "pid", "gen", "uptime", "restarts", "last beat", "last output"
+        )?;
+        for stage in &self.stages {
+            writeln!(
+                f,
+                "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
+                stage.name,
+                stage.state,
+                stage.pid,
+                stage.generation,
+                age(stage.uptime_s),
+                stage.restarts,
+                age(stage.beat_age_s),
+                age(stage.output_age_s),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for LinkStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.lost_s, self.next_attempt_s) {
+            (Some(lost), Some(next)) => write!(
+                f,
+                "ROBOT LOST for {}: {} attempts to reach it, the next in {}",
+                age(Some(lost)),
+                self.attempts,
+                age(Some(next))
+            )?,
+            _ => write!(f, "the robot answers")?,
+        }
+        if self.losses > 0 {
+            write!(f, "; times it was lost: {}", self.losses)?;
+        }
+        if self.reboots > 0 {
+            write!(f, "; times it restarted: {}", self.reboots)?;
+        }
+        match self.cause {
+            None => Ok(()),
+            Some(cause) => write!(f, "; it {}: {cause}", self.robot),
+        }
+    }
+}
+
+impl fmt::Display for PowerStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = if self.low { "BATTERY LOW" } else { "batteries" };
+        write!(
+            f,
+            "{word}: board {:.1} V, motors {:.1} V, servos {:.1} V",
+            self.board_v, self.motor_v, self.servo_v
+        )
+    }
+}
+
+/// u64::MAX nanoseconds are never.
+fn seconds(nanoseconds: u64) -> Option<f64> {
+    (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
+}
+
+/// An age for people.
+fn age(seconds: Option<f64>) -> String {
+    match seconds {
+        None => "never".to_owned(),
+        Some(seconds) if seconds < 1.0 => format!("{:.0} ms", seconds * 1e3),
+        Some(seconds) => format!("{seconds:.1} s"),
+    }
+}

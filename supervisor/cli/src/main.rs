@@ -1,0 +1,124 @@
+//! The one executable: the command line of a robot's supervisor, its stages, the simulated robot and the tools.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`commands`] | one file a subcommand |
+//! | [`summary`] | how a run ended, as numbers |
+//! | [`run_picture`] | the picture a run ends with |
+//! | [`logging`] | logs where they are looked for |
+
+mod commands;
+mod logging;
+#[cfg(feature = "tools")]
+mod run_picture;
+mod summary;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+#[cfg(feature = "simulator")]
+use commands::sim;
+#[cfg(feature = "tools")]
+use commands::{chaos, field, latency};
+use commands::{check, fault, install, missions, operate, run, stage, status, tables};
+
+/// Time-critical mobility for ground robots: a target, a perimeter, one sonar, and off it goes.
+///
+/// Without a subcommand: `firsthand run obstacle-course`.
+#[derive(Debug, Parser)]
+#[command(name = "firsthand", version, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(run::Arguments),
+    Stage(stage::Arguments),
+    #[cfg(feature = "simulator")]
+    Sim(sim::Arguments),
+    Missions(missions::Arguments),
+    Check(check::Arguments),
+    #[cfg(feature = "tools")]
+    Field(field::Arguments),
+    #[cfg(feature = "tools")]
+    Latency(latency::Arguments),
+    Status(status::Arguments),
+    Stop(operate::Stop),
+    Resume(operate::Resume),
+    Restart(operate::Restart),
+    Kill(operate::Kill),
+    Freeze(operate::Freeze),
+    Thaw(operate::Thaw),
+    Fault(fault::Arguments),
+    #[cfg(feature = "tools")]
+    Chaos(chaos::Arguments),
+    Install(install::Arguments),
+    Topics(tables::TopicArguments),
+    Stages(tables::StageArguments),
+    Failsafe(tables::FailsafeArguments),
+    Faults(tables::FaultArguments),
+}
+
+/// What `run` ends with.
+const EXIT_CODES: &str = "Exit codes of run:
+  0  target reached, or stopped by Ctrl-C or SIGTERM
+  1  could not start, or something failed
+  2  wrong usage
+  3  target unreachable
+  4  timeout
+  5  collision (simulated robot)
+  6  aborted by a fault
+  7  an earlier run was cut off (--resume-last)";
+
+/// Run the command line of this process.
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let command = arguments
+        .command
+        .unwrap_or_else(|| Command::Run(run::Arguments::default()));
+    match &command {
+        // It logs into its run directory.
+        Command::Run(_) => {}
+        Command::Stage(_) => logging::to_stderr("info"),
+        #[cfg(feature = "simulator")]
+        Command::Sim(_) => logging::to_stderr("info"),
+        _ => logging::to_stderr("error"),
+    }
+    let result = match command {
+        Command::Run(arguments) => run::main(&arguments),
+        Command::Stage(arguments) => stage::main(&arguments),
+        #[cfg(feature = "simulator")]
+        Command::Sim(arguments) => sim::main(&arguments),
+        Command::Missions(arguments) => missions::main(&arguments),
+        Command::Check(arguments) => check::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Field(arguments) => field::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Latency(arguments) => latency::main(&arguments),
+        Command::Status(arguments) => status::main(&arguments),
+        Command::Stop(arguments) => operate::stop(&arguments),
+        Command::Resume(arguments) => operate::resume(&arguments),
+        Command::Restart(arguments) => operate::restart(&arguments),
+        Command::Kill(arguments) => operate::kill(&arguments),
+        Command::Freeze(arguments) => operate::freeze(&arguments),
+        Command::Thaw(arguments) => operate::thaw(&arguments),
+        Command::Fault(arguments) => fault::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Chaos(arguments) => chaos::main(&arguments),
+        Command::Install(arguments) => install::main(&arguments),
+        Command::Topics(arguments) => tables::topics(&arguments),
+        Command::Stages(arguments) => tables::stages(&arguments),
+        Command::Failsafe(arguments) => tables::failsafe(&arguments),
+        Command::Faults(arguments) => tables::faults(&arguments),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("firsthand: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! The picture a run ends with.
+
+use common::{kinematics::Pose2, mission::Mission, samples::PoseSample, truth::TruthTick};
+use picture::{Facts, Scene};
+use supervisor::{Finished, outcome::Outcome};
+
+use crate::summary::Summary;
+
+/// SVG of the run.
+pub(crate) fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
+    let record = &finished.record;
+    let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
+    let mut captions = summary.captions();
+    if summary.outcome != Outcome::Reached {
+        captions.insert(0, summary.reason.clone());
+    }
+    picture::svg(&Scene {
+        mission,
+        grid: record
+            .grid
+            .frame()
+            .map(|frame| (frame, record.grid.cells())),
+        field: record
+            .field
+            .frame()
+            .map(|frame| (frame, record.field.cells())),
+        believed: &believed,
+        truth: &true_poses(&finished.truth),
+        facts: Facts {
+            outcome: summary.outcome.as_str(),
+            reached: summary.outcome == Outcome::Reached,
+            mission_time_s: summary.mission_time_s,
+            path_length_m: summary.path_length_m,
+            straight_m: summary.straight_m,
+            safety_events: summary.safety_events,
+            seed: mission.robot.address.is_none().then_some(mission.seed),
+        },
+        captions: &captions,
+    })
+}
+
+/// Poses of the truth, for the picture.
+fn true_poses(truth: &[TruthTick]) -> Vec<Pose2> {
+    truth
+        .iter()
+        .map(|tick| Pose2 {
+            position: glam::DVec2::new(tick.x, tick.y),
+            heading: tick.heading,
+        })
+        .collect()
+}

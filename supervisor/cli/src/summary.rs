@@ -1,0 +1,228 @@
+//! How a run ended, as numbers: for people, for scripts, for the picture.
+
+use std::{collections::BTreeMap, fmt};
+
+use common::{clock::MissionTime, latency::Histogram, mission::Mission, truth::TruthTick};
+use serde::Serialize;
+
+use supervisor::{Finished, outcome::Outcome};
+
+/// Quantiles of a duration, microseconds; none of nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct Quantiles {
+    p50: Option<f64>,
+    p99: Option<f64>,
+    max: Option<f64>,
+}
+
+impl From<&Histogram> for Quantiles {
+    fn from(histogram: &Histogram) -> Self {
+        Self {
+            p50: histogram.quantile_us(0.5),
+            p99: histogram.quantile_us(0.99),
+            max: histogram.quantile_us(1.0),
+        }
+    }
+}
+
+/// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the
+/// truth about a real robot.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Summary {
+    pub(crate) outcome: Outcome,
+    pub(crate) reason: String,
+    pub(crate) mission_time_s: f64,
+    pub(crate) path_length_m: f64,
+    pub(crate) straight_m: f64,
+    pub(crate) min_clearance_m: Option<f64>,
+    pub(crate) collisions: Option<u64>,
+    pub(crate) pose_error_m: Option<f64>,
+    /// The longest that a wheel turned after the last command the robot had heard: command limit and speed loop
+    /// together, in an outage or when a stage dies.
+    pub(crate) unattended_s: Option<f64>,
+    pub(crate) safety_events: u64,
+    pub(crate) full_solves: u64,
+    pub(crate) local_updates: u64,
+    pub(crate) ticks: u64,
+    pub(crate) restarts: BTreeMap<&'static str, u32>,
+    /// Supervisors that went on with the run. Path and clearance from the truth, solves and latencies are those of
+    /// the last one; the path is then the believed one, which is whole.
+    pub(crate) resumes: u32,
+    /// Fresh planners that a stalled robot was given.
+    pub(crate) replans: u32,
+    /// Times its sensed belief was forgotten.
+    pub(crate) resets: u64,
+    /// From the datagram in to the datagram out.
+    pub(crate) tick_latency_us: Quantiles,
+    pub(crate) full_solve_us: Quantiles,
+    pub(crate) local_update_us: Quantiles,
+}
+
+impl Summary {
+    /// Of a run that ended like this. What came after the arrival does not count: it depends on how
+    /// fast the stop was.
+    pub(crate) fn of(mission: &Mission, finished: &Finished) -> Self {
+        let Finished {
+            ending,
+            record,
+            resumes,
+            ..
+        } = finished;
+        let arrival = record
+            .arrival
+            .filter(|_| ending.outcome == Outcome::Reached);
+        let last_tick = match arrival {
+            Some(command) => Some(command.stamp.tick),
+            None => record.newest_tick(),
+        };
+        let pose = last_tick.and_then(|tick| record.pose_at(tick));
+        let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
+        let truth = truth_until(
+            &finished.truth,
+            pose.map(|pose| (pose.left_counts, pose.right_counts)),
+            arrival.is_some(),
+        );
+        let (full_solves, local_updates) = record.solves(guidance);
+        let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
+        let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
+        let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
+        let collisions = truth.last().map(|tick| tick.contacts);
+        // The truth comes through a pipe of its own: a touch on the way may be seen after the arrival.
+        let touched = ending.outcome == Outcome::Reached && collisions.is_some_and(|n| n > 0);
+        let (outcome, reason) = if touched {
+            let reason = "touched something on the way to the target".to_owned();
+            (Outcome::Collision, reason)
+        } else {
+            (ending.outcome, ending.reason.clone())
+        };
+        Self {
+            outcome,
+            reason,
+            mission_time_s: time.seconds(),
+            path_length_m: match ended {
+                Some(_) if *resumes == 0 => path_length(truth),
+                _ => pose.map_or(0.0, |pose| pose.travelled_m),
+            },
+            straight_m: mission.target.length(),
+            min_clearance_m: clearance.filter(|&clearance| clearance < TruthTick::NOTHING_NEAR),
+            collisions,
+            pose_error_m: pose
+                .zip(truth.last())
+                .map(|(pose, truth)| (pose.x_m - truth.x).hypot(pose.y_m - truth.y)),
+            unattended_s: truth.last().map(|tick| tick.unattended_s),
+            safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
+            full_solves,
+            local_updates,
+            ticks: last_tick.map_or(0, |tick| tick + 1),
+            restarts: finished.restarts.clone(),
+            resumes: *resumes,
+            replans: finished.replans,
+            resets: finished.resets,
+            tick_latency_us: (&record.latency()).into(),
+            full_solve_us: (&record.full_solves).into(),
+            local_update_us: (&record.local_updates).into(),
+        }
+    }
+
+    /// Lines below the picture.
+    pub(crate) fn captions(&self) -> Vec<String> {
+        let metres = |value: Option<f64>| {
+            value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))
+        };
+        let stalls = (self.replans > 0 || self.resets > 0).then(|| {
+            format!(
+                "The robot stalled: fresh planners {}, beliefs forgotten {}",
+                self.replans, self.resets
+            )
+        });
+        let numbers = [
+            format!(
+                "Least true clearance {} · pose error at the end {} · {} full solves, {} local updates",
+                metres(self.min_clearance_m),
+                metres(self.pose_error_m),
+                self.full_solves,
+                self.local_updates,
+            ),
+            format!(
+                "tick latency {} · {} ticks · {}{}",
+                self.tick_latency_us,
+                self.ticks,
+                self.restarted(),
+                self.unattended_s.map_or(String::new(), |seconds| format!(
+                    " · at rest {seconds:.2} s after a last command at the latest"
+                )),
+            ),
+        ];
+        stalls.into_iter().chain(numbers).collect()
+    }
+
+    fn restarted(&self) -> String {
+        let some: Vec<_> = self
+            .restarts
+            .iter()
+            .filter(|(_, times)| **times > 0)
+            .map(|(stage, times)| format!("{stage} restarted {times}×"))
+            .collect();
+        let resumed = (self.resumes > 0).then(|| format!("resumed {}×", self.resumes));
+        let all: Vec<_> = resumed.into_iter().chain(some).collect();
+        if all.is_empty() {
+            "no restarts".to_owned()
+        } else {
+            all.join(", ")
+        }
+    }
+}
+
+impl fmt::Display for Quantiles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.p50, self.p99, self.max) {
+            (Some(p50), Some(p99), Some(max)) => {
+                write!(
+                    f,
+                    "{p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)"
+                )
+            }
+            _ => f.write_str("unknown"),
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {}", self.outcome.as_str(), self.reason)?;
+        let ratio = self.path_length_m / self.straight_m;
+        writeln!(
+            f,
+            "{:.1} s, {:.2} m driven, {ratio:.2} x the straight {:.2} m, {} safety events",
+            self.mission_time_s, self.path_length_m, self.straight_m, self.safety_events
+        )?;
+        for caption in self.captions() {
+            writeln!(f, "{caption}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The truth up to the tick whose frames showed `counts`: wheel counts are what belief and truth have in
+/// common. All of it when the run did not end by arriving.
+fn truth_until(truth: &[TruthTick], counts: Option<(u16, u16)>, arrived: bool) -> &[TruthTick] {
+    if !arrived {
+        return truth;
+    }
+    let shows = |tick: &TruthTick| counts == Some((tick.left_counts, tick.right_counts));
+    let end = truth.iter().rposition(shows).map_or(truth.len(), |last| {
+        // A robot at rest shows the same counts for many ticks: the first of them is the arrival.
+        truth[..=last]
+            .iter()
+            .rposition(|tick| !shows(tick))
+            .map_or(0, |before| before + 1)
+    });
+    &truth[..truth.len().min(end + 1)]
+}
+
+fn path_length(truth: &[TruthTick]) -> f64 {
+    truth
+        .windows(2)
+        .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))
+        .sum()
+}

@@ -1,0 +1,255 @@
+//! The record of a death: what is known of it, told once, in one form for the bus, the log and the run directory.
+
+use std::{
+    fs::File,
+    io::{self, Read as _, Seek as _, SeekFrom},
+    os::unix::process::ExitStatusExt as _,
+    path::Path,
+    time::Duration,
+};
+
+use common::samples::{DeathCause, DeathSample, NextStep, Words, name, words};
+use rustix::process::Signal;
+use serde::Serialize;
+
+use crate::{json_lines::append_line, process::Ended, stages::REFUSED};
+
+/// The file of a run's deaths, a JSON object a line.
+pub(crate) const FILE_NAME: &str = "deaths.jsonl";
+/// Bytes of a dead stage's log that are kept as its last words: a handful of lines.
+const LAST_WORDS: u64 = 400;
+
+/// One death of a stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Death {
+    /// Which stage.
+    pub stage: &'static str,
+    /// Its process.
+    pub pid: u32,
+    /// Which life.
+    pub generation: u32,
+    /// What ended it.
+    pub cause: Cause,
+    /// Whether it hung, or was never ready, and was ended by the supervisor for that.
+    pub hung: bool,
+    /// Age of its last beat when that was seen.
+    pub noticed_after_s: Option<f64>,
+    /// Age of its last beat; none if it never beat.
+    pub beat_age_s: Option<f64>,
+    /// Length of its life.
+    pub uptime_s: f64,
+    /// Deaths of this stage within the policy's window, this one among them.
+    pub deaths_in_window: u32,
+    /// What follows.
+    pub next: Next,
+    /// The end of what it wrote to its log.
+    pub last_words: String,
+}
+
+/// How a process ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// It ended by itself, with this code.
+    Exited(i32),
+    /// A signal ended it.
+    Signalled {
+        /// Its number.
+        signal: i32,
+        /// Whether it left a core.
+        core: bool,
+    },
+    /// It was another's child; its parent knows.
+    Unknown,
+}
+
+/// What the supervisor does about it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Next {
+    /// A successor is started at once.
+    StartNow,
+    /// A successor is started after a pause.
+    StartLater {
+        /// How long.
+        after_s: f64,
+    },
+    /// It died too often: an operator's word starts it.
+    Hold,
+    /// None is wanted any more.
+    Nothing,
+}
+
+impl Cause {
+    /// As the kernel tells it.
+    pub fn of(ended: Ended) -> Self {
+        let Ended::Child(status) = ended else {
+            return Self::Unknown;
+        };
+        match (status.code(), status.signal()) {
+            (Some(code), _) => Self::Exited(code),
+            (None, signal) => Self::Signalled {
+                signal: signal.unwrap_or_default(),
+                core: status.core_dumped(),
+            },
+        }
+    }
+}
+
+impl std::fmt::Display for Cause {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::Exited(code) => write!(to, "exit code {code}"),
+            Self::Unknown => Ended::External.fmt(to),
+            Self::Signalled { signal, core } => {
+                match Signal::from_named_raw(signal) {
+                    Some(named) => write!(to, "{named:?}")?,
+                    None => write!(to, "signal {signal}")?,
+                }
+                to.write_str(if core { ", core dumped" } else { "" })
+            }
+        }
+    }
+}
+
+impl Death {
+    /// Whether the bus would not have it.
+    pub fn was_refused(&self) -> bool {
+        self.cause == Cause::Exited(REFUSED.into())
+    }
+
+    /// For the log: one line that says all but the last words.
+    pub fn log(&self) {
+        let Self {
+            stage,
+            pid,
+            generation,
+            cause,
+            hung,
+            noticed_after_s: _,
+            beat_age_s,
+            uptime_s,
+            deaths_in_window,
+            next,
+            last_words,
+        } = self;
+        tracing::warn!(stage, pid, generation, %cause, hung, ?beat_age_s, uptime_s, deaths_in_window, ?next, last_words, "stage died");
+    }
+
+    /// For the bus.
+    pub fn sample(&self) -> DeathSample {
+        let (cause, code) = match self.cause {
+            Cause::Exited(code) => (DeathCause::Exited, code),
+            Cause::Signalled {
+                signal,
+                core: false,
+            } => (DeathCause::Signalled, signal),
+            Cause::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
+            Cause::Unknown => (DeathCause::Unknown, 0),
+        };
+        let (next, after) = match self.next {
+            Next::StartNow => (NextStep::StartNow, 0.0),
+            Next::StartLater { after_s } => (NextStep::StartLater, after_s),
+            Next::Hold => (NextStep::Hold, 0.0),
+            Next::Nothing => (NextStep::Nothing, 0.0),
+        };
+        let last_words: Words = words(&self.last_words);
+        DeathSample {
+            stage: name(self.stage),
+            pid: self.pid,
+            generation: self.generation,
+            beat_age_ns: self.beat_age_s.map_or(u64::MAX, nanoseconds),
+            uptime_ns: nanoseconds(self.uptime_s),
+            next_after_ns: nanoseconds(after),
+            code,
+            deaths_in_window: self.deaths_in_window,
+            cause: cause.into(),
+            next: next.into(),
+            hung: self.hung.into(),
+            last_words,
+            ..DeathSample::default()
+        }
+    }
+
+    /// Append it to the run's list.
+    pub fn append_to(&self, directory: &Path) -> io::Result<()> {
+        append_line(&directory.join(FILE_NAME), self)
+    }
+}
+
+fn nanoseconds(seconds: f64) -> u64 {
+    Duration::try_from_secs_f64(seconds).map_or(u64::MAX, |time| time.as_nanos() as u64)
+}
+
+/// The end of a stage's log, from where a line begins; empty if there is none.
+pub(crate) fn last_words(log: &Path, since: u64) -> String {
+    let read = || -> io::Result<Vec<u8>> {
+        let mut file = File::open(log)?;
+        let end = file.metadata()?.len();
+        file.seek(SeekFrom::Start(end.saturating_sub(LAST_WORDS).max(since)))?;
+        let mut bytes = Vec::new();
+        file.take(LAST_WORDS).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let bytes = read().unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    // The first line may be half of one.
+    let whole = match text.split_once('\n') {
+        Some((_, rest)) if bytes.len() as u64 == LAST_WORDS => rest,
+        _ => &text,
+    };
+    whole.trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn last_words_are_whole_lines_of_this_life_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let log = directory.path().join("stage.log");
+        let lines: String = (0..100).map(|line| format!("line {line}\n")).collect();
+        std::fs::write(&log, &lines).unwrap();
+        let words = last_words(&log, 0);
+        assert!(
+            words.starts_with("line ") && words.ends_with("line 99"),
+            "{words}"
+        );
+        assert!(words.len() as u64 <= LAST_WORDS);
+        assert_eq!(last_words(&log, lines.len() as u64 - 8), "line 99");
+        assert_eq!(last_words(&directory.path().join("none"), 0), "");
+    }
+
+    #[test]
+    fn a_death_reads_the_same_on_the_bus_and_in_the_file() {
+        let death = Death {
+            stage: "mapper",
+            pid: 77,
+            generation: 3,
+            cause: Cause::Signalled {
+                signal: 9,
+                core: false,
+            },
+            hung: false,
+            noticed_after_s: None,
+            beat_age_s: Some(0.02),
+            uptime_s: 12.5,
+            deaths_in_window: 2,
+            next: Next::StartLater { after_s: 0.05 },
+            last_words: "ready".to_owned(),
+        };
+        let sample = death.sample();
+        assert_eq!((sample.code, sample.deaths_in_window), (9, 2));
+        assert_eq!(sample.uptime_ns, 12_500_000_000);
+        assert_eq!(NextStep::from_byte(sample.next), NextStep::StartLater);
+        let directory = tempfile::tempdir().unwrap();
+        death.append_to(directory.path()).unwrap();
+        death.append_to(directory.path()).unwrap();
+        let text = std::fs::read_to_string(directory.path().join(FILE_NAME)).unwrap();
+        assert_eq!(text.lines().count(), 2);
+        let read: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+        assert_eq!(read["cause"]["signalled"]["signal"], 9);
+        assert_eq!(read["next"]["start_later"]["after_s"], 0.05);
+    }
+}

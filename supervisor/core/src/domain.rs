@@ -1,0 +1,317 @@
+//! The supervisor's hold on a robot's domain: locked, wiped, its services created and held open.
+
+use std::{
+    fs::{self, DirBuilder, File, OpenOptions},
+    io,
+    os::unix::fs::{DirBuilderExt, MetadataExt},
+    path::{Path, PathBuf},
+    rc::Rc,
+};
+
+use common::{
+    bus::{Bus, BusError, Services},
+    domain::{Domain, SHARED_MEMORY},
+};
+use thiserror::Error;
+
+use crate::orphans;
+
+/// Why a robot's domain cannot be had.
+#[derive(Debug, Error)]
+pub enum DomainError {
+    /// Somebody else supervises it.
+    #[error(
+        "robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot"
+    )]
+    Supervised {
+        /// The robot.
+        robot: String,
+        /// What the lock file says.
+        holder: String,
+    },
+    /// Stages of a dead supervisor live on, killed as they are.
+    #[error(
+        "robot {robot:?} is held by processes that do not even end when killed: {holders}; give this one another name with --robot, or restart the machine"
+    )]
+    Orphans {
+        /// The robot.
+        robot: String,
+        /// Their numbers.
+        holders: String,
+    },
+    /// Shared memory is missing or full.
+    #[error("{SHARED_MEMORY} {problem}; {remedy}")]
+    SharedMemory {
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The directory is not ours.
+    #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
+    Foreign {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {action} {path}: {source}; is it writable and not full?", path = path.display())]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// The system's word.
+        source: io::Error,
+    },
+    /// The middleware refused.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+/// Shared memory that the topics of small structs take, measured, and as much again.
+const SMALL_TOPICS_BYTES: u64 = 16 << 20;
+/// Shared memory a cell of the map takes: a byte in `grid` and twelve in `field`, in each of the samples
+/// that are under way at once when readers keep up.
+const CELL_BYTES: u64 = 8 * 13;
+
+/// A domain held by this process. Dropping it leaves nothing behind.
+pub struct DomainLock {
+    domain: Domain,
+    // Dropped before the files are removed.
+    bus: Option<(Services, Rc<Bus>)>,
+    // Held while the bus is made and removed: stages wait before the door.
+    shut: Option<File>,
+    cells: usize,
+    _lock: File,
+}
+
+impl DomainLock {
+    /// Lock `domain`, wipe what an earlier supervisor left, create the services for a map of so many
+    /// `cells`.
+    pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
+        let lock = lock(&domain)?;
+        let mut held = Self {
+            domain,
+            bus: None,
+            shut: None,
+            cells,
+            _lock: lock,
+        };
+        held.recreate_bus()?;
+        Ok(held)
+    }
+
+    /// Make the bus, anew if there is one: what was had through the old one must be gone.
+    pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
+        self.clear()?;
+        check_shared_memory(
+            SHARED_MEMORY,
+            SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
+        )?;
+        make_own_directory(&self.domain.middleware_root())?;
+        let (bus, services) = Bus::make(&self.domain, "supervisor")?;
+        self.bus = Some((services, Rc::new(bus)));
+        self.shut = None;
+        Ok(())
+    }
+
+    /// Remove the bus. Nobody enters until there is one again.
+    fn clear(&mut self) -> Result<(), DomainError> {
+        self.bus = None;
+        if self.shut.is_none() {
+            // Stages that another started may still be leaving, or just coming.
+            self.shut = Some(orphans::wait_for(&self.domain)?);
+        }
+        wipe(&self.domain)
+    }
+
+    /// The bus.
+    pub fn bus(&self) -> Option<Rc<Bus>> {
+        self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
+    }
+}
+
+impl Drop for DomainLock {
+    fn drop(&mut self) {
+        // The lock goes last, with its directory: who waits for it finds nothing and makes its own.
+        let _ = self.clear();
+        for file in [self.domain.stages_lock_file(), self.domain.lock_file()] {
+            let _ = fs::remove_file(file);
+        }
+        let _ = fs::remove_dir(self.domain.directory());
+    }
+}
+
+pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+    let path = path.to_path_buf();
+    move |source| DomainError::File {
+        action,
+        path,
+        source,
+    }
+}
+
+/// The user's directory and the robot's in it, for their owner only.
+fn make_directory(domain: &Domain) -> Result<(), DomainError> {
+    let directory = domain.directory();
+    let mut both = directory.parent().into_iter().chain([directory]);
+    both.try_for_each(make_own_directory)
+}
+
+/// A directory for its owner only, in a place where anyone may have made it before us.
+fn make_own_directory(path: &Path) -> Result<(), DomainError> {
+    match DirBuilder::new().mode(0o700).create(path) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        Err(error) => return Err(failed("make", path)(error)),
+    }
+    let found = fs::symlink_metadata(path).map_err(failed("look at", path))?;
+    if !found.is_dir() || found.uid() != rustix::process::geteuid().as_raw() {
+        return Err(DomainError::Foreign {
+            path: path.to_path_buf(),
+        });
+    }
+    Ok(())
+}
+
+/// Lock the domain; the file names the holder for whoever comes too late.
+fn lock(domain: &Domain) -> Result<File, DomainError> {
+    let path = domain.lock_file();
+    loop {
+        make_directory(domain)?;
+        let opened = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(&path);
+        let file = match opened {
+            Ok(file) => file,
+            // The last holder has just removed the directory.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error) => return Err(failed("open", &path)(error)),
+        };
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(fs::TryLockError::WouldBlock) => {
+                let holder = fs::read_to_string(&path).unwrap_or_default();
+                return Err(DomainError::Supervised {
+                    robot: domain.robot.to_string(),
+                    holder: holder.trim().to_owned(),
+                });
+            }
+            Err(fs::TryLockError::Error(error)) => return Err(failed("lock", &path)(error)),
+        }
+        // Its last holder may have removed it between our opening and our locking.
+        let (ours, there) = (file.metadata(), fs::metadata(&path));
+        if let (Ok(ours), Ok(there)) = (ours, there)
+            && ours.ino() == there.ino()
+        {
+            fs::write(&path, format!("{}\n", std::process::id()))
+                .map_err(failed("write", &path))?;
+            return Ok(file);
+        }
+    }
+}
+
+/// Remove every trace of the middleware in this domain.
+fn wipe(domain: &Domain) -> Result<(), DomainError> {
+    // Without a configuration nobody joins.
+    let files = [
+        domain.middleware_config(),
+        domain.middleware_config_unfinished(),
+        domain.run_link(),
+    ];
+    files.iter().try_for_each(|file| remove_file(file))?;
+    // Out of the way first: a consumer that is joining would fill it while it is emptied.
+    let (root, aside) = (domain.middleware_root(), domain.middleware_root_aside());
+    remove_directory(&aside)?;
+    match fs::rename(&root, &aside) {
+        Ok(()) => remove_directory(&aside)?,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(failed("move", &root)(error)),
+    }
+    let prefix = domain.shared_memory_prefix();
+    let shared = Path::new(SHARED_MEMORY);
+    let entries = fs::read_dir(shared).map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be read: {error}"),
+        remedy: "mount a tmpfs there",
+    })?;
+    for entry in entries.flatten() {
+        if entry
+            .file_name()
+            .as_encoded_bytes()
+            .starts_with(prefix.as_bytes())
+        {
+            let path = entry.path();
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                remove_directory(&path)?;
+            } else {
+                remove_file(&path)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// If it is there: a consumer of the old bus that leaves it just now removes what is its own.
+fn remove_file(path: &Path) -> Result<(), DomainError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// With all that is in it, if it is there.
+fn remove_directory(path: &Path) -> Result<(), DomainError> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// A segment made in a full file system is a SIGBUS later: look before.
+fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
+    let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be examined: {error}"),
+        remedy: "mount a tmpfs there",
+    })?;
+    let free = space.f_bavail * space.f_frsize;
+    if free < needed {
+        return Err(DomainError::SharedMemory {
+            problem: format!(
+                "has {} MiB free of the {} MiB needed",
+                free >> 20,
+                needed >> 20
+            ),
+            remedy: "remove what fills it, enlarge it (docker: --shm-size), or lower perimeter.cells",
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_domain_that_could_not_be_had_keeps_no_lock() {
+        let domain = Domain::of("no-lock".parse().unwrap());
+        make_directory(&domain).unwrap();
+        // A directory cannot be removed as the file that should be there.
+        fs::create_dir(domain.middleware_config()).unwrap();
+        let refused = DomainLock::acquire(domain.clone(), 1).err().unwrap();
+        fs::remove_dir(domain.middleware_config()).unwrap();
+        assert!(refused.to_string().contains("iceoryx2.toml"), "{refused}");
+        assert!(!domain.lock_file().exists() && !domain.stages_lock_file().exists());
+        fs::remove_dir(domain.directory()).unwrap();
+    }
+
+    #[test]
+    fn too_little_or_no_shared_memory_is_said_with_the_remedy() {
+        let full = check_shared_memory(SHARED_MEMORY, u64::MAX).unwrap_err();
+        assert!(full.to_string().contains("--shm-size"), "{full}");
+        let missing = check_shared_memory("/no/such/mount", 1).unwrap_err();
+        assert!(missing.to_string().contains("mount a tmpfs"), "{missing}");
+    }
+}

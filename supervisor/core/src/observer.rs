@@ -1,0 +1,209 @@
+//! What the supervisor hears on the bus: the record a run is judged, drawn and summed up by.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use common::{
+    bus::{Bus, BusError, Reader, SliceReader},
+    grid::Replica,
+    latency::Histogram,
+    samples::{
+        CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
+        HealthSample, LinkSample, PoseSample,
+    },
+    topics::{self, AnyTopic as _},
+    waiter::Waiter,
+};
+
+use crate::stage_processes::StageProcesses;
+
+/// Guidance samples kept, so that the one of the arrival tick is still there when the command is seen.
+const GUIDANCE_KEPT: usize = 1024;
+/// Poses kept: three hours at 7 Hz. A longer run is drawn ever coarser.
+const POSES_KEPT: usize = 80_000;
+
+/// Readers of every topic the record is made of.
+pub struct Observer {
+    health: Reader<HealthSample>,
+    link: Reader<LinkSample>,
+    pose: Reader<PoseSample>,
+    grid: SliceReader<GridHeader, u8>,
+    guidance: Reader<GuidanceSample>,
+    field: SliceReader<FieldHeader, FieldCell>,
+    command: Reader<CommandSample>,
+    /// What was heard.
+    pub record: Record,
+}
+
+/// What was heard so far.
+#[derive(Default)]
+pub struct Record {
+    /// Where the robot believed it was, tick by tick.
+    pub poses: Vec<PoseSample>,
+    /// The newest pose.
+    pub pose: Option<PoseSample>,
+    /// The newest guidance samples, oldest first.
+    guidance: VecDeque<GuidanceSample>,
+    /// The newest command.
+    pub command: Option<CommandSample>,
+    /// The first command that said arrived.
+    pub arrival: Option<CommandSample>,
+    /// The newest state of the wire.
+    pub link: Option<LinkSample>,
+    /// Latencies by life of the link.
+    latencies: BTreeMap<u32, LinkSample>,
+    /// The newest counts of each life of the planner: full solves, local updates.
+    planners: BTreeMap<u32, (u64, u64)>,
+    /// How long full solves took.
+    pub full_solves: Histogram,
+    /// How long local updates took.
+    pub local_updates: Histogram,
+    /// The newest belief.
+    pub grid: Replica<u8>,
+    /// The newest policy.
+    pub field: Replica<FieldCell>,
+}
+
+impl Observer {
+    /// Listen to everything on `bus`; `waiter` wakes for heartbeats and for the end of each tick.
+    pub fn new(bus: &Bus, waiter: &mut Waiter) -> Result<Self, BusError> {
+        waiter.on(bus.wakeup(&topics::HEALTH)?);
+        waiter.on(bus.wakeup(&topics::COMMAND)?);
+        Ok(Self {
+            health: bus.reader(&topics::HEALTH)?,
+            link: bus.reader(&topics::LINK)?,
+            pose: bus.reader(&topics::POSE)?,
+            grid: bus.slice_reader(&topics::GRID)?,
+            guidance: bus.reader(&topics::GUIDANCE)?,
+            field: bus.slice_reader(&topics::FIELD)?,
+            command: bus.reader(&topics::COMMAND)?,
+            record: Record::default(),
+        })
+    }
+
+    /// Listen no more; what was heard stays, but of the wire to the robot, which is opened anew.
+    pub fn close(self) -> Record {
+        Record {
+            link: None,
+            ..self.record
+        }
+    }
+
+    /// Take all that came. Says whether a stage became ready.
+    pub fn take(&mut self, stages: &mut StageProcesses) -> Result<bool, BusError> {
+        let mut became_ready = false;
+        while let Some(health) = self.health.take()? {
+            became_ready |= stages.on_health(&health);
+        }
+        let record = &mut self.record;
+        while let Some(link) = self.link.take()? {
+            stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
+            record.latencies.insert(link.stamp.generation, link);
+            record.link = Some(link);
+        }
+        // The command of a tick is looked at before what it was computed from, so that whatever led to
+        // it is in the record when it is.
+        while let Some(command) = self.command.take()? {
+            stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
+            record.command = Some(command);
+            if CommandState::from_byte(command.state) == CommandState::Arrived {
+                record.arrival.get_or_insert(command);
+            }
+        }
+        while let Some(guidance) = self.guidance.take()? {
+            stages.on_output(topics::GUIDANCE.spec().writer, guidance.stamp.tick);
+            record.take_guidance(guidance);
+        }
+        while let Some(grid) = self.grid.take()? {
+            stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
+            record.grid.apply(&grid.header().part.revision(), &grid);
+        }
+        while let Some(field) = self.field.take()? {
+            record.field.apply(&field.header().part.revision(), &field);
+        }
+        while let Some(pose) = self.pose.take()? {
+            stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
+            record.pose = Some(pose);
+            if record.poses.len() == POSES_KEPT {
+                // Half as fine from here on; the ends of the way stay.
+                let mut nth = 0;
+                record.poses.retain(|_| {
+                    nth += 1;
+                    nth % 2 == 1
+                });
+            }
+            record.poses.push(pose);
+        }
+        Ok(became_ready)
+    }
+}
+
+impl Record {
+    fn take_guidance(&mut self, guidance: GuidanceSample) {
+        let counts = (guidance.full_solves, guidance.local_updates);
+        let before = self.planners.insert(guidance.stamp.generation, counts);
+        let (full, local) = before.unwrap_or_default();
+        // Several in one tick are counted as the last of them.
+        if counts.0 > full {
+            self.full_solves.record(guidance.full_solve_ns);
+        }
+        if counts.1 > local {
+            self.local_updates.record(guidance.local_update_ns);
+        }
+        if self.guidance.len() == GUIDANCE_KEPT {
+            self.guidance.pop_front();
+        }
+        self.guidance.push_back(guidance);
+    }
+
+    /// The newest guidance at or before `tick`.
+    pub fn guidance_at(&self, tick: u64) -> Option<&GuidanceSample> {
+        self.guidance
+            .iter()
+            .rev()
+            .find(|guidance| guidance.stamp.tick <= tick)
+    }
+
+    /// The newest guidance.
+    pub fn newest_guidance(&self) -> Option<&GuidanceSample> {
+        self.guidance.back()
+    }
+
+    /// The newest pose at or before `tick`.
+    pub fn pose_at(&self, tick: u64) -> Option<&PoseSample> {
+        self.poses.iter().rev().find(|pose| pose.stamp.tick <= tick)
+    }
+
+    /// The newest tick that anyone spoke of.
+    pub fn newest_tick(&self) -> Option<u64> {
+        let ticks = [
+            self.pose.map(|pose| pose.stamp.tick),
+            self.command.map(|command| command.stamp.tick),
+            self.link.map(|link| link.stamp.tick),
+        ];
+        ticks.into_iter().flatten().max()
+    }
+
+    /// Full solves and local updates of every life of the planner, the last one's as of `last`.
+    pub fn solves(&self, last: Option<&GuidanceSample>) -> (u64, u64) {
+        let mut sum = (0, 0);
+        for (&generation, &counts) in &self.planners {
+            let (full, local) = match last {
+                Some(last) if last.stamp.generation == generation => {
+                    (last.full_solves, last.local_updates)
+                }
+                _ => counts,
+            };
+            sum = (sum.0 + full, sum.1 + local);
+        }
+        sum
+    }
+
+    /// Tick latencies of every life of the link.
+    pub fn latency(&self) -> Histogram {
+        let mut all = Histogram::default();
+        for link in self.latencies.values() {
+            all.add(&link.latency_histogram, link.latency_max_ns);
+        }
+        all
+    }
+}

@@ -1,0 +1,577 @@
+//! The rules one by one, then all of them against a plain progress of one process, over every short history and a
+//! great many long ones.
+
+use std::collections::HashSet;
+
+use rand_pcg::{Pcg64, rand_core::Rng as _};
+
+use super::*;
+use crate::stages::TABLE;
+
+const fn ms(count: u64) -> Duration {
+    Duration::from_millis(count)
+}
+
+/// Of the link: beats due every 500 ms, ready due after 3 s.
+fn running() -> Policy {
+    let mut policy = Policy::new(TABLE[0].deadlines);
+    assert_eq!(policy.step(Event::Start, ms(0)), Some(Action::Start));
+    assert_eq!(policy.step(Event::BeatStarting, ms(5)), None);
+    assert_eq!(policy.step(Event::BeatReady, ms(10)), None);
+    policy
+}
+
+#[test]
+fn the_first_death_is_answered_at_once() {
+    let mut policy = running();
+    assert_eq!(policy.step(Event::Exited, ms(20)), Some(Action::Start));
+}
+
+#[test]
+fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
+    let mut policy = running();
+    let mut now = ms(20);
+    policy.step(Event::Exited, now);
+    let mut waits = Vec::new();
+    for _ in 0..10 {
+        assert_eq!(policy.step(Event::Exited, now), None);
+        let until = policy.deadline().unwrap();
+        waits.push((until - now).as_millis());
+        assert_eq!(policy.step(Event::Time, until - ms(1)), None);
+        assert_eq!(policy.step(Event::Time, until), Some(Action::Start));
+        now = until;
+    }
+    assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
+}
+
+/// Dies as soon as it is started, until it is held; the time of that.
+fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
+    for _ in 0..100 {
+        policy.step(Event::Exited, now);
+        if policy.phase() == Phase::Held {
+            return now;
+        }
+        if let Phase::BackingOff { until } = policy.phase() {
+            now = until;
+            assert_eq!(policy.step(Event::Time, now), Some(Action::Start));
+        }
+    }
+    panic!("it dies for ever: {policy:?}");
+}
+
+#[test]
+fn a_stage_that_cannot_live_is_held_within_ten_seconds() {
+    let mut policy = running();
+    let held = crash_until_held(&mut policy, ms(20));
+    assert!(held < Duration::from_secs(10), "{held:?}");
+    assert_eq!(policy.recent_deaths(), 12);
+    let later = held + Duration::from_secs(3600);
+    assert_eq!(policy.step(Event::Time, later), None);
+    assert_eq!((policy.phase(), policy.deadline()), (Phase::Held, None));
+}
+
+#[test]
+fn a_stage_that_never_becomes_ready_is_held_after_twelve_starts() {
+    let mut policy = Policy::new(TABLE[0].deadlines);
+    policy.step(Event::Start, ms(0));
+    let mut starts = 1;
+    for _ in 0..100 {
+        let Some(now) = policy.deadline() else { break };
+        let mut action = policy.step(Event::Time, now);
+        if action == Some(Action::Abort) {
+            action = policy.step(Event::Exited, now + ms(1));
+        }
+        starts += u32::from(action == Some(Action::Start));
+    }
+    assert_eq!((policy.phase(), starts), (Phase::Held, 12));
+}
+
+#[test]
+fn a_released_stage_starts_with_a_clean_slate() {
+    let mut policy = running();
+    let held = crash_until_held(&mut policy, ms(20));
+    assert_eq!(
+        policy.step(Event::Replace, held + ms(1)),
+        Some(Action::Start)
+    );
+    assert_eq!(
+        policy.step(Event::Exited, held + ms(2)),
+        Some(Action::Start)
+    );
+}
+
+#[test]
+fn a_stage_killed_once_a_second_is_never_held() {
+    let mut policy = running();
+    for second in 1..1000 {
+        let started = policy.step(Event::Exited, ms(second * 1000));
+        assert_eq!(started, Some(Action::Start), "after {second} kills");
+        policy.step(Event::BeatReady, ms(second * 1000 + 100));
+    }
+}
+
+#[test]
+fn a_stage_killed_again_and_again_is_held_though_it_was_well_in_between() {
+    let mut policy = running();
+    for death in 1..12 {
+        assert_eq!(
+            policy.step(Event::Exited, ms(death * 600)),
+            Some(Action::Start)
+        );
+        policy.step(Event::BeatReady, ms(death * 600 + 1));
+    }
+    assert_eq!(policy.step(Event::Exited, ms(12 * 600)), None);
+    assert_eq!(policy.phase(), Phase::Held);
+}
+
+#[test]
+fn a_life_that_was_well_clears_the_deaths_before_it() {
+    let mut policy = running();
+    policy.step(Event::Exited, ms(20));
+    policy.step(Event::BeatReady, ms(30));
+    assert_eq!(policy.step(Event::Exited, ms(530)), Some(Action::Start));
+    policy.step(Event::BeatReady, ms(540));
+    assert_eq!(policy.step(Event::Exited, ms(1039)), None);
+}
+
+#[test]
+fn a_stage_that_stops_beating_is_aborted_then_killed() {
+    let mut policy = running();
+    assert_eq!(policy.step(Event::Time, ms(509)), None);
+    assert_eq!(policy.step(Event::Time, ms(510)), Some(Action::Abort));
+    assert_eq!(policy.step(Event::Time, ms(609)), None);
+    assert_eq!(policy.step(Event::Time, ms(610)), Some(Action::Kill));
+    assert_eq!(policy.step(Event::Exited, ms(611)), Some(Action::Start));
+}
+
+#[test]
+fn a_stage_that_beats_without_output_is_aborted() {
+    let mut policy = running();
+    assert_eq!(policy.step(Event::OutputStale, ms(50)), Some(Action::Abort));
+    assert_eq!(policy.step(Event::Exited, ms(60)), Some(Action::Start));
+    assert_eq!(policy.recent_deaths(), 1);
+}
+
+#[test]
+fn a_stage_that_never_becomes_ready_is_aborted() {
+    let mut policy = Policy::new(TABLE[0].deadlines);
+    policy.step(Event::Start, ms(0));
+    policy.step(Event::BeatStarting, ms(2999));
+    assert_eq!(policy.step(Event::Time, ms(2999)), None);
+    assert_eq!(policy.step(Event::Time, ms(3000)), Some(Action::Abort));
+}
+
+#[test]
+fn a_bus_that_lets_no_life_begin_is_made_anew_once() {
+    for refused in [false, true] {
+        let mut policy = running();
+        let mut now = ms(600);
+        assert_eq!(policy.step(Event::Exited, now), Some(Action::Start));
+        let mut answers = Vec::new();
+        for _ in 0..4 {
+            if refused {
+                now += ms(5);
+            } else {
+                now += ms(3000);
+                assert_eq!(policy.step(Event::Time, now), Some(Action::Abort));
+            }
+            let event = if refused {
+                Event::Refused
+            } else {
+                Event::Exited
+            };
+            answers.push(policy.step(event, now));
+            // As when all stages are stopped and started.
+            policy.step(Event::Stop, now);
+            assert_eq!(policy.step(Event::Start, now), Some(Action::Start));
+        }
+        let once = [None, Some(Action::RecreateBus), None, None];
+        assert_eq!(answers, once, "refused: {refused}");
+    }
+}
+
+#[test]
+fn a_life_that_began_speaks_for_the_bus() {
+    let mut policy = running();
+    for second in 1..5 {
+        policy.step(Event::Exited, ms(second * 1000));
+        // Two starts lie between two refusals.
+        assert_ne!(
+            policy.step(Event::Refused, ms(second * 1000 + 1)),
+            Some(Action::RecreateBus)
+        );
+        policy.step(Event::Time, ms(second * 1000 + 51));
+        policy.step(Event::BeatReady, ms(second * 1000 + 60));
+    }
+}
+
+#[test]
+fn a_replaced_stage_is_asked_to_go_and_followed_and_has_not_died() {
+    let mut policy = running();
+    for turn in 1..100 {
+        let now = ms(turn * 50);
+        assert_eq!(policy.step(Event::Replace, now), Some(Action::Terminate));
+        let gone = policy.step(Event::Exited, now + ms(10));
+        assert_eq!(gone, Some(Action::Start));
+        policy.step(Event::BeatReady, now + ms(20));
+    }
+    assert_eq!(policy.recent_deaths(), 0);
+}
+
+#[test]
+fn a_replaced_stage_that_stays_is_killed() {
+    let mut policy = running();
+    policy.step(Event::Replace, ms(50));
+    assert_eq!(policy.step(Event::Time, ms(349)), None);
+    assert_eq!(policy.step(Event::Time, ms(350)), Some(Action::Kill));
+}
+
+#[test]
+fn a_stage_that_got_no_process_is_tried_again_but_not_at_once() {
+    let mut policy = Policy::new(TABLE[0].deadlines);
+    policy.step(Event::Start, ms(0));
+    assert_eq!(policy.step(Event::StartFailed, ms(0)), None);
+    assert_eq!(policy.deadline(), Some(ms(2)));
+}
+
+#[test]
+fn a_stopped_stage_is_not_followed_and_killed_if_it_stays() {
+    let mut policy = running();
+    assert_eq!(policy.step(Event::Stop, ms(50)), Some(Action::Terminate));
+    assert_eq!(policy.step(Event::Time, ms(349)), None);
+    assert_eq!(policy.step(Event::Time, ms(350)), Some(Action::Kill));
+    assert_eq!(policy.step(Event::Exited, ms(351)), None);
+    assert_eq!(policy.phase(), Phase::Down);
+    assert_eq!(policy.step(Event::Time, ms(9999)), None);
+}
+
+/// One process and its policy: what is true of the process, written down without a look at the phases.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Progress {
+    policy: Policy,
+    now: Now,
+    /// The process, if there is one.
+    generation: Option<Generation>,
+    /// Whether a process is wanted.
+    wanted: bool,
+    /// Held, until somebody starts it.
+    held: bool,
+    /// Deaths, when they happened: those in a row, of no generation that was well, and the last wait between them.
+    deaths: Vec<Now>,
+    row: usize,
+    wait: Duration,
+    blocked_starts: u32,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Generation {
+    ready: Option<Now>,
+    /// When it was last known well; its start counts.
+    sign: Now,
+    /// Told to go: to make room, or for good. Nobody's word makes that a death.
+    leaves: bool,
+    /// Aborted.
+    late: bool,
+    /// When it is to be killed.
+    kill: Option<Now>,
+}
+
+const EVENTS: [Event; 10] = [
+    Event::Start,
+    Event::StartFailed,
+    Event::BeatStarting,
+    Event::BeatReady,
+    Event::OutputStale,
+    Event::Exited,
+    Event::Refused,
+    Event::Replace,
+    Event::Stop,
+    Event::Time,
+];
+
+impl Progress {
+    fn new() -> Self {
+        Self {
+            policy: Policy::new(TABLE[0].deadlines),
+            now: ms(0),
+            generation: None,
+            wanted: false,
+            held: false,
+            deaths: Vec::new(),
+            row: 0,
+            wait: ms(0),
+            blocked_starts: 0,
+        }
+    }
+
+    /// Whether the world lets that happen: only what lives can beat or end.
+    fn can(&self, event: Event) -> bool {
+        match event {
+            Event::Start => self.generation.is_none(),
+            // Told in the moment of the start.
+            Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
+                generation.sign == self.now && generation.ready.is_none() && !generation.leaves
+            }),
+            Event::BeatStarting
+            | Event::BeatReady
+            | Event::OutputStale
+            | Event::Exited
+            | Event::Refused => self.generation.is_some(),
+            Event::Replace | Event::Stop | Event::Time => true,
+        }
+    }
+
+    /// When the clock must be looked at, by the promises alone.
+    fn due(&self) -> Option<Now> {
+        match &self.generation {
+            Some(generation) => Some(generation.kill.unwrap_or_else(|| match generation.ready {
+                Some(_) => generation.sign + ms(500),
+                None => generation.sign + ms(3000),
+            })),
+            None if self.wanted && !self.held => {
+                Some(self.deaths.last().copied().unwrap_or_default() + self.wait)
+            }
+            None => None,
+        }
+    }
+
+    /// What must be done by the promises alone.
+    fn expect(&mut self, event: Event) -> Option<Action> {
+        let now = self.now;
+        let due = self.due().is_some_and(|due| now >= due);
+        let Some(generation) = &mut self.generation else {
+            let starts = match event {
+                Event::Start if !self.held => true,
+                Event::Start | Event::Replace if self.wanted => {
+                    (self.row, self.blocked_starts) = (0, 0);
+                    self.deaths.clear();
+                    true
+                }
+                Event::Time => self.wanted && !self.held && due,
+                _ => false,
+            };
+            if event == Event::Stop {
+                (self.wanted, self.held) = (false, false);
+            }
+            return starts.then(|| self.begin());
+        };
+        match event {
+            Event::BeatReady if generation.kill.is_none() => {
+                generation.ready.get_or_insert(now);
+                generation.sign = now;
+                self.blocked_starts = 0;
+                None
+            }
+            Event::Time if due && generation.kill.is_some() => {
+                generation.kill = Some(now + ms(100));
+                Some(Action::Kill)
+            }
+            Event::Time if due => self.late(),
+            Event::OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
+                generation.sign = now;
+                self.late()
+            }
+            Event::Replace if self.wanted && !generation.leaves => {
+                generation.leaves = true;
+                let told = generation.kill.is_none();
+                generation.kill.get_or_insert(now + ms(300));
+                told.then_some(Action::Terminate)
+            }
+            Event::Stop if self.wanted => {
+                (generation.leaves, generation.kill) = (true, Some(now + ms(300)));
+                self.wanted = false;
+                Some(Action::Terminate)
+            }
+            Event::StartFailed => self.death(true, false),
+            Event::Exited => {
+                let jam = generation.late && generation.ready.is_none();
+                self.death(false, jam)
+            }
+            Event::Refused => {
+                let jam = generation.ready.is_none();
+                self.death(false, jam)
+            }
+            _ => None,
+        }
+    }
+
+    fn begin(&mut self) -> Action {
+        (self.wanted, self.held) = (true, false);
+        self.generation = Some(Generation {
+            ready: None,
+            sign: self.now,
+            leaves: false,
+            late: false,
+            kill: None,
+        });
+        Action::Start
+    }
+
+    fn late(&mut self) -> Option<Action> {
+        let generation = self.generation.as_mut().unwrap();
+        (generation.late, generation.kill) = (true, Some(self.now + ms(100)));
+        Some(Action::Abort)
+    }
+
+    fn death(&mut self, unborn: bool, jam: bool) -> Option<Action> {
+        let now = self.now;
+        let generation = self.generation.take().unwrap();
+        if generation.leaves {
+            return self.wanted.then(|| self.begin());
+        }
+        let until = if generation.late {
+            generation.sign
+        } else {
+            now
+        };
+        if generation
+            .ready
+            .is_some_and(|since| until - since >= ms(500))
+        {
+            self.row = 0;
+        }
+        self.row += 1;
+        if unborn {
+            self.row = self.row.max(2);
+        }
+        self.deaths.retain(|then| now - *then < ms(10_000));
+        self.deaths.push(now);
+        self.blocked_starts += u32::from(jam);
+        if self.deaths.len() >= 12 || self.row >= 12 {
+            self.held = true;
+            return None;
+        }
+        let waits = [0, 0, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1000];
+        self.wait = ms(waits[self.row.min(11)]);
+        if jam && self.blocked_starts == 2 {
+            return Some(Action::RecreateBus);
+        }
+        self.wait.is_zero().then(|| self.begin())
+    }
+
+    /// Let it happen, and compare.
+    fn step(&mut self, event: Event) {
+        let expected = self.expect(event);
+        let action = self.policy.step(event, self.now);
+        let (phase, now) = (self.policy.phase(), self.now);
+        assert_eq!(action, expected, "{event:?} at {now:?}, now {phase:?}");
+        assert_eq!(self.policy.deadline(), self.due(), "{event:?}: {phase:?}");
+        assert_eq!(phase == Phase::Held, self.held, "{event:?}: {phase:?}");
+        assert_eq!(
+            phase == Phase::Down,
+            self.generation.is_none() && !self.wanted
+        );
+        let processless = matches!(phase, Phase::Down | Phase::Held | Phase::BackingOff { .. });
+        assert_eq!(
+            processless,
+            self.generation.is_none(),
+            "{event:?}: {phase:?}"
+        );
+    }
+
+    /// The moments at and around what is due, and one long after anything.
+    fn moments(&self) -> Vec<Duration> {
+        let mut pauses = vec![ms(0), ms(20), ms(11_000)];
+        if let Some(due) = self.due() {
+            let left = due.saturating_sub(self.now);
+            pauses.extend([left.saturating_sub(ms(1)), left]);
+        }
+        pauses
+    }
+
+    /// The same with the clock set back: two accounts of equal ages are one.
+    fn at_zero(&self) -> Self {
+        // A common origin of all times, so that what lies behind stays behind.
+        const ORIGIN: Duration = Duration::from_secs(100);
+        let back = |then: &mut Now| *then = (*then + ORIGIN).saturating_sub(self.now);
+        let mut same = self.clone();
+        same.deaths
+            .retain(|then| self.now - *then < ms(10_000) || self.wanted);
+        same.deaths.iter_mut().for_each(back);
+        same.policy.recent.iter_mut().for_each(back);
+        match &mut same.policy.phase {
+            Phase::Down | Phase::Held => {}
+            Phase::BackingOff { until: then }
+            | Phase::Starting { since: then }
+            | Phase::Late { kill: then, .. }
+            | Phase::Replaced { kill: then }
+            | Phase::Stopping { kill: then } => back(then),
+            Phase::Running { since, beat } => {
+                back(since);
+                back(beat);
+            }
+        }
+        if let Some(generation) = &mut same.generation {
+            back(&mut generation.sign);
+            generation.ready.iter_mut().for_each(back);
+            generation.kill.iter_mut().for_each(back);
+        }
+        same.now = ORIGIN;
+        same
+    }
+}
+
+#[test]
+fn every_short_history_keeps_every_promise() {
+    let mut seen = HashSet::new();
+    let mut newest = vec![Progress::new().at_zero()];
+    let mut cases = 0_u64;
+    for _ in 0..6 {
+        let mut next = Vec::new();
+        for progress in newest {
+            for pause in progress.moments() {
+                for event in EVENTS {
+                    let mut progress = progress.clone();
+                    progress.now += pause;
+                    if progress.can(event) {
+                        cases += 1;
+                        progress.step(event);
+                        let progress = progress.at_zero();
+                        if seen.insert(progress.clone()) {
+                            next.push(progress);
+                        }
+                    }
+                }
+            }
+        }
+        newest = next;
+    }
+    println!("{cases} cases, {} accounts", seen.len());
+}
+
+#[test]
+fn two_million_steps_of_long_histories_keep_every_promise() {
+    let mut chance = Pcg64::new(5, 5);
+    let mut phases = HashSet::new();
+    let mut actions = 0_u64;
+    for history in 0..2_000 {
+        let mut progress = Progress::new();
+        // Some worlds are kind, some are not: how likely each event is differs.
+        let weights: Vec<u64> = EVENTS.iter().map(|_| chance.next_u64() % 100).collect();
+        let sum: u64 = weights.iter().sum::<u64>().max(1);
+        for _ in 0..1_000 {
+            let moments = progress.moments();
+            let pause = moments[chance.next_u64() as usize % moments.len()];
+            // Mostly the short ones: what is long after anything forgets.
+            if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
+                progress.now += pause;
+            }
+            let mut pick = chance.next_u64() % sum;
+            let event = EVENTS.iter().zip(&weights).find(|(_, weight)| {
+                let found = pick < **weight;
+                pick = pick.saturating_sub(**weight);
+                found
+            });
+            let event = *event.map_or(&Event::Time, |(event, _)| event);
+            if progress.can(event) {
+                progress.step(event);
+                actions += 1;
+                phases.insert(std::mem::discriminant(&progress.policy.phase()));
+            }
+            assert!(progress.policy.recent_deaths() <= 12, "history {history}");
+        }
+    }
+    // The walk has been everywhere.
+    assert_eq!(phases.len(), 8);
+    assert!(actions > 1_000_000, "{actions}");
+}

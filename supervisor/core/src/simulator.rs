@@ -1,0 +1,201 @@
+//! The simulated robot as a child process, and the truth it tells through its standard output.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read},
+    net::SocketAddr,
+    os::fd::{AsFd, BorrowedFd},
+    path::Path,
+    process::{ChildStdout, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::{
+    clock::Pace,
+    mission::Mission,
+    run,
+    truth::{TruthHeader, TruthTick},
+};
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    fs::{OFlags, fcntl_getfl, fcntl_setfl},
+};
+use thiserror::Error;
+
+use crate::process::{Process, firsthand};
+
+/// A simulator that has not said where it listens by then never will.
+const STARTUP: Duration = Duration::from_secs(5);
+/// Time it has to end when told to.
+const STOP_GRACE: Duration = Duration::from_millis(300);
+/// A line of truth is under 300 bytes; more without an end is no truth.
+const LONGEST_LINE: usize = 64 * 1024;
+
+/// The simulated robot is not to be had.
+#[derive(Debug, Error)]
+pub enum SimulatorError {
+    /// The system refused.
+    #[error("cannot {action} the simulated robot: {source}")]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// The system's word.
+        source: io::Error,
+    },
+    /// It did not come up.
+    #[error("the simulated robot did not start: {0}")]
+    Startup(String),
+}
+
+fn system(action: &'static str) -> impl FnOnce(io::Error) -> SimulatorError {
+    move |source| SimulatorError::System { action, source }
+}
+
+/// The running simulator.
+pub struct Simulator {
+    process: Process,
+    truth: Truth,
+    address: SocketAddr,
+}
+
+/// Everything it told so far.
+struct Truth {
+    pipe: ChildStdout,
+    pending: Vec<u8>,
+    listening: Option<SocketAddr>,
+    ticks: Vec<TruthTick>,
+}
+
+impl Simulator {
+    /// Start one on this very `mission`, overrides included, and wait until it says where it listens. Its files are
+    /// in `directory`; it goes on where an earlier one of that directory stands.
+    pub fn start(directory: &Path, mission: &Mission, pace: Pace) -> Result<Self, SimulatorError> {
+        let text = toml::to_string(mission)
+            .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
+        let file = directory.join("mission.toml");
+        fs::write(&file, text).map_err(system("write the mission of"))?;
+        let log_path = directory.join("x80-sim.log");
+        let log = File::options().create(true).append(true).open(&log_path);
+        let log = log.map_err(system("log"))?;
+        let keep = run::checkpoint_file(directory, "x80-sim");
+        let mission = file.to_str().ok_or_else(|| {
+            SimulatorError::Startup("the run directory's name is not UTF-8".into())
+        })?;
+        let mut command = firsthand(&[
+            "sim",
+            mission,
+            "--pace",
+            &pace.to_string(),
+            "--truth",
+            "--supervisor",
+            &std::process::id().to_string(),
+        ]);
+        command.arg("--keep").arg(keep);
+        command.stdout(Stdio::piped()).stderr(log);
+        let mut process = Process::spawn(command).map_err(system("start"))?;
+        let pipe = process
+            .take_stdout()
+            .ok_or_else(|| SimulatorError::Startup("it has no output".into()))?;
+        let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
+        fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
+            .map_err(|errno| system("listen to")(errno.into()))?;
+        let mut truth = Truth {
+            pipe,
+            pending: Vec::new(),
+            listening: None,
+            ticks: Vec::new(),
+        };
+        let began = Instant::now();
+        loop {
+            truth.take()?;
+            if let Some(address) = truth.listening {
+                return Ok(Self {
+                    process,
+                    truth,
+                    address,
+                });
+            }
+            if process.try_reap().map_err(system("watch"))?.is_some() || began.elapsed() > STARTUP {
+                let words = fs::read_to_string(&log_path).unwrap_or_default();
+                return Err(SimulatorError::Startup(words.trim().to_owned()));
+            }
+            wait(&[truth.pipe.as_fd(), process.as_fd()], STARTUP)?;
+        }
+    }
+
+    /// Where the robot answers.
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Readable when there is more truth, or the process ended.
+    pub fn descriptors(&self) -> [BorrowedFd<'_>; 2] {
+        [self.truth.pipe.as_fd(), self.process.as_fd()]
+    }
+
+    /// Take what it told since. Says whether it still runs.
+    pub fn tend(&mut self) -> Result<bool, SimulatorError> {
+        self.truth.take()?;
+        Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
+    }
+
+    /// What it told, tick by tick.
+    pub fn truth(&self) -> &[TruthTick] {
+        &self.truth.ticks
+    }
+
+    /// End it; what it told stays.
+    pub fn stop(&mut self) -> Result<(), SimulatorError> {
+        self.process.end(STOP_GRACE);
+        self.truth.take()
+    }
+}
+
+fn wait(descriptors: &[BorrowedFd<'_>], timeout: Duration) -> Result<(), SimulatorError> {
+    let mut polled: Vec<PollFd<'_>> = descriptors
+        .iter()
+        .map(|descriptor| PollFd::from_borrowed_fd(*descriptor, PollFlags::IN))
+        .collect();
+    match poll(&mut polled, Timespec::try_from(timeout).ok().as_ref()) {
+        Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+        Err(errno) => Err(system("wait for")(errno.into())),
+    }
+}
+
+impl Truth {
+    fn take(&mut self) -> Result<(), SimulatorError> {
+        let mut bytes = [0; 16 * 1024];
+        loop {
+            match self.pipe.read(&mut bytes) {
+                Ok(0) => return Ok(()),
+                Ok(length) => self.pending.extend_from_slice(&bytes[..length]),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(system("listen to")(error)),
+            }
+            self.take_lines()?;
+        }
+    }
+
+    fn take_lines(&mut self) -> Result<(), SimulatorError> {
+        let Some(end) = self.pending.iter().rposition(|&byte| byte == b'\n') else {
+            if self.pending.len() > LONGEST_LINE {
+                return Err(SimulatorError::Startup(
+                    "it tells a line without end".into(),
+                ));
+            }
+            return Ok(());
+        };
+        let rest = self.pending.split_off(end + 1);
+        for line in self.pending.split(|&byte| byte == b'\n') {
+            if self.listening.is_none() {
+                let header = serde_json::from_slice::<TruthHeader>(line).ok();
+                self.listening = header.and_then(|header| header.listening.parse().ok());
+            } else if let Ok(tick) = serde_json::from_slice(line) {
+                self.ticks.push(tick);
+            }
+        }
+        self.pending = rest;
+        Ok(())
+    }
+}

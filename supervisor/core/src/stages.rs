@@ -1,0 +1,224 @@
+//! THE table of stages: what runs for a robot, what each reads and writes, and how long it may be silent.
+//!
+//! Start order, deadlines, `firsthand stage`, `firsthand stages` and the README's table come from it.
+
+use std::time::Duration;
+
+use common::{
+    shell::{StageError, Start, run_stage},
+    topics::{
+        AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
+        SURROUNDINGS, WHEELS,
+    },
+};
+
+/// A row of the table.
+pub struct Stage {
+    /// Its name: of the process, of `firsthand stage NAME`, of the folder under `services/`.
+    pub name: &'static str,
+    /// Topics it reads, whose writers start before it.
+    pub inputs: &'static [&'static dyn AnyTopic],
+    /// Topics it reads that close the loop: their writers start after it.
+    pub feedback: &'static [&'static dyn AnyTopic],
+    /// Topics it alone writes.
+    pub outputs: &'static [&'static dyn AnyTopic],
+    /// How long it may be silent, whatever the map.
+    pub deadlines: Deadlines,
+    /// What each deadline grows by for a million cells of the map.
+    pub million_cells: Duration,
+    /// What the robot does while the stage is down.
+    pub while_down: &'static str,
+    /// Its process.
+    pub live: fn(&Start) -> Result<(), StageError>,
+}
+
+/// How long a stage may be silent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Deadlines {
+    /// From its start to its first beat as ready.
+    pub startup: Duration,
+    /// From beat to beat; they come every 20 ms.
+    pub heartbeat: Duration,
+    /// From a tick on its inputs to its output of that tick, or of a later one.
+    pub answers: Duration,
+}
+
+impl Stage {
+    /// Its deadlines on a map of so many `cells`.
+    pub fn deadlines_on(&self, cells: usize) -> Deadlines {
+        let more = self.million_cells.mul_f64(cells as f64 * 1e-6);
+        Deadlines {
+            startup: self.deadlines.startup + more,
+            heartbeat: self.deadlines.heartbeat + more,
+            answers: self.deadlines.answers + more,
+        }
+    }
+}
+
+/// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded
+/// machine of two cores the slowest start seen took a tenth of it.
+const STARTUP: Duration = Duration::from_secs(3);
+/// Twenty-five beats: a loaded machine with more stages than cores delays one by ten times 20 ms now and
+/// then. The robot does not wait for it: the link stops it when the command is stale.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+/// An answer takes a hundredth of that where it takes long.
+const ANSWERS: Duration = Duration::from_secs(1);
+/// What most stages keep to.
+const DEADLINES: Deadlines = Deadlines {
+    startup: STARTUP,
+    heartbeat: HEARTBEAT,
+    answers: ANSWERS,
+};
+/// The planner beats between solves, and may owe some answers while it solves: it is rather seen to hang.
+const PLANNER_DEADLINES: Deadlines = Deadlines {
+    startup: STARTUP,
+    heartbeat: Duration::from_secs(2),
+    answers: Duration::from_secs(4),
+};
+/// The mapper reads its map back, and tells it whole, in one turn. Ample: at 16.8 million cells none was late without it.
+const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
+/// At 16.8 million cells the planner was silent for more than 2 s forty times in a mission, and with this allowance never
+/// for too long in a run of 97 s: a full solve, the field told whole and what came meanwhile fall into one turn.
+const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
+
+/// What a stage's process ends with when the bus would not have it.
+pub const REFUSED: u8 = 8;
+
+/// Every stage, in the order of the pipeline.
+pub static TABLE: [Stage; 5] = [
+    Stage {
+        name: "x80-link",
+        inputs: &[&DIRECTIVE],
+        feedback: &[&COMMAND],
+        outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
+        deadlines: DEADLINES,
+        million_cells: Duration::ZERO,
+        while_down: "stands when its timed command ends",
+        live: run_stage::<x80_link::shell::Shell>,
+    },
+    Stage {
+        name: "dead-reckoning",
+        inputs: &[&WHEELS],
+        feedback: &[],
+        outputs: &[&POSE],
+        deadlines: DEADLINES,
+        million_cells: Duration::ZERO,
+        while_down: "stopped by the link when the command is stale",
+        live: run_stage::<dead_reckoning::shell::Shell>,
+    },
+    Stage {
+        name: "mapper",
+        inputs: &[&RANGE, &POSE, &DIRECTIVE],
+        feedback: &[],
+        outputs: &[&GRID],
+        deadlines: DEADLINES,
+        million_cells: MAPPER_MILLION_CELLS,
+        while_down: "stopped by the link when the command is stale",
+        live: run_stage::<mapper::shell::Shell>,
+    },
+    Stage {
+        name: "planner",
+        inputs: &[&POSE, &GRID],
+        feedback: &[],
+        outputs: &[&GUIDANCE, &FIELD],
+        deadlines: PLANNER_DEADLINES,
+        million_cells: PLANNER_MILLION_CELLS,
+        while_down: "stopped by the link when the command is stale",
+        live: run_stage::<planner::shell::Shell>,
+    },
+    Stage {
+        name: "controller",
+        inputs: &[&POSE, &GUIDANCE],
+        feedback: &[],
+        outputs: &[&COMMAND],
+        deadlines: DEADLINES,
+        million_cells: Duration::ZERO,
+        while_down: "stopped by the link when the command is stale",
+        live: run_stage::<controller::shell::Shell>,
+    },
+];
+
+/// The stage of that name.
+pub fn find(name: &str) -> Option<&'static Stage> {
+    TABLE.iter().find(|stage| stage.name == name)
+}
+
+/// What to say of a name that no stage has.
+pub fn unknown(name: &str) -> String {
+    let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
+    let names = names.join(", ");
+    format!("no stage is called {name:?}; the stages are {names}")
+}
+
+/// The stages so that each comes after the writers of its inputs. Stopping goes the other way.
+pub fn start_order() -> Vec<&'static Stage> {
+    let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
+    while order.len() < TABLE.len() {
+        let waiting: Vec<&'static Stage> = TABLE
+            .iter()
+            .filter(|stage| !order.iter().any(|placed| placed.name == stage.name))
+            .collect();
+        let next = waiting.iter().find(|stage| {
+            stage.inputs.iter().all(|input| {
+                let writer = input.spec().writer;
+                !waiting.iter().any(|other| other.name == writer)
+            })
+        });
+        // Inputs that form a circle leave no next; the rest then starts in table order.
+        order.extend(next.or(waiting.first()));
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::topics::{self, EVERY_STAGE, OPERATOR, SUPERVISOR};
+
+    #[test]
+    fn every_input_has_a_writer_and_every_output_names_its_stage() {
+        for stage in &TABLE {
+            for input in stage.inputs.iter().chain(stage.feedback) {
+                let writer = input.spec().writer;
+                assert!(
+                    writer == SUPERVISOR || find(writer).is_some(),
+                    "{} reads {}, which nobody writes",
+                    stage.name,
+                    input.spec().name
+                );
+            }
+            for output in stage.outputs {
+                assert_eq!(output.spec().writer, stage.name, "{}", output.spec().name);
+            }
+        }
+    }
+
+    #[test]
+    fn every_topic_is_written_by_the_stage_it_names() {
+        for topic in topics::TABLE {
+            let spec = topic.spec();
+            if ![SUPERVISOR, EVERY_STAGE, OPERATOR].contains(&spec.writer) {
+                let writer = find(spec.writer).unwrap();
+                let writes = writer
+                    .outputs
+                    .iter()
+                    .any(|output| output.spec().name == spec.name);
+                assert!(writes, "{} does not write {}", spec.writer, spec.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_stage_starts_after_the_writers_of_its_inputs() {
+        let names: Vec<_> = start_order().iter().map(|stage| stage.name).collect();
+        let place = |name: &str| names.iter().position(|placed| *placed == name);
+        for stage in &TABLE {
+            for input in stage.inputs {
+                if let Some(writer) = place(input.spec().writer) {
+                    assert!(Some(writer) < place(stage.name), "{names:?}");
+                }
+            }
+        }
+        assert_eq!(names.len(), TABLE.len());
+    }
+}

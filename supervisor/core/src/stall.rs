@@ -1,0 +1,266 @@
+//! The paper's rule: a robot that should move and does not has a planner to blame. Pure.
+//!
+//! Rungs, in order: plan anew from the same belief; forget what was sensed and plan anew; give up.
+//!
+//! | cause | seen as | first step |
+//! |---|---|---|
+//! | still | it neither drives nor turns | plan anew |
+//! | pinned | it drives or turns, and stays where it is | plan anew |
+//! | buried | it stands in hazard, and has driven far without coming out | forget |
+//! | cut off | it stands where no way leads to the target, and has looked around | forget |
+
+use std::{f64::consts::TAU, time::Duration};
+
+use common::{
+    clock::MissionTime,
+    mission::{Method, Mission},
+    samples::{GuidanceSample, GuidanceStatus, PoseSample, StallCause},
+};
+use glam::DVec2;
+
+pub(crate) mod record;
+
+/// Mission time without motion that is a stall: longer than the slowest turn on the spot takes to begin.
+const STALLED_AFTER: Duration = Duration::from_secs(3);
+/// Mission time without a way to the target that is no passing false echo.
+const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
+/// A careful robot that is cut off turns so often on the spot first, at half the speed it is told to.
+const LOOKS_AROUND: f64 = 1.2;
+/// A robot that gets on turns no more often than so at one place, at the slower of its two rates.
+const TURNS_AT_A_PLACE: f64 = 2.0;
+/// Farther than this is another place, metres; likewise less for a robot that is to drive slower than that.
+const PLACE_M: f64 = 0.2;
+/// Where a robot circles what it should stand on, another place begins beyond this many of its circles.
+const CIRCLES: f64 = 1.2;
+/// Less than this is standing still, metres; less still for a robot that is to drive slower than that.
+const MOVED_M: f64 = 0.02;
+/// Less than this is not turning either, radians; likewise.
+const TURNED_RAD: f64 = 0.1;
+/// The share of what full speed would give that counts as motion: near its target a robot crawls.
+const SHARE: f64 = 0.05;
+/// A way so long leads out of any margin: several of them on top of each other, metres.
+const WAY_OUT_M: f64 = 1.0;
+/// Fresh planners tried before the belief is blamed.
+const MOST_REPLANS: u32 = 2;
+/// Beliefs forgotten before the target is called unreachable.
+const MOST_RESETS: u64 = 3;
+
+/// A robot that does not get on: how, and what to do about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Stall {
+    /// How it was seen.
+    pub cause: StallCause,
+    /// What to do.
+    pub recovery: Recovery,
+}
+
+/// What to do about a stall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Recovery {
+    /// Restart the planner: a full solve of the same belief.
+    Replan,
+    /// Forget what was sensed: this is the epoch to begin.
+    Forget {
+        /// The new epoch.
+        epoch: u64,
+    },
+    /// End the mission: the target is unreachable.
+    GiveUp,
+}
+
+/// Watches one mission.
+#[derive(Debug)]
+pub(crate) struct StallWatch {
+    moved_m: f64,
+    turned_rad: f64,
+    place_m: f64,
+    pinned_after: Duration,
+    cut_off_after: Duration,
+    anchor: Option<Anchor>,
+    place: Option<Place>,
+    cut_off_since: Option<MissionTime>,
+    /// What it had travelled when it was first seen in hazard, metres.
+    buried_since: Option<f64>,
+    /// Fresh planners at this place, with this belief.
+    replans_here: u32,
+    replans: u32,
+    epoch: u64,
+}
+
+/// Where the robot last was seen to move.
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    time: MissionTime,
+    travelled: f64,
+    heading: f64,
+}
+
+/// Where the robot has been for a while.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    since: MissionTime,
+    middle: DVec2,
+    /// The nearest it has been to the target there, metres.
+    nearest_m: f64,
+}
+
+impl StallWatch {
+    /// For the robot of a mission.
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let seconds = STALLED_AFTER.as_secs_f64();
+        let controller = &mission.controller;
+        let slowest_turn = TAU / controller.turn_rad_s.min(controller.look_rad_s);
+        let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
+        Self {
+            moved_m: MOVED_M.min(controller.speed_m_s * seconds * SHARE),
+            turned_rad: TURNED_RAD.min(controller.turn_rad_s * seconds * SHARE),
+            place_m: match mission.method {
+                Method::Evidential => PLACE_M.min(controller.speed_m_s * at_a_place * SHARE),
+                // It turns as it drives.
+                Method::Paper => CIRCLES * 2.0 * controller.speed_m_s / controller.turn_rad_s,
+            },
+            pinned_after: STALLED_AFTER + Duration::from_secs_f64(at_a_place),
+            cut_off_after: match mission.method {
+                Method::Evidential => {
+                    let turn = LOOKS_AROUND * TAU / controller.look_rad_s;
+                    CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
+                }
+                Method::Paper => CUT_OFF_AFTER,
+            },
+            anchor: None,
+            place: None,
+            cut_off_since: None,
+            buried_since: None,
+            replans_here: 0,
+            replans: 0,
+            epoch: 0,
+        }
+    }
+
+    /// The belief's current epoch.
+    pub(crate) const fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Fresh planners so far in this mission.
+    pub(crate) const fn replans(&self) -> u32 {
+        self.replans
+    }
+
+    /// Beliefs forgotten so far in this mission.
+    pub(crate) const fn resets(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Look at a tick of a robot that is ordered to drive. `held` says that something else holds it: the
+    /// link's failsafe, a stage that is down.
+    pub(crate) fn step(
+        &mut self,
+        pose: &PoseSample,
+        guidance: &GuidanceSample,
+        held: bool,
+    ) -> Option<Stall> {
+        // The belief outlives its supervisor.
+        self.epoch = self.epoch.max(guidance.epoch);
+        if held {
+            (self.anchor, self.place) = (None, None);
+            return None;
+        }
+        let cause = self
+            .without_ground(pose, guidance)
+            .or_else(|| self.without_motion(pose, guidance))?;
+        let recovery = match cause {
+            StallCause::Still | StallCause::Pinned if self.replans_here < MOST_REPLANS => {
+                self.replans_here += 1;
+                self.replans += 1;
+                Recovery::Replan
+            }
+            _ if self.epoch < MOST_RESETS => {
+                self.epoch += 1;
+                self.replans_here = 0;
+                Recovery::Forget { epoch: self.epoch }
+            }
+            _ => Recovery::GiveUp,
+        };
+        // What is tried gets the time that the robot had.
+        let now = pose.stamp.time();
+        if let (Some(anchor), Some(place)) = (&mut self.anchor, &mut self.place) {
+            (anchor.time, place.since) = (now, now);
+        }
+        (self.cut_off_since, self.buried_since) = (None, None);
+        Some(Stall { cause, recovery })
+    }
+
+    /// Whether u = 0 where the robot stands, by this very belief, for longer than a robot needs to get away.
+    fn without_ground(
+        &mut self,
+        pose: &PoseSample,
+        guidance: &GuidanceSample,
+    ) -> Option<StallCause> {
+        let (now, travelled) = (pose.stamp.time(), pose.travelled_m);
+        let status = GuidanceStatus::from_byte(guidance.status);
+        let is = |what| status == what && guidance.epoch == self.epoch;
+        if !is(GuidanceStatus::Unreachable) {
+            self.cut_off_since = None;
+        } else if now.since(*self.cut_off_since.get_or_insert(now)) >= self.cut_off_after {
+            return Some(StallCause::CutOff);
+        }
+        if !is(GuidanceStatus::WayOut) {
+            self.buried_since = None;
+        } else if travelled - *self.buried_since.get_or_insert(travelled) >= WAY_OUT_M {
+            return Some(StallCause::Buried);
+        }
+        None
+    }
+
+    /// Whether the robot has neither moved nor turned for long, or both for longer and to no avail.
+    fn without_motion(
+        &mut self,
+        pose: &PoseSample,
+        guidance: &GuidanceSample,
+    ) -> Option<StallCause> {
+        let now = pose.stamp.time();
+        let here = Anchor {
+            time: now,
+            travelled: pose.travelled_m,
+            heading: pose.heading_rad,
+        };
+        let anchor = *self.anchor.get_or_insert(here);
+        if (here.travelled - anchor.travelled).abs() >= self.moved_m
+            || (here.heading - anchor.heading).abs() >= self.turned_rad
+        {
+            self.anchor = Some(here);
+        }
+        let arrived = Place {
+            since: now,
+            middle: pose.pose().position,
+            nearest_m: guidance.distance_m,
+        };
+        let place = *self.place.get_or_insert(arrived);
+        if arrived.middle.distance(place.middle) >= self.place_m {
+            self.place = Some(arrived);
+            self.replans_here = 0;
+        } else if arrived.nearest_m <= place.nearest_m - self.moved_m {
+            // One that crawls to its target gets on, too.
+            self.place = Some(Place {
+                middle: place.middle,
+                ..arrived
+            });
+        }
+        // It looks around first, and that has a time of its own.
+        if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
+            return None;
+        }
+        let since = |then: Option<MissionTime>| then.map_or(Duration::ZERO, |then| now.since(then));
+        let still = since(self.anchor.map(|anchor| anchor.time)) >= STALLED_AFTER;
+        let pinned = since(self.place.map(|place| place.since)) >= self.pinned_after;
+        match (still, pinned) {
+            (true, _) => Some(StallCause::Still),
+            (_, true) => Some(StallCause::Pinned),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,240 @@
+use super::*;
+use common::samples::Stamp;
+
+fn watch() -> StallWatch {
+    let path = std::path::Path::new("test.toml");
+    StallWatch::new(&Mission::parse("target = [3, 0]\nmethod = 'paper'", path).unwrap())
+}
+
+fn pose(seconds: f64, travelled_m: f64) -> PoseSample {
+    PoseSample {
+        stamp: Stamp {
+            stamp_ns: MissionTime::from_seconds(seconds).0,
+            ..Stamp::default()
+        },
+        travelled_m,
+        ..PoseSample::default()
+    }
+}
+
+fn guidance(status: GuidanceStatus, epoch: u64) -> GuidanceSample {
+    GuidanceSample {
+        status: status.into(),
+        epoch,
+        ..GuidanceSample::default()
+    }
+}
+
+#[test]
+fn a_robot_that_moves_is_left_alone() {
+    let mut watch = watch();
+    for tick in (0..100).map(f64::from) {
+        let driving = PoseSample {
+            x_m: tick * 0.05,
+            ..pose(tick, tick * 0.05)
+        };
+        assert_eq!(
+            watch.step(&driving, &guidance(GuidanceStatus::Along, 0), false),
+            None
+        );
+    }
+}
+
+#[test]
+fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
+    let mut watch = watch();
+    let along = guidance(GuidanceStatus::Along, 0);
+    let recoveries: Vec<_> = (0..=10)
+        .filter_map(|second| watch.step(&pose(f64::from(second), 0.0), &along, false))
+        .collect();
+    let want = [
+        Recovery::Replan,
+        Recovery::Replan,
+        Recovery::Forget { epoch: 1 },
+    ];
+    let cause = StallCause::Still;
+    assert_eq!(recoveries, want.map(|recovery| Stall { cause, recovery }));
+}
+
+#[test]
+fn a_robot_held_by_something_else_is_not_stalled() {
+    let mut watch = watch();
+    let along = guidance(GuidanceStatus::Along, 0);
+    for second in 0..20 {
+        assert_eq!(
+            watch.step(&pose(f64::from(second), 0.0), &along, true),
+            None
+        );
+    }
+}
+
+#[test]
+fn a_robot_cut_off_forgets_three_times_and_gives_up() {
+    let mut watch = watch();
+    let mut recoveries = Vec::new();
+    for tick in 0..100 {
+        let cut_off = guidance(GuidanceStatus::Unreachable, watch.epoch());
+        recoveries.extend(watch.step(
+            &pose(f64::from(tick) * 0.5, f64::from(tick)),
+            &cut_off,
+            false,
+        ));
+        if matches!(recoveries.last(), Some(stall) if stall.recovery == Recovery::GiveUp) {
+            break;
+        }
+    }
+    let [first, second, third, last] = recoveries[..] else {
+        panic!("{recoveries:?}");
+    };
+    let cause = StallCause::CutOff;
+    let epochs = [1, 2, 3].map(|epoch| Recovery::Forget { epoch });
+    let forgets = epochs.map(|recovery| Stall { cause, recovery });
+    assert_eq!([first, second, third], forgets);
+    let recovery = Recovery::GiveUp;
+    assert_eq!(last, Stall { cause, recovery });
+}
+
+#[test]
+fn a_careful_robot_cut_off_looks_around_before_its_belief_is_blamed() {
+    let path = std::path::Path::new("test.toml");
+    let mission = Mission::parse("target = [3, 0]", path).unwrap();
+    let mut watch = StallWatch::new(&mission);
+    let cut_off = guidance(GuidanceStatus::Unreachable, 0);
+    let turning = |second: f64| PoseSample {
+        heading_rad: second,
+        ..pose(second, 0.0)
+    };
+    let turn = TAU / mission.controller.look_rad_s;
+    let first = (0..100)
+        .map(f64::from)
+        .find(|&second| watch.step(&turning(second), &cut_off, false).is_some());
+    assert!(first > Some(turn) && first < Some(5.0 * turn), "{first:?}");
+}
+
+#[test]
+fn a_scan_is_no_stall() {
+    let mut watch = watch();
+    let look = guidance(GuidanceStatus::Look, 0);
+    for tick in 0..75 {
+        let seconds = f64::from(tick) * 0.2;
+        let scanning = PoseSample {
+            heading_rad: seconds.sin(),
+            ..pose(seconds, 0.0)
+        };
+        assert_eq!(watch.step(&scanning, &look, false), None);
+    }
+}
+
+#[test]
+fn an_answer_from_before_the_reset_does_not_reset_again() {
+    let mut watch = watch();
+    let old = guidance(GuidanceStatus::Unreachable, 0);
+    watch.step(&pose(0.0, 0.0), &old, false);
+    let reset = watch.step(&pose(1.0, 0.0), &old, false);
+    let recovery = Recovery::Forget { epoch: 1 };
+    assert_eq!(reset.map(|stall| stall.recovery), Some(recovery));
+    assert_eq!(watch.step(&pose(2.5, 0.1), &old, false), None);
+}
+
+/// Rocks to and fro at one place, so long as `seconds` go.
+fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<Stall> {
+    let along = guidance(GuidanceStatus::Along, 0);
+    let rocking = seconds.filter_map(|second| {
+        let seconds = f64::from(second);
+        let rocking = PoseSample {
+            x_m: 0.05 * seconds.sin(),
+            heading_rad: seconds,
+            ..pose(seconds, 0.05 * seconds)
+        };
+        watch.step(&rocking, &along, false)
+    });
+    rocking.collect()
+}
+
+#[test]
+fn a_robot_that_moves_and_stays_where_it_is_gets_a_fresh_planner_twice_then_a_fresh_belief() {
+    let want = [
+        Recovery::Replan,
+        Recovery::Replan,
+        Recovery::Forget { epoch: 1 },
+    ];
+    let cause = StallCause::Pinned;
+    let stalls = rock(&mut watch(), 0..60);
+    assert_eq!(stalls, want.map(|recovery| Stall { cause, recovery }));
+}
+
+#[test]
+fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to_it_is_not() {
+    let path = std::path::Path::new("test.toml");
+    let mission = Mission::parse("target = [3, 0]\nmethod = 'paper'", path).unwrap();
+    let (speed, turn) = (mission.controller.speed_m_s, mission.controller.turn_rad_s);
+    let radius = speed / turn;
+    let mut circling = StallWatch::new(&mission);
+    let mut crawling = StallWatch::new(&mission);
+    let mut seen = [None; 2];
+    for second in (0..40).map(f64::from) {
+        let heading = turn * second;
+        let circle = PoseSample {
+            x_m: radius * heading.sin(),
+            y_m: -radius * heading.cos(),
+            heading_rad: heading,
+            ..pose(second, speed * second)
+        };
+        let crawl = PoseSample {
+            x_m: 0.01 * second,
+            ..pose(second, 0.01 * second)
+        };
+        let near = |distance_m| GuidanceSample {
+            distance_m,
+            ..guidance(GuidanceStatus::Along, 0)
+        };
+        let stalls = [
+            circling.step(&circle, &near(3.0 - circle.x_m), false),
+            crawling.step(&crawl, &near(0.5 - crawl.x_m), false),
+        ];
+        for (first, stall) in seen.iter_mut().zip(stalls) {
+            *first = first.or(stall.map(|stall| stall.cause));
+        }
+    }
+    assert_eq!(seen, [Some(StallCause::Pinned), None]);
+}
+
+#[test]
+fn a_place_that_was_left_is_forgiven() {
+    let mut watch = watch();
+    assert_eq!(rock(&mut watch, 0..40).len(), 2);
+    let elsewhere = PoseSample {
+        x_m: 1.0,
+        ..pose(40.0, 3.0)
+    };
+    watch.step(&elsewhere, &guidance(GuidanceStatus::Along, 0), false);
+    let recoveries: Vec<_> = rock(&mut watch, 41..85)
+        .iter()
+        .map(|stall| stall.recovery)
+        .collect();
+    assert_eq!(recoveries, [Recovery::Replan, Recovery::Replan]);
+    assert_eq!(watch.replans(), 4);
+}
+
+#[test]
+fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
+    let way_out = guidance(GuidanceStatus::WayOut, 0);
+    let drive = |watch: &mut StallWatch, metres: std::ops::Range<u32>| {
+        let mut driving = metres.map(|tenths| PoseSample {
+            x_m: f64::from(tenths) * 0.1,
+            ..pose(f64::from(tenths), f64::from(tenths) * 0.1)
+        });
+        driving.find_map(|pose| watch.step(&pose, &way_out, false))
+    };
+    let recovery = Recovery::Forget { epoch: 1 };
+    let cause = StallCause::Buried;
+    assert_eq!(drive(&mut watch(), 0..12), Some(Stall { cause, recovery }));
+    let mut watch = watch();
+    assert_eq!(drive(&mut watch, 0..8), None);
+    let out = PoseSample {
+        x_m: 0.8,
+        ..pose(8.0, 0.8)
+    };
+    watch.step(&out, &guidance(GuidanceStatus::Along, 0), false);
+    assert_eq!(drive(&mut watch, 9..17), None);
+}

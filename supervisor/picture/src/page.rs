@@ -1,0 +1,342 @@
+//! The sheet: how the mission frame lies on it, and how numbers, lines and text are written.
+
+use std::fmt::{self, Display, Write};
+
+use common::grid::GridFrame;
+use glam::DVec2;
+
+/// Width of the sheet. Lengths on the sheet are in SVG's user units, "px".
+pub(super) const WIDTH: f64 = 1150.0;
+/// Left edge of the plot.
+pub(super) const PLOT_LEFT: f64 = 62.0;
+/// Top edge of the plot.
+pub(super) const PLOT_TOP: f64 = 92.0;
+/// Side of the plot: a square, as the perimeter is.
+pub(super) const PLOT_SIDE: f64 = 800.0;
+
+/// Beyond the plot lines are cut, not only hidden: a far pose must not make far coordinates.
+const OVERHANG: f64 = 20.0;
+/// Steps of a line shorter than this cannot be seen.
+const FINEST: f64 = 0.6;
+
+/// The colours, in one place so that they stay apart from each other. Hue tells belief (orange,
+/// violet) from motion (black, magenta); the field stays pale below both.
+pub(super) mod ink {
+    /// Text and the plot's frame.
+    pub(crate) const TEXT: &str = "#1f2933";
+    /// Text of less weight.
+    pub(crate) const QUIET: &str = "#5b6773";
+    /// Where there is no way to the target, or no field at all.
+    pub(crate) const NOWHERE: &str = "#eceef0";
+    /// Lines of E.
+    pub(crate) const GUIDANCE: &str = "#3f5f86";
+    /// Cells a sensor marked.
+    pub(crate) const SENSED: &str = "#f0923b";
+    /// Cells the a-priori map marked.
+    pub(crate) const KNOWN: &str = "#8f78c4";
+    /// Cells of the perimeter.
+    pub(crate) const PERIMETER: &str = "#9aa5b1";
+    /// What is really there.
+    pub(crate) const WORLD: &str = "#27313b";
+    /// The way really driven.
+    pub(crate) const TRUTH: &str = "#0b0f14";
+    /// The way believed.
+    pub(crate) const BELIEVED: &str = "#d1126f";
+    /// Target, and success.
+    pub(crate) const TARGET: &str = "#087f4b";
+    /// Anything but success.
+    pub(crate) const FAILURE: &str = "#c0271c";
+}
+
+/// The mission frame laid over the plot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    /// The corner of least x and y, metres.
+    low: DVec2,
+    /// Side of the plot, metres.
+    side_m: f64,
+}
+
+impl View {
+    /// The whole of `frame`, rim cells included.
+    pub(super) fn of(frame: &GridFrame) -> Self {
+        let side_m = f64::from(frame.cells) * frame.resolution_m;
+        let low = metres(frame, DVec2::splat(-0.5));
+        if side_m.is_finite() && side_m > 0.0 && low.is_finite() {
+            return Self { low, side_m };
+        }
+        // No mission that was validated comes here; a picture must come out all the same.
+        Self {
+            low: DVec2::splat(-0.5),
+            side_m: 1.0,
+        }
+    }
+
+    /// The corner of least x and y, metres.
+    pub(super) const fn low(&self) -> DVec2 {
+        self.low
+    }
+
+    /// Side of the plot, metres.
+    pub(super) const fn side_m(&self) -> f64 {
+        self.side_m
+    }
+
+    /// Where `point` (metres) lies on the sheet.
+    pub(super) fn place(&self, point: DVec2) -> DVec2 {
+        let from_low = (point - self.low) * self.px(1.0);
+        DVec2::new(PLOT_LEFT + from_low.x, PLOT_TOP + PLOT_SIDE - from_low.y)
+    }
+
+    /// `metres` as a length on the sheet.
+    pub(super) fn px(&self, metres: f64) -> f64 {
+        metres * PLOT_SIDE / self.side_m
+    }
+
+    /// Whether any of a disc (metres) is on the plot. NaN is not.
+    pub(super) fn shows(&self, centre: DVec2, radius_m: f64) -> bool {
+        let reach = radius_m + self.side_m / 2.0;
+        let from_middle = (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs();
+        from_middle.cmple(DVec2::splat(reach)).all()
+    }
+
+    /// The line through `points` (metres), cut at the plot and broken where one is not finite.
+    pub(super) fn line(&self, points: impl IntoIterator<Item = DVec2>) -> Path {
+        let mut path = Path::default();
+        let mut last: Option<DVec2> = None;
+        for point in points {
+            let to = self.place(point);
+            if !to.is_finite() {
+                last = None;
+                continue;
+            }
+            let Some(from) = last else {
+                last = Some(to);
+                continue;
+            };
+            if from.distance(to) < FINEST {
+                continue;
+            }
+            if let Some((enter, leave)) = cut(from, to) {
+                path.join(enter);
+                path.line_to(leave);
+            }
+            last = Some(to);
+        }
+        path
+    }
+}
+
+/// A place given in cells (cell centres at whole numbers), in metres.
+pub(super) fn metres(frame: &GridFrame, cells: DVec2) -> DVec2 {
+    let centre = DVec2::splat(f64::from(frame.centre_index()));
+    frame.centre + (cells - centre) * frame.resolution_m
+}
+
+/// The part of `from`..`to` on the plot or little beside it: Liang and Barsky's clipping.
+fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
+    let low = DVec2::new(PLOT_LEFT, PLOT_TOP) - OVERHANG;
+    let high = low + PLOT_SIDE + 2.0 * OVERHANG;
+    let along = to - from;
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    for axis in 0..2 {
+        if along[axis] == 0.0 {
+            if from[axis] < low[axis] || from[axis] > high[axis] {
+                return None;
+            }
+            continue;
+        }
+        let a = (low[axis] - from[axis]) / along[axis];
+        let b = (high[axis] - from[axis]) / along[axis];
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    let ends = (from + along * enter, from + along * leave);
+    // An overflow in `along` ends here, as a line that is not drawn.
+    (enter <= leave && ends.0.is_finite() && ends.1.is_finite()).then_some(ends)
+}
+
+/// A coordinate as it is written: a tenth is finer than any screen, and what is not a number is
+/// none in the file either.
+pub(super) struct Px(pub(super) f64);
+
+impl Display for Px {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let finite = if self.0.is_finite() { self.0 } else { 0.0 };
+        // Adding 0 turns -0 into 0.
+        let tenths = (finite.clamp(-1e7, 1e7) * 10.0).round() + 0.0;
+        write!(f, "{}", tenths / 10.0)
+    }
+}
+
+/// The `d` of an SVG path, in sheet coordinates.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Path {
+    data: String,
+    pen: Option<DVec2>,
+}
+
+impl Path {
+    /// Whether nothing was drawn.
+    pub(super) const fn is_empty(&self) -> bool {
+        self.data.is_empty()
+    }
+
+    /// Bytes it takes.
+    pub(super) const fn len(&self) -> usize {
+        self.data.len()
+    }
+
+    /// Lift the pen and set it down at `to`.
+    pub(super) fn move_to(&mut self, to: DVec2) {
+        self.push('M', to);
+    }
+
+    /// Draw a straight line to `to`.
+    pub(super) fn line_to(&mut self, to: DVec2) {
+        self.push('L', to);
+    }
+
+    /// Set the pen down at `to` unless it is there.
+    pub(super) fn join(&mut self, to: DVec2) {
+        if self.pen != Some(to) {
+            self.move_to(to);
+        }
+    }
+
+    /// A closed polygon.
+    pub(super) fn polygon(&mut self, corners: impl IntoIterator<Item = DVec2>) {
+        for (nth, corner) in corners.into_iter().enumerate() {
+            self.push(if nth == 0 { 'M' } else { 'L' }, corner);
+        }
+        self.data.push('Z');
+        self.pen = None;
+    }
+
+    /// A rectangle with sides along the sheet's.
+    pub(super) fn rectangle(&mut self, corner: DVec2, size: DVec2) {
+        let (x, y, width, height) = (Px(corner.x), Px(corner.y), Px(size.x), Px(size.y));
+        let back = Px(-size.x);
+        self.write(format_args!("M{x} {y}h{width}v{height}h{back}z"));
+        self.pen = None;
+    }
+
+    /// A circle.
+    pub(super) fn circle(&mut self, centre: DVec2, radius: f64) {
+        let (x, y) = (Px(centre.x - radius), Px(centre.y));
+        let (r, there, back) = (Px(radius), Px(2.0 * radius), Px(-2.0 * radius));
+        self.write(format_args!(
+            "M{x} {y}a{r} {r} 0 1 0 {there} 0a{r} {r} 0 1 0 {back} 0z"
+        ));
+        self.pen = None;
+    }
+
+    fn push(&mut self, command: char, to: DVec2) {
+        self.write(format_args!("{command}{} {}", Px(to.x), Px(to.y)));
+        self.pen = Some(to);
+    }
+
+    fn write(&mut self, text: fmt::Arguments<'_>) {
+        // Writing to a String cannot fail.
+        let _ = self.data.write_fmt(text);
+    }
+
+    /// The element, with `style` as its further attributes; nothing if nothing was drawn.
+    pub(super) fn element(&self, style: &str) -> String {
+        if self.is_empty() {
+            return String::new();
+        }
+        format!("<path d=\"{}\" {style}/>\n", self.data)
+    }
+}
+
+/// `text` as XML character data of at most `limit` characters.
+pub(super) fn escape(text: &str, limit: usize) -> String {
+    let mut escaped = String::new();
+    for (nth, character) in text.chars().enumerate() {
+        if nth + 1 >= limit && text.chars().nth(limit).is_some() {
+            escaped.push('…');
+            break;
+        }
+        match character {
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '&' => escaped.push_str("&amp;"),
+            '"' => escaped.push_str("&quot;"),
+            // XML 1.0 has no way to write these, not even as references.
+            '\u{fffe}' | '\u{ffff}' => escaped.push(' '),
+            other if other.is_control() => escaped.push(' '),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+/// The least of 1, 2, 5, 10, 20, ... (and their fractions) that is not below `least`.
+pub(super) fn round_up(least: f64) -> f64 {
+    if !(least.is_finite() && least > 0.0) {
+        return 1.0;
+    }
+    let decade = 10_f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|digit| digit * decade)
+        // The slack keeps 0.2 from being rounded up to 0.5 by the last bit.
+        .find(|candidate| *candidate >= least * (1.0 - 1e-9))
+        .unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_round_up_to_one_two_five() {
+        for (least, step) in [
+            (0.2, 0.2),
+            (0.21, 0.5),
+            (1.0, 1.0),
+            (6.0, 10.0),
+            (130.0, 200.0),
+        ] {
+            assert!((round_up(least) - step).abs() < 1e-9, "{least}");
+        }
+        assert_eq!(round_up(f64::NAN), 1.0);
+        assert_eq!(round_up(0.0), 1.0);
+    }
+
+    #[test]
+    fn coordinates_are_short_and_always_numbers() {
+        let written =
+            [12.0, -0.04, 2.345, f64::NAN, f64::INFINITY, 1e300].map(|value| Px(value).to_string());
+        assert_eq!(written, ["12", "0", "2.3", "0", "0", "10000000"]);
+    }
+
+    #[test]
+    fn a_line_that_leaves_and_returns_is_cut_in_two() {
+        let view = View {
+            low: DVec2::ZERO,
+            side_m: 8.0,
+        };
+        let away = [(4.0, 4.0), (1e6, 4.0), (1e6, 5.0), (4.0, 5.0)];
+        let path = view.line(away.map(|(x, y)| DVec2::new(x, y)));
+        assert_eq!(path.data, "M462 492L882 492M882 392L462 392");
+    }
+
+    #[test]
+    fn a_line_is_broken_at_a_pose_that_is_no_place() {
+        let view = View {
+            low: DVec2::ZERO,
+            side_m: 8.0,
+        };
+        let holed = [1.0, 2.0, f64::NAN, 3.0, 4.0].map(|x| DVec2::new(x, 8.0));
+        assert_eq!(view.line(holed).data, "M162 92L262 92M362 92L462 92");
+    }
+
+    #[test]
+    fn text_is_escaped_and_cut() {
+        assert_eq!(escape("a<b>&\"\u{1}", 9), "a&lt;b&gt;&amp;&quot; ");
+        assert_eq!(escape("abcdef", 4), "abc…");
+        assert_eq!(escape("abcd", 4), "abcd");
+    }
+}

@@ -1,0 +1,35 @@
+//! A drawing as pixels. It must hold no text: no fonts are looked for.
+
+use resvg::{tiny_skia::Pixmap, usvg};
+use thiserror::Error;
+
+/// A drawing that did not become pixels: a fault of the program, whatever the map.
+#[derive(Debug, Error)]
+pub enum RasterError {
+    /// The SVG is none.
+    #[error("the picture could not be read back: {0}; report this map")]
+    Drawing(#[from] usvg::Error),
+    /// There is no pixmap of that size.
+    #[error("no picture of {width} x {height} pixels can be made; report this map")]
+    Size {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The PNG could not be written.
+    #[error("the picture could not be encoded: {0}; report this map")]
+    Encoding(String),
+}
+
+/// `svg` as the bytes of a PNG file, a pixel each of its units.
+pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
+    let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
+    let size = tree.size().to_int_size();
+    let (width, height) = (size.width(), size.height());
+    let mut pixels = Pixmap::new(width, height).ok_or(RasterError::Size { width, height })?;
+    resvg::render(&tree, usvg::Transform::identity(), &mut pixels.as_mut());
+    pixels
+        .encode_png()
+        .map_err(|error| RasterError::Encoding(error.to_string()))
+}
