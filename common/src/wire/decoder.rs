@@ -6,11 +6,11 @@
 
 use super::{
     crc::crc8,
-    frame::{BEFORE_DATA, Frame, HEADER},
+    frame::{BEFORE_DATA, Frame, HEADER, MAX_FRAME_BYTES},
 };
 
 /// Bytes held at most: the largest datagram, and a frame begun in the one before.
-const CAPACITY: usize = 65_536 + super::MAX_FRAME_BYTES;
+const CAPACITY: usize = 65_536 + MAX_FRAME_BYTES;
 /// No message that is known is longer. A header that claims more is likely noise, so it does not hold
 /// back the complete frames behind it while the rest of its own is missing.
 const LONGEST_PLAUSIBLE: usize = 64;

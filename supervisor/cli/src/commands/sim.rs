@@ -5,8 +5,8 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 use clap::{Args, ValueEnum};
 use common::{
     clock::Pace,
-    shell::become_child,
     signals::{SIGINT, SIGTERM, Signals},
+    start::become_child,
 };
 use x80_sim::SimOptions;
 

@@ -54,9 +54,8 @@ pub(crate) fn faults(_: &FaultArguments) -> Result<ExitCode, Failure> {
 
 /// The topics as a Markdown table.
 pub(crate) fn topic_table() -> String {
-    let mut table = String::from(
-        "| topic | payload | written by | rate | too old after | meaning |\n|---|---|---|---|---|---|\n",
-    );
+    let mut table =
+        String::from("| topic | payload | written by | rate | meaning |\n|---|---|---|---|---|\n");
     for topic in topics::TABLE {
         let spec = topic.spec();
         let rate = match spec.rate {
@@ -65,13 +64,10 @@ pub(crate) fn topic_table() -> String {
             Rate::WhenItHappens => "when it happens".to_owned(),
             Rate::OnChange(least) => format!("on change, at least every {} ms", least.as_millis()),
         };
-        let age = spec
-            .max_age
-            .map_or("-".to_owned(), |age| format!("{} ms", age.as_millis()));
         // Writing to a String cannot fail.
         let _ = writeln!(
             table,
-            "| `{}` | `{}` | {} | {rate} | {age} | {} |",
+            "| `{}` | `{}` | {} | {rate} | {} |",
             spec.name,
             topic.payload(),
             spec.writer,
