@@ -1,7 +1,7 @@
 //! State that outlives a SIGKILL: a small file of two slots, written in turn.
 //!
 //! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older
-//! slot, so a kill at any instruction leaves at least one whole; the checksum tells which. Nothing is
+//! slot, so a kill at any instruction leaves at least one whole; the checksum shows which. Nothing is
 //! synced to the disk: the kernel keeps what a killed process has written, and a robot that lost
 //! power has lost its encoder counts too.
 

@@ -18,6 +18,24 @@ pub use crate::bus::{
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
+/// Twenty-five heartbeats fit in the tightest deadline set on them; they take a hundredth of a percent of a core.
+const BEAT: Duration = Duration::from_millis(20);
+/// So that `firsthand status` is up to date while no ticks come.
+const LINK_AGAIN: Duration = Duration::from_millis(100);
+
+/// For eyes and loggers: the robot should not wait for it. In mission time.
+const FIELD_RATE: Rate = Rate::OnChange {
+    at_most_every: Duration::from_millis(250),
+    again_after: Duration::from_secs(1),
+};
+
+/// At every change at once, and again after `again_after`.
+const fn on_change(again_after: Duration) -> Rate {
+    Rate::OnChange {
+        at_most_every: Duration::ZERO,
+        again_after,
+    }
+}
 
 macro_rules! topics {
     ($($(#[doc = $meaning:literal])+ $id:ident: $kind:ident<$($payload:ty),+> {
@@ -61,7 +79,7 @@ topics! {
     }
     /// The whole-domain policy, for consumers.
     FIELD: SliceTopic<FieldHeader, FieldCell> {
-        name: "field", writer: "planner", rate: Rate::OnChange(Duration::from_secs(1)), limits: Limits::MAP,
+        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::MAP,
     }
     /// Wheel speeds for the robot.
     COMMAND: Topic<CommandSample> {
@@ -69,11 +87,11 @@ topics! {
     }
     /// Heartbeats, from inside the work loop.
     HEALTH: Topic<HealthSample> {
-        name: "health", writer: EVERY_STAGE, rate: Rate::OnChange(Duration::from_millis(20)), limits: Limits::SMALL,
+        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT), limits: Limits::SMALL,
     }
     /// The wire to the robot: connection, counts, tick latency.
     LINK: Topic<LinkSample> {
-        name: "link", writer: "x80-link", rate: Rate::OnChange(Duration::from_millis(100)), limits: Limits::SMALL,
+        name: "link", writer: "x80-link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL,
     }
     /// The seven infrared rangers, metres.
     INFRARED: Topic<InfraredSample> {
@@ -89,11 +107,11 @@ topics! {
     }
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {
-        name: "directive", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), limits: Limits::SMALL,
+        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
     }
     /// What runs, as the supervisor sees it.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {
-        name: "roster", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), limits: Limits::MAP,
+        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::MAP,
     }
     /// A stage died: cause, ages, last words, what follows.
     DEATHS: Topic<DeathSample> {

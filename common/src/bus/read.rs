@@ -91,7 +91,7 @@ impl Authorship {
         }
     }
 
-    /// Whether no newer generation than `generation` was seen.
+    /// Whether no newer generation than `generation` was seen: samples of older ones are dropped.
     fn admits(&mut self, generation: u32) -> bool {
         match &mut self.newest {
             Some(newest) if generation < *newest => false,

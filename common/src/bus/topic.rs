@@ -22,9 +22,14 @@ pub enum Rate {
     /// After each frame of the robot that it is read from, driving or not: about once a tick, in a pause of the
     /// other work. Of several frames between two pauses only the newest is published.
     EachFrame,
-    /// At every change, and again when this time has passed since the last. The writer looks at the clock once in
-    /// each turn of its work loop, so a long turn delays it.
-    OnChange(Duration),
+    /// At every change, and again when nothing changes, for readers that joined since. The writer looks at the clock
+    /// once in each turn of its work loop, so a long turn delays it.
+    OnChange {
+        /// Changes that follow each other sooner are published together; zero: each at once.
+        at_most_every: Duration,
+        /// How long after the last sample; after the last whole one, where samples carry changes.
+        again_after: Duration,
+    },
     /// When something happened, once.
     WhenItHappens,
 }
@@ -133,11 +138,18 @@ pub trait AnyTopic: Sync + CreateServices {
     fn spec(&self) -> &'static Spec;
     /// The name of its payload, for every language: a struct, or a header and a slice of elements.
     fn payload(&self) -> String;
-    /// How often its writer publishes it again when nothing changes; zero where the table does not say.
+    /// After how long its writer publishes it again when nothing changes; zero where the table does not say.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
             Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
-            Rate::OnChange(period) => period,
+            Rate::OnChange { again_after, .. } => again_after,
+        }
+    }
+    /// How long its writer waits from one change to the next; zero where the table does not say.
+    fn changes_at_most_every(&self) -> Duration {
+        match self.spec().rate {
+            Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
+            Rate::OnChange { at_most_every, .. } => at_most_every,
         }
     }
 }

@@ -83,7 +83,7 @@ impl Simulator {
             mission,
             "--pace",
             &pace.to_string(),
-            "--truth",
+            "--ground-truth",
             "--supervisor",
             &std::process::id().to_string(),
         ]);

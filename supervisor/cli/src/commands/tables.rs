@@ -62,7 +62,19 @@ pub(crate) fn topic_table() -> String {
             Rate::EachTick => "each tick".to_owned(),
             Rate::EachFrame => "each frame of the robot".to_owned(),
             Rate::WhenItHappens => "when it happens".to_owned(),
-            Rate::OnChange(least) => format!("on change, at least every {} ms", least.as_millis()),
+            Rate::OnChange {
+                at_most_every,
+                again_after,
+            } => {
+                let limit = match at_most_every.as_millis() {
+                    0 => String::new(),
+                    limit => format!(" at most every {limit} ms"),
+                };
+                format!(
+                    "on change{limit}, again after {} ms",
+                    again_after.as_millis()
+                )
+            }
         };
         // Writing to a String cannot fail.
         let _ = writeln!(
