@@ -7,7 +7,7 @@
 //! exactly the residual left on black. It is restricted at once.
 
 use super::coarse::Coarse;
-use super::grid::{EE, EO, Grid, OE, OO, Planes, Scratch, join_row, split_row};
+use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
 use crate::real::Real;
 
 /// An inflow at one cell: the right-hand side of its equation.
@@ -186,11 +186,12 @@ impl<R: Real> Finest<R> {
             // Every sweep follows the one before at a distance of one row.
             for sweep in 0..sweeps {
                 if (sweep..rows + sweep).contains(&y) {
-                    self.relax_even_even(y - sweep);
+                    self.relax(EE, y - sweep, None);
                 }
                 if (sweep + 1..=rows + sweep).contains(&y) {
-                    self.relax_odd_odd(y - sweep - 1);
-                    self.relax_black(y - sweep - 1);
+                    for plane in [OO, OE, EO] {
+                        self.relax(plane, y - sweep - 1, None);
+                    }
                 }
             }
             if !descend || y < sweeps {
@@ -201,18 +202,18 @@ impl<R: Real> Finest<R> {
             even.swap(0, 1);
             odd.swap(0, 1);
             if y < rows {
-                self.relax_even_even_noting(y, &mut even[1]);
+                self.relax(EE, y, Some(&mut even[1]));
             } else {
                 even[1].fill(R::default());
             }
             if (1..=rows).contains(&y) {
                 let y = y - 1;
-                self.relax_odd_odd_noting(y, &mut odd[1]);
+                self.relax(OO, y, Some(&mut odd[1]));
                 left.swap(0, 1);
                 let [above, here] = &mut *left;
                 left_on_black(n, [&even[0], &even[1]], [&odd[0], &odd[1]], beside, here);
                 let o = grid.start(y);
-                let m = super::grid::MARGIN;
+                let m = MARGIN;
                 let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
                 let (north, south) = (&self.north[o..][..n], &self.south[o - stride..][..n]);
                 let (b, b_west) = (&beside[m..][..n], &beside[m - 1..][..n]);
@@ -254,123 +255,29 @@ impl<R: Real> Finest<R> {
         unconverged as usize
     }
 
+    /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes what each cell changes by.
     #[inline(always)]
-    fn relax_even_even(&mut self, y: usize) {
+    fn relax(&mut self, plane: usize, y: usize, mut change: Option<&mut [R]>) {
         let Grid {
             columns: n, stride, ..
         } = self.grid;
         let o = self.grid.start(y);
-        let [ee, oe, eo, _] = &mut self.u;
-        let (e, w, s, no) = (
-            &oe[o..][..n],
-            &oe[o - 1..][..n],
-            &eo[o..][..n],
-            &eo[o - stride..][..n],
-        );
-        relax(
-            &mut ee[o..][..n],
-            &self.inverse[EE][o..][..n],
-            [e, w, s, no],
-        );
-        self.add_sources(EE, y, None);
-    }
-
-    #[inline(always)]
-    fn relax_odd_odd(&mut self, y: usize) {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
-        let o = self.grid.start(y);
-        let [_, oe, eo, oo] = &mut self.u;
-        let (no, s, w, e) = (
-            &oe[o..][..n],
-            &oe[o + stride..][..n],
-            &eo[o..][..n],
-            &eo[o + 1..][..n],
-        );
-        relax(
-            &mut oo[o..][..n],
-            &self.inverse[OO][o..][..n],
-            [no, s, w, e],
-        );
-        self.add_sources(OO, y, None);
-    }
-
-    #[inline(always)]
-    fn relax_black(&mut self, y: usize) {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
-        let o = self.grid.start(y);
-        let [ee, oe, eo, oo] = &mut self.u;
-        let (w, e, s, no) = (
-            &ee[o..][..n],
-            &ee[o + 1..][..n],
-            &oo[o..][..n],
-            &oo[o - stride..][..n],
-        );
-        relax(
-            &mut oe[o..][..n],
-            &self.inverse[OE][o..][..n],
-            [w, e, s, no],
-        );
-        let (no, s, e, w) = (
-            &ee[o..][..n],
-            &ee[o + stride..][..n],
-            &oo[o..][..n],
-            &oo[o - 1..][..n],
-        );
-        relax(
-            &mut eo[o..][..n],
-            &self.inverse[EO][o..][..n],
-            [no, s, e, w],
-        );
-        self.add_sources(OE, y, None);
-        self.add_sources(EO, y, None);
-    }
-
-    #[inline(always)]
-    fn relax_even_even_noting(&mut self, y: usize, change: &mut [R]) {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
-        let o = self.grid.start(y);
-        let [ee, oe, eo, _] = &mut self.u;
-        let (e, w, s, no) = (
-            &oe[o..][..n],
-            &oe[o - 1..][..n],
-            &eo[o..][..n],
-            &eo[o - stride..][..n],
-        );
-        relax_noting(
-            &mut ee[o..][..n],
-            &self.inverse[EE][o..][..n],
-            [e, w, s, no],
-            change,
-        );
-        self.add_sources(EE, y, Some(change));
-    }
-
-    #[inline(always)]
-    fn relax_odd_odd_noting(&mut self, y: usize, change: &mut [R]) {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
-        let o = self.grid.start(y);
-        let [_, oe, eo, oo] = &mut self.u;
-        let (no, s, w, e) = (
-            &oe[o..][..n],
-            &oe[o + stride..][..n],
-            &eo[o..][..n],
-            &eo[o + 1..][..n],
-        );
-        relax_noting(
-            &mut oo[o..][..n],
-            &self.inverse[OO][o..][..n],
-            [no, s, w, e],
-            change,
-        );
-        self.add_sources(OO, y, Some(change));
+        let mut row = std::mem::take(&mut self.u[plane]);
+        let [ee, oe, eo, oo] = &self.u;
+        let [a, b, c, d] = match plane {
+            EE => [&oe[o..], &oe[o - 1..], &eo[o..], &eo[o - stride..]],
+            OE => [&ee[o..], &ee[o + 1..], &oo[o..], &oo[o - stride..]],
+            EO => [&ee[o..], &ee[o + stride..], &oo[o..], &oo[o - 1..]],
+            _ => [&oe[o..], &oe[o + stride..], &eo[o..], &eo[o + 1..]],
+        };
+        let around = [&a[..n], &b[..n], &c[..n], &d[..n]];
+        let inverse = &self.inverse[plane][o..][..n];
+        match &mut change {
+            Some(change) => relax_noting(&mut row[o..][..n], inverse, around, change),
+            None => relax(&mut row[o..][..n], inverse, around),
+        }
+        self.u[plane] = row;
+        self.add_sources(plane, y, change);
     }
 
     /// Adds what flows into the cells of one row, to u and to its noted change.
@@ -386,7 +293,7 @@ impl<R: Real> Finest<R> {
             let inflow = self.inverse[plane][source.at] * source.value;
             self.u[plane][source.at] += inflow;
             if let Some(change) = change.as_deref_mut() {
-                change[source.at - self.grid.start(row) + super::grid::MARGIN] += inflow;
+                change[source.at - self.grid.start(row) + MARGIN] += inflow;
             }
         }
     }
@@ -405,7 +312,7 @@ fn relax<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4]) {
 fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], change: &mut [R]) {
     let n = u.len();
     let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
-    let change = &mut change[super::grid::MARGIN..][..n];
+    let change = &mut change[MARGIN..][..n];
     for x in 0..n {
         let new = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
         change[x] = new - u[x];
@@ -423,7 +330,7 @@ fn left_on_black<R: Real>(
     odd_even: &mut [R],
     even_odd: &mut [R],
 ) {
-    let m = super::grid::MARGIN;
+    let m = MARGIN;
     let (west, east) = (&even[m..][..n], &even[m + 1..][..n]);
     let (above, here) = (&odd_above[m..][..n], &odd[m..][..n]);
     let out = &mut odd_even[m..][..n];

@@ -3,6 +3,9 @@
 //! The interpolation to an odd-odd cell satisfies that cell's own equation, so the product of the equations and the
 //! interpolation vanishes there: only the rows of the even-even, odd-even and even-odd cells are formed, one row of cells
 //! at a time, and added up with their weights on the coarse cell.
+//!
+//! The finest level has a product of its own: its couplings are 0 or 1 and diagonal ones do not occur. One loop for both
+//! takes 30 % longer for the whole set-up, one loop a term 7 %.
 
 use std::ops::Range;
 
