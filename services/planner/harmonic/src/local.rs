@@ -1,14 +1,16 @@
-//! Local updates: newly blocked and newly freed cells, repaired in a window around them.
+//! Local updates: the field in a window around newly blocked and newly freed cells, solved again.
 //!
-//! A hazard changes the field in a wake that grows with the room, so a local update cannot be right everywhere. It is
-//! right near the change, it keeps every cell leading to the target, and it knows when that is not enough:
-//! - [`window`] solves the window for u between what flows in and what flows out, and estimates from the rim how far off
-//!   the directions beyond it are; the window grows until that is small.
-//! - [`walks`] tries whether walks through the window still get ahead, where that is in doubt.
-//! - [`patch`] keeps u as it was in each window. Across the outflow rim the ratios stay what they were, and windows that
-//!   would touch are solved anew as one, from u as it was before any of them. So a walk outside all windows always climbs
-//!   u of the last full solve, and each window is left higher, by that measure, than it is entered: the walk arrives.
+//! A change alters u everywhere downstream of it, so a local update cannot be right everywhere. It is right near the
+//! change, steepest ascent still ends at the target from every cell, and it reports when that is not enough:
+//! - [`window`] solves for u in a window, between inflow and outflow at its rim.
+//! - [`estimate`] estimates from the rim how far off directions beyond it are; the window grows until that is small.
+//! - [`paths`] checks that paths of steepest ascent through the window still ascend, where the estimate cannot tell.
+//!
+//! A [`Patch`] keeps u of each window before its update. Across the outflow rim ratios of u stay as they were, and windows
+//! that would touch are solved again as one, from u before any of them. So outside all windows steepest ascent climbs u of
+//! the last full solve, and it leaves each window at a higher u, by that measure, than it enters: it ends at the target.
 
+mod estimate;
 mod paths;
 mod window;
 
@@ -17,7 +19,8 @@ use crate::domain::Domain;
 use crate::field::Field;
 use crate::patch::{Patch, Rect};
 use crate::store::BLOCKED;
-use window::{ErrorEstimate, Window, WindowError};
+use estimate::{ErrorEstimate, estimate};
+use window::{Window, WindowError};
 
 /// What an update did, and whether its field may be followed.
 ///
@@ -33,55 +36,55 @@ pub enum Verdict {
     PassageClosed,
 }
 
-/// Widths and heights of the windows, cells. The larger ones are for changes that lie apart.
-/// Halved again and again they keep whole vectors and end in few cells.
+/// Widths and heights of the windows, cells: multiples of high powers of two, which coarsen well. The larger ones are for
+/// changes that lie apart.
 const SIDES: [usize; 7] = [48, 64, 96, 128, 192, 256, 384];
 
-/// The largest window tried only because the estimate asks for more: a tick of the robot must not wait for a larger one.
+/// The largest side a window grows to because of the estimate: larger ones take longer than a control period.
 const LARGEST_GROWN: usize = 96;
 
-/// Cells between a change and the rim at least; the first window tried has about this much.
+/// Least distance of a change from the rim, cells; about that of the first window tried.
 const MARGIN: usize = 24;
 
-/// Estimates of the directions beyond the rim above this, in radians, make the window grow.
+/// Estimated error of directions beyond the rim, radians, above which the window grows.
 const ANGLE: f64 = 0.0175;
 
-/// Beyond this many times that, a window half as wide again falls short more often than not: a full solve is advised at
-/// once, if what flows in is known to within [`UPSTREAM_ANGLE`], or is so far off that the next window's seldom is.
+/// At more than this multiple of [`ANGLE`] a window half as wide again is seldom enough: the window grows no further, if the
+/// upstream error is below [`UPSTREAM_ANGLE`] or above twice that.
 const GROWTH_LIMIT: f64 = 4.0;
 
-/// Estimates of the directions upstream above this, in radians, spoil the window itself.
+/// Estimated error of directions upstream, radians, above which directions in the window itself are too far off.
 const UPSTREAM_ANGLE: f64 = 0.3;
 
-/// Beyond these ratios of u in the wake, after to before, a passage was closed or opened.
+/// Ratios of u on the outflow rim, after to before, beyond which a passage was closed or opened.
 const OUTFLOW_RATIO: (f64, f64) = (0.02, 50.0);
 
-/// Maps of at most this many cells are solved in full where a window does not do: that takes a millisecond.
+/// Maps of at most this many cells are solved in full where a window is not enough: that takes a millisecond.
 const SMALL: usize = 1 << 14;
 
-/// What came of growing a window.
+/// The outcome of growing a window.
 enum Growth {
     /// The window of this index, the last that could be solved.
     Solved(usize, ErrorEstimate),
     /// The estimate asks for more than half of the map: a full solve costs no more.
     TooWide,
-    /// The window's solution does not pass its check.
+    /// The window's solution does not converge or pass its verification.
     NotConverged,
     /// No window could be solved.
     Failed,
 }
 
-/// What an update has to solve for.
+/// The changes an update has to take in.
 struct Region {
-    /// Around all of it: the changes, and those of the patches that were undone.
+    /// The rectangle around all of them.
     area: Rect,
-    /// Each on its own.
+    /// The rectangle of this update's changes, then those of the patches that were undone.
     rects: Vec<Rect>,
 }
 
 impl Region {
-    /// A window of at least `least` cells either way, once no patch is near it: those that were are undone, to be solved
-    /// again together with the change, which may bring others near. `None` if that is more than the largest window takes.
+    /// A window of at least `least` cells either way that touches no patch: patches it would touch are undone and their
+    /// changes taken in, which may make it touch others. `None` if the region outgrows the largest window.
     fn place_window(&mut self, domain: &Domain, field: &mut Field, least: usize) -> Option<Rect> {
         loop {
             let reach = choose(domain, &self.area, least)?;
@@ -98,8 +101,8 @@ impl Region {
     }
 }
 
-/// Whether a window half as wide again would not be worth its time, `before` being the angle of the one before: it does not
-/// open a closed passage, and where the wake fills a hall it does not help either.
+/// Whether a larger window would not improve the estimate enough, `before` being the angle of the window before: it does not
+/// open a closed passage, and does not help either where the change alters all of a hall downstream.
 fn is_final(estimate: &ErrorEstimate, before: f64) -> bool {
     let out_of_reach = estimate.angle > GROWTH_LIMIT * ANGLE
         && !(UPSTREAM_ANGLE..2.0 * UPSTREAM_ANGLE).contains(&estimate.upstream);
@@ -116,7 +119,7 @@ pub(crate) struct LocalUpdate {
 }
 
 impl LocalUpdate {
-    /// Repairs `field` after `changes`, which `domain` already has. `None` if a full solve is the cheaper.
+    /// Updates `field` after `changes`, which `domain` already has. `None` if a full solve is cheaper.
     pub(crate) fn update(
         &mut self,
         domain: &Domain,
@@ -129,7 +132,7 @@ impl LocalUpdate {
         };
         let small = domain.blocked().len() <= SMALL;
         let mut least = 0;
-        // What a window cannot tell, a larger one may.
+        // Where a window is not enough, a larger one may be.
         while let Some(reach) = region.place_window(domain, field, least) {
             if too_wide(domain, &reach) {
                 return None;
@@ -164,12 +167,12 @@ impl LocalUpdate {
             if choose(domain, &region.area, least).is_none() {
                 return (!small).then_some(Verdict::PassageClosed);
             }
-            // Undone again: the larger window touches it.
+            // The larger window touches the patch just written and undoes it.
         }
         if small {
             return None;
         }
-        // No window can tell. What is known must still hold: blocked cells are blocked.
+        // No window is enough. Blocked cells must still be blocked in the field.
         for rect in region.rects {
             mark(domain, field, &rect);
         }
@@ -195,7 +198,7 @@ impl LocalUpdate {
             let index = self.window((reach.width, reach.height));
             let at = (reach.col, reach.row);
             let estimate = match self.windows[index].solve(domain, field.store(), at, area) {
-                Ok(estimate) => estimate,
+                Ok(()) => estimate(&self.windows[index]),
                 Err(WindowError::NotConverged) if matches!(found, Growth::Failed) => {
                     return Growth::NotConverged;
                 }
@@ -258,7 +261,7 @@ fn bounds(changes: &[Change]) -> Option<Rect> {
     changes.iter().map(cell).reduce(|a, b| a.union(&b))
 }
 
-/// Makes the cells of `rect` blocked or cut off in the field as they are blocked or free in the map, u staying elsewhere.
+/// Marks cells of `rect` blocked in the map as blocked in the field, and freed ones as cut off; u of the others stays.
 fn mark(domain: &Domain, field: &mut Field, rect: &Rect) {
     for row in rect.row..rect.row + rect.height {
         for index in row * domain.width() + rect.col..row * domain.width() + rect.col + rect.width {

@@ -8,12 +8,14 @@
 //! - [`grid`]: the layout in four parity planes.
 //! - [`finest`], [`coarse`], [`coarsest`]: relaxation and transfer on the three kinds of level.
 //! - [`galerkin`]: the equations of a level from those of the finer one.
+//! - [`sources`]: the inflow on the coarse levels.
 
 mod coarse;
 mod coarsest;
 mod finest;
 mod galerkin;
 mod grid;
+mod sources;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +23,7 @@ use coarse::Coarse;
 use coarsest::Coarsest;
 pub(crate) use finest::Progress;
 use finest::{Finest, Source};
-use grid::{EE, EO, Grid, OE};
+use grid::Grid;
 
 use std::ops::Range;
 
@@ -35,19 +37,19 @@ use crate::simd::Simd;
 /// Sweeps after the last correction.
 const SMOOTHING: usize = 2;
 
-/// The level solved twice in every cycle, counted from the first coarse one. A cycle through the levels below is not
-/// exact, and what it gets wrong reaches far beyond the rooms it belongs to, where u is so much smaller; here, on a
-/// sixteenth of the map's cells, that is cheap to mend, and saves up to every third cycle.
-const TWICE: usize = 1;
+/// The level visited twice in every cycle, as in a W-cycle, counted from the first coarse one. One visit of the levels below
+/// is not exact, and its error reaches far into cells where u is much smaller; here, on a sixteenth of the map's cells, a
+/// second visit is cheap, and saves up to every third cycle.
+const VISITED_TWICE: usize = 1;
 
-/// On maps with no longer side than this a second cycle there and a second sweep save no cycles worth their cost.
+/// On maps whose longer side is at most this, the second visit and the second sweep save fewer cycles than they cost.
 const SMALL_SIDE: usize = 128;
 
 /// Full sweeps in a pass over the finest level of a large map: the second reads no more from memory.
 const SWEEPS: usize = 2;
 
-/// The same where no more than one cell in `FEW` has not converged: those are left in dead ends a few cells wide, of which
-/// the coarser levels know little.
+/// The same where no more than one cell in `FEW` has not converged: those lie in dead ends a few cells wide, which the
+/// coarser levels do not resolve.
 const SWEEPS_FOR_FEW: usize = 6;
 const FEW: usize = 64;
 
@@ -144,7 +146,7 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Makes `target` the only inflow and starts from the coarsest level's answer.
+    /// Makes `target` the only inflow and starts from the coarsest level's solution.
     pub(crate) fn start(&mut self, target: Cell) {
         let (plane, at) = self.finest.grid.locate(target.col, target.row);
         let value = R::of(pow2(R::TOP));
@@ -167,7 +169,7 @@ impl<R: Real> Multigrid<R> {
             guess(row, &mut buffer[..grid.width]);
             grid::split_row(&grid, &mut finest.u, row, &buffer);
         }
-        // The inflow that satisfies the target's own equation; the sweeps see to those of the others.
+        // The inflow that satisfies the target's own equation; the sweeps relax the others.
         let u = |col: Option<usize>, row: Option<usize>| match (col, row) {
             (Some(col), Some(row)) if col < grid.width && row < grid.height => {
                 let (plane, at) = grid.locate(col, row);
@@ -191,13 +193,14 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Starts from the coarser levels' answer to what flows in, each taken from the next and bettered by a cycle.
+    /// Starts from the coarser levels' solution for the inflow, each interpolated from the next and improved by a cycle (full
+    /// multigrid).
     pub(crate) fn start_from_sources(&mut self) {
         self.sweeps = 1;
         for plane in &mut self.finest.u {
             plane.fill(R::default());
         }
-        self.restrict_sources();
+        sources::restrict(&self.finest, &mut self.coarse);
         let last = self.coarse.len() - 1;
         self.coarsest.solve(&mut self.coarse[last]);
         for level in (0..last).rev() {
@@ -205,8 +208,8 @@ impl<R: Real> Multigrid<R> {
                 plane.fill(R::default());
             }
             self.ascend(level);
-            if self.is_large() && level >= TWICE {
-                self.visit_again(level);
+            if self.is_large() && level >= VISITED_TWICE {
+                self.second_visit(level);
             }
         }
     }
@@ -216,8 +219,8 @@ impl<R: Real> Multigrid<R> {
         width.max(height) > SMALL_SIDE
     }
 
-    /// Takes over equations that are not a map's: for each row 1 / diagonal (0 for a cell that stays zero) and a first
-    /// guess, and what flows in by cell. Every pair of neighbours is coupled by one.
+    /// Loads equations other than a map's: for each row 1 / diagonal (0 for a cell that stays zero) and a first
+    /// guess, and the inflow by cell. Every pair of neighbours is coupled by one.
     pub(crate) fn load<'a>(
         &mut self,
         rows: impl Fn(usize) -> (&'a [R], &'a [R]),
@@ -275,8 +278,8 @@ impl<R: Real> Multigrid<R> {
         progress
     }
 
-    /// As [`cycle`](Self::cycle), and says whether all cells had converged, in which case nothing more is corrected: for small maps,
-    /// whose coarser levels cost more than the finest. [`smooth`](Self::smooth) instead of [`finish`](Self::finish) ends it.
+    /// As [`cycle`](Self::cycle), but without the coarser levels if all cells had converged; says whether they had. For small
+    /// maps, whose coarser levels cost more than the finest. End with [`smooth`](Self::smooth), not [`finish`](Self::finish).
     pub(crate) fn cycle_unless_converged(&mut self, tolerance: f64) -> bool {
         let converged = self.pass(1, true, tolerance).unconverged == 0;
         if !converged {
@@ -285,14 +288,16 @@ impl<R: Real> Multigrid<R> {
         converged
     }
 
-    /// Solves on the coarser levels for what the finest one left.
+    /// Solves the residual equation of the finest level on the coarser ones.
     fn correct(&mut self) {
         let last = self.coarse.len() - 1;
-        if self.is_large() && last > TWICE {
-            (0..TWICE).for_each(|level| self.descend(level));
-            self.solve_level(TWICE);
-            self.visit_again(TWICE);
-            (0..TWICE).rev().for_each(|level| self.ascend(level));
+        if self.is_large() && last > VISITED_TWICE {
+            (0..VISITED_TWICE).for_each(|level| self.descend(level));
+            self.solve_level(VISITED_TWICE);
+            self.second_visit(VISITED_TWICE);
+            (0..VISITED_TWICE)
+                .rev()
+                .for_each(|level| self.ascend(level));
         } else {
             self.solve_level(0);
         }
@@ -310,8 +315,9 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Solves on a coarse level, by one more cycle, for what the one before left. The right-hand side is used up.
-    fn visit_again(&mut self, level: usize) {
+    /// The second visit of a W-cycle: solves for the residual that the first one left on a coarse level. The right-hand side
+    /// is overwritten.
+    fn second_visit(&mut self, level: usize) {
         let fine = &mut self.coarse[level];
         self.simd.run(
             #[inline(always)]
@@ -330,8 +336,8 @@ impl<R: Real> Multigrid<R> {
         );
     }
 
-    /// Brings the last coarse correction to the finest level, for u to be read, and smoothes what that leaves from cell to
-    /// cell: near a saddle point the direction hangs on the last digits. Cycles may follow.
+    /// Interpolates the last coarse correction to the finest level, for u to be read, and smoothes the error that leaves from
+    /// cell to cell: near a saddle point the direction depends on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
         self.pass(1, false, 0.0);
         self.smooth();
@@ -363,67 +369,6 @@ impl<R: Real> Multigrid<R> {
         );
     }
 
-    /// Puts the inflow, interpolation transposed, on every coarse level; it touches a handful of cells on each.
-    fn restrict_sources(&mut self) {
-        let mut flows: Vec<((usize, usize), R)> = Vec::new();
-        for source in &self.finest.sources {
-            let finest = &self.finest;
-            spread(
-                &finest.grid,
-                (source.plane, source.at),
-                source.value,
-                |at| {
-                    [
-                        finest.west[at],
-                        finest.east[at],
-                        finest.north[at],
-                        finest.south[at],
-                    ]
-                },
-                |at| finest.corner_weights(at),
-                &mut flows,
-            );
-        }
-        for level in 0..self.coarse.len() {
-            let coarse = &mut self.coarse[level];
-            for plane in &mut coarse.f {
-                plane.fill(R::default());
-            }
-            let mut next = Vec::new();
-            for &((col, row), value) in &flows {
-                if col >= coarse.grid.width || row >= coarse.grid.height {
-                    continue;
-                }
-                let (plane, at) = coarse.grid.locate(col, row);
-                coarse.f[plane][at] += value;
-                spread(
-                    &coarse.grid,
-                    (plane, at),
-                    value,
-                    |at| {
-                        [
-                            coarse.west[at],
-                            coarse.east[at],
-                            coarse.north[at],
-                            coarse.south[at],
-                        ]
-                    },
-                    |at| coarse.corner_weights(at),
-                    &mut next,
-                );
-            }
-            next.sort_unstable_by_key(|flow| flow.0);
-            next.dedup_by(|b, a| {
-                let same = a.0 == b.0;
-                if same {
-                    a.1 += b.1;
-                }
-                same
-            });
-            flows = next;
-        }
-    }
-
     /// u of every cell, row by row, times 2^TOP over u(target); `blocked` where the map is.
     pub(crate) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
         let grid = &self.finest.grid;
@@ -438,7 +383,7 @@ impl<R: Real> Multigrid<R> {
             grid::join_row(grid, &self.finest.u, row, &mut u);
             grid::join_row(grid, &self.finest.inverse, row, &mut inverse);
             for ((out, u), inverse) in out.iter_mut().zip(&u).zip(&inverse) {
-                // Not yet converged cells may be below zero; the check finds a zero there.
+                // Cells that have not converged may be below zero; the verification finds a zero there.
                 let u = if *u > R::default() {
                     *u * scale
                 } else {
@@ -459,41 +404,4 @@ fn rows_of_interpolation(rows: &Range<usize>, count: usize) -> Range<usize> {
 /// Rows of the next level whose equations depend on `rows` of a level's cells: one more on either side.
 fn rows_of_next(rows: &Range<usize>, count: usize) -> Range<usize> {
     (rows.start / 2).saturating_sub(2)..(rows.end / 2 + 3).min(count)
-}
-
-/// Adds `value` of the cell at (plane, place) to the coarse cells it is interpolated from.
-fn spread<R: Real>(
-    grid: &Grid,
-    (plane, at): (usize, usize),
-    value: R,
-    weights: impl Fn(usize) -> [R; 4],
-    corner: impl Fn(usize) -> [R; 4],
-    flows: &mut Vec<((usize, usize), R)>,
-) {
-    let row = (at - grid::MARGIN) / grid.stride - 1;
-    let col = (at - grid::MARGIN) % grid.stride;
-    let [west, east, north, south] = weights(at);
-    let mut add = |col: usize, row: usize, weight: R| {
-        if weight > R::default() {
-            flows.push(((col, row), value * weight));
-        }
-    };
-    match plane {
-        EE => add(col, row, R::ONE),
-        OE => {
-            add(col, row, west);
-            add(col + 1, row, east);
-        }
-        EO => {
-            add(col, row, north);
-            add(col, row + 1, south);
-        }
-        _ => {
-            let [north_west, north_east, south_west, south_east] = corner(at);
-            add(col, row, north_west);
-            add(col + 1, row, north_east);
-            add(col, row + 1, south_west);
-            add(col + 1, row + 1, south_east);
-        }
-    }
 }

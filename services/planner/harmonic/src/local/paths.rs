@@ -1,4 +1,4 @@
-//! Walks from cell to cell through a window just solved: whether they get ahead.
+//! Paths of steepest ascent through a window just solved: whether they ascend.
 
 use std::cmp::Ordering;
 
@@ -6,12 +6,12 @@ use super::window::{Step, Window};
 use crate::cell::Cell;
 use crate::field::Field;
 
-/// Steps of a walk before it is taken for one that leads nowhere, as a multiple of the window's longer side.
+/// Steps after which a path counts as endless, as a multiple of the window's longer side.
 const MOST_STEPS: usize = 16;
 
-/// Whether walks from `cells`, all outside patches, come out of the patches higher than they went in: above u of the cell
-/// they started from, which no patch changed. Then no walk can return to where it was. Tried one by one, from the highest
-/// down, so a walk that meets an earlier one is done.
+/// Whether the paths of steepest ascent from `cells`, all outside patches, leave the patches at a cell of higher u than the
+/// cell they start from, u being unchanged at both. Then no path can return to where it was. Followed one by one, the
+/// highest first, so a path that joins an earlier one ascends too.
 pub(super) fn all_ascend(field: &Field, window: &mut Window, mut cells: Vec<Cell>) -> bool {
     cells.sort_by(|&a, &b| {
         let order = field.u(b).partial_cmp(&field.u(a));
@@ -23,7 +23,7 @@ pub(super) fn all_ascend(field: &Field, window: &mut Window, mut cells: Vec<Cell
         .all(|(number, start)| ascends(field, window, start, number))
 }
 
-/// The walk from `start`, the window's `number`th.
+/// Whether the path from `start`, the window's `number`th, ascends.
 fn ascends(field: &Field, window: &mut Window, start: Cell, number: u32) -> bool {
     let from = field.u(start);
     let (wide, high) = window.size();
@@ -33,12 +33,12 @@ fn ascends(field: &Field, window: &mut Window, start: Cell, number: u32) -> bool
             return true;
         }
         let next = match window.step(here, number) {
-            Step::Proven => return true,
-            Step::Again => return false,
+            Step::Joined => return true,
+            Step::Cycle => return false,
             Step::To(next) => Some(next),
-            Step::Inside => field.ascent(here),
-            Step::Beyond if is_outside(field, here) && field.u(here) > from => return true,
-            Step::Beyond => field.ascent(here),
+            Step::Rim => field.ascent(here),
+            Step::Outside if is_outside(field, here) && field.u(here) > from => return true,
+            Step::Outside => field.ascent(here),
         };
         match next {
             Some(next) => here = next,

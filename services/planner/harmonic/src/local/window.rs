@@ -1,9 +1,9 @@
-//! The equations of one window of the map, between what flows in and what flows out.
+//! The boundary value problem of one window of the map.
 //!
 //! Across each edge of the window's rim, u flows from the larger side to the smaller (u as it was before the change).
-//! Where it flows in, the cell outside keeps its u: the change is assumed not to reach upstream. Where it flows out, the
-//! cell outside keeps its ratio to the cell inside: whatever changes in the window changes the outflow_ratio in proportion. Holding
-//! u itself there would put false maxima just outside.
+//! At inflow edges the cell outside keeps its u (Dirichlet): the change is assumed not to reach upstream. At outflow edges
+//! the cell outside keeps its ratio to the cell inside (Robin): u downstream is scaled by what u at the rim changes by.
+//! Keeping u itself there would make local maxima just outside.
 //!
 //! All arrays have a frame of one cell around the window, so a cell's neighbours are one or one row away.
 
@@ -15,7 +15,7 @@ use crate::screening::Coefficients;
 use crate::store::Store;
 use crate::verification::check_framed;
 
-/// Coarse corrections above this weight of u mean that a cell has not converged.
+/// Coarse corrections above this fraction of u mean that a cell has not converged.
 const TOLERANCE: f64 = 1e-3;
 
 /// Cycles before a window is given up.
@@ -24,14 +24,14 @@ const CYCLES: usize = 24;
 /// Cycles added where the check asks for more.
 const CYCLES_MORE: usize = 3;
 
-/// u this far above and below u at the change is unknown in. Cells beyond are left outside as if they lay beyond the rim: the
+/// Cells whose u is in this range of multiples of u at the change are unknowns. Others are treated as beyond the rim: the
 /// next corridor of a maze may be 1e-45 of this one.
 const SPAN: std::ops::RangeInclusive<f32> = 1e-24..=1e24;
 
-/// Numbers read from the store that are not clamped for certain.
+/// Numbers read from the store in this range were not clamped.
 const EXACT: std::ops::RangeInclusive<f32> = 1e-35..=1e35;
 
-/// The largest relative residual of a window. It holds only until the next full solve.
+/// Largest relative residual of a window; higher than for a full solve, which follows every update.
 const RESIDUAL_LIMIT: f64 = 1e-3;
 
 /// Arrays and levels for windows of one size, kept between updates.
@@ -41,13 +41,13 @@ pub(super) struct Window {
     width: usize,
     height: usize,
     /// Cells of a row, frame included.
-    stride: usize,
+    pub(super) stride: usize,
     levels: Multigrid<f32>,
-    /// u before the change, relatively to 2^`reference`; 0 where blocked or cut off.
-    before: Vec<f32>,
-    /// u after it, the same way; outside as seen from inside; negative where blocked.
-    after: Vec<f32>,
-    /// 1 / diagonal of the cells solved for, 0 elsewhere.
+    /// u before the change, in units of 2^`reference`; 0 where blocked or cut off.
+    pub(super) before: Vec<f32>,
+    /// u after it, in the same units; outside as seen from inside; negative where blocked.
+    pub(super) after: Vec<f32>,
+    /// 1 / diagonal of the unknowns, 0 elsewhere.
     inverse: Vec<f32>,
     /// 0.25 / (1 + k), 0 where no equation holds.
     weights: Vec<f32>,
@@ -55,11 +55,11 @@ pub(super) struct Window {
     blocked: Vec<bool>,
     /// Cells the window is solved for, blocked ones included.
     unknown: Vec<bool>,
-    /// Cells that what flows in can reach.
+    /// Unknowns connected to an inflow edge or to the target.
     reached: Vec<bool>,
-    /// Free cells of the window with a neighbour it is not solved for.
-    rim: Vec<usize>,
-    /// The walk that last came by, from 1; 0 for none.
+    /// Free unknowns with a neighbour that is none.
+    pub(super) rim: Vec<usize>,
+    /// The path that last came by, from 1; 0 for none.
     visited: Vec<u32>,
     stack: Vec<usize>,
     inflow: Vec<(Cell, f32)>,
@@ -67,33 +67,19 @@ pub(super) struct Window {
     rect: Rect,
 }
 
-/// What a window's solution says of the world outside.
-#[derive(Clone, Debug)]
-pub(super) struct ErrorEstimate {
-    /// Estimate of the angle, in radians, by which directions beyond the rim are off.
-    pub angle: f64,
-    /// The same of where u flows in alone. What it is wrong by there it is wrong by in the window, too.
-    pub upstream: f64,
-    /// The smallest and the largest ratio of u after to u before on the outflow rim.
-    pub outflow_ratio: (f64, f64),
-    /// Cells outside that lead into the window at a place now lower than they are: whether walks from there still get
-    /// ahead must be tried.
-    pub ascents_to_check: Vec<Cell>,
-}
-
-/// What a walk finds at a cell.
+/// What a path of steepest ascent finds at a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Step {
-    /// An earlier walk came by here, and they are tried only until one fails.
-    Proven,
-    /// This walk was here before.
-    Again,
-    /// The cell with the largest u beside it.
+    /// An earlier path came by here; it succeeded, or this one would not be followed.
+    Joined,
+    /// This path was here before.
+    Cycle,
+    /// The neighbour with the largest u.
     To(Cell),
-    /// A cell the window is solved for, with one beside it that it is not.
-    Inside,
-    /// A cell the window is not solved for.
-    Beyond,
+    /// An unknown with a neighbour that is none.
+    Rim,
+    /// No unknown.
+    Outside,
 }
 
 /// Why a window has no solution.
@@ -148,7 +134,7 @@ impl Window {
         store: &Store,
         (col, row): (usize, usize),
         changed: &Rect,
-    ) -> Result<ErrorEstimate, WindowError> {
+    ) -> Result<(), WindowError> {
         self.rect = Rect {
             col,
             row,
@@ -157,7 +143,7 @@ impl Window {
         };
         self.read(domain, store, changed);
         self.select_unknowns();
-        // A cell that was blocked since must be solved for: a change may lie on both sides of a wall.
+        // A newly blocked cell must be an unknown; it may not be where a change lies on both sides of a wall.
         let missed = self
             .unknown
             .iter()
@@ -165,7 +151,7 @@ impl Window {
             .zip(&self.before)
             .any(|((&t, &b), &u)| b && !t && u > 0.0);
         let target = self.target(domain);
-        // Nor can a freed cell join passages whose u differs beyond what the window's numbers hold.
+        // A freed cell cannot join passages whose u differs by more than the range of single precision.
         let beyond = self.rim.iter().any(|&f| {
             self.outside(f)
                 .any(|o| self.before[o] > 0.0 && !EXACT.contains(&self.before[o]))
@@ -180,7 +166,7 @@ impl Window {
             |row| (&self.inverse[inside(row)], &self.after[inside(row)]),
             self.inflow.iter().copied(),
         );
-        // The first cycle has no correction yet that could be judged.
+        // The first cycle has no coarse correction yet to judge convergence by.
         self.levels.cycle(TOLERANCE);
         let mut cycles = 1;
         while cycles < CYCLES {
@@ -188,8 +174,8 @@ impl Window {
                 (cycles..CYCLES).find(|_| self.levels.cycle_unless_converged(TOLERANCE));
             cycles = converged.ok_or(WindowError::NotConverged)? + CYCLES_MORE;
             self.levels.smooth();
-            if self.is_right(target) {
-                return Ok(self.estimate_error());
+            if self.read_solution(target) {
+                return Ok(());
             }
             // The correction converged before the residual did.
             for _ in 0..CYCLES_MORE {
@@ -199,8 +185,8 @@ impl Window {
         Err(WindowError::NotConverged)
     }
 
-    /// Takes the solution over; whether it passes its check.
-    fn is_right(&mut self, target: Option<usize>) -> bool {
+    /// Reads the solution from the levels; whether it passes the verification.
+    fn read_solution(&mut self, target: Option<usize>) -> bool {
         let (stride, width) = (self.stride, self.width);
         self.levels.unload(|row, values| {
             self.after[(row + 1) * stride + 1..][..width].copy_from_slice(values);
@@ -210,7 +196,7 @@ impl Window {
         check.local_maxima == 0 && check.unreached == 0 && check.worst_residual <= RESIDUAL_LIMIT
     }
 
-    /// Writes u of the cells solved for to `store`; returns the patch that remembers what it was.
+    /// Writes u of the cells solved for to `store`; returns the patch with u before.
     pub(super) fn write(&self, domain: &Domain, store: &mut Store, changed: Rect) -> Patch {
         let mut unknown = Vec::with_capacity(self.width * self.height);
         for row in 1..=self.height {
@@ -238,22 +224,22 @@ impl Window {
         self.visited.fill(0);
     }
 
-    /// Where walk `number`, from 1, goes from `cell`, as far as the window's own u tells.
+    /// Where path `number`, from 1, leads from `cell`, as far as the window's own u tells.
     pub(super) fn step(&mut self, cell: Cell, number: u32) -> Step {
         if !self.rect.contains((cell.col as i64, cell.row as i64)) {
-            return Step::Beyond;
+            return Step::Outside;
         }
         let f = (cell.row - self.rect.row + 1) * self.stride + cell.col - self.rect.col + 1;
         match std::mem::replace(&mut self.visited[f], number) {
             0 => {}
-            last if last == number => return Step::Again,
-            _ => return Step::Proven,
+            last if last == number => return Step::Cycle,
+            _ => return Step::Joined,
         }
         if !self.unknown[f] {
-            return Step::Beyond;
+            return Step::Outside;
         }
         if self.outside(f).next().is_some() {
-            return Step::Inside;
+            return Step::Rim;
         }
         // East before west before south before north, as the field has it where two are equal.
         let [west, east, north, south] = self.around(f);
@@ -310,7 +296,7 @@ impl Window {
         }
     }
 
-    /// Decides which cells to solve for, and finds the rim.
+    /// Selects the cells to solve for, and the rim.
     fn select_unknowns(&mut self) {
         let (width, height, stride) = (self.width, self.height, self.stride);
         self.unknown.fill(false);
@@ -342,8 +328,8 @@ impl Window {
         }
     }
 
-    /// Marks the cells that what flows in can reach; true if that includes one beside a free cell of u = 0 outside, which
-    /// is then cut off no longer.
+    /// Marks the unknowns that inflow can reach; true if one of them has a free neighbour of u = 0 outside, which is then
+    /// no longer cut off.
     fn mark_reached(&mut self, target: Option<usize>) -> bool {
         self.reached.fill(false);
         self.stack.clear();
@@ -376,13 +362,13 @@ impl Window {
         [f - 1, f + 1, f - self.stride, f + self.stride]
     }
 
-    /// The neighbours of a cell that the window is not solved for.
-    fn outside(&self, f: usize) -> impl Iterator<Item = usize> {
+    /// The neighbours of a cell that are no unknowns.
+    pub(super) fn outside(&self, f: usize) -> impl Iterator<Item = usize> {
         self.around(f).into_iter().filter(|&o| !self.unknown[o])
     }
 
-    /// Whether u flows from the window's rim cell out to `o`.
-    fn flows_out(&self, f: usize, o: usize) -> bool {
+    /// Whether u flows from the rim cell `f` out to `o`.
+    pub(super) fn flows_out(&self, f: usize, o: usize) -> bool {
         self.before[o] > 0.0 && self.before[f] > 0.0 && self.before[o] <= self.before[f]
     }
 
@@ -442,7 +428,7 @@ impl Window {
         }
     }
 
-    /// Completes the solution by what is not solved for, as seen from inside.
+    /// Completes the solution by the cells that are no unknowns, as seen from inside.
     fn frame(&mut self, target: Option<usize>) {
         if let Some(target) = target {
             self.after[target] = self.before[target];
@@ -468,7 +454,7 @@ impl Window {
         }
     }
 
-    /// The target's place, if it is among the cells solved for.
+    /// The target's place, if it is an unknown.
     fn target(&self, domain: &Domain) -> Option<usize> {
         let target = domain.target();
         let inside = self.rect.contains((target.col as i64, target.row as i64));
@@ -478,77 +464,8 @@ impl Window {
         inside.then(|| f(target)).filter(|&f| self.unknown[f])
     }
 
-    fn estimate_error(&self) -> ErrorEstimate {
-        let mut found = ErrorEstimate {
-            angle: 0.0,
-            upstream: 0.0,
-            outflow_ratio: (f64::INFINITY, 0.0),
-            ascents_to_check: Vec::new(),
-        };
-        // The largest tangent of an angle; its arc is unknown once, at the end.
-        let (mut slope, mut upstream) = (0.0_f64, 0.0_f64);
-        for &f in &self.rim {
-            if self.before[f] <= 0.0 {
-                // A freed cell now leads where u was too far from that of the window to be solved for.
-                found.outflow_ratio.1 = found.outflow_ratio.1.max(self.opening_ratio(f));
-                continue;
-            }
-            let ratio = f64::from(self.after[f]) / f64::from(self.before[f]);
-            let scale = 1.0 / (self.steepness(f) * ratio.max(f64::MIN_POSITIVE));
-            for o in self.outside(f).filter(|&o| self.before[o] > 0.0) {
-                if self.flows_out(f, o) {
-                    found.outflow_ratio = (
-                        found.outflow_ratio.0.min(ratio),
-                        found.outflow_ratio.1.max(ratio),
-                    );
-                    for beside in self.beside(f, o) {
-                        if self.before[beside] > 0.0 && self.after[beside] > 0.0 {
-                            let other =
-                                f64::from(self.after[beside]) / f64::from(self.before[beside]);
-                            slope = slope.max((ratio - other).abs() * scale);
-                        }
-                    }
-                    if self.after[f] < self.before[o] {
-                        found.ascents_to_check.push(self.map_cell(o));
-                    }
-                } else {
-                    upstream = upstream.max((1.0 - ratio).abs() * scale);
-                }
-            }
-        }
-        found.angle = slope.max(upstream).atan();
-        found.upstream = upstream.atan();
-        found
-    }
-
-    /// How many times u before of the cells outside u of the freed cell `f` is now: what flows there had another way before.
-    fn opening_ratio(&self, f: usize) -> f64 {
-        let beyond = self.outside(f).map(|o| self.before[o]);
-        let least = beyond.filter(|&u| u > 0.0).reduce(f32::min);
-        least.map_or(0.0, |least| f64::from(self.after[f]) / f64::from(least))
-    }
-
-    /// The neighbours of `f` along the rim, across from `o` outside.
-    fn beside(&self, f: usize, o: usize) -> [usize; 2] {
-        if f.abs_diff(o) == 1 {
-            [f - self.stride, f + self.stride]
-        } else {
-            [f - 1, f + 1]
-        }
-    }
-
-    /// |gradient of ln u| before the change.
-    fn steepness(&self, f: usize) -> f64 {
-        let u = |at: usize| f64::from(self.before[at]) / f64::from(self.before[f]);
-        let (x, y) = (
-            0.5 * (u(f + 1) - u(f - 1)),
-            0.5 * (u(f + self.stride) - u(f - self.stride)),
-        );
-        x.hypot(y).max(1e-6)
-    }
-
     /// The cell of the map at a place of the arrays that lies inside it.
-    fn map_cell(&self, f: usize) -> Cell {
+    pub(super) fn map_cell(&self, f: usize) -> Cell {
         Cell::new(
             self.rect.col + f % self.stride - 1,
             self.rect.row + f / self.stride - 1,

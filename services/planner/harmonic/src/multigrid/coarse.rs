@@ -2,7 +2,7 @@
 //!
 //! The four planes are relaxed in turn. On the way down they start from zero, so each plane only sees those before it, and
 //! the residual left on a plane is what the planes after it add: neither the right-hand side nor the diagonal is read
-//! again. The odd-odd cells come last, so nothing is left on them, and first on the way up, so they need no correction:
+//! again. The odd-odd cells come last, so their residual is zero, and first on the way up, so they need no correction:
 //! no interpolation to them is ever stored.
 
 use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
@@ -34,8 +34,8 @@ const SMALL: usize = 1 << 13;
 pub(super) struct Coarse<R> {
     pub grid: Grid,
     pub u: Planes<R>,
-    /// u of the cycle before, where a second one solves for what that left.
-    aside: Planes<R>,
+    /// u of the first of two visits in a W-cycle, while the second solves for its residual.
+    first_visit: Planes<R>,
     /// Right-hand side.
     pub f: Planes<R>,
     /// 1 / diagonal, 0 where the cell is inactive.
@@ -55,7 +55,7 @@ impl<R: Real> Coarse<R> {
         Self {
             grid,
             u: grid.planes(),
-            aside: grid.planes(),
+            first_visit: grid.planes(),
             f: grid.planes(),
             inverse: grid.planes(),
             coupling: std::array::from_fn(|_| grid.planes()),
@@ -91,9 +91,9 @@ impl<R: Real> Coarse<R> {
         } = self.grid;
         let mut scratch = std::mem::take(&mut self.scratch);
         let Scratch {
-            left,
-            beside,
-            own,
+            residual_eo,
+            residual_oe,
+            residual_ee,
             restricted,
             ..
         } = &mut scratch;
@@ -103,18 +103,25 @@ impl<R: Real> Coarse<R> {
             self.relax(OE, o, span, [W, E]);
             self.relax(EO, o, span, [N, S, NW, NE, SW, SE]);
             self.relax(OO, o, span, ALL);
-            let [_, here] = left;
-            for buffer in [&mut *own, &mut *beside, &mut *here] {
+            let [_, here] = residual_eo;
+            for buffer in [&mut *residual_ee, &mut *residual_oe, &mut *here] {
                 buffer.resize(self.grid.len(), R::default());
             }
             restricted.resize(2 * next.grid.columns, R::default());
-            self.gather(EE, o, ALL, &mut own[o..][..span]);
-            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut beside[o..][..span]);
+            self.gather(EE, o, ALL, &mut residual_ee[o..][..span]);
+            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[o..][..span]);
             self.gather(EO, o, [W, E], &mut here[o..][..span]);
             for y in 0..rows {
                 let o = self.grid.start(y);
                 let above = &here[o - stride..][..n];
-                self.restrict_row(y, own, beside, (above, &here[o..][..n]), o, restricted);
+                self.restrict_row(
+                    y,
+                    residual_ee,
+                    residual_oe,
+                    (above, &here[o..][..n]),
+                    o,
+                    restricted,
+                );
                 split_row(&next.grid, &mut next.f, y, restricted);
             }
             self.scratch = scratch;
@@ -122,9 +129,9 @@ impl<R: Real> Coarse<R> {
         }
         scratch.reset(&self.grid, &next.grid);
         let Scratch {
-            left,
-            beside,
-            own,
+            residual_eo,
+            residual_oe,
+            residual_ee,
             restricted,
             ..
         } = &mut scratch;
@@ -142,25 +149,33 @@ impl<R: Real> Coarse<R> {
             self.relax(EO, o, n, [N, S, NW, NE, SW, SE]);
             self.relax(OO, o, n, ALL);
 
-            left.swap(0, 1);
-            self.gather(EE, o, ALL, &mut own[MARGIN..][..n]);
-            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut beside[MARGIN..][..n]);
-            self.gather(EO, o, [W, E], &mut left[1][MARGIN..][..n]);
-            let left = (&left[0][MARGIN..][..n], &left[1][MARGIN..][..n]);
-            self.restrict_row(y, own, beside, left, MARGIN, restricted);
+            residual_eo.swap(0, 1);
+            self.gather(EE, o, ALL, &mut residual_ee[MARGIN..][..n]);
+            self.gather(
+                OE,
+                o,
+                [N, S, NW, NE, SW, SE],
+                &mut residual_oe[MARGIN..][..n],
+            );
+            self.gather(EO, o, [W, E], &mut residual_eo[1][MARGIN..][..n]);
+            let residual_eo = (
+                &residual_eo[0][MARGIN..][..n],
+                &residual_eo[1][MARGIN..][..n],
+            );
+            self.restrict_row(y, residual_ee, residual_oe, residual_eo, MARGIN, restricted);
             split_row(&next.grid, &mut next.f, y, restricted);
         }
         self.scratch = scratch;
     }
 
-    /// What is left on row `y` and around it, as the next level's right-hand side; `at` is where the row starts in `own`
-    /// and `beside`.
+    /// Restricts the residuals on row `y` and around it to the next level's right-hand side; `at` is where the row starts in
+    /// `residual_ee` and `residual_oe`.
     #[inline(always)]
     fn restrict_row(
         &self,
         y: usize,
-        own: &[R],
-        beside: &[R],
+        residual_ee: &[R],
+        residual_oe: &[R],
         (above, here): (&[R], &[R]),
         at: usize,
         out: &mut [R],
@@ -172,14 +187,14 @@ impl<R: Real> Coarse<R> {
             &self.north[o..][..n],
             &self.south[o - self.grid.stride..][..n],
         );
-        let (b, b_west) = (&beside[at..][..n], &beside[at - 1..][..n]);
-        let (h, a, own) = (&here[..n], &above[..n], &own[at..][..n]);
+        let (b, b_west) = (&residual_oe[at..][..n], &residual_oe[at - 1..][..n]);
+        let (h, a, residual_ee) = (&here[..n], &above[..n], &residual_ee[at..][..n]);
         let active = &self.inverse[EE][o..][..n];
         let out = &mut out[..n];
         for x in 0..n {
             let around =
                 (west[x] * b[x] + east[x] * b_west[x]) + (north[x] * h[x] + south[x] * a[x]);
-            out[x] = (active[x].is_active() * own[x] + around).flushed();
+            out[x] = (active[x].is_active() * residual_ee[x] + around).flushed();
         }
     }
 
@@ -234,7 +249,7 @@ impl<R: Real> Coarse<R> {
         self.scratch = scratch;
     }
 
-    /// Puts u aside, and what it leaves of the equations in the place of their right-hand side.
+    /// Keeps u of the first visit and makes its residual the right-hand side of the second.
     #[inline(always)]
     pub(super) fn begin_second_visit(&mut self) {
         let Grid {
@@ -251,14 +266,14 @@ impl<R: Real> Coarse<R> {
             }
         }
         // The next descent starts from zero and overwrites all of u.
-        std::mem::swap(&mut self.aside, &mut self.u);
+        std::mem::swap(&mut self.first_visit, &mut self.u);
     }
 
-    /// Adds u put aside to the correction of it that u has become.
+    /// Adds u of the first visit to its correction.
     pub(super) fn end_second_visit(&mut self) {
-        for (u, aside) in self.u.iter_mut().zip(&self.aside) {
-            for (u, &aside) in u.iter_mut().zip(aside) {
-                *u += aside;
+        for (u, first) in self.u.iter_mut().zip(&self.first_visit) {
+            for (u, &first) in u.iter_mut().zip(first) {
+                *u += first;
             }
         }
     }
@@ -341,7 +356,7 @@ impl<R: Real> Coarse<R> {
         }
     }
 
-    /// As [`Finest::corner_weights`](super::finest::Finest::corner_weights).
+    /// The weights of the odd-odd cell at `at` on the four coarse cells around it, in the order of the finest level.
     pub(super) fn corner_weights(&self, at: usize) -> [R; 4] {
         let a = |step| self.coupling_at(OO, at, step);
         let m = self.inverse[OO][at];
@@ -443,8 +458,8 @@ fn subtract<R: Real, const COUNT: usize>(
 ) {
     for x in 0..f.len() {
         let active = inverse[x].is_active();
-        let left = (f[x] + sum_at(terms, x)) - inverse[x].inverse() * u[x];
-        f[x] = (active * left).flushed();
+        let residual = (f[x] + sum_at(terms, x)) - inverse[x].inverse() * u[x];
+        f[x] = (active * residual).flushed();
     }
 }
 

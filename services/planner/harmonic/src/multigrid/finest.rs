@@ -169,10 +169,10 @@ impl<R: Real> Finest<R> {
             upper,
             lower,
             restricted,
-            even,
-            odd,
-            left,
-            beside,
+            change_ee,
+            change_oo,
+            residual_eo,
+            residual_oe,
             ..
         } = &mut scratch;
         join_row(&next.grid, &next.u, 0, upper);
@@ -199,24 +199,30 @@ impl<R: Real> Finest<R> {
             }
             let y = y - sweeps;
             // Beyond the last row the change is that of the margin: none.
-            even.swap(0, 1);
-            odd.swap(0, 1);
+            change_ee.swap(0, 1);
+            change_oo.swap(0, 1);
             if y < rows {
-                self.relax(EE, y, Some(&mut even[1]));
+                self.relax(EE, y, Some(&mut change_ee[1]));
             } else {
-                even[1].fill(R::default());
+                change_ee[1].fill(R::default());
             }
             if (1..=rows).contains(&y) {
                 let y = y - 1;
-                self.relax(OO, y, Some(&mut odd[1]));
-                left.swap(0, 1);
-                let [above, here] = &mut *left;
-                left_on_black(n, [&even[0], &even[1]], [&odd[0], &odd[1]], beside, here);
+                self.relax(OO, y, Some(&mut change_oo[1]));
+                residual_eo.swap(0, 1);
+                let [above, here] = &mut *residual_eo;
+                residual_on_black(
+                    n,
+                    [&change_ee[0], &change_ee[1]],
+                    [&change_oo[0], &change_oo[1]],
+                    residual_oe,
+                    here,
+                );
                 let o = grid.start(y);
                 let m = MARGIN;
                 let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
                 let (north, south) = (&self.north[o..][..n], &self.south[o - stride..][..n]);
-                let (b, b_west) = (&beside[m..][..n], &beside[m - 1..][..n]);
+                let (b, b_west) = (&residual_oe[m..][..n], &residual_oe[m - 1..][..n]);
                 let (h, a) = (&here[m..][..n], &above[m..][..n]);
                 let out = &mut restricted[..n];
                 for x in 0..n {
@@ -323,7 +329,7 @@ fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], ch
 /// The residual of one row of black cells: the sum of what their red neighbours changed by. Blocked cells get one too;
 /// their interpolation weights are zero.
 #[inline(always)]
-fn left_on_black<R: Real>(
+fn residual_on_black<R: Real>(
     n: usize,
     [even, even_below]: [&[R]; 2],
     [odd_above, odd]: [&[R]; 2],

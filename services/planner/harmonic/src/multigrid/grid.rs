@@ -82,7 +82,7 @@ impl Grid {
     }
 }
 
-/// Rows under way in a pass over a level, kept between passes.
+/// Row buffers of a pass over a level, kept between passes.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<R> {
     /// Rows of the next level in column order.
@@ -90,12 +90,12 @@ pub(super) struct Scratch<R> {
     pub lower: Vec<R>,
     pub restricted: Vec<R>,
     /// What even-even and odd-odd cells changed by in the last two rows.
-    pub even: [Vec<R>; 2],
-    pub odd: [Vec<R>; 2],
+    pub change_ee: [Vec<R>; 2],
+    pub change_oo: [Vec<R>; 2],
     /// Residuals of even-odd cells in the last two rows, of odd-even and of even-even cells in one.
-    pub left: [Vec<R>; 2],
-    pub beside: Vec<R>,
-    pub own: Vec<R>,
+    pub residual_eo: [Vec<R>; 2],
+    pub residual_oe: Vec<R>,
+    pub residual_ee: Vec<R>,
 }
 
 impl<R: Real> Scratch<R> {
@@ -109,11 +109,11 @@ impl<R: Real> Scratch<R> {
             reset(row, 2 * next.columns + 2);
         }
         let pairs = self
-            .even
+            .change_ee
             .iter_mut()
-            .chain(&mut self.odd)
-            .chain(&mut self.left);
-        for row in pairs.chain([&mut self.beside, &mut self.own]) {
+            .chain(&mut self.change_oo)
+            .chain(&mut self.residual_eo);
+        for row in pairs.chain([&mut self.residual_oe, &mut self.residual_ee]) {
             reset(row, grid.stride + MARGIN);
         }
     }
