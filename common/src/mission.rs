@@ -154,8 +154,8 @@ pub struct Mapper {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
-    /// How far a random walk gets before it dies, metres: lambda of laplacian u = u / lambda^2. Without
-    /// it the paper's method lets no walk die, which is exactly (11), and the careful one takes
+    /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without it the paper's method has
+    /// no screening, which is exactly (11), and the careful one takes
     /// [`Planner::CAREFUL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,

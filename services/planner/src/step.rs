@@ -17,7 +17,7 @@ use crate::{
     lookout::{Advice, Lookout, View},
 };
 
-/// Maps of at most this many cells are solved in full at once where a repair does not do: that takes less
+/// Maps of at most this many cells are solved in full at once where a local update is not enough: that takes less
 /// than a thread takes to begin.
 const SMALL: usize = 1 << 14;
 

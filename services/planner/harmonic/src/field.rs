@@ -125,11 +125,11 @@ impl Field {
         best.1
     }
 
-    /// u of the cell `there` as seen from its neighbour `here`: their ratio is what counts, u(here) being what it is.
+    /// u of the cell `there` relative to its neighbour `here`: u(there) such that its ratio to u(here) is right.
     ///
-    /// A local update changes u in a window and leaves it beyond. Where u flows out of the window, everything beyond is
-    /// to be scaled by what u changed by at its rim, and that is done here rather than in every cell downstream: across
-    /// such an edge the ratio stays what it was before.
+    /// A local update changes u in a window and nowhere else, though u of all cells downstream should be scaled by what u
+    /// at the window's rim changed by. That is done here, rather than in every cell: across an outflow edge of a patch the
+    /// ratio is that before the update.
     pub(crate) fn seen(&self, here: (i64, i64), there: (i64, i64)) -> Scaled {
         let u = self.u_at(there.0, there.1);
         if self.patches.is_empty() {
@@ -153,7 +153,7 @@ impl Field {
         } else {
             (to_before, from_before)
         };
-        // To single precision, as the window was solved.
+        // In single precision, as the window was solved.
         let rounded = |u: Scaled| Scaled::new(f64::from(u.mantissa as f32), u.exponent);
         if outside.is_zero() || inside.is_zero() || rounded(outside) > rounded(inside) {
             return u;

@@ -2,9 +2,9 @@
 //!
 //! At a cell's centre the gradient is the central difference of u, blocked cells counting as 0. Between centres it is
 //! interpolated bilinearly between the free cells among the four centres around, which keeps it continuous; cells that
-//! meet only across a blocked corner do not see each other. Near a wall the part of it that points into the wall fades
-//! out with the distance, so that it never leads into a blocked cell. Only ratios of neighbouring u enter: the common
-//! exponent is taken out first.
+//! meet only across a blocked corner are left out. Near a wall its component into the wall decreases with the distance to
+//! 0, so that it never leads into a blocked cell. Only ratios of neighbouring u enter: the common
+//! exponent is removed out first.
 
 use crate::cell::Cell;
 use crate::field::Field;
@@ -23,11 +23,11 @@ pub enum Guidance {
     Unreachable,
 }
 
-/// Distance from a wall, in cells, below which the gradient's part into the wall fades.
+/// Distance from a wall, in cells, below which the gradient's component into the wall decreases.
 const WALL_REACH: f64 = 0.5;
 
-/// Gradients shorter than this share of the local u are saddle points, where the better neighbour decides. It is above
-/// the rounding of the stored u and far below the gradient of any cell that has a way to go.
+/// Gradients shorter than this fraction of the local u are those of saddle points, where the direction is that to the
+/// neighbour of largest u. It is above the rounding of the stored u and far below the gradient of other cells.
 const SADDLE: f64 = 1e-7;
 
 impl Field {
@@ -54,20 +54,20 @@ impl Field {
         let position = [col, row];
         let gradient =
             self.interpolate(here, position, |c, r| self.central_difference(here, (c, r)));
-        let held = self.hold_off_walls(here, position, gradient);
-        // What the walls took is given to the ascent from cell to cell, which leads around them; else a gradient straight
-        // into a wall would keep its direction to the last, however little of it is left.
-        let taken = (gradient[0] - held[0]).hypot(gradient[1] - held[1]);
-        let mut total = held;
-        if taken > 0.0 {
+        let kept = self.without_wall_component(here, position, gradient);
+        // The component removed is replaced by steepest ascent from cell to cell, which leads around walls; a gradient
+        // straight into a wall would otherwise keep its direction, however small it gets.
+        let removed = (gradient[0] - kept[0]).hypot(gradient[1] - kept[1]);
+        let mut total = kept;
+        if removed > 0.0 {
             let ascent = self.interpolate(here, position, |c, r| {
                 self.steepest_ascent(c, r).map(|step| step as f64)
             });
-            let ascent = self.hold_off_walls(here, position, ascent);
-            total = [held[0] + taken * ascent[0], held[1] + taken * ascent[1]];
+            let ascent = self.without_wall_component(here, position, ascent);
+            total = [kept[0] + removed * ascent[0], kept[1] + removed * ascent[1]];
         }
         unit(total, SADDLE)
-            .or_else(|| self.toward_better_neighbour(here, position))
+            .or_else(|| self.toward_best_neighbour(here, position))
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
 
@@ -80,7 +80,7 @@ impl Field {
         let here = (cell.col as i64, cell.row as i64);
         let gradient = self.central_difference(here, here);
         unit(gradient, SADDLE)
-            .or_else(|| self.toward_better_neighbour(here, [cell.col as f64, cell.row as f64]))
+            .or_else(|| self.toward_best_neighbour(here, [cell.col as f64, cell.row as f64]))
     }
 
     fn blocked_at(&self, col: i64, row: i64) -> bool {
@@ -153,15 +153,20 @@ impl Field {
         }
     }
 
-    /// Takes from `gradient` what points into a blocked cell: all of it at the wall, nothing half a cell away.
+    /// Removes from `gradient` the component into blocked cells: all of it at the wall, nothing half a cell away.
     ///
     /// Each blocked neighbour acts through the point of it nearest to the position. A diagonal one counts only where both
     /// cells beside it are free, else a wall running past the corner would stop the motion along it. At most two of them,
     /// at right angles, are ever within reach of one position, so their order does not matter.
-    fn hold_off_walls(&self, here: (i64, i64), position: [f64; 2], gradient: [f64; 2]) -> [f64; 2] {
+    fn without_wall_component(
+        &self,
+        here: (i64, i64),
+        position: [f64; 2],
+        gradient: [f64; 2],
+    ) -> [f64; 2] {
         let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
         let blocked = |dc: i64, dr: i64| self.blocked_at(here.0 + dc, here.1 + dr);
-        let mut held = gradient;
+        let mut kept = gradient;
         for (dc, dr) in [
             (1, 0),
             (-1, 0),
@@ -194,18 +199,18 @@ impl Field {
                 let length = (dc as f64).hypot(dr as f64);
                 [dc as f64 / length, dr as f64 / length]
             };
-            let inward = held[0] * normal[0] + held[1] * normal[1];
+            let inward = kept[0] * normal[0] + kept[1] * normal[1];
             if inward > 0.0 {
                 let share = inward * (1.0 - distance / WALL_REACH);
-                held = [held[0] - share * normal[0], held[1] - share * normal[1]];
+                kept = [kept[0] - share * normal[0], kept[1] - share * normal[1]];
             }
         }
-        held
+        kept
     }
 
     /// Straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way
     /// there is free from anywhere in this one, and leads away from every wall it touches.
-    fn toward_better_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
+    fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
         let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
         unit(
             [

@@ -1,9 +1,9 @@
 //! Multigrid for wide maps whose u spans more than an `f64` holds: a screening length far below the size of the map.
 //!
-//! u is solved band by band from the target outwards. A band takes in every cell not resolved before; what the resolved
-//! cells give their neighbours flows in. Those of its cells that come out well inside the range are resolved for good, with
-//! the band's exponent, and the rest is left to the next band. What was resolved feels nothing of what lies farther out but
-//! through cells some hundred orders of magnitude smaller.
+//! u is solved band by band from the target outwards. The unknowns of a band are the cells not resolved before; u of the
+//! resolved cells beside them is their inflow. Unknowns that come out well inside the range of `f64` are resolved, with the
+//! exponent of the band; the others are unknowns of the next band. Cells farther out have no influence on resolved ones but
+//! through cells of u some hundred orders of magnitude smaller.
 
 use crate::cancellation::Cancellation;
 use crate::cell::Cell;
@@ -14,17 +14,17 @@ use crate::real::Real;
 use crate::scaled::{Scaled, pow2};
 use crate::store::{BLOCKED, Store};
 
-/// Coarse corrections above this share of u mean that a cell has not converged. Stricter than for one solve that can be
-/// checked and continued.
+/// Coarse corrections above this fraction of u mean that a cell has not converged. Stricter than for a solve that is
+/// continued where it fails verification.
 const TOLERANCE: f64 = 3e-4;
 
-/// Cycles for one band: its range at 1.4 orders of magnitude a cycle, and some.
+/// Cycles for one band: its range at 1.4 orders of magnitude a cycle, with a reserve.
 const CYCLES: usize = 450;
 
-/// Numbers above this, of 2^900 at the top of a band, are resolved.
+/// Cells of u above this are resolved, the largest inflow of a band being 2^900.
 const RESOLVED: f64 = 1e-200;
 
-/// u of every cell of `domain`, as far as the bands come.
+/// u of every cell of `domain` that a band resolves; 0 elsewhere.
 pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Store, SolveError> {
     let (width, height) = (domain.width(), domain.height());
     let mut levels = Multigrid::<f64>::new(width, height);
@@ -79,8 +79,8 @@ pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Stor
     })
 }
 
-/// What the cells resolved so far give to free neighbours that are not, with the largest exponent among them, at which it
-/// is put to 2^TOP. `None` if all that can be reached is resolved.
+/// The inflow from resolved cells to their free neighbours that are not, scaled to at most 2^TOP, after the exponent it was
+/// scaled by. `None` if every cell that can be reached is resolved.
 fn inflow(domain: &Domain, u: &[Scaled]) -> Option<(i32, Vec<(Cell, f64)>)> {
     let (width, height) = (domain.width(), domain.height());
     let mut edges: Vec<(usize, Scaled)> = Vec::new();

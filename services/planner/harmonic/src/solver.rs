@@ -17,7 +17,8 @@ use crate::local::{LocalUpdate, Verdict};
 use full::{Full, Task};
 pub use settings::{Phase, Settings};
 
-/// Solves fields. Keeps between solves what does not depend on the target, and patches it where cells changed.
+/// Solves fields. Between solves it keeps the set-up, which does not depend on the target, and updates it where cells
+/// changed.
 #[derive(Debug, Default)]
 pub struct Solver {
     settings: Settings,
@@ -26,7 +27,7 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// A solver that has prepared nothing yet.
+    /// A solver without a set-up.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -92,8 +93,8 @@ impl Solver {
     /// Applies `changes` to `domain` and brings its `field` up to date: in a window around them, or by a full solve where
     /// the map is small or the window would be half of it.
     ///
-    /// `field` may lag behind `domain`: what counts is whether it knows a changed cell as blocked or free. So when a field
-    /// solved in the background is swapped in, update it with all changes since that solve began. Every local update is
+    /// `field` may be older than `domain`: a change counts if the cell is not yet so in the field. So when a field solved in
+    /// the background is swapped in, update it with all changes since that solve began. Every local update is
     /// provisional, whatever its verdict: follow it by a full solve ([`solve_near`](Self::solve_near)) beside the live field.
     ///
     /// # Errors
@@ -111,16 +112,16 @@ impl Solver {
             return Err(SolveError::ForeignField);
         }
         domain.apply(changes)?;
-        // By what the field knows, not by what the map was: a change may be reported twice.
-        let news: Vec<Change> = changes
+        // Compared with the field, not with the map before: a change may be reported twice.
+        let changes: Vec<Change> = changes
             .iter()
             .copied()
             .filter(|change| field.is_blocked(change.cell) != change.blocked)
             .collect();
-        if news.is_empty() {
+        if changes.is_empty() {
             return Ok(Verdict::Accurate);
         }
-        if let Some(verdict) = self.local.update(domain, field, &news) {
+        if let Some(verdict) = self.local.update(domain, field, &changes) {
             return Ok(verdict);
         }
         *field = self.solve_near(domain, field, cancellation)?;

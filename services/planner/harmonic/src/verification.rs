@@ -1,10 +1,9 @@
-//! The check every field passes before it is handed out.
+//! The verification every field passes before it is handed out.
 //!
-//! Two promises, cell by cell: the equation holds relatively to u itself (a global norm says nothing of cells where u is
-//! 1e-50), and some neighbour is strictly better, so that following the field from anywhere ends at the target. A free cell
-//! of u = 0 beside one of u > 0 fails too. So the cells with u > 0 are a union of connected pieces, each leads somewhere
-//! better from all its cells but the target's, and therefore there is one piece: what can reach the target, no more and no
-//! less. That needs no search of its own.
+//! Of every cell two things are checked: the residual of its equation is small relative to its own u (a norm over the map
+//! says nothing about cells where u is 1e-50), and one of its neighbours has a larger u, so steepest ascent from it ends at
+//! the target. A free cell of u = 0 beside one of u > 0 fails too. So the cells of u > 0 are connected components without a
+//! local maximum but the target, hence one component: exactly the cells that can reach the target. No search is needed.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -29,17 +28,17 @@ pub struct Verification {
 }
 
 /// Largest componentwise relative residual of a published field.
-pub(crate) const RESIDUAL_LIMIT: f64 = 2e-4;
+const RESIDUAL_LIMIT: f64 = 2e-4;
 
-/// A thread of its own takes some ten microseconds to start: cells it must be given to be worth that.
+/// Least cells for a thread of their own, which takes some ten microseconds to start.
 const CELLS_PER_THREAD: usize = 1 << 18;
 
-/// What a check found.
+/// The result of a verification.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Check {
     /// Largest relative residual of the cells with u > 0 but the target.
     pub worst_residual: f64,
-    /// Cells with u > 0, but the target, without a strictly better neighbour.
+    /// Cells with u > 0, other than the target, that no neighbour exceeds.
     pub local_maxima: usize,
     /// Free cells with u = 0 beside one with u > 0.
     pub unreached: usize,
@@ -48,7 +47,7 @@ pub(crate) struct Check {
 }
 
 impl Check {
-    /// The two together.
+    /// The result for the cells of both.
     fn and(self, other: Self) -> Self {
         Self {
             worst_residual: self.worst_residual.max(other.worst_residual),
@@ -64,7 +63,7 @@ impl Check {
     }
 }
 
-/// Checks every cell of a field, on up to `threads` threads; what is found does not depend on how many.
+/// Checks every cell of a field, on up to `threads` threads; the result does not depend on how many.
 pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Check {
     let mut found = match store {
         Store::Single { values, .. } => {
@@ -106,7 +105,7 @@ fn in_strips(
             .map(|strip| scope.spawn(move || check(rows(strip))))
             .collect();
         let first = check(rows(0));
-        // A thread that panicked has checked nothing: then nothing holds.
+        // A thread that panicked has verified nothing.
         let failed = Check {
             worst_residual: f64::INFINITY,
             ..Check::default()

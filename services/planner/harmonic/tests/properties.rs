@@ -155,7 +155,7 @@ fn a_set_up_that_was_kept_and_patched_gives_the_same_field_bit_for_bit() {
 }
 
 #[test]
-fn more_threads_give_the_same_field_and_certificate() {
+fn more_threads_give_the_same_field_and_verification() {
     let domain = Map::generate(Kind::Drums, 900, 800, 3)
         .domain()
         .expect("a valid map");

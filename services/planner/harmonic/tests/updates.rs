@@ -131,7 +131,7 @@ fn leads_on(kind: Kind) {
         }
     }
     let all: usize = MAPS.iter().map(|(_, updates)| updates).sum();
-    assert!(closed * 2 < all, "{kind:?}: {closed} of {all} not repaired");
+    assert!(closed * 2 < all, "{kind:?}: {closed} of {all} closed a passage");
 }
 
 #[test]
@@ -215,7 +215,7 @@ impl Count {
     }
 }
 
-/// Single changes on maps of each kind: those repaired, and those for which a full solve was advised.
+/// Single changes on maps of each kind: those after which the field is accurate, and those for which a full solve was advised.
 fn single_changes(kinds: &[Kind], degrees: f64) -> [Count; 2] {
     let mut counts = [Count::default(), Count::default()];
     for (seed, (&kind, side)) in
@@ -239,15 +239,15 @@ fn single_changes(kinds: &[Kind], degrees: f64) -> [Count; 2] {
 }
 
 #[test]
-fn around_a_repaired_change_directions_are_within_a_degree_of_a_full_solve_in_99_of_100_cases() {
+fn around_a_change_directions_called_accurate_are_within_a_degree_of_a_full_solve_in_99_of_100_cases() {
     let wide = [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap];
-    let [repaired, _] = single_changes(&wide, 1.0);
-    assert!(repaired.cases > 300, "{repaired:?}");
-    repaired.assert_right(100);
+    let [accurate, _] = single_changes(&wide, 1.0);
+    assert!(accurate.cases > 300, "{accurate:?}");
+    accurate.assert_right(100);
 }
 
 #[test]
-fn in_corridors_directions_around_a_repaired_change_are_within_a_degree_in_99_of_100_cases() {
+fn in_corridors_directions_called_accurate_are_within_a_degree_in_99_of_100_cases() {
     let narrow = [
         Kind::Maze { corridor: 1 },
         Kind::Maze { corridor: 4 },
@@ -256,9 +256,9 @@ fn in_corridors_directions_around_a_repaired_change_are_within_a_degree_in_99_of
         Kind::Serpentine { corridor: 8 },
         Kind::Serpentine { corridor: 24 },
     ];
-    let [repaired, _] = single_changes(&narrow, 1.0);
-    assert!(repaired.cases > 500, "{repaired:?}");
-    repaired.assert_right(100);
+    let [accurate, _] = single_changes(&narrow, 1.0);
+    assert!(accurate.cases > 500, "{accurate:?}");
+    accurate.assert_right(100);
 }
 
 #[test]
@@ -390,7 +390,7 @@ fn every_closed_doorway_is_reported() {
                         })
                         .collect();
                     let verdict = case.update(&changes);
-                    // Unless another door of the same two rooms keeps the wake fed, all beyond it is cut off or led
+                    // Unless another door of the same two rooms lets u flow on, all beyond it is cut off or led
                     // another way.
                     if before && follow_full_differs(&mut case) {
                         assert_eq!(
@@ -442,7 +442,7 @@ fn an_update_that_changes_nothing_leaves_the_field_as_it_is() {
 }
 
 #[test]
-fn changes_one_beside_the_other_are_repaired_together_without_a_full_solve_between() {
+fn changes_one_beside_the_other_are_updated_together_without_a_full_solve_between() {
     let mut map = Map::generate(Kind::Empty, 500, 400, 0);
     map.aim((400, 200));
     let mut case = Case::new(&map);

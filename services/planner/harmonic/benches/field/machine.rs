@@ -1,4 +1,4 @@
-//! What the machine can do at best: stream the grid, and sweep over it once.
+//! Lower bounds of this machine: stream the grid, and sweep over it once.
 
 use crate::{fastest, runs};
 

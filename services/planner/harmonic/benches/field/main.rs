@@ -1,4 +1,4 @@
-//! `cargo bench -p harmonic`: the table of the solver's times, beside what the machine can do and what else there is.
+//! `cargo bench -p harmonic`: times of the solver, beside those of plain passes over the grid and of other algorithms.
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
 //! is the least of several runs. `cargo bench -p harmonic -- quick` leaves out the large maps, `-- updates` all but the
@@ -131,7 +131,7 @@ fn real_table(directory: &Path) {
     }
 }
 
-/// One map: what it takes from scratch and with the set-up kept, beside what else there is.
+/// One map: times from scratch and with the set-up kept, beside those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let cells = domain.blocked().len();
     let sweep = machine::sweep(cells.isqrt());
@@ -218,9 +218,7 @@ fn screening_table() {
 }
 
 fn update_table(quick: bool) {
-    println!(
-        "\nLocal updates: 3 x 3 blocks put down at random, up to three between full solves, us"
-    );
+    println!("\nLocal updates: 3 x 3 blocks placed at random, up to three between full solves, us");
     println!(
         "{:<28} {:>5} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7}  verdicts",
         "map", "N", "least", "p50", "p90", "p99", "x least", "x p50", "radius"

@@ -1,4 +1,4 @@
-//! What else there is: Dijkstra's algorithm over eight neighbours, and sparse Cholesky factorisation.
+//! Other algorithms: Dijkstra's algorithm over eight neighbours, and sparse Cholesky factorisation.
 
 use harmonic::{Cell, Domain};
 

@@ -7,7 +7,7 @@ use crate::error::SolveError;
 /// The cell has no place in the order: blocked, or cut off from the target.
 pub(crate) const ABSENT: u32 = u32::MAX;
 
-/// Distances between two looks at the cancellation: at most some hundred microseconds on the largest maps.
+/// Distances between two checks of the cancellation: at most some hundred microseconds on the largest maps.
 const CHECKED_EVERY: usize = 64;
 
 /// The reachable cells in order of their distance from the target.

@@ -10,7 +10,7 @@ use crate::domain::Domain;
 use crate::scaled::Scaled;
 use crate::store::Store;
 
-/// Sweeps there and back before giving up.
+/// Most sweeps, each in both directions.
 const SWEEPS: usize = 200;
 
 /// Largest relative change of a sweep that ends them.

@@ -3,7 +3,7 @@
 //! Cells are eliminated stage by stage, from the farthest inwards. Where the free space is one passage, a stage is a few
 //! distances. Where many passages run side by side and loops join them, everything beyond a distance is one piece, and its
 //! fronts are as wide as all passages together; so there the space between two distances, a slab, is eliminated first,
-//! passage by passage, and only one distance in many, the separators, sees the wide fronts:
+//! passage by passage, and only the separators, one distance in many, have wide fronts:
 //!
 //! ```text
 //! target ... separator | slab: stages inwards | separator | slab ...
@@ -37,7 +37,7 @@ pub(crate) struct Front {
 /// No front.
 const NONE: u32 = u32::MAX;
 
-/// What an elimination takes.
+/// The cost of a factorisation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cost {
     /// Multiplications.
@@ -78,10 +78,10 @@ impl Shape {
 const NARROW: f64 = 1.5;
 const MIDDLING: f64 = 10.0;
 
-/// Passages side by side from which on slabs pay.
+/// Passages side by side from which on slabs reduce the cost.
 const MANY: f64 = 6.0;
 
-/// Stages between two looks at the cancellation.
+/// Stages between two checks of the cancellation.
 const CHECKED_EVERY: usize = 16;
 
 /// Fronts in order of elimination, children before their parents.

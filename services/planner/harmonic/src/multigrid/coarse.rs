@@ -1,8 +1,7 @@
 //! A coarser level: nine-point equations for the correction of the finer one, solved from a zero guess.
 //!
 //! The four planes are relaxed in turn. On the way down they start from zero, so each plane only sees those before it, and
-//! the residual left on a plane is what the planes after it add: neither the right-hand side nor the diagonal is read
-//! again. The odd-odd cells come last, so their residual is zero, and first on the way up, so they need no correction:
+//! the residual on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The odd-odd cells come last, so their residual is zero, and first on the way up, so they need no correction:
 //! no interpolation to them is ever stored.
 
 use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
@@ -26,7 +25,7 @@ const SW: (isize, isize) = (-1, 1);
 const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
-/// Places of a plane up to which it is gone through as one row.
+/// Largest plane that is traversed as one row, in values.
 const SMALL: usize = 1 << 13;
 
 /// Cells of one coarse level.

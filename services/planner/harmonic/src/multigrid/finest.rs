@@ -3,8 +3,8 @@
 //! Even-even and odd-odd cells are red, the others black; red cells have black neighbours alone and the reverse. One pass
 //! over the rows does all of the level's work between two visits to the coarser ones, so the level is read from memory
 //! once a cycle: the coarse correction goes to the black cells, red is relaxed from black (and needs no correction of its
-//! own), black from red, then red again, and what that last half sweep changed is, summed over the red neighbours,
-//! exactly the residual left on black. It is restricted at once.
+//! own), black from red, then red again. The changes of that last half sweep, summed over the red neighbours of a black cell,
+//! are exactly its residual, which is restricted at once.
 
 use super::coarse::Coarse;
 use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};

@@ -17,8 +17,8 @@ use crate::screening::Coefficients;
 use crate::store::{BLOCKED, Store};
 use crate::verification::{self, Check, Verification};
 
-/// Coarse corrections above this share of u mean that a cell has not converged. The next cycle takes off another factor of
-/// three or more, which leaves directions well within a degree.
+/// Coarse corrections above this fraction of u mean that a cell has not converged. The next cycle reduces them by a factor
+/// of three or more, which leaves directions well within a degree.
 const TOLERANCE: f64 = 5e-3;
 
 /// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count as unconverged.
@@ -30,7 +30,7 @@ const FIRST_CHECK_NEAR: usize = 2;
 /// Cycles between a check that failed and the next.
 const BETWEEN_CHECKS: usize = 1;
 
-/// Cycles after which a precision is given up: its range of u at 1.4 orders of magnitude a cycle, and some.
+/// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
 const SINGLE_CYCLES: usize = 60;
 const DOUBLE_CYCLES: usize = 450;
 

@@ -5,10 +5,11 @@ use std::num::NonZeroUsize;
 /// How a solver may work; what it computes does not depend on it.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Threads a solve may use; the result is the same bit for bit. So far only the verification of large maps is spread
-    /// over them.
+    /// Threads a solve may use; the result is the same to the bit. Only the verification of large maps uses more than
+    /// one.
     pub threads: NonZeroUsize,
-    /// Bytes the multifrontal factorisation may take before a solve gives up with [`SolveError::TooCostly`](crate::SolveError::TooCostly).
+    /// Bytes the multifrontal factorisation may take; a solve that needs more ends in
+    /// [`SolveError::TooCostly`](crate::SolveError::TooCostly).
     pub memory_limit: u64,
 }
 
