@@ -59,8 +59,8 @@ pub enum SolveError {
     },
     /// A screening length is not a number or shorter than [`MIN_SCREENING_CELLS`].
     #[error(
-        "a screening length of {cells} cells at cell index {index}: it must be at least {MIN_SCREENING_CELLS}; for no \
-         screening say none"
+        "a screening length of {cells} cells at cell index {index}: it must be at least {MIN_SCREENING_CELLS}; an \
+         infinite length is no screening"
     )]
     ScreeningLength {
         /// Row-major index of the first such cell; 0 for a uniform screening.
@@ -77,8 +77,7 @@ pub enum SolveError {
     /// No method could finish within the memory allowed.
     #[error(
         "no iterative method converged and the multifrontal factorisation would need {needed} bytes, {allowed} are \
-         allowed: \
-         raise `Settings::memory_limit` or use larger cells"
+         allowed: raise `Settings::memory_limit` or use larger cells"
     )]
     TooCostly {
         /// Bytes the factorisation would need.

@@ -95,7 +95,8 @@ impl Solver {
     ///
     /// `field` may be older than `domain`: a change counts if the cell is not yet so in the field. So when a field solved in
     /// the background is swapped in, update it with all changes since that solve began. Every local update is
-    /// provisional, whatever its verdict: follow it by a full solve ([`solve_near`](Self::solve_near)) beside the live field.
+    /// provisional, whatever its verdict: follow it by a full solve ([`solve_near`](Self::solve_near)) while the
+    /// updated field is in use.
     ///
     /// # Errors
     /// [`SolveError::Outside`], [`SolveError::TargetBlocked`] and [`SolveError::ForeignField`], with neither domain nor
