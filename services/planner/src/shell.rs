@@ -11,8 +11,9 @@ use common::{
     topics::{self, AnyTopic as _},
 };
 
+use harmonic::SolveError;
+
 use crate::{
-    SolveError,
     beside::{BesideSolver, Solved},
     step::{Planner, Work},
 };
