@@ -1,8 +1,5 @@
 //! The states of its files in which the middleware lets nobody in any more, each made by hand in the middle of a
 //! mission: it goes on without a hand.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{
     fs,
@@ -10,10 +7,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::{
+    PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, in_own_process, pid,
+    signal_process,
+};
 use common::{bus::Bus, domain::Domain, topics};
 use rustix::process::Signal;
 use serde_json::Value;
-use support::{PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, pid, signal_process};
 
 /// Mission time runs so many times as fast as the wall's.
 const PACE: [&str; 2] = ["--pace", "4"];
@@ -138,42 +138,44 @@ fn a_half_made_service_jams_starts_until_the_bus_is_made_anew() {
 
 #[test]
 fn places_in_a_topic_that_nobody_gives_back_jam_starts_until_the_bus_is_made_anew() {
-    let mut run = Run::start("jam-places", "obstacle-course", &PACE);
-    let status = run.wait_until_under_way(1.0);
-    let bus = Bus::join(&domain("jam-places"), "greedy").unwrap();
-    let mut places = Vec::new();
-    let mut take_all = || {
-        loop {
-            match bus.writer(&topics::POSE, 0) {
-                Ok(place) => places.push(place),
-                Err(error) if error.to_string().contains("ExceedsMax") => {
-                    return Some(places.len());
+    in_own_process(|| {
+        let mut run = Run::start("jam-places", "obstacle-course", &PACE);
+        let status = run.wait_until_under_way(1.0);
+        let bus = Bus::join(&domain("jam-places"), "greedy").unwrap();
+        let mut places = Vec::new();
+        let mut take_all = || {
+            loop {
+                match bus.writer(&topics::POSE, 0) {
+                    Ok(place) => places.push(place),
+                    Err(error) if error.to_string().contains("ExceedsMax") => {
+                        return Some(places.len());
+                    }
+                    // Two starts were refused already, and this bus is going.
+                    Err(_) => return None,
                 }
-                // Two starts were refused already, and this bus is going.
-                Err(_) => return None,
             }
-        }
-    };
-    let all_but_one = take_all().unwrap();
-    // The last place, too, before the successor takes it: now and then it is faster.
-    let mut status = status;
-    'took: loop {
-        signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
-        let died = Instant::now();
-        while died.elapsed() < Duration::from_millis(100) {
-            if take_all().is_none_or(|taken| taken > all_but_one) {
-                break 'took;
+        };
+        let all_but_one = take_all().unwrap();
+        // The last place, too, before the successor takes it: now and then it is faster.
+        let mut status = status;
+        'took: loop {
+            signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
+            let died = Instant::now();
+            while died.elapsed() < Duration::from_millis(100) {
+                if take_all().is_none_or(|taken| taken > all_but_one) {
+                    break 'took;
+                }
             }
+            let generation = find(&status, "dead-reckoning")["generation"].as_u64();
+            status = run.wait_until("it lives again", |status| {
+                let stage = find(status, "dead-reckoning");
+                stage["generation"].as_u64() > generation && stage["state"] == "running"
+            });
         }
-        let generation = find(&status, "dead-reckoning")["generation"].as_u64();
-        status = run.wait_until("it lives again", |status| {
-            let stage = find(status, "dead-reckoning");
-            stage["generation"].as_u64() > generation && stage["state"] == "running"
-        });
-    }
-    // Never given back: as when their owners were killed in a bad moment.
-    std::mem::forget((places, bus));
-    assert_renewed(&assert_arrives("jam-places", run));
+        // Never given back: as when their owners were killed in a bad moment.
+        std::mem::forget((places, bus));
+        assert_renewed(&assert_arrives("jam-places", run));
+    });
 }
 
 #[test]

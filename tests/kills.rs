@@ -1,39 +1,46 @@
 //! Stages killed, frozen and stopped in the middle of missions.
-#![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
+use crate::support::{self, Run, STAGES, assert_nothing_left, processes_of, run};
 use rustix::process::Signal;
-use support::{Run, STAGES, assert_nothing_left, processes_of, run};
 
 /// Mission time runs so many times as fast as the wall's: a mission takes ten seconds.
 const PACE: &str = "4";
 
 #[test]
-fn each_stage_killed_once_the_robot_arrives_and_knows_where_it_is() {
-    let (_, undisturbed) = run("calm", "obstacle-course", &["--pace", PACE]);
-    let mut killed = Run::start("kills", "obstacle-course", &["--pace", PACE]);
-    killed.wait_until_under_way(2.0);
-    for stage in STAGES {
-        killed.kill_and_await_successor(stage, Signal::KILL);
+fn each_stage_killed_or_frozen_once_the_robot_arrives_and_knows_where_it_is() {
+    let start = |robot| Run::start(robot, "obstacle-course", &["--pace", PACE]);
+    let (calm, killed, frozen) = (start("calm"), start("kills"), start("frozen"));
+    let disturbed = [(killed, Signal::KILL), (frozen, Signal::STOP)].map(|(mut run, signal)| {
+        std::thread::spawn(move || {
+            run.wait_until_under_way(2.0);
+            for stage in STAGES {
+                run.kill_and_await_successor(stage, signal);
+            }
+            run.finish()
+        })
+    });
+    let (_, undisturbed) = calm.finish();
+    for run in disturbed {
+        let (code, summary) = run.join().unwrap();
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(0), &"reached".into()),
+            "{summary}"
+        );
+        assert_eq!(summary["collisions"], 0, "{summary}");
+        for stage in STAGES {
+            assert_eq!(summary["restarts"][stage], 1, "{summary}");
+        }
+        // A count of the encoders is half a millimetre; a lost pose is metres.
+        let error = |summary: &serde_json::Value| summary["pose_error_m"].as_f64().unwrap();
+        assert!(
+            error(&summary) <= error(&undisturbed) + 0.005,
+            "{summary} against {undisturbed}"
+        );
     }
-    let (code, summary) = killed.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_eq!(summary["collisions"], 0, "{summary}");
-    for stage in STAGES {
-        assert_eq!(summary["restarts"][stage], 1, "{summary}");
+    for robot in ["calm", "kills", "frozen"] {
+        assert_nothing_left(robot);
     }
-    // A count of the encoders is half a millimetre; a lost pose is metres.
-    let error = |summary: &serde_json::Value| summary["pose_error_m"].as_f64().unwrap();
-    assert!(
-        error(&summary) <= error(&undisturbed) + 0.005,
-        "{summary} against {undisturbed}"
-    );
-    assert_nothing_left("kills");
 }
 
 #[test]
@@ -89,21 +96,6 @@ fn what_a_stage_killed_in_its_start_left_on_the_bus_is_cleared_away() {
     run.signal(Signal::INT);
     run.finish();
     assert_nothing_left("dregs");
-}
-
-#[test]
-fn a_frozen_stage_is_noticed_and_replaced() {
-    let mut frozen = Run::start("frozen", "obstacle-course", &["--pace", PACE]);
-    frozen.wait_until_under_way(2.0);
-    frozen.kill_and_await_successor("mapper", Signal::STOP);
-    let (code, summary) = frozen.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_eq!(summary["restarts"]["mapper"], 1);
-    assert_nothing_left("frozen");
 }
 
 #[test]

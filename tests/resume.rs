@@ -1,13 +1,10 @@
 //! A run whose supervisor was killed, and everything else with it, goes on.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{path::Path, process::Stdio, time::Instant};
 
+use crate::support::{self, Run, assert_nothing_left, firsthand, pids_of, run, signal_process};
 use rustix::process::Signal;
 use serde_json::Value;
-use support::{Run, assert_nothing_left, firsthand, pids_of, run, signal_process};
 
 /// Wait until nobody works for `robot` any more.
 fn wait_until_alone(robot: &str) {

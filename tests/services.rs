@@ -1,7 +1,4 @@
 //! Runs under a service manager: this test in the place of systemd.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{
     os::{
@@ -18,8 +15,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::{self, PATIENCE, Run, assert_nothing_left, find, firsthand, signal_process};
 use rustix::process::Signal;
-use support::{PATIENCE, Run, assert_nothing_left, find, firsthand, signal_process};
 use tempfile::TempDir;
 
 /// What a unit would give as WatchdogSec.

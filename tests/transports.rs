@@ -1,7 +1,4 @@
 //! Missions over every wire, by robots that are not the run's own children: they come and go by themselves.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -10,8 +7,8 @@ use std::{
     sync::mpsc::{Receiver, channel},
 };
 
+use crate::support::{self, Run, assert_nothing_left, firsthand};
 use serde_json::Value;
-use support::{Run, assert_nothing_left, firsthand};
 use tempfile::TempDir;
 
 /// A few seconds straight ahead.

@@ -290,6 +290,10 @@ fn work(
                 while fault == Ok(FaultKind::Spin) && !end.came() {
                     std::hint::spin_loop();
                 }
+                while fault == Ok(FaultKind::Mute) && !end.came() {
+                    std::thread::sleep(BEAT);
+                    heart.beat(HealthState::Ready, progress)?;
+                }
             }
         }
     }
@@ -303,8 +307,9 @@ fn inject(
 ) -> Result<FaultAnswer, StageError> {
     Ok(match request {
         Err(answer) => answer,
-        // The one that every stage has is done in the work loop.
-        Ok(fault) if fault == FaultKind::Spin || process.inject(fault)? => FaultAnswer::Taken,
+        // Those that every stage has are done in the work loop.
+        Ok(FaultKind::Spin | FaultKind::Mute) => FaultAnswer::Taken,
+        Ok(fault) if process.inject(fault)? => FaultAnswer::Taken,
         Ok(_) => FaultAnswer::Impossible,
     })
 }

@@ -359,6 +359,8 @@ wire_enum! {
         BuryRobot = 4,
         /// A closed wall believed around the target, whatever is forgotten.
         CutOff = 5,
+        /// Beats, and no output.
+        Mute = 6,
     }
 }
 
