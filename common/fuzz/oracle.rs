@@ -1,5 +1,4 @@
-//! What must hold for any bytes whatever. Shared by the fuzz target and by the plain test that runs the
-//! kept corpus.
+//! What must hold for any bytes whatever. Shared by the fuzz target and by the plain test that runs the corpus.
 
 use common::wire::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report};
 
