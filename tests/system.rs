@@ -19,7 +19,6 @@ mod repeatability;
 mod replaced_bus;
 mod resume;
 mod services;
+mod structure;
 mod telemetry;
 mod transports;
-
-mod structure;
