@@ -136,7 +136,7 @@ impl Tap {
 
     /// The longest that the robot was left with a valid command, among all that was heard by now: until the next
     /// valid one or a zero, or until now; if the link was down, also until the end of the time that commands had.
-    fn longest_unattended(&self, first: Heard, link_down: bool) -> Duration {
+    fn longest_uncommanded(&self, first: Heard, link_down: bool) -> Duration {
         let mut longest = Duration::ZERO;
         let (mut valid, mut ends) = (Some(first.at), first.at + first.limit);
         let mut left_until = |since: Instant, end: Instant, ends: Instant| {
@@ -228,7 +228,7 @@ fn whatever_is_killed_or_frozen_the_wheels_have_zero_within_250_ms_and_a_period_
         for stage in STAGES {
             let moving = tap.next_that(Heard::valid);
             run.kill_and_await_successor(stage, signal);
-            let longest = tap.longest_unattended(moving, stage == "x80-link");
+            let longest = tap.longest_uncommanded(moving, stage == "x80-link");
             println!("{stage} {signal:?}: at most {} ms", longest.as_millis());
             assert!(longest <= LIMIT + PERIOD, "{stage} {signal:?}: {longest:?}");
         }

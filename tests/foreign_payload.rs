@@ -1,4 +1,4 @@
-//! A consumer built against other payload types is told so, and does no harm.
+//! A consumer built against other payload types is refused with the reason, and does no harm.
 
 use crate::support::{Run, in_own_process};
 use common::{
@@ -10,7 +10,7 @@ use common::{
 use rustix::process::Signal;
 
 #[test]
-fn a_consumer_built_against_another_payload_is_told_so() {
+fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
     in_own_process(|| {
         let mut run = Run::start("foreign", "obstacle-course", &["--pace", "1"]);
         run.wait_until_under_way(0.3);

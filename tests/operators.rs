@@ -1,4 +1,4 @@
-//! An operator's hand on a robot that runs: stop and resume, kill and freeze, hold and release.
+//! What an operator does to a robot that runs: stop and resume, kill and freeze, hold and release.
 
 use crate::support::{self, Run, assert_nothing_left, find, operate, output};
 use std::time::{Duration, Instant};
@@ -32,7 +32,7 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     let mut run = Run::start("held", "open-room", &["--pace", "1"]);
     run.wait_until_under_way(1.0);
-    // From its next life on it fails at its very beginning.
+    // From its next generation on it fails when it starts.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();
     std::fs::create_dir(&checkpoint).unwrap();
@@ -73,7 +73,7 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
 
 #[test]
 fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
-    let mut run = Run::start("ice", "obstacle-course", &PACE);
+    let mut run = Run::start("thawed", "obstacle-course", &PACE);
     run.wait_until_under_way(1.0);
     // Two commands must start and end before the controller is overdue: again, where the machine was too slow.
     let thawed = loop {
@@ -81,13 +81,13 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
             find(status, "controller")["state"] == "running"
         });
         let froze = Instant::now();
-        operate("ice", &["freeze", "controller"]);
-        operate("ice", &["thaw", "controller"]);
+        operate("thawed", &["freeze", "controller"]);
+        operate("thawed", &["thaw", "controller"]);
         if froze.elapsed() < Duration::from_millis(250) {
             break find(&status, "controller")["pid"].clone();
         }
     };
-    operate("ice", &["freeze", "mapper"]);
+    operate("thawed", &["freeze", "mapper"]);
     let status = run.wait_until("it is replaced", |status| {
         find(status, "mapper")["generation"] == 2 && find(status, "mapper")["state"] == "running"
     });
@@ -106,11 +106,11 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
     );
     let (_, summary) = run.finish();
     assert_eq!(summary["outcome"], "reached", "{summary}");
-    assert_nothing_left("ice");
+    assert_nothing_left("thawed");
 }
 
 #[test]
-fn a_word_to_nobody_is_refused_with_the_reason() {
+fn a_command_for_a_robot_or_stage_that_is_not_there_is_refused_with_the_reason() {
     let output = output(&["stop", "--robot", "nobody"]);
     assert!(!output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();

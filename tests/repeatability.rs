@@ -15,12 +15,12 @@ fn numbers(mut summary: Value) -> Value {
     summary
 }
 
-/// What a consumer hears of a run, and what the run writes.
+/// What a consumer receives of a run, and what the run writes.
 #[derive(Debug, PartialEq)]
 struct Recording {
     /// Each sample, by topic and tick.
     samples: BTreeMap<(&'static str, u64), String>,
-    /// The cells of each version of the grid that was put together. Of several in one moment the last may be heard alone.
+    /// The cells of each version of the grid that was put together. A reader that was late has missed some.
     grids: BTreeMap<u64, Vec<u8>>,
     summary: Value,
     picture: Vec<u8>,
@@ -37,7 +37,7 @@ impl Recording {
         self.samples.insert((topic, tick), format!("{sample:?}"));
     }
 
-    /// Whether every sample of every tick was heard.
+    /// Whether every sample of every tick was received.
     fn is_whole(&self, topics: usize) -> bool {
         let ticks = self.summary["ticks"].as_u64().unwrap();
         let last = self.samples.keys().map(|(_, tick)| *tick).max();
@@ -45,7 +45,7 @@ impl Recording {
     }
 }
 
-/// Run the default mission, and hear all of it.
+/// Run the default mission, and receive all of it.
 fn record(robot: &str) -> Recording {
     let domain = Domain::of(robot.parse().unwrap());
     let mut run = Run::start(robot, "obstacle-course", &["--seed", "7"]);
@@ -63,7 +63,7 @@ fn record(robot: &str) -> Recording {
     let mut grids = bus.slice_reader(&topics::GRID).unwrap();
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::GRID).unwrap());
-    let mut heard = Recording {
+    let mut received = Recording {
         samples: BTreeMap::new(),
         grids: BTreeMap::new(),
         summary: Value::Null,
@@ -71,26 +71,26 @@ fn record(robot: &str) -> Recording {
     };
     let mut grid = Replica::default();
     loop {
-        // Asked first: what was published until then is heard below.
+        // Asked first: what was published until then is received below.
         let over = !run.is_running();
         while let Ok(Some(part)) = grids.take() {
             grid.apply(&part.header().part.revision(), &part);
-            heard.grids.insert(grid.version(), grid.cells().to_vec());
+            received.grids.insert(grid.version(), grid.cells().to_vec());
         }
         while let Ok(Some(sample)) = ranges.take() {
-            heard.add("range", sample);
+            received.add("range", sample);
         }
         while let Ok(Some(sample)) = wheels.take() {
-            heard.add("wheels", sample);
+            received.add("wheels", sample);
         }
         while let Ok(Some(sample)) = poses.take() {
-            heard.add("pose", sample);
+            received.add("pose", sample);
         }
         while let Ok(Some(sample)) = guidances.take() {
-            heard.add("guidance", sample);
+            received.add("guidance", sample);
         }
         while let Ok(Some(sample)) = commands.take() {
-            heard.add("command", sample);
+            received.add("command", sample);
         }
         if over {
             break;
@@ -98,9 +98,9 @@ fn record(robot: &str) -> Recording {
         let _ = waiter.wait(Duration::from_millis(20));
     }
     let (_, summary, kept) = run.finish_in();
-    heard.summary = numbers(summary);
-    heard.picture = std::fs::read(kept.path().join("run/picture.svg")).unwrap();
-    heard
+    received.summary = numbers(summary);
+    received.picture = std::fs::read(kept.path().join("run/picture.svg")).unwrap();
+    received
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! A consumer that joined before the bus was made anew is told, joins again, and is in nobody's way when it leaves.
+//! A consumer that joined before the bus was recreated can tell, joins again, and does no harm when it leaves.
 
 use std::time::{Duration, Instant};
 
@@ -8,7 +8,7 @@ use crate::support::{
 use common::{bus::Bus, domain::Domain, samples::PoseSample, topics, waiter::Waiter};
 use rustix::process::Signal;
 
-const ROBOT: &str = "anew";
+const ROBOT: &str = "recreated";
 
 /// The next pose heard on `bus`; as the README's consumer listens.
 fn next_pose(bus: &Bus) -> PoseSample {
@@ -40,27 +40,27 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         for service in std::fs::read_dir(services).unwrap() {
             half_make(&service.unwrap().path());
         }
-        // Not one that speaks of poses: the dead count as users of their topics.
+        // Not one that has to do with poses: killed processes count as users of their topics.
         signal_process(pid(&status, "x80-link"), Signal::KILL);
         let began = Instant::now();
         while !old.is_replaced() {
-            assert!(began.elapsed() < PATIENCE, "the bus is never made anew");
+            assert!(began.elapsed() < PATIENCE, "the bus is never recreated");
             run.status();
         }
         let new = Bus::join(&domain, "logger").unwrap();
         assert!(!new.is_replaced());
         assert!(next_pose(&new).stamp.tick > heard.stamp.tick);
 
-        // The last to leave it: everybody else has gone over.
+        // The last to leave it: all others use the new one.
         drop((old_poses, old));
         let before = run.wait_until("all work", |status| status["order"] == "driving");
         let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
-        // One life, not two that were refused and a bus made anew once more.
-        let lives = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
+        // One start, not two that were refused and a bus recreated once more.
+        let generation = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
         for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
             assert_eq!(
-                lives(&after, stage),
-                lives(&before, stage) + more,
+                generation(&after, stage),
+                generation(&before, stage) + more,
                 "{stage}"
             );
         }

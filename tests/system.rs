@@ -6,12 +6,12 @@
 mod support;
 
 mod bad_input;
+mod blocked_starts;
 mod consumers;
 mod failsafe;
 mod faults;
 mod field;
 mod foreign_payload;
-mod jams;
 mod kills;
 mod missions;
 mod operators;

@@ -1,4 +1,4 @@
-//! What the robot feels besides its wheels and its front sonar reaches whoever listens.
+//! What the robot measures besides its wheels and its front sonar reaches a consumer.
 
 use std::time::Instant;
 
@@ -29,7 +29,7 @@ fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_on
         let began = Instant::now();
         let (mut infrared, mut power, mut around) = (None, None, None);
         let (infrared, power, around) = loop {
-            assert!(began.elapsed() < support::PATIENCE, "nothing is told");
+            assert!(began.elapsed() < support::PATIENCE, "nothing is published");
             waiter.wait(support::PATIENCE).unwrap();
             infrared = infrareds.newest().unwrap().or(infrared);
             power = powers.newest().unwrap().or(power);

@@ -1,4 +1,4 @@
-//! What the system tests share: the real executable, robots of their own, words to wait for.
+//! What the system tests share: the real executable, robots of their own, states to wait for.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -125,7 +125,7 @@ impl Run {
         status_of(&self.robot)
     }
 
-    /// Ask for the status until `is_so` of it: each answer waits for the supervisor's next word.
+    /// Ask for the status until `is_so` of it: each answer waits for what the supervisor publishes next.
     pub fn wait_until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
         let began = Instant::now();
         loop {
@@ -168,7 +168,7 @@ impl Run {
         self.kill_and_await(stage, signal, &status)
     }
 
-    /// The same of a stage that runs in `status`, where nobody can ask any more.
+    /// The same of a stage that runs in `status`, when no further status can be had.
     pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
         let generation = find(status, stage)["generation"].as_u64().unwrap();
         signal_process(pid(status, stage), signal);
@@ -192,7 +192,7 @@ impl Run {
         (output.status.code(), summary)
     }
 
-    /// Wait for the end and keep the run directory.
+    /// Wait for the end; the run directory with it.
     pub fn finish_in(mut self) -> (Option<i32>, Value, TempDir) {
         let kept = std::mem::replace(&mut self.directory, tempfile::tempdir().unwrap());
         let (code, summary) = self.finish();
@@ -200,7 +200,7 @@ impl Run {
     }
 }
 
-/// A test that fails leaves nobody behind: the stages go with their supervisor.
+/// A test that fails leaves no process behind: the stages go with their supervisor.
 impl Drop for Run {
     fn drop(&mut self) {
         if let Some(child) = &mut self.child {

@@ -1,5 +1,5 @@
-//! The states of its files in which the middleware lets nobody in any more, each made by hand in the middle of a
-//! mission: it goes on without a hand.
+//! The states of the middleware's files in which it lets no process join any more, each made by a test in the middle of
+//! a mission: the mission goes on by itself.
 
 use std::{
     fs,
@@ -72,8 +72,8 @@ fn assert_arrives(robot: &str, run: Run) -> Value {
     summary
 }
 
-/// That the bus was made anew is seen on every stage: each has had another life.
-fn assert_renewed(summary: &Value) {
+/// That the bus was recreated is seen on every stage: each was started again.
+fn assert_bus_was_recreated(summary: &Value) {
     for stage in STAGES {
         let restarts = summary["restarts"][stage].as_u64();
         assert!(restarts >= Some(1), "{stage}: {summary}");
@@ -81,10 +81,10 @@ fn assert_renewed(summary: &Value) {
 }
 
 #[test]
-fn a_connection_half_made_by_a_stage_that_was_killed_is_in_nobodys_way() {
-    let mut run = Run::start("jam-own", "obstacle-course", &PACE);
+fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
+    let mut run = Run::start("block-own", "obstacle-course", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let domain = domain("jam-own");
+    let domain = domain("block-own");
     let mapper = pid(&status, "mapper");
     let ports = shared(&domain, ".data");
     let port = ports.iter().find_map(|name| {
@@ -96,17 +96,17 @@ fn a_connection_half_made_by_a_stage_that_was_killed_is_in_nobodys_way() {
     run.kill_and_await_successor("mapper", Signal::KILL);
     // Not after a start-up that was too late.
     assert!(began.elapsed().as_secs() < 3, "{:?}", began.elapsed());
-    let summary = assert_arrives("jam-own", run);
+    let summary = assert_arrives("block-own", run);
     assert_eq!(summary["restarts"]["mapper"], 1, "{summary}");
     assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
 }
 
 #[test]
-fn a_connection_half_made_by_who_knows_whom_jams_one_start_at_most() {
-    let mut run = Run::start("jam-other", "obstacle-course", &PACE);
+fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
+    let mut run = Run::start("block-other", "obstacle-course", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let domain = domain("jam-other");
-    // Of the dead mapper, by its tags, but with a number that is not its own.
+    let domain = domain("block-other");
+    // Of the killed mapper, by its tags, but with a number that is not its own.
     let port = 7;
     let node = nodes_of(&domain, pid(&status, "mapper")).remove(0);
     let tag = format!("{}{port}.port_tag", domain.shared_memory_prefix());
@@ -118,30 +118,30 @@ fn a_connection_half_made_by_who_knows_whom_jams_one_start_at_most() {
         assert!(began.elapsed() < PATIENCE, "it stays");
         run.status();
     }
-    let summary = assert_arrives("jam-other", run);
+    let summary = assert_arrives("block-other", run);
     let restarts = summary["restarts"]["mapper"].as_u64().unwrap();
     assert!((1..=2).contains(&restarts), "{summary}");
     assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
 }
 
 #[test]
-fn a_half_made_service_jams_starts_until_the_bus_is_made_anew() {
-    let mut run = Run::start("jam-service", "obstacle-course", &PACE);
+fn a_half_made_service_blocks_starts_until_the_bus_is_recreated() {
+    let mut run = Run::start("block-service", "obstacle-course", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let services = domain("jam-service").middleware_root().join("services");
+    let services = domain("block-service").middleware_root().join("services");
     for service in fs::read_dir(services).unwrap() {
         half_make(&service.unwrap().path());
     }
     run.kill_and_await("planner", Signal::KILL, &status);
-    assert_renewed(&assert_arrives("jam-service", run));
+    assert_bus_was_recreated(&assert_arrives("block-service", run));
 }
 
 #[test]
-fn places_in_a_topic_that_nobody_gives_back_jam_starts_until_the_bus_is_made_anew() {
+fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_recreated() {
     in_own_process(|| {
-        let mut run = Run::start("jam-places", "obstacle-course", &PACE);
+        let mut run = Run::start("block-places", "obstacle-course", &PACE);
         let status = run.wait_until_under_way(1.0);
-        let bus = Bus::join(&domain("jam-places"), "greedy").unwrap();
+        let bus = Bus::join(&domain("block-places"), "greedy").unwrap();
         let mut places = Vec::new();
         let mut take_all = || {
             loop {
@@ -150,7 +150,7 @@ fn places_in_a_topic_that_nobody_gives_back_jam_starts_until_the_bus_is_made_ane
                     Err(error) if error.to_string().contains("ExceedsMax") => {
                         return Some(places.len());
                     }
-                    // Two starts were refused already, and this bus is going.
+                    // Two starts were refused already, and this bus is being removed.
                     Err(_) => return None,
                 }
             }
@@ -167,22 +167,22 @@ fn places_in_a_topic_that_nobody_gives_back_jam_starts_until_the_bus_is_made_ane
                 }
             }
             let generation = find(&status, "dead-reckoning")["generation"].as_u64();
-            status = run.wait_until("it lives again", |status| {
+            status = run.wait_until("its successor runs", |status| {
                 let stage = find(status, "dead-reckoning");
                 stage["generation"].as_u64() > generation && stage["state"] == "running"
             });
         }
-        // Never given back: as when their owners were killed in a bad moment.
+        // Never given back: as when their owners were killed while they held them.
         std::mem::forget((places, bus));
-        assert_renewed(&assert_arrives("jam-places", run));
+        assert_bus_was_recreated(&assert_arrives("block-places", run));
     });
 }
 
 #[test]
-fn node_files_of_the_dead_are_swept() {
-    let mut run = Run::start("jam-nodes", "obstacle-course", &PACE);
+fn node_files_of_processes_that_ended_are_removed() {
+    let mut run = Run::start("block-nodes", "obstacle-course", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let domain = domain("jam-nodes");
+    let domain = domain("block-nodes");
     let mapper = pid(&status, "mapper");
     let nodes = domain.middleware_root().join("nodes");
     // As left by hundreds of processes killed while they joined; of the number, the process alone counts.
@@ -193,14 +193,14 @@ fn node_files_of_the_dead_are_swept() {
         fs::write(nodes.join(monitor), [0; 16]).unwrap();
     }
     let status = run.kill_and_await_successor("mapper", Signal::KILL);
-    let living: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
+    let running: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
     let began = Instant::now();
     while !nodes_of(&domain, mapper).is_empty() {
         assert!(began.elapsed() < PATIENCE, "node files stay");
         run.status();
     }
-    for pid in living {
-        assert_eq!(nodes_of(&domain, pid).len(), 1, "of the living");
+    for pid in running {
+        assert_eq!(nodes_of(&domain, pid).len(), 1, "of a running process");
     }
-    assert_arrives("jam-nodes", run);
+    assert_arrives("block-nodes", run);
 }
