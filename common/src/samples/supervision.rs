@@ -358,6 +358,8 @@ wire_enum! {
         HazardAroundRobot = 4,
         /// A closed wall believed around the target, whatever is forgotten.
         CutOff = 5,
+        /// Beats, and no output.
+        Mute = 6,
     }
 }
 
