@@ -37,6 +37,8 @@ pub mod journal;
 pub mod kinematics;
 pub mod latency;
 pub mod mission;
+pub mod process_status;
+pub mod roster;
 pub mod run;
 pub mod samples;
 pub mod shell;
