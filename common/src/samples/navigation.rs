@@ -3,9 +3,8 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::Stamp;
 use crate::{
-    bus::ZeroCopySend,
+    bus::{Stamp, ZeroCopySend},
     grid::{GridFrame, Revision, Window},
     kinematics::{Pose2, Twist},
 };

@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use common::{
+    ground_truth::GroundTruthTick,
     samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
     topics::{self, AnyTopic as _, SUPERVISOR},
-    truth::TruthTick,
 };
 use rustix::process::{Pid, kill_process};
 
@@ -145,7 +145,7 @@ impl Attack {
     }
 
     /// How far the last published pose was from the ground truth of its tick, metres; none without both.
-    pub(crate) fn pose_error(&self, truth: &[TruthTick]) -> Option<f64> {
+    pub(crate) fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
         Some(tick.pose_error_m(&pose))

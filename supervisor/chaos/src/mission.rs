@@ -125,7 +125,7 @@ pub(crate) fn attack(
         let truth = robot.truth();
         let last = truth.last();
         end.collisions = last.map_or(0, |tick| tick.contacts);
-        end.stopping_time_s = last.map_or(0.0, |tick| tick.unattended_s);
+        end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - number(undisturbed, "pose_error_m");
     }

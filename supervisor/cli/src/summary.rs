@@ -3,7 +3,8 @@
 use std::{collections::BTreeMap, fmt};
 
 use common::{
-    clock::MissionTime, latency::Histogram, mission::Mission, samples::PoseSample, truth::TruthTick,
+    clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
+    samples::PoseSample,
 };
 use serde::Serialize;
 
@@ -101,12 +102,13 @@ impl Summary {
                 _ => pose.map_or(0.0, |pose| pose.travelled_m),
             },
             straight_m: mission.target.length(),
-            min_clearance_m: clearance.filter(|&clearance| clearance < TruthTick::NOTHING_NEAR),
+            min_clearance_m: clearance
+                .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             collisions,
             pose_error_m: pose
                 .zip(truth.last())
                 .map(|(pose, truth)| truth.pose_error_m(pose)),
-            stopping_time_s: truth.last().map(|tick| tick.unattended_s),
+            stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves,
             local_updates,
@@ -203,14 +205,14 @@ impl fmt::Display for Summary {
 
 /// The ground truth up to the tick of `pose`. All of it when the run did not end by arriving.
 fn truth_until<'a>(
-    truth: &'a [TruthTick],
+    truth: &'a [GroundTruthTick],
     pose: Option<&PoseSample>,
     arrived: bool,
-) -> &'a [TruthTick] {
+) -> &'a [GroundTruthTick] {
     if !arrived {
         return truth;
     }
-    let shows = |tick: &TruthTick| pose.is_some_and(|pose| tick.is_of(pose));
+    let shows = |tick: &GroundTruthTick| pose.is_some_and(|pose| tick.is_of(pose));
     let end = truth.iter().rposition(shows).map_or(truth.len(), |last| {
         // A robot at rest shows the same counts for many ticks: the first of them is the arrival.
         truth[..=last]
@@ -221,7 +223,7 @@ fn truth_until<'a>(
     &truth[..truth.len().min(end + 1)]
 }
 
-fn path_length(truth: &[TruthTick]) -> f64 {
+fn path_length(truth: &[GroundTruthTick]) -> f64 {
     truth
         .windows(2)
         .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))

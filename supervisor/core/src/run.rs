@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use common::{
     domain::Domain,
+    ground_truth::GroundTruthTick,
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
-    truth::TruthTick,
 };
 
 use crate::{
@@ -25,7 +25,7 @@ pub struct Finished {
     /// What was read from the bus.
     pub record: Record,
     /// What really happened, of a simulated robot.
-    pub truth: Vec<TruthTick>,
+    pub truth: Vec<GroundTruthTick>,
     /// Times each stage was started again.
     pub restarts: BTreeMap<&'static str, u32>,
     /// Times another supervisor went on with the run.

@@ -12,10 +12,9 @@ use std::{
 
 use common::{
     clock::Pace,
+    ground_truth::{GroundTruthHeader, GroundTruthTick},
     mission::Mission,
-    run,
-    truth::{TruthHeader, TruthTick},
-    waiter::Waiter,
+    poll, run,
 };
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
@@ -62,7 +61,7 @@ struct GroundTruth {
     /// The beginning of a line.
     unfinished: Vec<u8>,
     listening: Option<SocketAddr>,
-    ticks: Vec<TruthTick>,
+    ticks: Vec<GroundTruthTick>,
 }
 
 impl Simulator {
@@ -85,7 +84,7 @@ impl Simulator {
             mission,
             "--pace",
             &pace.to_string(),
-            "--truth",
+            "--ground-truth",
             "--supervisor",
             &std::process::id().to_string(),
         ]);
@@ -119,8 +118,7 @@ impl Simulator {
                 return Err(SimulatorError::Startup(words.trim().to_owned()));
             }
             let descriptors = [truth.pipe.as_fd(), process.as_fd()];
-            let waited = Waiter::default().wait_also_for(&descriptors, STARTUP);
-            waited.map_err(|error| system("wait for")(io::Error::other(error)))?;
+            poll::readable(&descriptors, Some(STARTUP)).map_err(system("wait for"))?;
         }
     }
 
@@ -141,7 +139,7 @@ impl Simulator {
     }
 
     /// The ground truth, tick by tick.
-    pub fn truth(&self) -> &[TruthTick] {
+    pub fn truth(&self) -> &[GroundTruthTick] {
         &self.truth.ticks
     }
 
@@ -179,7 +177,7 @@ impl GroundTruth {
         let rest = self.unfinished.split_off(end + 1);
         for line in self.unfinished.split(|&byte| byte == b'\n') {
             if self.listening.is_none() {
-                let header = serde_json::from_slice::<TruthHeader>(line).ok();
+                let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();
                 self.listening = header.and_then(|header| header.listening.parse().ok());
             } else if let Ok(tick) = serde_json::from_slice(line) {
                 self.ticks.push(tick);

@@ -148,7 +148,7 @@ impl StageProcesses {
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
                 let mut death = stage.record_death(cause, &self.directory, now);
-                if let Err(error) = bus.make_way(death.pid) {
+                if let Err(error) = bus.remove_unfinished(death.pid) {
                     tracing::warn!(stage = death.stage, %error, "cannot prepare the bus for its successor");
                 }
                 let event = if death.was_refused() {

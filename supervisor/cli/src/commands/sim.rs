@@ -5,8 +5,8 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 use clap::{Args, ValueEnum};
 use common::{
     clock::Pace,
-    shell::become_child,
     signals::{SIGINT, SIGTERM, Signals},
+    start::become_child,
 };
 use x80_sim::SimOptions;
 
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     keep: Option<PathBuf>,
     /// Write the ground truth to standard output, a JSON object a line.
     #[arg(long)]
-    truth: bool,
+    ground_truth: bool,
     /// End when this process, the parent, ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
@@ -78,7 +78,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         transport: arguments.transport.into(),
         keep: arguments.keep.clone(),
         truth: arguments
-            .truth
+            .ground_truth
             .then(|| Box::new(std::io::stdout()) as Box<_>),
     };
     x80_sim::run(options, &signals)?;

@@ -1,6 +1,6 @@
-//! What a simulated robot tells of itself: one JSON object a line, for the summary and the pictures.
+//! The ground truth of a simulated robot: one JSON object a line, for the summary and the pictures.
 //!
-//! The first line is a [`TruthHeader`], every further one a [`TruthTick`]. No stage reads it.
+//! The first line is a [`GroundTruthHeader`], every further one a [`GroundTruthTick`]. No stage reads it.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,14 +8,14 @@ use crate::samples::PoseSample;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TruthHeader {
+pub struct GroundTruthHeader {
     /// Where the robot answers, `address:port`.
     pub listening: String,
 }
 
 /// One line a tick, written when the tick's frames are made; tick 0 comes before anything has moved.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TruthTick {
+pub struct GroundTruthTick {
     /// Number of the tick.
     pub tick: u64,
     /// Mission time, seconds.
@@ -31,7 +31,7 @@ pub struct TruthTick {
     /// Turn rate, rad/s.
     pub omega: f64,
     /// Least distance since the tick before from the body's surface to the nearest thing, metres;
-    /// [`TruthTick::NOTHING_NEAR`] where nothing stands.
+    /// [`GroundTruthTick::NOTHING_NEAR`] where nothing stands.
     pub clearance_m: f64,
     /// How often the body has touched something so far.
     pub contacts: u64,
@@ -41,18 +41,18 @@ pub struct TruthTick {
     pub right_counts: u16,
     /// The front ultrasonic byte of this tick's frame, centimetres; 255 is nothing.
     pub sonar_cm: u8,
-    /// The longest so far that a wheel turned after the last motion command the robot heard, seconds: how far
-    /// it goes on its own when the host falls silent. Slower than [`TruthTick::AT_REST_M_S`] is at rest.
+    /// The longest so far that a wheel turned after the last motion command the robot received, seconds. Slower than
+    /// [`GroundTruthTick::AT_REST_M_S`] is at rest.
     #[serde(default)]
-    pub unattended_s: f64,
+    pub stopping_time_s: f64,
     /// What the radio has done so far; missing where it is perfect.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub radio: Option<TruthRadio>,
+    pub radio: Option<GroundTruthRadio>,
 }
 
 /// What the radio has done so far, both ways together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TruthRadio {
+pub struct GroundTruthRadio {
     /// Whether it is out now.
     pub out: bool,
     /// Datagrams sent over it.
@@ -63,7 +63,7 @@ pub struct TruthRadio {
     pub longest_outage_s: f64,
 }
 
-impl TruthTick {
+impl GroundTruthTick {
     /// A wheel whose rim is slower than this is at rest, m/s.
     pub const AT_REST_M_S: f64 = 0.01;
     /// Clearance where nothing stands, metres: JSON has no infinity.
