@@ -95,7 +95,7 @@ wire_enum! {
         Running = 2,
         /// Died too often; waits before the next start.
         BackingOff = 3,
-        /// Told to stop.
+        /// Asked to stop, or aborted because it hung.
         Stopping = 4,
         /// Died far too often: only an operator starts it again.
         Held = 5,

@@ -115,7 +115,7 @@ impl Attack {
         };
         let mut next = Instant::now() + schedule.pause();
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
-            // A hit that is overdue waits for the robot to drive, which is heard.
+            // A hit that is overdue waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
             let timeout = due.unwrap_or(POLL).min(self.time_to_startup_hit());
             subscriptions.roster.waiter.wait(timeout.min(POLL))?;

@@ -41,7 +41,7 @@ pub(crate) struct Summary {
     pub(crate) collisions: Option<u64>,
     pub(crate) pose_error_m: Option<f64>,
     /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
-    /// together, in an outage or when a stage dies.
+    /// together, in an outage or when a stage is down.
     pub(crate) stopping_time_s: Option<f64>,
     pub(crate) safety_events: u64,
     pub(crate) full_solves: u64,

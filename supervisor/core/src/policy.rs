@@ -112,12 +112,12 @@ pub enum Phase {
         /// When it is killed.
         kill: Now,
     },
-    /// A process that was told to stop for its successor; that is no death.
+    /// A process that was asked to stop for its successor; that is no death.
     Replaced {
         /// When it is killed.
         kill: Now,
     },
-    /// A process that was told to stop, and no successor is wanted.
+    /// A process that was asked to stop, and no successor is wanted.
     Stopping {
         /// When it is killed.
         kill: Now,

@@ -9,7 +9,7 @@ use crate::observer::Record;
 
 /// How far a run has come, as shown to its user.
 pub struct Progress<'a> {
-    /// What was heard on the bus so far.
+    /// What was read from the bus so far.
     pub record: &'a Record,
     /// Stages that run, of how many.
     pub running: (usize, usize),

@@ -7,7 +7,7 @@ use crate::{
     supervisor::Supervisor,
 };
 
-/// Time the link has to confirm that the robot was told to stand, before it is stopped.
+/// Time the link has to confirm that the robot was ordered to stand, before it is stopped.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
 
 /// The robot to rest, then the stages stopped in reverse order, the link last, then the simulated robot.
@@ -26,7 +26,7 @@ pub(crate) fn stop(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorErro
 /// Recreate the bus under all stages: leftovers of the middleware block the start of one of them. The mission goes on
 /// from the checkpoints of the stages.
 ///
-/// A consumer of the old bus reads nothing more: [`Bus::is_replaced`](common::bus::Bus::is_replaced) tells it.
+/// A consumer of the old bus reads nothing more, and asks [`Bus::is_replaced`](common::bus::Bus::is_replaced).
 pub(crate) fn recreate_bus<'a>(
     mut supervisor: Supervisor<'a>,
     lock: &mut DomainLock,

@@ -158,7 +158,7 @@ impl StageProcesses {
                 };
                 self.apply(index, event, self.now(), first_tick);
                 self.stages[index].record_next(&mut death, self.now());
-                // One that was told to stop, and has stopped, is no death.
+                // One that was asked to stop, and has stopped, is no death.
                 if asked {
                     tracing::info!(stage = death.stage, cause = %death.cause, "stage ended");
                 } else {

@@ -83,7 +83,7 @@ impl Robot {
 /// The supervisor of one run.
 pub(crate) struct Supervisor<'a> {
     options: &'a Options,
-    // Dropped in this order: the stages end before the robot they speak to.
+    // Dropped in this order: the stages end before the robot.
     pub stages: StageProcesses,
     pub robot: Robot,
     pub bus: BusEndpoints,
@@ -163,7 +163,10 @@ impl<'a> Supervisor<'a> {
         self.bus.waiter.on_readable(&*signals)?;
         loop {
             if signals.came() {
-                return Ok(Some(Ending::asked_for(Outcome::Aborted, "told to stop")));
+                return Ok(Some(Ending::asked_for(
+                    Outcome::Aborted,
+                    "stopped by a signal",
+                )));
             }
             if let Some(ending) = self.iterate()? {
                 return Ok(Some(ending));

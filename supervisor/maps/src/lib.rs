@@ -83,7 +83,7 @@ pub enum MapError {
         /// What was given.
         file: PathBuf,
     },
-    /// Nothing in the name tells what it is.
+    /// Nothing in the name says which kind of map it is.
     #[error(
         "{}: not the name of a map; give a .yaml of the ROS map_server, a .pgm or .png image, or a MovingAI .map",
         file.display()

@@ -36,7 +36,7 @@ pub(crate) struct Stop {
     robot: Robot,
 }
 
-/// Let a robot go on that was told to stop.
+/// Let a stopped robot go on.
 #[derive(Debug, Args)]
 pub(crate) struct Resume {
     #[command(flatten)]

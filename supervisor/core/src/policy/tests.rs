@@ -44,7 +44,7 @@ fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
     assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
 }
 
-/// Dies as soon as it is started, until it is held; the time of that.
+/// It exits as soon as it is started, until it is held. Returns the time of that.
 fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
     for _ in 0..100 {
         policy.step(Event::Exited, now);
@@ -56,7 +56,7 @@ fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
             assert_eq!(policy.step(Event::Time, now), Some(Action::Start));
         }
     }
-    panic!("it dies without end: {policy:?}");
+    panic!("it is never held: {policy:?}");
 }
 
 #[test]
@@ -268,7 +268,7 @@ struct Generation {
     ready: Option<Now>,
     /// Its last sign; its start counts.
     sign: Now,
-    /// Told to stop, for a successor or for good: that is no death.
+    /// Asked to stop, for a successor or for good: that is no death.
     stopping: bool,
     /// Aborted.
     aborted: bool,
