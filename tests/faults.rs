@@ -89,11 +89,11 @@ fn a_robot_pinned_by_a_corrupted_field_comes_free_by_a_fresh_planner_by_either_m
 
 #[test]
 fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_forgotten_belief_by_either_method() {
-    for (robot, method) in [("buried", &[][..]), ("buried-p", &PAPER[..])] {
+    for (robot, method) in [("inside", &[][..]), ("inside-p", &PAPER[..])] {
         let (summary, stalls, _) = broken(robot, "mapper", "hazard-around-robot", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
         let first = stalls.iter().find(|stall| stall["recovery"] == "forget");
-        assert_eq!(first.unwrap()["cause"], "buried", "{stalls:?}");
+        assert_eq!(first.unwrap()["cause"], "inside_hazard", "{stalls:?}");
     }
 }
 

@@ -113,7 +113,7 @@ pub(crate) fn stage_table() -> String {
             stage.deadlines.startup.as_millis(),
             stage.deadlines.heartbeat.as_millis(),
             stage.deadlines.answers.as_millis(),
-            stage.million_cells.as_millis(),
+            stage.per_million_cells.as_millis(),
             stage.while_down
         );
     }

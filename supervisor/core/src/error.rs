@@ -5,7 +5,9 @@ use std::io;
 use common::{address::AddressError, bus::BusError, checkpoint::CheckpointError, run::RunError};
 use thiserror::Error;
 
-use crate::{domain::DomainError, simulator::SimulatorError, stage_processes::StageProcessError};
+use crate::{
+    domain_error::DomainError, simulator::SimulatorError, stage_process::StageProcessError,
+};
 
 /// Why a run could not be carried out.
 #[derive(Debug, Error)]
@@ -18,14 +20,14 @@ pub enum SupervisorError {
     Bus(#[from] BusError),
     /// A stage.
     #[error(transparent)]
-    StageProcesses(#[from] StageProcessError),
+    StageProcess(#[from] StageProcessError),
     /// The simulator.
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
     /// The run file.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// What the supervisor keeps.
+    /// The supervisor's checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// The robot's address.
@@ -36,12 +38,13 @@ pub enum SupervisorError {
     System {
         /// What was tried.
         action: String,
-        /// The system's word.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-pub(super) fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SupervisorError {
+/// The system refused to do `action`.
+pub(crate) fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SupervisorError {
     let action = action.into();
     move |source| SupervisorError::System { action, source }
 }
