@@ -13,17 +13,7 @@ use std::{
 use modules::{Crate, tokens};
 
 /// Crates that still have circles.
-const EXCLUDED: [&str; 9] = [
-    "common",
-    "services/planner",
-    "services/planner/harmonic",
-    "services/x80-link",
-    "services/x80-sim",
-    "supervisor/chaos",
-    "supervisor/core",
-    "supervisor/maps",
-    "supervisor/picture",
-];
+const EXCLUDED: [&str; 3] = ["common", "services/x80-link", "services/x80-sim"];
 
 fn root() -> PathBuf {
     fs::canonicalize(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap()
