@@ -19,7 +19,7 @@ use std::{collections::VecDeque, time::Duration};
 use crate::stages::Deadlines;
 
 /// A stage that was ready for so long was stable: its next death is a first one.
-const STABLE_AFTER: Duration = Duration::from_millis(500);
+pub const STABLE_AFTER: Duration = Duration::from_millis(500);
 /// Wait before the second start in a row; doubles with each further one. Less than a start takes: one that is killed in
 /// its start-up was mostly unlucky.
 const FIRST_BACKOFF: Duration = Duration::from_millis(2);
