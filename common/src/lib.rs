@@ -20,6 +20,7 @@
 //! | [`run`] | what the supervisor tells the stages of a run |
 //! | [`signals`] | signals as something to wait for |
 //! | [`shell`] | the process shell every stage runs in |
+//! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | `external` | how a stage that the supervisor did not start finds its place |
 //! | [`wire`] | the X80's protocol: frames and messages |
 //! | [`truth`] | what a simulated robot tells of itself |
@@ -41,12 +42,13 @@ pub mod run;
 pub mod samples;
 pub mod shell;
 pub mod signals;
+pub mod step;
 pub mod topics;
 pub mod truth;
 pub mod waiter;
 pub mod wire;
 
-/// The README's Rust is compiled with the doc tests.
+/// The guide's Rust is compiled with the doc tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-pub struct Readme;
+#[doc = include_str!("../../supervisor/guide/attach.md")]
+pub struct Attach;
