@@ -15,44 +15,43 @@ pub(crate) struct Arguments {
 
 /// A page of the guide.
 struct Page {
-    /// What `firsthand help` calls it.
-    topic: &'static str,
-    /// Where it is, below `supervisor/guide/`.
-    #[cfg(test)]
+    /// Its name below `supervisor/guide/`, without `.md`; the topic is the same in small letters.
     file: &'static str,
     /// Markdown; the first line is its title.
     text: &'static str,
 }
 
 macro_rules! guide {
-    ($($topic:literal: $file:literal),* $(,)?) => {
+    ($($file:literal),* $(,)?) => {
         [$(Page {
-            topic: $topic,
-            #[cfg(test)]
             file: $file,
-            text: include_str!(concat!("../../../guide/", $file)),
+            text: include_str!(concat!("../../../guide/", $file, ".md")),
         }),*]
     };
 }
 
 /// Every page, in the order to read them. None has the name of a subcommand.
 static GUIDE: [Page; 13] = guide! {
-    "method": "method.md",
-    "mission-file": "mission-file.md",
-    "attach": "attach.md",
-    "deploy": "deploy.md",
-    "break-it": "break-it.md",
-    "field-tool": "field-tool.md",
-    "figures": "figures.md",
-    "capabilities": "capabilities.md",
-    "tables": "tables.md",
-    "glossary": "glossary.md",
-    "contributing": "CONTRIBUTING.md",
-    "add-a-stage": "add-a-stage.md",
-    "changelog": "CHANGELOG.md",
+    "method",
+    "mission-file",
+    "attach",
+    "deploy",
+    "break-it",
+    "field-tool",
+    "figures",
+    "capabilities",
+    "tables",
+    "glossary",
+    "CONTRIBUTING",
+    "add-a-stage",
+    "CHANGELOG",
 };
 
 impl Page {
+    fn topic(&self) -> String {
+        self.file.to_ascii_lowercase()
+    }
+
     fn title(&self) -> &'static str {
         self.text
             .lines()
@@ -63,7 +62,9 @@ impl Page {
 }
 
 fn page(topic: &str) -> Option<&'static Page> {
-    GUIDE.iter().find(|page| page.topic == topic)
+    GUIDE
+        .iter()
+        .find(|page| page.file.eq_ignore_ascii_case(topic))
 }
 
 /// The pages, one a line, as the help of the whole command line lists them.
@@ -71,7 +72,7 @@ pub(crate) fn topics() -> String {
     let mut list = String::from("Guide (firsthand help TOPIC):\n");
     for page in &GUIDE {
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "  {:<14} {}", page.topic, page.title());
+        let _ = writeln!(list, "  {:<14} {}", page.topic(), page.title());
     }
     list
 }

@@ -1,4 +1,5 @@
 //! What README and guide say of commands, files and tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
     collections::BTreeSet,
@@ -24,7 +25,7 @@ struct Document {
 fn documents() -> Vec<Document> {
     let pages = GUIDE
         .iter()
-        .map(|page| Path::new("supervisor/guide").join(page.file));
+        .map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
     std::iter::once(PathBuf::from("README.md"))
         .chain(pages)
         .map(|path| Document {
@@ -297,24 +298,14 @@ fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let package = fs::read_to_string(root().join(".ci/package-files")).unwrap();
     for page in &GUIDE {
-        assert!(help.contains(page.title()), "{}", page.topic);
-        assert!(page.text.starts_with("# "), "{} has no title", page.topic);
-        assert!(
-            readme.contains(&format!("`{}`", page.topic)),
-            "{}",
-            page.topic
-        );
-        assert!(
-            package.contains(&format!("supervisor/guide/{}", page.file)),
-            "{}",
-            page.file
-        );
+        let topic = page.topic();
+        assert!(page.text.starts_with("# "), "{topic} has no title");
+        assert!(help.contains(page.title()), "{topic}");
+        assert!(readme.contains(&format!("`{topic}`")), "{topic}");
+        let file = format!("supervisor/guide/{}.md", page.file);
+        assert!(package.contains(&file), "{file}");
         let commands = crate::Arguments::command();
-        assert!(
-            commands.find_subcommand(page.topic).is_none(),
-            "{}",
-            page.topic
-        );
+        assert!(commands.find_subcommand(&topic).is_none(), "{topic}");
     }
     let files = fs::read_dir(root().join("supervisor/guide")).unwrap();
     let written = files.filter(|file| file.as_ref().unwrap().path().extension().is_some());
