@@ -34,7 +34,7 @@ struct Robot {
 
 impl Robot {
     fn start() -> Self {
-        let mut process = firsthand(&["sim", "obstacle-course", "--truth"])
+        let mut process = firsthand(&["sim", "obstacle-course", "--ground-truth"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

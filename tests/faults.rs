@@ -101,7 +101,7 @@ fn a_robot_pinned_by_a_corrupted_field_comes_free_by_a_fresh_planner_by_either_m
 #[test]
 fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_forgotten_belief_by_either_method() {
     for (robot, method) in [("buried", &[][..]), ("buried-p", &PAPER[..])] {
-        let (summary, stalls, _) = broken(robot, "mapper", "bury-robot", method);
+        let (summary, stalls, _) = broken(robot, "mapper", "hazard-around-robot", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
         let first = stalls.iter().find(|stall| stall["recovery"] == "forget");
         assert_eq!(first.unwrap()["cause"], "buried", "{stalls:?}");
@@ -221,7 +221,7 @@ fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor
 fn a_fault_that_nobody_has_is_refused_with_those_there_are() {
     let said = refusal(&["fault", "mapper", "saddle", "--robot", "nobody"]);
     assert!(
-        said.contains("bury-robot") && said.contains("spin"),
+        said.contains("hazard-around-robot") && said.contains("spin"),
         "{said}"
     );
     let said = refusal(&["fault", "wheel", "spin"]);

@@ -88,20 +88,12 @@ fn array(npz: &[u8], name: &str, bytes_each: usize) -> Vec<u8> {
 }
 
 /// u and guidance of the rooms as they are in the file, (u, ex, ey) a cell.
-fn solved(absorption: &str) -> Vec<(f64, f64, f64)> {
+fn solved(screening: &[&str]) -> Vec<(f64, f64, f64)> {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("rooms.npz");
-    report(
-        &write_map(directory.path()),
-        &[
-            "--target-cell",
-            "3,12",
-            "--absorption",
-            absorption,
-            "--out",
-            out.to_str().unwrap(),
-        ],
-    );
+    let mut arguments = vec!["--target-cell", "3,12", "--out", out.to_str().unwrap()];
+    arguments.extend(screening);
+    report(&write_map(directory.path()), &arguments);
     let npz = std::fs::read(out).unwrap();
     let mantissas = array(&npz, "mantissa", 8);
     let exponents = array(&npz, "exponent", 4);
@@ -126,8 +118,10 @@ const CLOSET: usize = 9 * 24 + 19;
 
 #[test]
 fn u_in_the_file_is_the_mean_of_its_neighbours_over_1_plus_k() {
-    for (absorption, k) in [("0", 0.0), ("0.02", 0.02)] {
-        let cells = solved(absorption);
+    // A screening length of 2.5 cells: k = (1 / (2 x 2.5))^2.
+    let screened = ["--screening-cells", "2.5"];
+    for (screening, k) in [(&[][..], 0.0), (&screened[..], 0.04)] {
+        let cells = solved(screening);
         let free: Vec<bool> = rooms().concat().bytes().map(|cell| cell == b'.').collect();
         for (at, &(u, ..)) in cells.iter().enumerate() {
             if !free[at] || at == CLOSET {
@@ -145,7 +139,7 @@ fn u_in_the_file_is_the_mean_of_its_neighbours_over_1_plus_k() {
 
 #[test]
 fn guidance_in_the_file_is_uphill_with_y_down_and_of_unit_length() {
-    let cells = solved("0");
+    let cells = solved(&[]);
     for (at, &(u, ex, ey)) in cells.iter().enumerate() {
         if u == 0.0 || at == TARGET {
             assert_eq!((ex, ey), (0.0, 0.0), "cell {at}");
@@ -239,8 +233,17 @@ fn a_target_that_is_none_is_answered_with_the_nearest_that_is() {
         );
     }
     assert!(refusal(&map, &["--target-cell", "3;4"]).contains("column"));
-    assert!(refusal(&map, &["--target-cell", "3,12", "--absorption", "-1"]).contains("absorption"));
-    assert!(refusal(&map, &["--target-cell", "3,12", "--absorption", "nan"]).contains("NaN"));
+    for (length, named) in [
+        ("-1", "-1 cells"),
+        ("0", "screening length"),
+        ("nan", "NaN"),
+    ] {
+        let text = refusal(
+            &map,
+            &["--target-cell", "3,12", "--screening-cells", length],
+        );
+        assert!(text.contains(named), "{length} gave {text}");
+    }
 }
 
 #[test]

@@ -314,7 +314,7 @@ fn a_stage_without_a_place_is_refused_with_the_remedy() {
     let (mut run, units) = watching("taken");
     run.wait_until_under_way(0.5);
     let second = refused("mapper", "taken");
-    assert!(second.contains("lives already"), "{second}");
+    assert!(second.contains("runs already"), "{second}");
     run.signal(Signal::TERM);
     run.finish();
     drop(units);

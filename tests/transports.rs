@@ -39,7 +39,7 @@ struct Robot {
 impl Robot {
     fn start(mission: &Path, transport: &str, listen: &str) -> Self {
         let mission = mission.to_str().unwrap();
-        let arguments = ["sim", mission, "--truth", "--transport", transport];
+        let arguments = ["sim", mission, "--ground-truth", "--transport", transport];
         let mut process = firsthand(&arguments)
             .args(["--listen", listen])
             .stdout(Stdio::piped())

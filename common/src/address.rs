@@ -1,4 +1,4 @@
-//! Where a robot answers and over what: as a mission writes it, and as its link opens it.
+//! A robot's address: where it answers and over which transport, as a mission writes it and as its link opens it.
 
 use std::{
     fmt,
@@ -14,7 +14,7 @@ use thiserror::Error;
 pub const FORMS: &str =
     "give \"host:port\", \"udp://host:port\", \"tcp://host:port\" or \"serial:///dev/ttyUSB0\"";
 
-/// Where a robot answers, and over what. `Host` is text in a mission and a number once it is resolved.
+/// Where a robot answers, and over which transport. `Host` is text in a mission and a number once it is resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address<Host = SocketAddr> {
     /// Datagrams, the default: `host:port` or `udp://host:port`.
@@ -25,7 +25,7 @@ pub enum Address<Host = SocketAddr> {
     Serial(PathBuf),
 }
 
-/// Why text is no address, or leads nowhere.
+/// Why text is no address, or its host cannot be found.
 #[derive(Debug, Error)]
 pub enum AddressError {
     /// It is not written as an address.
@@ -43,7 +43,7 @@ pub enum AddressError {
     Host {
         /// As it was given.
         address: String,
-        /// The resolver's word.
+        /// What the resolver reports.
         source: std::io::Error,
     },
 }
@@ -71,7 +71,7 @@ impl FromStr for Address<String> {
             return if rest.starts_with('/') {
                 Ok(Self::Serial(rest.into()))
             } else {
-                Err(refused("names no device by its whole path"))
+                Err(refused("names no device by its absolute path"))
             };
         }
         let (host, port) = rest
@@ -81,7 +81,7 @@ impl FromStr for Address<String> {
             let bracketed = host.starts_with('[') && host.ends_with(']');
             let plain = |c: char| !c.is_whitespace() && c != '/' && (c != ':' || bracketed);
             if host.is_empty() || !host.chars().all(plain) {
-                return Err(refused("has no host that could be one"));
+                return Err(refused("has no valid host"));
             }
         } else {
             return Err(refused("has no port from 1 to 65535"));
@@ -89,7 +89,7 @@ impl FromStr for Address<String> {
         match over {
             "udp" => Ok(Self::Udp(rest.to_owned())),
             "tcp" => Ok(Self::Tcp(rest.to_owned())),
-            _ => Err(refused("begins with nothing a robot is spoken to over")),
+            _ => Err(refused("begins with no known transport")),
         }
     }
 }

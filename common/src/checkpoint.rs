@@ -1,9 +1,9 @@
 //! State that outlives a SIGKILL: a small file of two slots, written in turn.
 //!
 //! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older
-//! slot, so a kill at any instruction leaves at least one whole; the checksum tells which. Nothing is
+//! slot, so a kill at any instruction leaves at least one whole; the checksum shows which. Nothing is
 //! synced to the disk: the kernel keeps what a killed process has written, and a robot that lost
-//! power has lost its encoders too.
+//! power has lost its encoder counts too.
 
 use std::{
     fs::{File, OpenOptions},
@@ -27,7 +27,7 @@ pub enum CheckpointError {
         action: &'static str,
         /// The file.
         file: PathBuf,
-        /// The system's word.
+        /// What the system reports.
         source: io::Error,
     },
     /// More state than the checkpoint was made for.
@@ -47,7 +47,7 @@ pub enum CheckpointError {
     Encode {
         /// The file.
         file: PathBuf,
-        /// The encoder's word.
+        /// What the encoder reports.
         source: postcard::Error,
     },
 }

@@ -1,6 +1,6 @@
 //! Mission time, the pace it runs at, and the machine's own monotonic clock.
 //!
-//! Samples carry mission time. Deadlines that guard against dead processes use [`monotonic_ns`].
+//! Samples carry mission time. Deadlines that detect processes which ended or hang use [`monotonic_ns`].
 
 use std::{fmt, str::FromStr, time::Duration};
 

@@ -1,4 +1,4 @@
-//! Where a robot lives on this machine: its name, its runtime directory, its corner of shared memory.
+//! A robot's domain on this machine: its name, its runtime directory, and the prefix of its files in shared memory.
 //!
 //! Two robots share nothing: each has its own directory, lock, prefix in `/dev/shm` and services.
 
@@ -61,17 +61,17 @@ impl fmt::Display for RobotName {
 /// The directory of shared memory on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A robot's corner of this machine.
+/// What belongs to one robot on this machine, for one user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
-    /// Whose it is.
+    /// The robot.
     pub robot: RobotName,
     user: u32,
     directory: PathBuf,
 }
 
 impl Domain {
-    /// The corner of `robot` for the user this process runs as.
+    /// The domain of `robot` for the user this process runs as.
     #[must_use]
     pub fn of(robot: RobotName) -> Self {
         let user = rustix::process::geteuid().as_raw();
@@ -85,25 +85,25 @@ impl Domain {
         }
     }
 
-    /// Holds everything below; only its owner may enter.
+    /// Holds the files below; only its owner may enter.
     #[must_use]
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// Held exclusively by the supervisor as long as it lives.
+    /// Locked exclusively by the supervisor as long as it runs.
     #[must_use]
     pub fn lock_file(&self) -> PathBuf {
         self.directory.join("lock")
     }
 
-    /// Held, shared, by every stage as long as it lives: a new supervisor waits for the last one's.
+    /// Locked, shared, by every stage as long as it runs: a new supervisor waits for the stages of the last one.
     #[must_use]
     pub fn stages_lock_file(&self) -> PathBuf {
         self.directory.join("stages.lock")
     }
 
-    /// Count as a process of this domain until the result is dropped, or the process dies.
+    /// Count as a process of this domain until the result is dropped or the process ends.
     ///
     /// # Errors
     /// When there is no domain.
@@ -113,7 +113,7 @@ impl Domain {
         Ok(lock)
     }
 
-    /// Leads to the run directory where a supervisor leaves it to others to start its stages.
+    /// A link to the run directory, made by a supervisor that leaves it to others to start the stages.
     #[must_use]
     pub fn run_link(&self) -> PathBuf {
         self.directory.join("run")
@@ -126,7 +126,7 @@ impl Domain {
         Path::new(SHARED_MEMORY).join(self.shared_memory_prefix() + "bus")
     }
 
-    /// Where they are moved to be removed.
+    /// Where that directory is moved to be removed.
     #[must_use]
     pub fn middleware_root_aside(&self) -> PathBuf {
         Path::new(SHARED_MEMORY).join(self.shared_memory_prefix() + "bus.old")
@@ -138,7 +138,7 @@ impl Domain {
         self.directory.join("iceoryx2.toml")
     }
 
-    /// The same while the bus is being made: nobody joins before it is whole.
+    /// The same while the bus is being made: nobody can join before it is complete.
     #[must_use]
     pub fn middleware_config_unfinished(&self) -> PathBuf {
         self.directory.join("iceoryx2.toml.unfinished")

@@ -1,7 +1,8 @@
-//! A stage that somebody else started (systemd, a person): it finds the run, its place in it, and the supervisor.
+//! External stages: processes that something other than the supervisor started (systemd, a person). Each finds the
+//! run, its place in it, and the supervisor.
 //!
-//! A supervisor that leaves its stages to others links its run directory into the robot's domain, and says in the
-//! roster which of them are down. A stage takes its place when the roster shows it free.
+//! A supervisor that only watches links its run directory into the robot's domain, and publishes in the roster which
+//! stages have no process. A stage takes its place when the roster shows it free.
 
 use std::{
     fs,
@@ -16,15 +17,15 @@ use crate::{
     domain::{Domain, RobotName},
     run::{self, Run},
     samples::{Order, name_str},
-    shell::{Generation, Joined, StageError, enter, name_process},
+    start::{Generation, Joined, StageError, enter, name_process},
     topics,
     waiter::Waiter,
 };
 
-/// The roster comes five times a second, and a place whose holder has died is free in the next.
+/// The roster is published five times a second, and the place of a process that has ended is free in the next.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Take the place of `stage` in what `robot` does.
+/// Take the place of `stage` in the run of `robot`.
 pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
     name_process(stage)?;
     let domain = Domain::of(robot.clone());
@@ -61,7 +62,7 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
     })
 }
 
-/// What the roster says of a free place.
+/// What the roster says about a free place.
 struct Place {
     first_tick: u64,
     supervisor: OwnedFd,
@@ -93,14 +94,14 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
         waiter.wait(PATIENCE)?;
     }
     Err(StageError::Other(match holder {
-        Some(pid) => format!("{stage} lives already, as process {pid}; end that one first"),
-        None => "no supervisor speaks on the robot's bus; is it frozen?".to_owned(),
+        Some(pid) => format!("{stage} runs already, as process {pid}; end that one first"),
+        None => "no supervisor publishes on the robot's bus; is it frozen?".to_owned(),
     }))
 }
 
-/// A descriptor that becomes readable when the supervisor ends. It spoke a moment ago: the number is still its own.
+/// A descriptor that becomes readable when the supervisor ends. It published a moment ago: the number is still its own.
 fn watch(pid: u32) -> Result<OwnedFd, StageError> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
-    let gone = || StageError::Other("the supervisor is gone".to_owned());
+    let gone = || StageError::Other("the supervisor has ended".to_owned());
     pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())
 }

@@ -1,12 +1,11 @@
-//! THE table of faults: what can be broken in a running stage on purpose, to see the rest cope.
+//! THE table of faults: what can be broken in a running stage on purpose, to see whether the others go on.
 //!
-//! `firsthand fault`, its help and the README read it. Every stage listens to the topic `faults` in its
-//! [`crate::shell`], which refuses them on a real robot unless the request says that it means one.
+//! `firsthand fault`, its help and the README read it. Every stage reads the topic `faults` in its process shell, which
+//! refuses them on a real robot unless the request says that it means a real one.
 
 use crate::{
     bus::{Bus, BusError, Reader},
     samples::{FaultAnswer, FaultKind, FaultSample, name_str},
-    shell::Generation,
     topics,
 };
 
@@ -35,8 +34,8 @@ pub static TABLE: [Fault; 5] = [
         ends: "the stage is aborted as hung, and started again",
     },
     Fault {
-        kind: FaultKind::BuryRobot,
-        name: "bury-robot",
+        kind: FaultKind::HazardAroundRobot,
+        name: "hazard-around-robot",
         stage: Some("mapper"),
         meaning: "hazard believed 0.5 m around the robot, wherever it goes: it stands where u = 0",
         ends: "what was sensed is forgotten",
@@ -60,7 +59,7 @@ pub static TABLE: [Fault; 5] = [
         name: "saddle",
         stage: Some("planner"),
         meaning: "no direction, as where the gradient is zero",
-        ends: "the planner is a fresh one",
+        ends: "the planner is replaced by a new process",
     },
 ];
 
@@ -77,10 +76,10 @@ pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
         .filter(move |fault| fault.stage.is_none_or(|its| its == stage))
 }
 
-/// What to make of a request, before the stage itself is asked: the fault, or the answer that ends the matter.
+/// What to do with a request, before the stage itself is asked: inject the fault, or give an answer at once.
 ///
 /// # Errors
-/// With the answer, when the robot is a real one and not meant, or the stage has no such fault.
+/// With the answer, when the robot is a real one and the request does not say so, or the stage has no such fault.
 pub fn admit(
     request: &FaultSample,
     stage: &str,
@@ -101,11 +100,11 @@ pub fn admit(
 pub(crate) struct Asked {
     /// Its id.
     pub(crate) id: u64,
-    /// What to make of it, as [`admit`] says.
+    /// What to do with it, as [`admit`] says.
     pub(crate) fault: Result<FaultKind, FaultAnswer>,
 }
 
-/// What operators ask of one stage's process.
+/// The requests of operators to one stage's process.
 #[derive(Debug)]
 pub(crate) struct Requests {
     requests: Reader<FaultSample>,
@@ -114,14 +113,10 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    pub(crate) fn open(
-        bus: &Bus,
-        generation: &Generation,
-        simulated: bool,
-    ) -> Result<Self, BusError> {
+    pub(crate) fn open(bus: &Bus, stage: &'static str, simulated: bool) -> Result<Self, BusError> {
         Ok(Self {
             requests: bus.reader(&topics::FAULTS)?,
-            stage: generation.stage,
+            stage,
             simulated,
         })
     }
@@ -153,30 +148,30 @@ mod tests {
     }
 
     #[test]
-    fn a_real_robot_is_broken_only_when_it_is_meant() {
-        let careless = request(FaultKind::Saddle, false);
+    fn a_fault_in_a_real_robot_needs_a_request_that_says_so() {
+        let unspecific = request(FaultKind::Saddle, false);
         assert_eq!(
-            admit(&careless, "planner", false),
+            admit(&unspecific, "planner", false),
             Err(FaultAnswer::Refused)
         );
-        assert_eq!(admit(&careless, "planner", true), Ok(FaultKind::Saddle));
+        assert_eq!(admit(&unspecific, "planner", true), Ok(FaultKind::Saddle));
         let meant = request(FaultKind::Saddle, true);
         assert_eq!(admit(&meant, "planner", false), Ok(FaultKind::Saddle));
     }
 
     #[test]
-    fn a_stage_is_not_broken_by_another_ones_fault_nor_by_an_unheard_of_one() {
+    fn a_stage_has_neither_the_faults_of_others_nor_unknown_ones() {
         let request = request(FaultKind::Saddle, true);
         assert_eq!(
             admit(&request, "mapper", true),
             Err(FaultAnswer::Impossible)
         );
-        let unheard_of = FaultSample {
+        let unknown = FaultSample {
             kind: 200,
             ..request
         };
         assert_eq!(
-            admit(&unheard_of, "planner", true),
+            admit(&unknown, "planner", true),
             Err(FaultAnswer::Impossible)
         );
     }

@@ -1,10 +1,9 @@
-//! A large state that outlives a SIGKILL: a snapshot now and then, and what happened since.
+//! A large state that outlives a SIGKILL: a snapshot now and then, and the changes since.
 //!
 //! The state is the fold of its entries. An entry is appended when it happens, which takes the time of a
-//! small write however large the state is; a restart that begins takes the snapshot and folds into it what
-//! came after. An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an
+//! small write however large the state is; a new process restores the snapshot and folds the later entries into it. An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an
 //! append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
-//! leaves entries that the snapshot holds already, which their numbers tell.
+//! leaves entries that the snapshot holds already, which their numbers show.
 
 use std::{
     fs::{File, OpenOptions},
@@ -18,8 +17,8 @@ use crate::checkpoint::{Checkpoint, CheckpointError, failed};
 
 /// Entries after which a snapshot is due at the soonest and at the latest.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
-/// In between, an entry more for so many bytes of the state: to write them takes about as long as to fold an entry,
-/// which a new restart must do with each before it is ready.
+/// In between, one more entry for each so many bytes of the state: to write them takes about as long as to fold an
+/// entry, which a new process does with each before it is ready.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
@@ -44,9 +43,9 @@ pub struct Journal {
     snapshot_after: u64,
 }
 
-/// What an earlier restart left.
+/// What an earlier process saved.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Kept<S, E> {
+pub struct Restored<S, E> {
     /// The last snapshot.
     pub state: Option<S>,
     /// What happened after it, oldest first.
@@ -69,7 +68,7 @@ impl Journal {
     pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
         path: &Path,
         capacity: usize,
-    ) -> Result<(Self, Kept<S, E>), CheckpointError> {
+    ) -> Result<(Self, Restored<S, E>), CheckpointError> {
         let (snapshots, snapshot) = Checkpoint::open::<Snapshot<S>>(path, capacity + NUMBER)?;
         let path = path.with_extension("journal");
         let file = OpenOptions::new()
@@ -93,7 +92,7 @@ impl Journal {
             snapshot_after: snapshot_after(capacity),
         };
         let entries = journal.read()?;
-        Ok((journal, Kept { state, entries }))
+        Ok((journal, Restored { state, entries }))
     }
 
     /// The entries after the snapshot; whatever follows the last whole one is cut off.
@@ -127,7 +126,7 @@ impl Journal {
         cut.map_err(failed("shorten", &self.path))
     }
 
-    /// Note what happened.
+    /// Append an entry.
     ///
     /// # Errors
     /// When the file system refuses.
@@ -158,14 +157,14 @@ impl Journal {
         Ok(())
     }
 
-    /// Whether so much happened since the last snapshot that one is due. It takes the time of writing the
-    /// whole state: at a moment when nobody waits.
+    /// Whether there are so many entries since the last snapshot that one is due. Saving it takes the time of
+    /// writing the whole state: do it when nobody waits.
     #[must_use]
     pub const fn is_long(&self) -> bool {
         self.number - self.first >= self.snapshot_after
     }
 
-    /// Keep `state`, into which every entry so far is folded, and forget the entries.
+    /// Save `state`, into which every entry so far is folded, and empty the journal.
     ///
     /// # Errors
     /// When the file system refuses, or the state is larger than was said at opening.
@@ -211,18 +210,18 @@ mod tests {
 
     type Sum = u64;
 
-    fn open(path: &Path) -> (Journal, Kept<Sum, u64>) {
+    fn open(path: &Path) -> (Journal, Restored<Sum, u64>) {
         Journal::open(path, 64).unwrap()
     }
 
-    /// The state as a new restart sees it.
+    /// The state as a new process restores it.
     fn folded(path: &Path) -> Sum {
-        let kept = open(path).1;
-        kept.state.unwrap_or_default() + kept.entries.iter().sum::<u64>()
+        let restored = open(path).1;
+        restored.state.unwrap_or_default() + restored.entries.iter().sum::<u64>()
     }
 
     #[test]
-    fn a_new_life_folds_what_happened_into_the_snapshot() {
+    fn a_new_process_folds_the_entries_into_the_snapshot() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("map.checkpoint");
         let mut sum = 0;
@@ -253,7 +252,7 @@ mod tests {
             std::fs::write(&file, &whole[..cut]).unwrap();
             let mut sum = if cut == whole.len() { 300 } else { 100 };
             assert_eq!(folded(&path), sum, "cut at {cut}");
-            // The next restart writes over the torn tail.
+            // The next process writes over the torn tail.
             open(&path).0.append(&7_u64).unwrap();
             sum += 7;
             assert_eq!(folded(&path), sum, "cut at {cut}");

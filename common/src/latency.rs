@@ -43,7 +43,7 @@ impl Histogram {
         self.max_ns
     }
 
-    /// Add the counts of another histogram, say of another life of its writer.
+    /// Add the counts of another histogram, for example of another generation of its writer.
     pub fn add(&mut self, counts: &[u32; BUCKETS], max_ns: u64) {
         for (own, other) in self.counts.iter_mut().zip(counts) {
             *own = own.saturating_add(*other);

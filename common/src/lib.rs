@@ -1,29 +1,31 @@
-//! The ground every firsthand process stands on: only what two processes must agree on.
+//! What firsthand's processes share: only what two of them must agree on.
 //!
-//! Layout, from the idea to the machine:
+//! Layout, lowest layer first: a module uses modules above it in this table only.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`mission`] | the mission file, validated |
-//! | [`address`] | where a robot answers, and over what |
-//! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
-//! | [`kinematics`] | (1)-(3) and their inverses |
 //! | [`clock`] | mission time, pace, the monotonic clock |
+//! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
+//! | [`kinematics`] | equations (1)-(3) and their inverses |
 //! | [`latency`] | a histogram that fits in a sample |
-//! | [`topics`] | THE table of topics |
-//! | [`samples`] | their payloads |
-//! | [`domain`] | where a robot lives on this machine |
-//! | [`bus`] | writers and readers: the one file that names the middleware |
-//! | [`waiter`] | one wait for topics, sockets, signals, processes |
-//! | [`checkpoint`] | state that outlives a SIGKILL |
-//! | [`faults`] | THE table of what can be broken in a stage on purpose |
-//! | [`run`] | what the supervisor tells the stages of a run |
+//! | [`address`] | where a robot answers, and over which transport |
+//! | [`wire`] | the X80's protocol: frames and messages |
+//! | [`ground_truth`] | what a simulated robot writes about itself |
+//! | [`mission`] | the mission file, validated |
+//! | [`poll`] | waiting for descriptors |
 //! | [`signals`] | signals as something to wait for |
+//! | [`domain`] | a robot's directory, locks and shared memory on this machine |
+//! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
+//! | [`bus`] | writers, readers and wakeups; the one folder that names the middleware |
+//! | [`samples`] | the payloads of the topics |
+//! | [`topics`] | THE table of topics |
+//! | [`faults`] | THE table of what can be broken in a stage on purpose |
+//! | [`waiter`] | one wait for topics, sockets, signals, processes |
+//! | [`run`] | what the supervisor gives the stages of a run |
+//! | [`start`] | how a stage's process takes its place in a run |
+//! | `external` | the same for a stage that the supervisor did not start |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
-//! | `external` | how a stage that the supervisor did not start finds its place |
-//! | [`wire`] | the X80's protocol: frames and messages |
-//! | [`truth`] | what a simulated robot tells of itself |
 
 pub mod address;
 pub mod bus;
@@ -34,17 +36,19 @@ mod external;
 pub mod faults;
 pub mod geometry;
 pub mod grid;
+pub mod ground_truth;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;
 pub mod mission;
+pub mod poll;
 pub mod run;
 pub mod samples;
 pub mod shell;
 pub mod signals;
+pub mod start;
 pub mod step;
 pub mod topics;
-pub mod truth;
 pub mod waiter;
 pub mod wire;
 

@@ -155,8 +155,8 @@ pub struct Mapper {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
-    /// How far a random walk gets before it dies, metres: lambda of laplacian u = u / lambda^2. Without
-    /// it the paper's method lets no walk die, which is exactly (11), and the careful one takes
+    /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without it the paper's method has
+    /// no screening, which is exactly (11), and the careful one takes
     /// [`Planner::EVIDENTIAL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
@@ -272,18 +272,19 @@ impl Mission {
         (cells - 1e-6).ceil().max(0.0) as u32
     }
 
-    /// k of u = mean of the neighbours / (1 + k): what `planner.screening_m` comes to on this grid, from
-    /// the five-point Laplacian; 0 is exactly (11).
+    /// The screening length of the field, metres: `planner.screening_m`, or what the method takes where the mission
+    /// does not say; none for no screening, which is exactly (11).
     #[must_use]
-    pub fn absorption(&self) -> f64 {
-        let resolution = self.grid_frame().resolution_m;
-        let per_cell = |lambda: f64| (resolution / (2.0 * lambda)).powi(2);
-        let unsaid = match self.method {
+    pub fn screening_length_m(&self) -> Option<f64> {
+        let default = match self.method {
             // No shorter than the grid resolves.
-            Method::Evidential => Some(Planner::EVIDENTIAL_SCREENING_M.max(resolution / 2.0)),
+            Method::Evidential => {
+                let resolution = self.grid_frame().resolution_m;
+                Some(Planner::EVIDENTIAL_SCREENING_M.max(resolution / 2.0))
+            }
             Method::Paper => None,
         };
-        self.planner.screening_m.or(unsaid).map_or(0.0, per_cell)
+        self.planner.screening_m.or(default)
     }
 
     /// The pose at mission time 0.
@@ -336,18 +337,15 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_dies_after_the_same_metres_on_any_grid() {
-        // u falls by exp(-1) in a length of lambda: 1 + 2 k = cosh(delta / lambda), nearly.
-        for cells in [200, 1000] {
-            let delta = 10.0 / f64::from(cells);
-            let decay = (1.0 + 2.0 * with_cells(cells).absorption()).acosh() / delta;
-            assert!((decay * 0.5 - 1.0).abs() < 1e-3, "{decay} a metre");
-        }
+    fn the_papers_method_has_no_screening_unless_the_mission_says_so() {
+        let paper = "target = [1, 0]\nmethod = 'paper'";
+        let parse = |text: &str| Mission::parse(text, Path::new("test.toml")).unwrap();
+        assert_eq!(parse(paper).screening_length_m(), None);
+        let screened = format!("{paper}\nplanner = {{ screening_m = 0.5 }}");
+        assert_eq!(parse(&screened).screening_length_m(), Some(0.5));
         assert_eq!(
-            Mission::parse("target = [1, 0]\nmethod = 'paper'", Path::new("test.toml"))
-                .unwrap()
-                .absorption(),
-            0.0
+            parse("target = [1, 0]").screening_length_m(),
+            Some(Planner::EVIDENTIAL_SCREENING_M)
         );
     }
 }

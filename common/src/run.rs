@@ -1,5 +1,5 @@
-//! What the supervisor tells the stages of a run: one TOML file in the run directory. Beside it, how many lives each
-//! stage has had.
+//! What the supervisor gives the stages of a run: one TOML file in the run directory. Beside it, how many generations
+//! each stage has had.
 
 use std::{
     fs::{self, File},
@@ -20,7 +20,7 @@ pub const FILE_NAME: &str = "run.toml";
 pub struct Run {
     /// Whose bus to join.
     pub robot: RobotName,
-    /// Where the robot answers, and over what.
+    /// Where the robot answers, and over which transport.
     pub address: Address,
     /// How samples are stamped.
     pub clock: MissionClock,
@@ -38,7 +38,7 @@ pub enum RunError {
         action: &'static str,
         /// The file.
         file: PathBuf,
-        /// The system's word.
+        /// What the system reports.
         source: io::Error,
     },
     /// It is not what a supervisor writes.
@@ -87,29 +87,29 @@ impl Run {
     }
 }
 
-/// One more life of `stage` in the run of `directory`, counted over the lives of supervisors too: readers drop what
-/// an older one said. 1 for the first.
+/// The number of a new generation of `stage` in the run of `directory`: 1 for the first, and counted on when a new
+/// supervisor resumes the run, since readers drop samples of older generations.
 ///
-/// A line a life: what is appended is there or not, and no file is replaced, for which a disk may take its time.
+/// The file holds a line for each: an appended line is there or not, and no file is replaced, which a disk can delay.
 ///
 /// # Errors
 /// When the count can be neither read nor written.
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
-    let file = directory.join(format!("{stage}.lives"));
-    let counted = || {
-        let mut lives = File::options().create(true).append(true).open(&file)?;
-        lives.write_all(b"\n")?;
-        let lived = lives.metadata()?.len();
-        u32::try_from(lived).map_err(|_| io::Error::other(format!("{lived} lives")))
+    let file = directory.join(format!("{stage}.generations"));
+    let count = || {
+        let mut lines = File::options().create(true).append(true).open(&file)?;
+        lines.write_all(b"\n")?;
+        let count = lines.metadata()?.len();
+        u32::try_from(count).map_err(|_| io::Error::other(format!("{count} generations")))
     };
-    counted().map_err(|source| RunError::File {
-        action: "count a life in",
+    count().map_err(|source| RunError::File {
+        action: "count a generation in",
         file: file.clone(),
         source,
     })
 }
 
-/// Where a process of the run in `directory` keeps what must outlive it.
+/// Where a process of the run in `directory` saves the state that its successor restores.
 #[must_use]
 pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
     directory.join(format!("{process}.checkpoint"))
@@ -128,12 +128,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lives_are_counted_over_the_lives_of_processes() {
+    fn generations_are_counted_on_by_the_next_supervisor() {
         let directory = tempfile::tempdir().unwrap();
-        let lives: Vec<_> = (0..3)
+        let numbers: Vec<_> = (0..3)
             .map(|_| next_generation(directory.path(), "mapper").unwrap())
             .collect();
-        assert_eq!(lives, [1, 2, 3]);
+        assert_eq!(numbers, [1, 2, 3]);
         assert_eq!(next_generation(directory.path(), "planner").unwrap(), 1);
     }
 }

@@ -8,44 +8,10 @@
 //! Any bit pattern may arrive from another process: states travel as bytes and are read through
 //! `from_byte`, never as Rust enums.
 //!
-//! Here is what they have in common; [`robot`], [`navigation`] and [`supervision`] hold them.
+//! [`robot`], [`navigation`] and [`supervision`] hold them; here is what they have in common.
 #![allow(unsafe_code)]
 
-use crate::bus::ZeroCopySend;
-use serde::{Deserialize, Serialize};
-
-use crate::clock::MissionTime;
-
-/// Which sample this is, who wrote it and when: the first field of every payload and header.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ZeroCopySend)]
-#[type_name("firsthand.Stamp")]
-#[repr(C)]
-pub struct Stamp {
-    /// The tick it belongs to: one tick runs from a motor frame to its command.
-    pub tick: u64,
-    /// Mission time, nanoseconds.
-    pub stamp_ns: u64,
-    /// Which life of its writer: grows by one each time the supervisor starts the stage.
-    pub generation: u32,
-    /// Counts the writer's samples on this topic in this life, from 0.
-    pub sequence: u32,
-}
-
-impl Stamp {
-    /// Mission time.
-    #[must_use]
-    pub const fn time(&self) -> MissionTime {
-        MissionTime(self.stamp_ns)
-    }
-}
-
-/// A payload or header that starts with a [`Stamp`].
-pub trait Stamped {
-    /// The stamp.
-    fn stamp(&self) -> &Stamp;
-    /// The stamp, to be filled in by the writer.
-    fn stamp_mut(&mut self) -> &mut Stamp;
-}
+pub use crate::bus::{Stamp, Stamped};
 
 macro_rules! stamped {
     ($($payload:ty),* $(,)?) => {$(
@@ -68,7 +34,7 @@ macro_rules! wire_enum {
         #[repr(u8)]
         pub enum $name { $($(#[$doc])* $variant = $byte),* }
         impl $name {
-            /// The value a byte stands for; an unheard-of byte is read as the safe one.
+            /// The value a byte stands for; an unknown byte is read as the safe one.
             #[must_use]
             pub const fn from_byte(byte: u8) -> Self {
                 match byte {
@@ -120,7 +86,7 @@ mod tests {
     use glam::DVec2;
 
     #[test]
-    fn an_unheard_of_byte_is_read_as_the_safe_state() {
+    fn an_unknown_byte_is_read_as_the_safe_state() {
         assert_eq!(Order::from_byte(200), Order::Stop);
         assert_eq!(CommandState::from_byte(200), CommandState::Halt);
         assert_eq!(GuidanceStatus::from_byte(200), GuidanceStatus::Waiting);

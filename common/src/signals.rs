@@ -19,7 +19,8 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Catch `signals` from now on. A terminal that is closed stays unheard where that is asked for, as by `nohup`.
+    /// Catch `signals` from now on. SIGHUP stays ignored where whoever started the process
+    /// had it ignored, as `nohup` does.
     ///
     /// # Errors
     /// When the process has no descriptor left.
@@ -35,7 +36,7 @@ impl Signals {
         Ok(Self { pipe })
     }
 
-    /// Whether one came since this was last asked.
+    /// Whether one came since the last call.
     pub fn came(&mut self) -> bool {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }

@@ -1,7 +1,8 @@
-//! THE table of topics: what the processes say to each other.
+//! THE table of topics: what the processes publish for each other.
 //!
-//! Services are created from it, the README's table is printed from it (`firsthand topics`), and the
-//! stages' table is checked against it. A topic is declared once, below, and named nowhere else.
+//! Services are created from it, the README's table is printed from it (`firsthand topics`), the stages' table is
+//! checked against it, and writers take from it how often they publish again. A topic is declared once, below, and
+//! named nowhere else.
 
 use std::time::Duration;
 
@@ -11,83 +12,34 @@ use crate::samples::{
     RequestSample, RosterEntry, RosterHeader, StallSample, SurroundingsSample, WheelSample,
 };
 
-pub use crate::bus::{AnyTopic, SliceTopic, Topic};
+pub use crate::bus::{
+    AnyTopic, EVERY_STAGE, Limits, OPERATOR, Rate, SUPERVISOR, SliceTopic, Spec, Topic,
+};
 
-/// How often a topic speaks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rate {
-    /// Once a tick.
-    EachTick,
-    /// Whenever the robot sends the frame it is read from, driving or not: about once a tick.
-    EachFrame,
-    /// At every change, and at least this often.
-    OnChange(Duration),
-    /// When something happened, once.
-    WhenItHappens,
-}
-
-/// What the table says of a topic.
-#[derive(Debug)]
-pub struct Spec {
-    /// Its name, and the name of its two services.
-    pub name: &'static str,
-    /// Who writes it: a stage, `supervisor`, or `every stage`.
-    pub writer: &'static str,
-    /// How often.
-    pub rate: Rate,
-    /// Mission time after which a reader must not act on it any more; none where age does not matter.
-    pub max_age: Option<Duration>,
-    /// Depth of history and buffers, number of readers.
-    pub limits: Limits,
-    /// What it means.
-    pub meaning: &'static str,
-}
-
-/// How much a topic holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Samples a reader that falls behind still gets; then the oldest give way.
-    pub buffer: usize,
-    /// Samples a reader may hold at once.
-    pub borrowed: usize,
-    /// Readers at once, dashboards and loggers among them.
-    pub readers: usize,
-}
-
-impl Limits {
-    /// For topics of one small struct.
-    pub const SMALL: Self = Self {
-        buffer: 128,
-        borrowed: 2,
-        readers: 16,
-    };
-    /// For slices of a whole map.
-    pub const MAP: Self = Self {
-        buffer: 4,
-        borrowed: 2,
-        readers: 12,
-    };
-    /// Writers at once. One is meant; a kill while starting can leak a place for good.
-    pub(crate) const WRITERS: usize = 16;
-    /// Processes at once on one topic.
-    pub(crate) const NODES: usize = 64;
-}
-
-/// A tick is late after this: one and three quarters of a period at 7 Hz.
-const TICK_AGE: Option<Duration> = Some(Duration::from_millis(250));
-/// How often state that changes seldom is said again for late joiners.
+/// How often the supervisor publishes its order and the roster again, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
+/// Twenty-five heartbeats fit in the tightest deadline set on them; they take a hundredth of a percent of a core.
+const BEAT: Duration = Duration::from_millis(20);
+/// So that `firsthand status` is up to date while no ticks come.
+const LINK_AGAIN: Duration = Duration::from_millis(100);
 
-/// The writer named by topics that all stages write.
-pub const EVERY_STAGE: &str = "every stage";
-/// The writers that are no stage: whoever uses the command line, one process each time.
-pub const OPERATOR: &str = "operator";
-/// The writer that is no stage.
-pub const SUPERVISOR: &str = "supervisor";
+/// For eyes and loggers: the robot should not wait for it. In mission time.
+const FIELD_RATE: Rate = Rate::OnChange {
+    at_most_every: Duration::from_millis(250),
+    again_after: Duration::from_secs(1),
+};
+
+/// At every change at once, and again after `again_after`.
+const fn on_change(again_after: Duration) -> Rate {
+    Rate::OnChange {
+        at_most_every: Duration::ZERO,
+        again_after,
+    }
+}
 
 macro_rules! topics {
     ($($(#[doc = $meaning:literal])+ $id:ident: $kind:ident<$($payload:ty),+> {
-        name: $name:literal, writer: $writer:expr, rate: $rate:expr, max_age: $age:expr, limits: $limits:expr $(,)?
+        name: $name:literal, writer: $writer:expr, rate: $rate:expr, limits: $limits:expr $(,)?
     })*) => {
         $(
             $(#[doc = $meaning])+
@@ -95,7 +47,6 @@ macro_rules! topics {
                 name: $name,
                 writer: $writer,
                 rate: $rate,
-                max_age: $age,
                 limits: $limits,
                 meaning: concat!($($meaning),+),
             });
@@ -108,75 +59,75 @@ macro_rules! topics {
 topics! {
     /// Front sonar: distance to the nearest thing ahead.
     RANGE: Topic<RangeSample> {
-        name: "range", writer: "x80-link", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+        name: "range", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL,
     }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {
-        name: "wheels", writer: "x80-link", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+        name: "wheels", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL,
     }
     /// Where the robot believes it is.
     POSE: Topic<PoseSample> {
-        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL,
     }
     /// The safety map: keyframes and changed windows.
     GRID: SliceTopic<GridHeader, u8> {
-        name: "grid", writer: "mapper", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::MAP,
+        name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP,
     }
     /// The reference direction at the robot's pose.
     GUIDANCE: Topic<GuidanceSample> {
-        name: "guidance", writer: "planner", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+        name: "guidance", writer: "planner", rate: Rate::EachTick, limits: Limits::SMALL,
     }
     /// The whole-domain policy, for consumers.
     FIELD: SliceTopic<FieldHeader, FieldCell> {
-        name: "field", writer: "planner", rate: Rate::OnChange(Duration::from_secs(1)), max_age: None, limits: Limits::MAP,
+        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::MAP,
     }
     /// Wheel speeds for the robot.
     COMMAND: Topic<CommandSample> {
-        name: "command", writer: "controller", rate: Rate::EachTick, max_age: TICK_AGE, limits: Limits::SMALL,
+        name: "command", writer: "controller", rate: Rate::EachTick, limits: Limits::SMALL,
     }
-    /// Heartbeats.
+    /// Heartbeats, from inside the work loop.
     HEALTH: Topic<HealthSample> {
-        name: "health", writer: EVERY_STAGE, rate: Rate::OnChange(Duration::from_millis(50)), max_age: None, limits: Limits::SMALL,
+        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT), limits: Limits::SMALL,
     }
     /// The wire to the robot: connection, counts, tick latency.
     LINK: Topic<LinkSample> {
-        name: "link", writer: "x80-link", rate: Rate::EachTick, max_age: None, limits: Limits::SMALL,
+        name: "link", writer: "x80-link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL,
     }
     /// The seven infrared rangers, metres.
     INFRARED: Topic<InfraredSample> {
-        name: "infrared", writer: "x80-link", rate: Rate::EachFrame, max_age: None, limits: Limits::SMALL,
+        name: "infrared", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
     }
     /// Battery volts and whether they are low, motor currents, heat of the drivers.
     POWER: Topic<PowerSample> {
-        name: "power", writer: "x80-link", rate: Rate::EachFrame, max_age: None, limits: Limits::SMALL,
+        name: "power", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
     }
     /// Human sensors, tilt, temperature.
     SURROUNDINGS: Topic<SurroundingsSample> {
-        name: "surroundings", writer: "x80-link", rate: Rate::EachFrame, max_age: None, limits: Limits::SMALL,
+        name: "surroundings", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
     }
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {
-        name: "directive", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), max_age: None, limits: Limits::SMALL,
+        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
     }
     /// What runs, as the supervisor sees it.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {
-        name: "roster", writer: SUPERVISOR, rate: Rate::OnChange(RESTATE), max_age: None, limits: Limits::MAP,
+        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::MAP,
     }
     /// A stage died: cause, ages, last words, what follows.
     DEATHS: Topic<DeathSample> {
-        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
     /// The robot should get on and does not: how, and what is tried.
     STALLS: Topic<StallSample> {
-        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
     /// What an operator asks: restart, stop, resume.
     REQUESTS: Topic<RequestSample> {
-        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
     /// What an operator breaks in a stage on purpose; every stage listens.
     FAULTS: Topic<FaultSample> {
-        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, max_age: None, limits: Limits::SMALL,
+        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
 }
 

@@ -5,11 +5,12 @@ use std::{
     time::Duration,
 };
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use crate::{
+    bus::{BusError, Wakeup},
+    poll,
+};
 
-use crate::bus::{BusError, Wakeup};
-
-/// Waits for wakeups and foreign descriptors (sockets, signals, processes) at once.
+/// Waits for wakeups and other descriptors (sockets, signals, processes) at once.
 #[derive(Debug, Default)]
 pub struct Waiter {
     wakeups: Vec<Wakeup>,
@@ -22,7 +23,7 @@ impl Waiter {
         self.wakeups.push(wakeup);
     }
 
-    /// Wake when `descriptor` is readable; what is read from it is the caller's.
+    /// Wake when `descriptor` is readable; the caller reads from it.
     ///
     /// # Errors
     /// When the process has no descriptor left.
@@ -35,7 +36,7 @@ impl Waiter {
         Ok(())
     }
 
-    /// Wait until something rings, is readable, or `timeout` has passed; drains the wakeups. Says whether
+    /// Wait until a wakeup or descriptor is readable or `timeout` has passed; drains the wakeups. Returns whether
     /// anything came.
     ///
     /// # Errors
@@ -55,28 +56,11 @@ impl Waiter {
     ) -> Result<bool, BusError> {
         let wakeups = self.wakeups.iter().map(AsFd::as_fd);
         let own = self.descriptors.iter().map(AsFd::as_fd);
-        let mut polled: Vec<PollFd<'_>> = wakeups
-            .chain(own)
-            .chain(others.iter().copied())
-            .map(|descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
-            .collect();
-        let timeout = Timespec::try_from(timeout).ok();
-        let came = match poll(&mut polled, timeout.as_ref()) {
-            Ok(ready) => ready > 0,
-            // A signal that interrupts has also written to the signal pipe.
-            Err(rustix::io::Errno::INTR) => true,
-            Err(error) => return Err(BusError::Wait(error.into())),
-        };
-        let rang: Vec<bool> = polled
-            .iter()
-            .take(self.wakeups.len())
-            .map(|entry| !entry.revents().is_empty())
-            .collect();
-        for (wakeup, rang) in self.wakeups.iter().zip(rang) {
-            if rang {
-                wakeup.drain()?;
-            }
+        let all: Vec<BorrowedFd<'_>> = wakeups.chain(own).chain(others.iter().copied()).collect();
+        let came = poll::readable(&all, Some(timeout)).map_err(BusError::Wait)?;
+        for (wakeup, _) in self.wakeups.iter().zip(&came).filter(|(_, came)| **came) {
+            wakeup.drain()?;
         }
-        Ok(came)
+        Ok(came.contains(&true))
     }
 }

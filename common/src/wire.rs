@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Little-endian, nothing is escaped. CRC is CRC-8/MAXIM-DOW over RID to the last data byte. RID says
-//! who is spoken to, DID what the data mean:
+//! who is addressed, DID what the data mean:
 //!
 //! | DID | host to robot ([`Command`]) | robot to host ([`Report`]) |
 //! |---|---|---|
@@ -20,7 +20,7 @@
 //! | 255 | ping, acknowledge | ping, acknowledge |
 //!
 //! There is no official document. What is written here comes from the vendor's manual and from
-//! drivers that are in use, so everything is sent in the commonest form and taken in any of them.
+//! drivers that are in use, so everything is sent in the commonest form and accepted in any of them.
 //!
 //! ```
 //! use common::wire::{Addressing, Command, Decoder, Report, SystemSignal};

@@ -1,13 +1,14 @@
-//! What a process that was killed while it joined the bus leaves, and the middleware neither expects nor removes.
+//! The files that a process killed while it joined the bus leaves, and that the middleware neither expects nor removes.
 //!
-//! - Shared memory it had made and not yet filled. Root may open that, where others are refused, and the middleware
-//!   then waits for ever for it to be filled.
-//! - Files of a node that is not yet one: they would be looked at, and not removed, at each start from then on.
+//! - Shared memory that it had made and not yet filled. Root may open such a file, where others are refused, and the
+//!   middleware then waits for ever for it to be filled.
+//! - Files of a node that was not complete: the middleware would look at them, and not remove them, at each start.
 //!
-//! Both are found by their names: these hold ids of nodes and ports, and an id tells the process that made it.
+//! Both are found by their names: these hold ids of nodes and ports, and an id holds the number of the process that
+//! made it.
 //!
-//! And what is missing because of the living: a consumer that leaves a bus which was replaced, as the last one,
-//! removes the file of each service by its name. That is the new one's file.
+//! And files that are missing: a consumer that leaves a bus which was replaced, as the last one, removes the file of
+//! each service by its name, which by then is the new bus's file. So each has a backup under a second name.
 
 use std::{
     fs::{self, DirEntry},
@@ -17,19 +18,19 @@ use std::{
     time::Duration,
 };
 
-/// What shared memory is before it is filled: its maker may write, nobody may read.
+/// Permissions of shared memory before it is filled: its maker may write, nobody may read.
 const UNFILLED: u32 = 0o200;
 
 /// Filling a piece of shared memory takes microseconds.
 const FILLED: Duration = Duration::from_secs(1);
 
-/// Remove shared memory that was to connect `dead`, which must be gone, and was never filled; and what anybody made so
-/// long ago that it will not be filled. `prefix` starts the names of this robot's files in `directory`. Says whether
-/// something unfilled is left, which its maker may be filling just now.
+/// Remove shared memory that was to connect `ended`, a process that must have ended, and was never filled; and that of
+/// any process, if it was made so long ago that it will not be filled. `prefix` starts the names of this robot's files
+/// in `directory`. Returns whether anything unfilled is left, which its maker may be filling just now.
 ///
 /// # Errors
 /// When the directory cannot be read, or a file not be removed.
-pub(super) fn remove_unfilled(directory: &Path, prefix: &str, dead: u32) -> io::Result<bool> {
+pub(super) fn remove_unfilled(directory: &Path, prefix: &str, ended: u32) -> io::Result<bool> {
     let mut left = false;
     for entry in fs::read_dir(directory)? {
         let entry = entry?;
@@ -39,8 +40,8 @@ pub(super) fn remove_unfilled(directory: &Path, prefix: &str, dead: u32) -> io::
         let Some(age) = ours.then(|| unfilled_for(&entry)).flatten() else {
             continue;
         };
-        if names(&name, dead) || age >= FILLED {
-            gone(fs::remove_file(entry.path()))?;
+        if names(&name, ended) || age >= FILLED {
+            removed(fs::remove_file(entry.path()))?;
         } else {
             left = true;
         }
@@ -58,15 +59,15 @@ fn unfilled_for(entry: &DirEntry) -> Option<Duration> {
         .map(Option::unwrap_or_default)
 }
 
-/// Remove from the directory `nodes` what is named after nodes of `dead`, which must be gone.
+/// Remove from the directory `nodes` what is named after nodes of `ended`, a process that must have ended.
 ///
 /// # Errors
 /// When the directory cannot be read, or something not be removed.
-pub(super) fn remove_nodes(nodes: &Path, dead: u32) -> io::Result<()> {
+pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     for entry in fs::read_dir(nodes)? {
         let entry = entry?;
-        if names(&entry.file_name().to_string_lossy(), dead) {
-            gone(if entry.file_type()?.is_dir() {
+        if names(&entry.file_name().to_string_lossy(), ended) {
+            removed(if entry.file_type()?.is_dir() {
                 fs::remove_dir_all(entry.path())
             } else {
                 fs::remove_file(entry.path())
@@ -76,25 +77,25 @@ pub(super) fn remove_nodes(nodes: &Path, dead: u32) -> io::Result<()> {
     Ok(())
 }
 
-/// Give each file in `services` a second name in `kept`, which must not be there.
+/// Give each file in `services` a second name in `backup`, a directory that must not exist.
 ///
 /// # Errors
 /// When the directory cannot be made, or a file not be linked.
-pub(super) fn keep(services: &Path, kept: &Path) -> io::Result<()> {
-    fs::create_dir(kept)?;
+pub(super) fn back_up(services: &Path, backup: &Path) -> io::Result<()> {
+    fs::create_dir(backup)?;
     for entry in fs::read_dir(services)? {
         let entry = entry?;
-        fs::hard_link(entry.path(), kept.join(entry.file_name()))?;
+        fs::hard_link(entry.path(), backup.join(entry.file_name()))?;
     }
     Ok(())
 }
 
-/// Give each file in `kept` its name in `services` again, if that is free.
+/// Give each file in `backup` its name in `services` again where it is missing.
 ///
 /// # Errors
 /// When the directory cannot be read, or a file not be linked.
-pub(super) fn put_back(kept: &Path, services: &Path) -> io::Result<()> {
-    for entry in fs::read_dir(kept)? {
+pub(super) fn restore(backup: &Path, services: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(backup)? {
         let entry = entry?;
         match fs::hard_link(entry.path(), services.join(entry.file_name())) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
@@ -104,9 +105,9 @@ pub(super) fn put_back(kept: &Path, services: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Somebody else may have removed it.
-fn gone(removed: io::Result<()>) -> io::Result<()> {
-    match removed {
+/// A file that another process removed first is removed, too.
+fn removed(result: io::Result<()>) -> io::Result<()> {
+    match result {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         other => other,
     }
@@ -129,8 +130,8 @@ mod tests {
     use super::*;
     use std::fs::Permissions;
 
-    const DEAD: u32 = 4321;
-    const LIVING: u32 = 4322;
+    const ENDED: u32 = 4321;
+    const RUNNING: u32 = 4322;
 
     const fn id(process: u32) -> u128 {
         (7 << 96) + ((process as u128) << 64) + (123 << 32) + 456
@@ -146,63 +147,66 @@ mod tests {
     }
 
     #[test]
-    fn node_files_of_the_dead_are_removed_and_no_others() {
+    fn node_files_of_ended_processes_are_removed_and_no_others() {
         let directory = tempfile::tempdir().unwrap();
         let nodes = directory.path();
-        for id in [id(DEAD), id(LIVING)] {
+        for id in [id(ENDED), id(RUNNING)] {
             fs::create_dir(nodes.join(id.to_string())).unwrap();
             fs::write(nodes.join(format!("{id}/fh0_x80_node.details")), "").unwrap();
             fs::write(nodes.join(format!("fh0_x80_{id}.node_monitor")), "").unwrap();
         }
-        remove_nodes(nodes, DEAD).unwrap();
-        let monitor = format!("fh0_x80_{}.node_monitor", id(LIVING));
-        assert_eq!(left(nodes), [id(LIVING).to_string(), monitor]);
+        remove_nodes(nodes, ENDED).unwrap();
+        let monitor = format!("fh0_x80_{}.node_monitor", id(RUNNING));
+        assert_eq!(left(nodes), [id(RUNNING).to_string(), monitor]);
     }
 
     #[test]
-    fn a_file_that_was_removed_gets_its_name_back_and_one_that_is_there_is_left() {
+    fn a_service_file_that_is_missing_is_restored_and_one_that_is_there_is_left() {
         let directory = tempfile::tempdir().unwrap();
-        let [services, kept] = ["services", "kept"].map(|name| directory.path().join(name));
+        let [services, backup] = ["services", "backup"].map(|name| directory.path().join(name));
         fs::create_dir(&services).unwrap();
         for name in ["pose.service", "grid.service"] {
             fs::write(services.join(name), name).unwrap();
         }
-        keep(&services, &kept).unwrap();
+        back_up(&services, &backup).unwrap();
         fs::remove_file(services.join("pose.service")).unwrap();
         fs::remove_file(services.join("grid.service")).unwrap();
         fs::write(services.join("grid.service"), "another").unwrap();
-        put_back(&kept, &services).unwrap();
-        let said = |name| fs::read_to_string(services.join(name)).unwrap();
-        assert_eq!(said("pose.service"), "pose.service");
-        assert_eq!(said("grid.service"), "another");
+        restore(&backup, &services).unwrap();
+        let content = |name| fs::read_to_string(services.join(name)).unwrap();
+        assert_eq!(content("pose.service"), "pose.service");
+        assert_eq!(content("grid.service"), "another");
         assert_eq!(left(&services).len(), 2);
     }
 
     #[test]
-    fn unfilled_memory_of_the_dead_or_of_long_ago_is_removed_and_no_other() {
+    fn unfilled_memory_of_ended_processes_or_of_long_ago_is_removed_and_no_other() {
         let directory = tempfile::tempdir().unwrap();
-        let (dead, living) = (id(DEAD), id(LIVING));
+        let (ended, running) = (id(ENDED), id(RUNNING));
         let make = |name: String, mode| {
             let path = directory.path().join(&name);
             fs::write(&path, "").unwrap();
             fs::set_permissions(&path, Permissions::from_mode(mode)).unwrap();
             name
         };
-        make(format!("fh0_x80_ab12_{living}_{dead}.connection"), UNFILLED);
-        make(format!("fh0_x80_ab12_{dead}.data"), UNFILLED);
+        make(
+            format!("fh0_x80_ab12_{running}_{ended}.connection"),
+            UNFILLED,
+        );
+        make(format!("fh0_x80_ab12_{ended}.data"), UNFILLED);
         let mut stay = [
-            make(format!("fh0_x80_ab12_{dead}_{living}.connection"), 0o600),
-            make(format!("fh0_x80_ab12_{living}.data"), UNFILLED),
-            make(format!("fh0_other_ab12_{dead}.data"), UNFILLED),
+            make(format!("fh0_x80_ab12_{ended}_{running}.connection"), 0o600),
+            make(format!("fh0_x80_ab12_{running}.data"), UNFILLED),
+            make(format!("fh0_other_ab12_{ended}.data"), UNFILLED),
         ];
-        let old = make(format!("fh0_x80_cd34_{living}.data"), 0o600);
+        let old = make(format!("fh0_x80_cd34_{running}.data"), 0o600);
         let old = directory.path().join(old);
         let file = fs::File::options().write(true).open(&old).unwrap();
         file.set_modified(std::time::SystemTime::now() - FILLED)
             .unwrap();
         fs::set_permissions(&old, Permissions::from_mode(UNFILLED)).unwrap();
         stay.sort();
-        assert!(remove_unfilled(directory.path(), "fh0_x80_", DEAD).unwrap());
+        assert!(remove_unfilled(directory.path(), "fh0_x80_", ENDED).unwrap());
         assert_eq!(left(directory.path()), stay);
     }
 }

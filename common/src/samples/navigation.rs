@@ -3,9 +3,8 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::Stamp;
 use crate::{
-    bus::ZeroCopySend,
+    bus::{Stamp, ZeroCopySend},
     grid::{GridFrame, Revision, Window},
     kinematics::{Pose2, Twist},
 };
@@ -204,9 +203,9 @@ pub struct FieldHeader {
     pub target_x_m: f64,
     /// X_T, metres.
     pub target_y_m: f64,
-    /// Certificate: the worst componentwise relative residual of the last full solve.
+    /// Verification: the worst componentwise relative residual of the last full solve.
     pub worst_residual: f64,
-    /// Certificate: free cells from which the target can be reached.
+    /// Verification: free cells from which the target can be reached.
     pub reachable: u64,
 }
 

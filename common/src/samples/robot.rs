@@ -1,12 +1,14 @@
-//! What the robot says, and what the link makes of it.
+//! What the link publishes: the robot's sensors, and the state of the link itself.
 
 use serde::{Deserialize, Serialize};
 
-use super::Stamp;
-use crate::{bus::ZeroCopySend, latency};
+use crate::{
+    bus::{Stamp, ZeroCopySend},
+    latency,
+};
 
 wire_enum! {
-    /// What the front sonar said in a tick.
+    /// What the front sonar measured in a tick.
     RangeStatus, unknown = Absent {
         /// No sonar frame came since the last tick: the map stays as it is.
         Absent = 0,
@@ -51,44 +53,44 @@ pub struct WheelSample {
     pub left_counts_per_s: i32,
     /// Right speed, counts a second, forward positive.
     pub right_counts_per_s: i32,
-    /// Times this life of the link noticed that the robot restarted its counts: the step from a sample with
+    /// Times this process of the link noticed that the robot restarted its counts: the step from a sample with
     /// a lower number is no motion.
     pub restarts: u32,
 }
 
 wire_enum! {
-    /// What the link's failsafe does with the robot, the mildest first.
+    /// What the link's failsafe does with the robot, the least severe first.
     #[derive(PartialOrd, Ord)]
     Action, unknown = Stop {
         /// Commands pass as they are.
         Go = 0,
-        /// Commands pass at a share of their speed, along the same curve.
+        /// Commands pass at a fraction of their speed, along the same curve.
         Slow = 1,
-        /// The robot stands; it goes on when the cause is gone.
+        /// The robot stands; it drives again when the cause has ended.
         Stop = 2,
-        /// The robot stands for good: the mission ends.
+        /// The robot stands until the process ends: the mission is over.
         End = 3,
     }
 }
 
 wire_enum! {
-    /// Why the link's failsafe does it; `firsthand failsafe` tells of each.
+    /// Why the link's failsafe does it; `firsthand failsafe` explains each.
     Cause, unknown = NotOrdered {
         /// Nothing is wrong.
         None = 0,
-        /// The supervisor has not said drive.
+        /// The supervisor has not ordered to drive.
         NotOrdered = 1,
         /// The supervisor ends the mission.
         MissionOver = 2,
         /// A battery that the robot drives on is empty.
         BatteryEmpty = 3,
-        /// An operator said stop.
+        /// An operator has asked for a stop.
         OperatorStop = 4,
         /// A stage is held.
         StageHeld = 5,
-        /// The supervisor says nothing any more.
+        /// The supervisor publishes nothing any more.
         SupervisorSilent = 6,
-        /// The robot does not answer; it is told to stand in case it hears.
+        /// The robot does not answer; stops are sent in case it receives them.
         RobotLost = 7,
         /// No command yet, or the newest is too old: a stage is down or slow.
         CommandStale = 8,
@@ -101,7 +103,7 @@ wire_enum! {
     }
 }
 
-/// Topic `link`: the state of the wire.
+/// Topic `link`: the state of the connection to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Link")]
 #[repr(C)]
@@ -119,8 +121,8 @@ pub struct LinkSample {
     /// Bytes that belonged to no frame.
     pub bytes_dropped: u64,
     /// Datagrams from another address than the robot's, dropped.
-    pub strangers: u64,
-    /// Messages the wire did not take, lost.
+    pub foreign_datagrams: u64,
+    /// Messages that could not be sent, lost.
     pub unsent: u64,
     /// Times the robot was lost.
     pub losses: u64,
@@ -128,7 +130,7 @@ pub struct LinkSample {
     pub reboots: u64,
     /// For how long the robot has not answered, nanoseconds of the machine's clock; 0 while it does.
     pub lost_ns: u64,
-    /// Attempts to reach it since: pings, or openings of the wire.
+    /// Attempts to reach it since: pings, or attempts to open the connection.
     pub attempts: u64,
     /// Until the next attempt, nanoseconds of the machine's clock.
     pub next_attempt_ns: u64,
@@ -140,9 +142,9 @@ pub struct LinkSample {
     pub repeated_ticks: u64,
     /// From the datagram in to the datagram out, last tick, nanoseconds.
     pub latency_ns: u64,
-    /// The longest of this life of the link, nanoseconds.
+    /// The longest of this process of the link, nanoseconds.
     pub latency_max_ns: u64,
-    /// All of this life, a [`crate::latency::Histogram`]: bucket k counts those from 2^(k/8) microseconds.
+    /// All of this process, a [`crate::latency::Histogram`]: bucket k counts those from 2^(k/8) microseconds.
     pub latency_histogram: [u32; latency::BUCKETS],
 }
 
@@ -155,7 +157,7 @@ impl Default for LinkSample {
             cause: Cause::NotOrdered.into(),
             frames_in: 0,
             bytes_dropped: 0,
-            strangers: 0,
+            foreign_datagrams: 0,
             unsent: 0,
             losses: 0,
             reboots: 0,
@@ -192,8 +194,8 @@ impl LinkSample {
     }
 }
 
-/// Topic `infrared`: the seven infrared rangers, which look straight ahead of themselves. Which one looks
-/// where differs from robot to robot; no source numbers them.
+/// Topic `infrared`: the seven infrared rangers. Where each is mounted differs from robot to robot; no source
+/// numbers them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Infrared")]
 #[repr(C)]
@@ -206,7 +208,7 @@ pub struct InfraredSample {
     pub raw_ad: [u16; 7],
 }
 
-/// Topic `power`: what the batteries give and the motors draw.
+/// Topic `power`: voltages of the batteries, currents of the motors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Power")]
 #[repr(C)]
@@ -221,7 +223,7 @@ pub struct PowerSample {
     pub servo_v: f64,
     /// The two motor drivers, degrees Celsius by the vendor's formula.
     pub driver_c: [f64; 2],
-    /// What the motors of the six channels draw, AD counts: no source says how many are an ampere.
+    /// Currents of the motors of the six channels, AD counts: no source says how many are an ampere.
     pub current_ad: [u16; 6],
     /// 1: the boards' battery is low by the mission's `robot.low_battery_v`.
     pub board_low: u8,
@@ -239,7 +241,7 @@ impl PowerSample {
     }
 }
 
-/// Topic `surroundings`: what else the robot feels of where it is.
+/// Topic `surroundings`: human sensors, tilt, temperature.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Surroundings")]
 #[repr(C)]

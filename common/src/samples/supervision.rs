@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Stamp;
-use crate::bus::ZeroCopySend;
+use crate::bus::{Stamp, ZeroCopySend};
 
 wire_enum! {
     /// How a stage is.
@@ -356,7 +355,7 @@ wire_enum! {
         /// No direction, as where the gradient is zero.
         Saddle = 3,
         /// Hazard believed wherever the robot is.
-        BuryRobot = 4,
+        HazardAroundRobot = 4,
         /// A closed wall believed around the target, whatever is forgotten.
         CutOff = 5,
     }

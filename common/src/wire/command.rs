@@ -226,7 +226,7 @@ impl Command {
     /// What a frame asks of the robot.
     ///
     /// # Errors
-    /// When the frame is sound but no command: unknown DID, odd length, a byte that means nothing.
+    /// When the frame has a right CRC but is no command: unknown DID, odd length, a byte that means nothing.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
         parse::command(frame)
     }

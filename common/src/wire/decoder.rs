@@ -1,21 +1,21 @@
-//! Bytes in any pieces to frames: several at once, halves, noise between, bad CRCs.
+//! Bytes to frames: the bytes may come in any pieces, with noise between frames and with bad CRCs.
 //!
 //! A frame is found by its header, LEN and CRC; its end bytes are looked at only where CRC-8 alone is
-//! too weak a witness. One noisy header in 256 passes the CRC and would swallow the good frames behind
-//! it, so a frame with wrong end bytes is believed only if no frame with right ones begins inside it.
+//! too weak. One noisy header in 256 passes the CRC, and the good frames behind it would be taken for its
+//! data, so a frame with wrong end bytes is accepted only if no frame with right ones begins inside it.
 
 use super::{
     crc::crc8,
-    frame::{BEFORE_DATA, Frame, HEADER},
+    frame::{BEFORE_DATA, Frame, HEADER, MAX_FRAME_BYTES},
 };
 
 /// Bytes held at most: the largest datagram, and a frame begun in the one before.
-const CAPACITY: usize = 65_536 + super::MAX_FRAME_BYTES;
+const CAPACITY: usize = 65_536 + MAX_FRAME_BYTES;
 /// No message that is known is longer. A header that claims more is likely noise, so it does not hold
 /// back the complete frames behind it while the rest of its own is missing.
 const LONGEST_PLAUSIBLE: usize = 64;
 
-/// What became of the bytes so far.
+/// Counts of what the bytes so far were.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecoderTally {
     /// Frames given out.
@@ -116,7 +116,7 @@ impl Decoder {
                     };
                     self.skip(at);
                 }
-                // Only the header is given up: the frame behind a bad one may begin inside it.
+                // Only the header is skipped: the frame behind a bad one may begin inside it.
                 Candidate::Broken => {
                     self.tally.bad_crc += 1;
                     self.skip(noise + 1);
@@ -143,7 +143,7 @@ impl Decoder {
         self.skip(self.buffer.len() - self.start);
     }
 
-    /// What became of the bytes so far.
+    /// Counts of what the bytes so far were.
     #[must_use]
     pub fn tally(&self) -> DecoderTally {
         self.tally
@@ -192,7 +192,7 @@ fn is_end(bytes: &[u8]) -> Ending {
     }
 }
 
-/// What begins inside a frame that is not to be believed without question.
+/// What begins inside a frame whose end bytes are not right.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
     Nothing,

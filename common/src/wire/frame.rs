@@ -24,7 +24,7 @@ pub enum Addressing {
 }
 
 impl Addressing {
-    /// The RID that speaks to the robot.
+    /// The RID that addresses the robot.
     #[must_use]
     pub const fn robot(self) -> u8 {
         match self {
@@ -33,7 +33,7 @@ impl Addressing {
         }
     }
 
-    /// The RID that speaks to the host.
+    /// The RID that addresses the host.
     #[must_use]
     pub const fn host(self) -> u8 {
         match self {
@@ -42,7 +42,7 @@ impl Addressing {
         }
     }
 
-    /// The form of a frame spoken to a robot; none if `rid` is not a robot's.
+    /// The form of a frame addressed to a robot; none if `rid` is not a robot's.
     #[must_use]
     pub const fn of_robot(rid: u8) -> Option<Self> {
         match rid {
@@ -52,7 +52,7 @@ impl Addressing {
         }
     }
 
-    /// The form of a frame spoken to a host; none if `rid` is not a host's.
+    /// The form of a frame addressed to a host; none if `rid` is not a host's.
     #[must_use]
     pub const fn of_host(rid: u8) -> Option<Self> {
         match rid {
@@ -66,7 +66,7 @@ impl Addressing {
 /// A frame whose CRC was right, or one about to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Who is spoken to.
+    /// Who is addressed.
     pub rid: u8,
     /// Serial number; everybody sends 0.
     pub sn: u8,
@@ -90,7 +90,7 @@ impl Frame<'_> {
     }
 }
 
-/// What both sides say with DID 255.
+/// What both sides send with DID 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SystemSignal {
     /// 0: are you there?
@@ -121,7 +121,7 @@ impl SystemSignal {
     }
 }
 
-/// Why a sound frame is no message we know. None of these is a reason to stop listening.
+/// Why a frame with a right CRC is no known message. None of these is a reason to stop receiving.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum MessageError {
     /// Its DID is not in the table.

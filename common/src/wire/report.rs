@@ -40,10 +40,10 @@ impl Report {
         }
     }
 
-    /// What a frame tells the host.
+    /// The report in a frame.
     ///
     /// # Errors
-    /// When the frame is sound but no report: unknown DID, too short, a byte that means nothing.
+    /// When the frame has a right CRC but is no report: unknown DID, too short, a byte that means nothing.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
         match frame.did {
             did::MOTOR => MotorSensors::from_bytes(frame.data).map(Self::Motor),

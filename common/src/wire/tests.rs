@@ -101,12 +101,12 @@ fn timed_commands_are_taken_with_14_and_with_15_bytes() {
 fn both_ways_to_leave_a_channel_alone_are_taken() {
     let other = bytes("90 01 70 fe 01 80 01 80 00 80 01 80");
     assert_eq!(parsed(27, &other), Ok(wheels(400, -400, None)));
-    let nobody = Ok(Command::Motion(Motion {
+    let no_channel = Ok(Command::Motion(Motion {
         quantity: Quantity::Velocity,
         targets: Targets::All([None; 6]),
         limit_ms: None,
     }));
-    assert_eq!(parsed(26, &[1, 0x01, 0x80]), nobody);
+    assert_eq!(parsed(26, &[1, 0x01, 0x80]), no_channel);
 }
 
 #[test]

@@ -40,7 +40,7 @@ impl Echo {
     }
 }
 
-/// Nearest and farthest an infrared ranger tells, metres.
+/// Nearest and farthest range of an infrared ranger, metres.
 const INFRARED_M: (f64, f64) = (0.09, 0.81);
 
 /// The range an infrared ranger means by `ad`, metres, clamped to 0.09..0.81; 0.81 is also nothing.

@@ -34,7 +34,7 @@ impl Area {
 /// What `fault` makes hazard, of a robot at `robot` on its way to `target`; none if it makes none.
 pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Area> {
     match fault {
-        FaultKind::BuryRobot => Some(Area::Disc(robot)),
+        FaultKind::HazardAroundRobot => Some(Area::Disc(robot)),
         FaultKind::CutOff => Some(Area::Wall(target)),
         _ => None,
     }
@@ -117,7 +117,7 @@ mod tests {
     fn a_buried_robot_takes_its_hazard_along_until_the_belief_is_forgotten() {
         for method in ["paper", "careful"] {
             let mut mapper = mapper(method);
-            mapper.inject(FaultKind::BuryRobot);
+            mapper.inject(FaultKind::HazardAroundRobot);
             stand(&mut mapper, 0, 0.0);
             assert!(is_hazard(&mapper, 0.0, 0.0) && !is_hazard(&mapper, 0.7, 0.0));
             stand(&mut mapper, 1, 0.3);
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn a_version_differs_from_the_one_before_in_one_window_broken_or_not() {
         let mut mapper = mapper("careful");
-        mapper.inject(FaultKind::BuryRobot);
+        mapper.inject(FaultKind::HazardAroundRobot);
         for tick in 0..4 {
             let before = (mapper.belief().version(), mapper.belief().cells().to_vec());
             stand(&mut mapper, tick, 0.1 * tick as f64);

@@ -11,7 +11,9 @@ use std::{
     time::Instant,
 };
 
-use crate::{Cancellation, Domain, Field, SolveError, Solver, step::Job};
+use harmonic::{Cancellation, Domain, Field, SolveError, Solver};
+
+use crate::step::Job;
 
 /// How much the thread gives way.
 const NICE: i32 = 10;

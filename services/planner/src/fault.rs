@@ -1,21 +1,16 @@
 //! A live field broken on purpose, to see what the rest makes of it.
 
-use crate::domain::Cell;
-use crate::field::Field;
+use harmonic::{Cell, Field, Scaled};
 
-impl Field {
-    /// Overwrites u wherever the target can be reached so that every way leads to `summit`, in cell units: u halves with
-    /// each cell away from there, straight through walls. The certificate stays: it speaks of what was solved.
-    pub(crate) fn lead_astray(&mut self, summit: [f64; 2]) {
-        for row in 0..self.height() {
-            for col in 0..self.width() {
-                let cell = Cell { col, row };
-                if self.is_reachable(cell) && cell != self.target() {
-                    let away = (col as f64 - summit[0]).hypot(row as f64 - summit[1]);
-                    let index = row * self.width() + col;
-                    self.store_mut()
-                        .set(index, (-away.fract()).exp2(), -(away as i32));
-                }
+/// Overwrites u wherever the target can be reached so that every way leads to `summit`, in cell units: u halves with each
+/// cell away from there, straight through walls. The verification stays: it speaks of what was solved.
+pub(crate) fn lead_astray(field: &mut Field, summit: [f64; 2]) {
+    for row in 0..field.height() {
+        for col in 0..field.width() {
+            let cell = Cell { col, row };
+            if field.is_reachable(cell) && cell != field.target() {
+                let away = (col as f64 - summit[0]).hypot(row as f64 - summit[1]);
+                field.overwrite(cell, Scaled::new((-away.fract()).exp2(), -(away as i32)));
             }
         }
     }
@@ -23,14 +18,16 @@ impl Field {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Cancellation, Cell, Domain, Guidance, Solver};
+    use harmonic::{Cancellation, Domain, Guidance, Solver};
+
+    use super::*;
 
     #[test]
     fn a_field_led_astray_leads_to_the_summit_from_everywhere_until_it_is_solved_anew() {
         let domain = Domain::new(30, 20, vec![false; 600], Cell::new(25, 10)).unwrap();
         let mut solver = Solver::default();
         let mut field = solver.solve(&domain, &Cancellation::new()).unwrap();
-        field.lead_astray([6.0, 7.0]);
+        lead_astray(&mut field, [6.0, 7.0]);
         for (col, row) in [(2.0, 3.0), (20.0, 7.0), (7.0, 18.0)] {
             let Guidance::Along([x, y]) = field.guidance(col, row) else {
                 panic!("no guidance at ({col}, {row})");

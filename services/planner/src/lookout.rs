@@ -13,8 +13,7 @@ use common::{
     mission::Mission,
 };
 use glam::DVec2;
-
-use crate::{Field, Guidance};
+use harmonic::{Field, Guidance};
 
 /// From point to point along a way, metres.
 const STEP_M: f64 = 0.05;

@@ -1,6 +1,6 @@
 //! `grid` and `pose` in; `guidance` each tick, `field` at every change and now and then.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use common::{
     bus::{Reader, SliceReader, SliceWriter, Writer},
@@ -11,15 +11,12 @@ use common::{
     topics::{self, AnyTopic as _},
 };
 
+use harmonic::SolveError;
+
 use crate::{
-    SolveError,
     beside::{BesideSolver, Solved},
     step::{Planner, Work},
 };
-
-/// Changes of the field are told at most so often in mission time: it is for eyes and loggers, and the
-/// robot should not wait for it.
-const FIELD_AT_MOST_EVERY: Duration = Duration::from_millis(250);
 
 /// On a clock of ticks the result of a full solve beside the live field is swapped in so many ticks after
 /// it began, sooner never and later never, so that a run can be repeated. At 7 Hz the largest map is solved
@@ -248,7 +245,8 @@ impl Shell {
         let keyframe = self.field.has_new_reader()
             || since(self.keyframe_told).is_none_or(|age| age >= topics::FIELD.restated_every());
         let change = self.field_changed
-            && since(self.change_told).is_none_or(|age| age >= FIELD_AT_MOST_EVERY);
+            && since(self.change_told)
+                .is_none_or(|age| age >= topics::FIELD.changes_at_most_every());
         if !(keyframe || change) {
             return Ok(());
         }

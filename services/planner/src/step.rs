@@ -7,14 +7,17 @@ use common::{
     samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
 };
 use glam::DVec2;
+use harmonic::{
+    Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, SolveError, Solver,
+    Verdict,
+};
 
 use crate::{
-    Absorption, Cancellation, Cell, Change, Domain, Field, Guidance, Settings, SolveError, Solver,
-    Verdict,
+    fault::lead_astray,
     lookout::{Advice, Lookout, View},
 };
 
-/// Maps of at most this many cells are solved in full at once where a repair does not do: that takes less
+/// Maps of at most this many cells are solved in full at once where a local update is not enough: that takes less
 /// than a thread takes to begin.
 const SMALL: usize = 1 << 14;
 
@@ -38,7 +41,7 @@ pub enum Work {
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
-    absorption: f64,
+    screening: Screening,
     /// None in the paper's method.
     lookout: Option<Lookout>,
     solver: Solver,
@@ -91,7 +94,7 @@ impl Planner {
     pub fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
-            absorption: mission.absorption(),
+            screening: screening(mission),
             lookout: (mission.method == Method::Evidential).then(|| Lookout::new(mission)),
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
@@ -136,8 +139,8 @@ impl Planner {
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
         let target = frame.to_cells(self.target).round().as_u64vec2();
         let target = Cell::new(target.x as usize, target.y as usize);
-        let domain = Domain::new(side, side, blocked.collect(), target)?
-            .with_absorption(Absorption::Uniform(self.absorption))?;
+        let domain =
+            Domain::new(side, side, blocked.collect(), target)?.with_screening(&self.screening)?;
         let field = self.solver.solve(&domain, &Cancellation::default())?;
         self.full_solves += 1;
         self.solved = Some(Solved {
@@ -165,7 +168,7 @@ impl Planner {
             &changes,
             &Cancellation::default(),
         )?;
-        if verdict != Verdict::Repaired && solved.frame.area() <= SMALL {
+        if verdict != Verdict::Accurate && solved.frame.area() <= SMALL {
             solved.field = self
                 .solver
                 .solve(&solved.domain, &Cancellation::default())?;
@@ -178,7 +181,7 @@ impl Planner {
     }
 
     fn heed(&mut self, verdict: Verdict) {
-        self.advised |= verdict != Verdict::Repaired;
+        self.advised |= verdict != Verdict::Accurate;
         self.unsafe_until_solved |= verdict == Verdict::PassageClosed;
     }
 
@@ -252,7 +255,7 @@ impl Planner {
         match (fault, &mut self.solved) {
             (FaultKind::CorruptField, Some(solved)) => {
                 let at = solved.frame.to_cells(position);
-                solved.field.lead_astray([at.x, at.y]);
+                lead_astray(&mut solved.field, [at.x, at.y]);
                 true
             }
             (FaultKind::Saddle, _) => {
@@ -333,19 +336,29 @@ impl Planner {
     #[must_use]
     pub fn policy(&self) -> Option<(FieldHeader, GridFrame, Vec<FieldCell>)> {
         let Solved { frame, field, .. } = self.solved.as_ref()?;
-        let certificate = field.certificate();
+        let verification = field.verification();
         let header = FieldHeader {
             grid_version: self.grid.version(),
             target_x_m: self.target.x,
             target_y_m: self.target.y,
-            worst_residual: certificate.worst_residual,
-            reachable: certificate.reachable as u64,
+            worst_residual: verification.worst_residual,
+            reachable: verification.reachable as u64,
             ..FieldHeader::default()
         };
         let side = frame.cells as usize;
         let cells = (0..side * side).map(|index| cell_policy(field, index % side, index / side));
         Some((header, *frame, cells.collect()))
     }
+}
+
+/// The mission's screening length, in the unit of its grid.
+fn screening(mission: &Mission) -> Screening {
+    mission
+        .screening_length_m()
+        .map_or(Screening::None, |length| Screening::Uniform {
+            length,
+            cell: mission.grid_frame().resolution_m,
+        })
 }
 
 fn cell_policy(field: &Field, col: usize, row: usize) -> FieldCell {

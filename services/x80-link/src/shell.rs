@@ -1,7 +1,5 @@
 //! The wire, `command` and `directive` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
-use std::time::Duration;
-
 use common::{
     bus::{Reader, Writer},
     clock::monotonic_ns,
@@ -11,7 +9,7 @@ use common::{
         RangeSample, SurroundingsSample, WheelSample,
     },
     shell::{Context, Process, Progress, StageError},
-    topics,
+    topics::{self, AnyTopic as _},
 };
 
 use crate::{
@@ -20,9 +18,6 @@ use crate::{
     telemetry::BatteryChange,
     transport::{Transport, TransportError},
 };
-
-/// The `link` topic is restated this often while no ticks come.
-const RESTATE: Duration = Duration::from_millis(100);
 
 /// The newest telemetry that is not published yet.
 #[derive(Debug, Default)]
@@ -108,7 +103,7 @@ impl Process for Shell {
         self.tend()?;
         let effects = self.link.step(Event::Quiet, monotonic_ns());
         self.carry_out(effects)?;
-        if monotonic_ns() - self.stated_ns >= RESTATE.as_nanos() as u64 {
+        if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
             self.state()?;
         }
         Ok(self.progress)
@@ -262,7 +257,7 @@ impl Shell {
             cause: self.link.decision().cause.into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
-            strangers: carried.strangers,
+            foreign_datagrams: carried.strangers,
             unsent: carried.unsent,
             losses: self.link.losses(),
             reboots: self.link.restarts().into(),

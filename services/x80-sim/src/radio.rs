@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use common::{mission, truth::TruthRadio};
+use common::{ground_truth::GroundTruthRadio, mission};
 
 use crate::noise::{Noise, Source};
 
@@ -245,8 +245,8 @@ impl<W: Copy + PartialEq> Radio<W> {
     }
 
     /// What it has done until mission time `now`.
-    pub fn truth(&mut self, now: f64) -> TruthRadio {
-        TruthRadio {
+    pub fn truth(&mut self, now: f64) -> GroundTruthRadio {
+        GroundTruthRadio {
             out: self.fading.is_out(now, &mut self.noise),
             sent: self.sent,
             lost: self.lost,

@@ -1,8 +1,8 @@
 //! The robot as a pure state machine: commands in, mission time forward, frames out.
 
 use common::{
+    ground_truth::GroundTruthTick,
     mission::{Mission, Physics},
-    truth::TruthTick,
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
         StandardSensors, SystemSignal,
@@ -338,7 +338,7 @@ impl Robot {
         if self
             .rims()
             .into_iter()
-            .any(|rim| rim.abs() > TruthTick::AT_REST_M_S)
+            .any(|rim| rim.abs() > GroundTruthTick::AT_REST_M_S)
         {
             self.unattended = self.unattended.max(now + dt - self.ordered_at);
         }
@@ -397,7 +397,7 @@ impl Robot {
     }
 
     /// What is true at this tick. The least clearance begins anew.
-    pub fn truth(&mut self) -> TruthTick {
+    pub fn truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Wiring { channel, sign } = self.wiring;
         let [left, right] = self.rims();
@@ -409,9 +409,9 @@ impl Robot {
                 position
             }
         };
-        let clearance_m = self.least_clearance.min(TruthTick::NOTHING_NEAR);
+        let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
         self.least_clearance = self.body.clearance();
-        TruthTick {
+        GroundTruthTick {
             tick: self.tick,
             time_s: self.time,
             x: pose.position.x,
@@ -424,7 +424,7 @@ impl Robot {
             left_counts: counts(channel.left, sign.left),
             right_counts: counts(channel.right, sign.right),
             sonar_cm: self.ranging.front(&self.standard),
-            unattended_s: self.unattended,
+            stopping_time_s: self.unattended,
             radio: None,
         }
     }

@@ -8,16 +8,14 @@ use std::{
     net::SocketAddr,
     os::fd::AsFd,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use common::{
     checkpoint::{Checkpoint, CheckpointError},
     clock::{Pace, monotonic_ns},
     mission::Mission,
-};
-use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
-    io::Errno,
+    poll,
 };
 use thiserror::Error;
 
@@ -62,8 +60,8 @@ pub struct SimOptions {
     pub transport: Transport,
     /// Where it is kept how the robot stands; one that is kept there goes on from it. None forgets.
     pub keep: Option<PathBuf>,
-    /// Where the truth is written: a [`common::truth::TruthHeader`], then a
-    /// [`common::truth::TruthTick`] each tick, one JSON object a line, each
+    /// Where the truth is written: a [`common::ground_truth::GroundTruthHeader`], then a
+    /// [`common::ground_truth::GroundTruthTick`] each tick, one JSON object a line, each
     /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
     /// without.
     pub truth: Option<Box<dyn Write + Send>>,
@@ -173,22 +171,12 @@ fn lock(file: &Path) -> io::Result<File> {
 fn wait(
     session: &Session,
     stop: &impl AsFd,
-    timeout: Option<Timespec>,
+    timeout: Option<Duration>,
 ) -> Result<[bool; 2], SimError> {
     let (first, second) = session.readable();
-    let mut fds = [
-        PollFd::from_borrowed_fd(stop.as_fd(), PollFlags::IN),
-        PollFd::from_borrowed_fd(first, PollFlags::IN),
-        PollFd::from_borrowed_fd(second.unwrap_or(first), PollFlags::IN),
-    ];
-    match poll(&mut fds, timeout.as_ref()) {
-        Ok(_) => {
-            let [stop, first, second] = fds.map(|fd| !fd.revents().is_empty());
-            Ok([first || second, stop])
-        }
-        Err(Errno::INTR) => Ok([false; 2]),
-        Err(error) => Err(SimError::Wait(error.into())),
-    }
+    let descriptors = [stop.as_fd(), first, second.unwrap_or(first)];
+    let came = poll::readable(&descriptors, timeout).map_err(SimError::Wait)?;
+    Ok([came[1] || came[2], came[0]])
 }
 
 /// Mission time by the machine's clock; none at the pace of the commands.
@@ -219,13 +207,10 @@ impl SimClock {
     }
 
     /// How long to wait for mission time `due`; for ever at the pace of the commands.
-    fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Timespec> {
+    fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Duration> {
         let (_, rate) = self.runs?;
         let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);
-        Some(Timespec {
-            tv_sec: seconds as i64,
-            tv_nsec: (seconds.fract() * 1e9) as i64,
-        })
+        Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
     }
 
     /// When more than a period is owed at machine time `machine_ns`, `due` being the next tick, let
@@ -252,7 +237,7 @@ mod tests {
         };
         assert_eq!(clock.now(2_500_000_000), Some(3.0));
         let wait = clock.wait_for(3.5, 2_500_000_000).unwrap();
-        assert_eq!((wait.tv_sec, wait.tv_nsec), (0, 250_000_000));
+        assert_eq!(wait, Duration::from_millis(250));
         clock.forgive(2.95, 2_500_000_000);
         assert_eq!(
             clock.now(2_500_000_000),

@@ -11,7 +11,7 @@ mod support;
 
 use common::{
     clock::Pace,
-    truth::TruthTick,
+    ground_truth::GroundTruthTick,
     wire::{Addressing, Command, Decoder, Report},
 };
 use support::{Sim, receive};
@@ -24,7 +24,7 @@ fn forward(counts: i16) -> Vec<u8> {
 
 /// Drive in lock-step for `rounds` of so many commands sent at once: every byte that came, and the truth of
 /// every tick.
-fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<TruthTick>) {
+fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
     let mut sim = Sim::start(mission, Pace::Max);
     let host = sim.host();
     let mut bytes = Vec::new();

@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use common::{
+    ground_truth::GroundTruthTick,
     samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
     topics::{self, AnyTopic as _, SUPERVISOR},
-    truth::TruthTick,
 };
 use rustix::process::{Pid, kill_process};
 
@@ -145,10 +145,10 @@ impl Attack {
     }
 
     /// How far the last pose heard of was from the truth of its tick, metres. Wheel counts are what both know.
-    pub(super) fn pose_error(&self, truth: &[TruthTick]) -> Option<f64> {
+    pub(super) fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let counts = (pose.left_counts, pose.right_counts);
-        let same = |tick: &&TruthTick| (tick.left_counts, tick.right_counts) == counts;
+        let same = |tick: &&GroundTruthTick| (tick.left_counts, tick.right_counts) == counts;
         let tick = truth.iter().rev().find(same)?;
         Some((pose.x_m - tick.x).hypot(pose.y_m - tick.y))
     }

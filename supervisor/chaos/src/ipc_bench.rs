@@ -11,8 +11,8 @@ use common::{
     domain::{Domain, RobotName},
     latency::Histogram,
     samples::{CommandSample, GridHeader, GuidanceSample, PoseSample, WheelSample},
-    shell::{StageError, become_child},
     signals::{SIGTERM, Signals},
+    start::{StageError, become_child},
     topics,
     waiter::Waiter,
 };

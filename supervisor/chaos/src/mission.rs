@@ -118,7 +118,7 @@ pub(super) fn attack(
         let truth = robot.truth();
         let last = truth.last();
         end.collisions = last.map_or(0, |tick| tick.contacts);
-        end.unattended_s = last.map_or(0.0, |tick| tick.unattended_s);
+        end.unattended_s = last.map_or(0.0, |tick| tick.stopping_time_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - number(calm, "pose_error_m");
     }

@@ -1,6 +1,8 @@
 //! The picture a run ends with.
 
-use common::{kinematics::Pose2, mission::Mission, samples::PoseSample, truth::TruthTick};
+use common::{
+    ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
+};
 use picture::{Facts, Scene};
 use supervisor::{Finished, outcome::Outcome};
 
@@ -40,7 +42,7 @@ pub(crate) fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> 
 }
 
 /// Poses of the truth, for the picture.
-fn true_poses(truth: &[TruthTick]) -> Vec<Pose2> {
+fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
     truth
         .iter()
         .map(|tick| Pose2 {

@@ -2,7 +2,9 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use common::{clock::MissionTime, latency::Histogram, mission::Mission, truth::TruthTick};
+use common::{
+    clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
+};
 use serde::Serialize;
 
 use supervisor::{Finished, outcome::Outcome};
@@ -104,12 +106,13 @@ impl Summary {
                 _ => pose.map_or(0.0, |pose| pose.travelled_m),
             },
             straight_m: mission.target.length(),
-            min_clearance_m: clearance.filter(|&clearance| clearance < TruthTick::NOTHING_NEAR),
+            min_clearance_m: clearance
+                .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             collisions,
             pose_error_m: pose
                 .zip(truth.last())
                 .map(|(pose, truth)| (pose.x_m - truth.x).hypot(pose.y_m - truth.y)),
-            unattended_s: truth.last().map(|tick| tick.unattended_s),
+            unattended_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves,
             local_updates,
@@ -205,11 +208,15 @@ impl fmt::Display for Summary {
 
 /// The truth up to the tick whose frames showed `counts`: wheel counts are what belief and truth have in
 /// common. All of it when the run did not end by arriving.
-fn truth_until(truth: &[TruthTick], counts: Option<(u16, u16)>, arrived: bool) -> &[TruthTick] {
+fn truth_until(
+    truth: &[GroundTruthTick],
+    counts: Option<(u16, u16)>,
+    arrived: bool,
+) -> &[GroundTruthTick] {
     if !arrived {
         return truth;
     }
-    let shows = |tick: &TruthTick| counts == Some((tick.left_counts, tick.right_counts));
+    let shows = |tick: &GroundTruthTick| counts == Some((tick.left_counts, tick.right_counts));
     let end = truth.iter().rposition(shows).map_or(truth.len(), |last| {
         // A robot at rest shows the same counts for many ticks: the first of them is the arrival.
         truth[..=last]
@@ -220,7 +227,7 @@ fn truth_until(truth: &[TruthTick], counts: Option<(u16, u16)>, arrived: bool) -
     &truth[..truth.len().min(end + 1)]
 }
 
-fn path_length(truth: &[TruthTick]) -> f64 {
+fn path_length(truth: &[GroundTruthTick]) -> f64 {
     truth
         .windows(2)
         .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))

@@ -11,6 +11,7 @@ use std::{
 use common::{
     bus::{Bus, BusError, Services},
     domain::{Domain, SHARED_MEMORY},
+    topics,
 };
 use thiserror::Error;
 
@@ -109,7 +110,7 @@ impl DomainLock {
             SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
         )?;
         make_own_directory(&self.domain.middleware_root())?;
-        let (bus, services) = Bus::make(&self.domain, "supervisor")?;
+        let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));
         self.shut = None;
         Ok(())

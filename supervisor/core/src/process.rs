@@ -11,10 +11,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
-    process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal},
-};
+use common::poll;
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 
 /// The kernel ends a killed process within this, unless it hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
@@ -126,12 +124,7 @@ impl Process {
 
     /// Wait until it has ended; says whether it has.
     fn wait(&self, patience: Duration) -> io::Result<bool> {
-        let mut polled = [PollFd::new(&self.pidfd, PollFlags::IN)];
-        match poll(&mut polled, Timespec::try_from(patience).ok().as_ref()) {
-            Ok(ready) => Ok(ready > 0),
-            Err(rustix::io::Errno::INTR) => Ok(false),
-            Err(errno) => Err(errno.into()),
-        }
+        poll::is_readable(&self.pidfd, patience)
     }
 }
 

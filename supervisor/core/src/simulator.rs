@@ -12,14 +12,11 @@ use std::{
 
 use common::{
     clock::Pace,
+    ground_truth::{GroundTruthHeader, GroundTruthTick},
     mission::Mission,
-    run,
-    truth::{TruthHeader, TruthTick},
+    poll, run,
 };
-use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
-    fs::{OFlags, fcntl_getfl, fcntl_setfl},
-};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
 
 use crate::process::{Process, firsthand};
@@ -63,7 +60,7 @@ struct Truth {
     pipe: ChildStdout,
     pending: Vec<u8>,
     listening: Option<SocketAddr>,
-    ticks: Vec<TruthTick>,
+    ticks: Vec<GroundTruthTick>,
 }
 
 impl Simulator {
@@ -86,7 +83,7 @@ impl Simulator {
             mission,
             "--pace",
             &pace.to_string(),
-            "--truth",
+            "--ground-truth",
             "--supervisor",
             &std::process::id().to_string(),
         ]);
@@ -140,7 +137,7 @@ impl Simulator {
     }
 
     /// What it told, tick by tick.
-    pub fn truth(&self) -> &[TruthTick] {
+    pub fn truth(&self) -> &[GroundTruthTick] {
         &self.truth.ticks
     }
 
@@ -152,14 +149,9 @@ impl Simulator {
 }
 
 fn wait(descriptors: &[BorrowedFd<'_>], timeout: Duration) -> Result<(), SimulatorError> {
-    let mut polled: Vec<PollFd<'_>> = descriptors
-        .iter()
-        .map(|descriptor| PollFd::from_borrowed_fd(*descriptor, PollFlags::IN))
-        .collect();
-    match poll(&mut polled, Timespec::try_from(timeout).ok().as_ref()) {
-        Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
-        Err(errno) => Err(system("wait for")(errno.into())),
-    }
+    poll::readable(descriptors, Some(timeout))
+        .map(drop)
+        .map_err(system("wait for"))
 }
 
 impl Truth {
@@ -189,7 +181,7 @@ impl Truth {
         let rest = self.pending.split_off(end + 1);
         for line in self.pending.split(|&byte| byte == b'\n') {
             if self.listening.is_none() {
-                let header = serde_json::from_slice::<TruthHeader>(line).ok();
+                let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();
                 self.listening = header.and_then(|header| header.listening.parse().ok());
             } else if let Ok(tick) = serde_json::from_slice(line) {
                 self.ticks.push(tick);

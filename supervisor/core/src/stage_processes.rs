@@ -226,7 +226,7 @@ impl StageProcesses {
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
                 let mut death = self.record(index, Cause::of(status));
-                if let Err(error) = bus.make_way(death.pid) {
+                if let Err(error) = bus.remove_unfinished(death.pid) {
                     tracing::warn!(stage = death.stage, %error, "cannot make way for its successor");
                 }
                 let member = &mut self.members[index];

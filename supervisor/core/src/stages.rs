@@ -5,7 +5,8 @@
 use std::time::Duration;
 
 use common::{
-    shell::{StageError, Start, run_stage},
+    shell::run_stage,
+    start::{StageError, Start},
     topics::{
         AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
         SURROUNDINGS, WHEELS,

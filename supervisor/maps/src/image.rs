@@ -6,7 +6,7 @@ use std::{
 };
 
 use ::image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
-use planner::MAX_SIDE;
+use harmonic::MAX_SIDE;
 
 use super::{Map, MapError, check_size, open};
 

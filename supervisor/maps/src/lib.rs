@@ -19,7 +19,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use planner::MAX_SIDE;
+use harmonic::MAX_SIDE;
 use thiserror::Error;
 
 /// A map of cells, row-major, row 0 at the top.

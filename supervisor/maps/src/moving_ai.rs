@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use planner::MAX_SIDE;
+use harmonic::MAX_SIDE;
 
 use super::{Map, MapError, check_size, read};
 

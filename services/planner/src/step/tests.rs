@@ -56,6 +56,17 @@ fn at(x: f64, y: f64) -> Pose2 {
 }
 
 #[test]
+fn a_screening_length_in_metres_is_the_same_on_any_grid() {
+    for cells in [40, 200] {
+        let mut mission = mission_of(cells);
+        mission.planner.screening_m = Some(0.5);
+        let cell = 4.0 / f64::from(cells);
+        let expected = Screening::Uniform { length: 0.5, cell };
+        assert_eq!(screening(&mission), expected);
+    }
+}
+
+#[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
     let planner = Planner::new(&mission());
     assert_eq!(

@@ -12,12 +12,9 @@ use std::{
     time::Duration,
 };
 
+use common::poll;
 use rustix::{
-    event::{
-        PollFd, PollFlags, Timespec,
-        epoll::{self, CreateFlags, EventData, EventFlags},
-        poll,
-    },
+    event::epoll::{self, CreateFlags, EventData, EventFlags},
     io::{Errno, read, write},
 };
 
@@ -128,7 +125,7 @@ impl<D: Dial> Stream<D> {
                 descriptor,
                 since_ns,
             } => {
-                if is_writable(descriptor)? {
+                if poll::is_writable(descriptor, Duration::ZERO)? {
                     match self.dial.finish(descriptor) {
                         Ok(()) => self.opened(now_ns)?,
                         Err(error) => self.close(&error),
@@ -275,20 +272,6 @@ const fn remedy(errno: Errno) -> &'static str {
 
 fn passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
     now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
-}
-
-/// Whether `descriptor` is writable or broken at this moment.
-fn is_writable(descriptor: &OwnedFd) -> io::Result<bool> {
-    let mut polled = [PollFd::new(descriptor, PollFlags::OUT)];
-    let at_once = Timespec {
-        tv_sec: 0,
-        tv_nsec: 0,
-    };
-    match poll(&mut polled, Some(&at_once)) {
-        Ok(ready) => Ok(ready > 0),
-        Err(Errno::INTR) => Ok(false),
-        Err(error) => Err(error.into()),
-    }
 }
 
 impl<D> AsFd for Stream<D> {

@@ -3,11 +3,14 @@ use std::{
     net::{SocketAddr, TcpListener, TcpStream, UdpSocket},
     os::fd::OwnedFd,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
-use common::wire::{Addressing, Command, Decoder};
+use common::{
+    poll,
+    wire::{Addressing, Command, Decoder},
+};
 use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
     fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open},
     io::{Errno, read, write},
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
@@ -21,13 +24,8 @@ const MS: u64 = 1_000_000;
 
 /// Wait until something is there to be done.
 fn ready(descriptor: impl AsFd) {
-    let mut polled = [PollFd::new(&descriptor, PollFlags::IN)];
-    let timeout = Timespec {
-        tv_sec: 10,
-        tv_nsec: 0,
-    };
-    let came = poll(&mut polled, Some(&timeout)).unwrap();
-    assert_eq!(came, 1, "nothing came");
+    let came = poll::is_readable(descriptor, Duration::from_secs(10)).unwrap();
+    assert!(came, "nothing came");
 }
 
 /// Tend at `now_ns` until the wire says that it is open, or is not.
@@ -181,7 +179,7 @@ fn a_connection_that_takes_no_more_loses_whole_frames_only() {
     let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
     let mut robot = connected(&listener, &mut transport, 0);
     robot
-        .set_read_timeout(Some(std::time::Duration::from_millis(200)))
+        .set_read_timeout(Some(Duration::from_millis(200)))
         .unwrap();
     overfill(&mut transport, |buffer| robot.read(buffer).ok());
 }
@@ -294,12 +292,7 @@ fn a_line_that_takes_no_more_loses_whole_frames_only() {
     let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
     tend_until(&mut transport, true, 0);
     overfill(&mut transport, |buffer| {
-        let mut polled = [PollFd::new(&line.robot, PollFlags::IN)];
-        let a_while = Timespec {
-            tv_sec: 0,
-            tv_nsec: 200_000_000,
-        };
-        let came = poll(&mut polled, Some(&a_while)).unwrap() > 0;
+        let came = poll::is_readable(&line.robot, Duration::from_millis(200)).unwrap();
         came.then(|| read(&line.robot, buffer).unwrap())
     });
 }

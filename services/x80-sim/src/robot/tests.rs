@@ -195,7 +195,7 @@ fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
         for _ in 0..30 {
             robot.advance_to_next_tick();
         }
-        robot.truth().unattended_s
+        robot.truth().stopping_time_s
     };
     let obeyed = unattended("");
     assert!((obeyed - 0.25 - coasting).abs() < 0.02, "{obeyed}");
@@ -278,7 +278,7 @@ fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
 fn a_line_of_truth_has_the_names_that_its_readers_know() {
     let line = serde_json::to_string(&robot("").truth()).unwrap();
     let names: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
-    let known = "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm unattended_s";
+    let known = "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm stopping_time_s";
     assert_eq!(names, known.split(' ').collect::<Vec<_>>());
 }
 

@@ -5,8 +5,8 @@ use std::{io::Write, os::fd::BorrowedFd};
 use common::{
     checkpoint::Checkpoint,
     clock::Pace,
+    ground_truth::GroundTruthHeader,
     mission::Mission,
-    truth::TruthHeader,
     wire::{Decoder, Frame},
 };
 use serde::Serialize;
@@ -73,7 +73,7 @@ impl Session {
             truth,
             checkpoint,
         };
-        session.tell(&TruthHeader { listening });
+        session.tell(&GroundTruthHeader { listening });
         session.tell_tick();
         session.keep()?;
         Ok(session)

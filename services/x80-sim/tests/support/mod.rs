@@ -20,8 +20,8 @@ use std::{
 
 use common::{
     clock::Pace,
+    ground_truth::{GroundTruthHeader, GroundTruthTick},
     mission::Mission,
-    truth::{TruthHeader, TruthTick},
 };
 use x80_sim::{SimError, SimOptions, Transport, run};
 
@@ -67,7 +67,7 @@ impl Sim {
                 }
             }
         });
-        let header: TruthHeader = serde_json::from_str(&truth.recv().unwrap()).unwrap();
+        let header: GroundTruthHeader = serde_json::from_str(&truth.recv().unwrap()).unwrap();
         Self {
             listening: header.listening,
             truth,
@@ -77,7 +77,7 @@ impl Sim {
     }
 
     /// The truth of the next tick.
-    pub(crate) fn next_truth(&mut self) -> TruthTick {
+    pub(crate) fn next_truth(&mut self) -> GroundTruthTick {
         serde_json::from_str(&self.truth.recv_timeout(PATIENCE).unwrap()).unwrap()
     }
 
@@ -88,7 +88,7 @@ impl Sim {
     }
 
     /// The truth of the next tick of a robot that has finished.
-    pub(crate) fn last_truth(&mut self) -> Option<TruthTick> {
+    pub(crate) fn last_truth(&mut self) -> Option<GroundTruthTick> {
         let line = self.truth.recv().ok()?;
         Some(serde_json::from_str(&line).unwrap())
     }

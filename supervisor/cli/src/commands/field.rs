@@ -13,8 +13,8 @@ use std::{
 
 use clap::Args;
 use common::samples::FieldCell;
+use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use npyz::WriterBuilder as _;
-use planner::{Absorption, Cancellation, Cell, Domain, Field, Phase, Settings, SolveError, Solver};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -32,14 +32,9 @@ pub(crate) struct Arguments {
     /// The target's column and row, from 0; row 0 is the top of the map.
     #[arg(long, value_name = "COL,ROW")]
     target_cell: TargetCell,
-    /// k >= 0 of every cell: u is the mean of its neighbours, divided by (1 + k).
-    #[arg(
-        long,
-        value_name = "K",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    absorption: f64,
+    /// The screening length, in cells: in it u falls by a further factor of e. Without it there is no screening.
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    screening_cells: Option<f64>,
     /// Write u (arrays mantissa, exponent) and the guidance (ex, ey) as a NumPy .npz.
     #[arg(long, value_name = "F.npz")]
     out: Option<PathBuf>,
@@ -88,7 +83,7 @@ enum FieldError {
         map.display()
     )]
     NothingFree { map: PathBuf },
-    /// The planner's own sentence.
+    /// The solver's own sentence.
     #[error("{}: {cause}", map.display())]
     Solve { map: PathBuf, cause: SolveError },
     /// A file cannot be written.
@@ -129,8 +124,11 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// What is to be solved.
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, FieldError> {
     let target = arguments.target_cell.0;
+    let screening = arguments
+        .screening_cells
+        .map_or(Screening::None, Screening::cells);
     Domain::new(map.cols, map.rows, map.blocked.clone(), target)
-        .and_then(|domain| domain.with_absorption(Absorption::Uniform(arguments.absorption)))
+        .and_then(|domain| domain.with_screening(&screening))
         .map_err(|cause| {
             let file = arguments.map.clone();
             let at_target = matches!(
@@ -186,7 +184,7 @@ struct Report {
     cols: usize,
     /// Column and row.
     target: [usize; 2],
-    absorption: f64,
+    screening_cells: Option<f64>,
     reachable: usize,
     method: &'static str,
     repeats: usize,
@@ -230,14 +228,14 @@ impl Report {
             let all = &phases[nth];
             (all[(all.len() - 1) / 2] + all[all.len() / 2]) / 2.0
         };
-        let certificate = field.certificate();
+        let verification = field.verification();
         Self {
             rows: field.height(),
             cols: field.width(),
             target: [field.target().col, field.target().row],
-            absorption: arguments.absorption,
-            reachable: certificate.reachable,
-            method: certificate.method.name(),
+            screening_cells: arguments.screening_cells,
+            reachable: verification.reachable,
+            method: verification.method.name(),
             repeats: runs.len(),
             threads: arguments.threads.get(),
             setup_ms,
@@ -248,7 +246,7 @@ impl Report {
                 solve_ms_median: median(1),
                 verify_ms_median: median(2),
             }),
-            worst_residual: certificate.worst_residual,
+            worst_residual: verification.worst_residual,
             log10_u_min: field.log10_u_min(),
             peak_memory_bytes: peak_memory(),
         }
@@ -263,10 +261,14 @@ impl fmt::Display for Report {
             "{} x {} cells, {} of them lead to the target at {col},{row}",
             self.cols, self.rows, self.reachable
         )?;
+        let screening = self.screening_cells.map_or_else(
+            || "without screening".to_owned(),
+            |cells| format!("with a screening length of {cells} cells"),
+        );
         writeln!(
             f,
-            "u down to 1e{:.1} with absorption {}, worst relative residual {:.1e}",
-            self.log10_u_min, self.absorption, self.worst_residual
+            "u down to 1e{:.1} {screening}, worst relative residual {:.1e}",
+            self.log10_u_min, self.worst_residual
         )?;
         writeln!(
             f,

@@ -9,7 +9,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, mission::Mission, shell::become_child};
+use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
 
 use super::{Failure, directories, missions};
 #[cfg(feature = "tools")]

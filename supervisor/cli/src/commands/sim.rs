@@ -5,8 +5,8 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 use clap::{Args, ValueEnum};
 use common::{
     clock::Pace,
-    shell::become_child,
     signals::{SIGINT, SIGTERM, Signals},
+    start::become_child,
 };
 use x80_sim::SimOptions;
 
@@ -35,9 +35,9 @@ pub(crate) struct Arguments {
     /// Keep in this file how the robot stands; if it is there, go on from it.
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
-    /// Tell the truth, a JSON object a line, on standard output.
+    /// Write the ground truth, a JSON object a line, on standard output.
     #[arg(long)]
-    truth: bool,
+    ground_truth: bool,
     /// End when this process, the parent, ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
@@ -78,7 +78,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         transport: arguments.transport.into(),
         keep: arguments.keep.clone(),
         truth: arguments
-            .truth
+            .ground_truth
             .then(|| Box::new(std::io::stdout()) as Box<_>),
     };
     x80_sim::run(options, &signals)?;

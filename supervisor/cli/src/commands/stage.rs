@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 use common::{
     domain::RobotName,
-    shell::{Generation, StageError, Start},
+    start::{Generation, StageError, Start},
 };
 
 use super::Failure;

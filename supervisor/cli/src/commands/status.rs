@@ -177,7 +177,7 @@ fn link_status(link: &LinkSample) -> LinkStatus {
         losses: link.losses,
         reboots: link.reboots,
         unsent: link.unsent,
-        strangers: link.strangers,
+        strangers: link.foreign_datagrams,
     }
 }
 

@@ -50,24 +50,32 @@ pub(crate) fn faults(_: &FaultArguments) -> Result<ExitCode, Failure> {
 
 /// The topics as a Markdown table.
 fn topic_table() -> String {
-    let mut table = String::from(
-        "| topic | payload | written by | rate | too old after | meaning |\n|---|---|---|---|---|---|\n",
-    );
+    let mut table =
+        String::from("| topic | payload | written by | rate | meaning |\n|---|---|---|---|---|\n");
     for topic in topics::TABLE {
         let spec = topic.spec();
         let rate = match spec.rate {
             Rate::EachTick => "each tick".to_owned(),
             Rate::EachFrame => "each frame of the robot".to_owned(),
             Rate::WhenItHappens => "when it happens".to_owned(),
-            Rate::OnChange(least) => format!("on change, at least every {} ms", least.as_millis()),
+            Rate::OnChange {
+                at_most_every,
+                again_after,
+            } => {
+                let limit = match at_most_every.as_millis() {
+                    0 => String::new(),
+                    limit => format!(" at most every {limit} ms"),
+                };
+                format!(
+                    "on change{limit}, again after {} ms",
+                    again_after.as_millis()
+                )
+            }
         };
-        let age = spec
-            .max_age
-            .map_or("-".to_owned(), |age| format!("{} ms", age.as_millis()));
         // Writing to a String cannot fail.
         let _ = writeln!(
             table,
-            "| `{}` | `{}` | {} | {rate} | {age} | {} |",
+            "| `{}` | `{}` | {} | {rate} | {} |",
             spec.name,
             topic.payload(),
             spec.writer,

@@ -6,8 +6,8 @@ use std::{
 };
 
 use common::{
+    ground_truth::GroundTruthTick,
     samples::{HoldReason, Order},
-    truth::TruthTick,
     waiter::Waiter,
 };
 
@@ -28,7 +28,7 @@ pub struct Finished {
     /// What was heard.
     pub record: Record,
     /// What really happened, of a simulated robot.
-    pub truth: Vec<TruthTick>,
+    pub truth: Vec<GroundTruthTick>,
     /// Times each stage was started again.
     pub restarts: BTreeMap<&'static str, u32>,
     /// Supervisors that went on with the run.

@@ -37,7 +37,6 @@ pub static DISTANCE: Topic<DistanceSample> = Topic::new(&Spec {
     name: "distance",
     writer: "odometer",
     rate: Rate::EachTick,
-    max_age: None,
     limits: Limits::SMALL,
     meaning: "Metres driven and seconds in motion.",
 });

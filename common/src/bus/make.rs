@@ -1,0 +1,226 @@
+//! Making and joining a bus, and removing what killed processes leave on it.
+
+use std::{
+    any::Any,
+    ffi::OsStr,
+    io,
+    os::unix::{ffi::OsStrExt as _, fs::MetadataExt as _},
+    path::{Path, PathBuf},
+};
+
+use iceoryx2::{
+    config::Config,
+    node::{Node, NodeBuilder, NodeState, NodeView as _},
+    prelude::{
+        CallbackProgression, LogLevel, NodeName, SemanticString, SignalHandlingMode, ipc,
+        set_log_level_from_env_or,
+    },
+};
+
+use super::{
+    error::BusError,
+    leftovers,
+    topic::{AnyTopic, BusNode},
+};
+use crate::domain::{Domain, SHARED_MEMORY};
+
+/// A process's place on a robot's bus.
+#[derive(Debug)]
+pub struct Bus {
+    pub(super) node: BusNode,
+    config: PathBuf,
+    identity: ConfigIdentity,
+}
+
+/// The services of every topic, existing as long as this is held.
+pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
+
+/// Tells the configuration of one bus from that of the next in its place, which may get the file's number, but not
+/// its time too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct ConfigIdentity {
+    file: u64,
+    seconds: i64,
+    nanoseconds: i64,
+}
+
+impl ConfigIdentity {
+    fn of(config: &Path) -> io::Result<Self> {
+        let file = config.metadata()?;
+        Ok(Self {
+            file: file.ino(),
+            seconds: file.mtime(),
+            nanoseconds: file.mtime_nsec(),
+        })
+    }
+}
+
+fn no_join(domain: &Domain) -> impl Fn(String) -> BusError {
+    move |detail| BusError::Join {
+        robot: domain.robot.to_string(),
+        detail,
+    }
+}
+
+impl Bus {
+    /// Make the bus of a robot: its configuration, which consumers in other languages load too, and the services of
+    /// every topic of `table`. Nobody can join before all are there. Only the supervisor calls this, when the robot
+    /// has no bus.
+    ///
+    /// # Errors
+    /// When a file cannot be written, a service exists already, or shared memory is full.
+    pub fn make(
+        domain: &Domain,
+        name: &str,
+        table: &[&dyn AnyTopic],
+    ) -> Result<(Self, Services), BusError> {
+        let (unfinished, config) = (
+            domain.middleware_config_unfinished(),
+            domain.middleware_config(),
+        );
+        Self::write_config(domain, &unfinished)?;
+        let mut bus = Self::join_by(&unfinished, domain, name)?;
+        let services = table
+            .iter()
+            .map(|topic| topic.create(&bus.node))
+            .collect::<Result<_, _>>()?;
+        let failed = |error: io::Error| no_join(domain)(error.to_string());
+        leftovers::back_up(&bus.services(), &bus.backup()).map_err(failed)?;
+        std::fs::rename(&unfinished, &config).map_err(failed)?;
+        bus.config = config;
+        Ok((bus, Services(services)))
+    }
+
+    fn write_config(domain: &Domain, file: &Path) -> Result<(), BusError> {
+        let failed = no_join(domain);
+        let mut config = Config::default();
+        let root = domain.middleware_root();
+        let prefix = domain.shared_memory_prefix();
+        let path = SemanticString::new(root.as_os_str().as_encoded_bytes())
+            .map_err(|error| failed(format!("{error:?} in {root:?}")))?;
+        config.global.set_root_path(&path);
+        config.global.prefix = SemanticString::new(prefix.as_bytes())
+            .map_err(|error| failed(format!("{error:?} in {prefix:?}")))?;
+        // The supervisor cleans up after processes that were killed: a stage that starts does not wait for it.
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+        let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
+        std::fs::write(file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
+    }
+
+    /// Join the bus of a robot under a name that `iox2 node list` shows.
+    ///
+    /// The first call decides the process's domain: a process joins the bus of one robot only.
+    ///
+    /// # Errors
+    /// When the robot does not run here, is another user's, or shared memory is full.
+    pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
+        Self::join_by(&domain.middleware_config(), domain, name)
+    }
+
+    fn join_by(file: &Path, domain: &Domain, name: &str) -> Result<Self, BusError> {
+        // We report what the middleware reports; IOX2_LOG_LEVEL brings its own messages back.
+        set_log_level_from_env_or(LogLevel::Fatal);
+        let join = no_join(domain);
+        // Before the file is read: if it is replaced meanwhile, `is_replaced` says so.
+        let identity = ConfigIdentity::of(file).map_err(|error| BusError::NotRunning {
+            robot: domain.robot.to_string(),
+            detail: format!("{}: {error}", file.display()),
+        })?;
+        let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
+            .map_err(|error| join(format!("{error:?} in {file:?}")))?;
+        let config = Config::setup_global_config_from_file(&path)
+            .map_err(|error| join(format!("{error:?}")))?;
+        if config.global.prefix.as_bytes() != domain.shared_memory_prefix().as_bytes() {
+            return Err(join(
+                "this process has joined the bus of another robot already".to_owned(),
+            ));
+        }
+        let name = NodeName::new(name).map_err(|error| join(format!("{error:?}")))?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|error| join(format!("{error:?}")))?;
+        Ok(Self {
+            node,
+            config: file.to_owned(),
+            identity,
+        })
+    }
+
+    /// Whether another bus has taken its place, of this run or of the robot's next: nothing is published on this one
+    /// any more. A consumer drops everything it has of it, and joins again.
+    #[must_use]
+    pub fn is_replaced(&self) -> bool {
+        ConfigIdentity::of(&self.config).is_ok_and(|now| now != self.identity)
+    }
+
+    /// Where the services' files are.
+    fn services(&self) -> PathBuf {
+        let services = self.node.config().global.service_dir();
+        PathBuf::from(OsStr::from_bytes(services.as_bytes()))
+    }
+
+    /// Where each of them has a second name.
+    fn backup(&self) -> PathBuf {
+        self.services().with_extension("backup")
+    }
+
+    /// Before a successor of `process`, which must have ended, is started: remove the shared memory that `process` had
+    /// not finished, for which the successor could wait for ever, and restore service files that are missing. Only the
+    /// supervisor calls this. Returns whether unfinished shared memory of other processes is left.
+    ///
+    /// # Errors
+    /// When files cannot be removed or restored.
+    pub fn remove_unfinished(&self, process: u32) -> io::Result<bool> {
+        leftovers::restore(&self.backup(), &self.services())?;
+        self.remove_unfilled(process)
+    }
+
+    fn remove_unfilled(&self, process: u32) -> io::Result<bool> {
+        let prefix = String::from_utf8_lossy(self.node.config().global.prefix.as_bytes());
+        leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
+    }
+
+    /// Free what ended processes held: their places on the topics and their memory; and what the processes `killed`,
+    /// which must have ended, left of a start that was cut off. Restore service files that are missing. Only the
+    /// supervisor calls this; it takes a few milliseconds for each process. Returns whether all of it could be done:
+    /// if not, try again later with the same processes.
+    ///
+    /// # Errors
+    /// When files cannot be removed or restored.
+    pub fn clear_up(&self, killed: &[u32]) -> io::Result<bool> {
+        leftovers::restore(&self.backup(), &self.services())?;
+        let config = self.node.config();
+        let nodes = config.global.node_dir();
+        let nodes = Path::new(OsStr::from_bytes(nodes.as_bytes()));
+        let (mut outcome, mut all) = (Ok(()), true);
+        let listed = Node::<ipc::Service>::list(config, |node| {
+            if let NodeState::Dead(dead) = node {
+                match self.remove_unfilled(leftovers::process_of(dead.id().value())) {
+                    // One that cannot be freed now is listed again next time.
+                    Ok(false) => drop(dead.try_remove_stale_resources()),
+                    // The middleware would wait for it to be filled, perhaps for ever; next time it is old.
+                    Ok(true) => all = false,
+                    Err(error) => {
+                        outcome = Err(error);
+                        return CallbackProgression::Stop;
+                    }
+                }
+            }
+            CallbackProgression::Continue
+        });
+        outcome?;
+        listed.map_err(|error| io::Error::other(format!("{error:?}")))?;
+        // The places of ended processes are found by these files, so they go last.
+        if all {
+            killed.iter().try_for_each(|&process| {
+                self.remove_unfilled(process)?;
+                leftovers::remove_nodes(nodes, process)
+            })?;
+        }
+        Ok(all)
+    }
+}

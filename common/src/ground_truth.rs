@@ -1,0 +1,69 @@
+//! The ground truth of a simulated robot: one JSON object a line, for the summary and the pictures.
+//!
+//! The first line is a [`GroundTruthHeader`], every further one a [`GroundTruthTick`]. No stage reads it.
+
+use serde::{Deserialize, Serialize};
+
+/// The first line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GroundTruthHeader {
+    /// Where the robot answers, `address:port`.
+    pub listening: String,
+}
+
+/// One line a tick, written when the tick's frames are made; tick 0 comes before anything has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GroundTruthTick {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Mission time, seconds.
+    pub time_s: f64,
+    /// Position of the robot's centre in the mission frame, metres.
+    pub x: f64,
+    /// See `x`.
+    pub y: f64,
+    /// Heading, radians counter-clockwise from x, not wrapped.
+    pub heading: f64,
+    /// Speed along the heading, m/s.
+    pub v: f64,
+    /// Turn rate, rad/s.
+    pub omega: f64,
+    /// Least distance since the tick before from the body's surface to the nearest thing, metres;
+    /// [`GroundTruthTick::NOTHING_NEAR`] where nothing stands.
+    pub clearance_m: f64,
+    /// How often the body has touched something so far.
+    pub contacts: u64,
+    /// Left wheel counts as this tick's frame shows them, growing forward, modulo 32768.
+    pub left_counts: u16,
+    /// Right wheel counts, likewise.
+    pub right_counts: u16,
+    /// The front ultrasonic byte of this tick's frame, centimetres; 255 is nothing.
+    pub sonar_cm: u8,
+    /// The longest so far that a wheel turned after the last motion command the robot received, seconds. Slower than
+    /// [`GroundTruthTick::AT_REST_M_S`] is at rest.
+    #[serde(default)]
+    pub stopping_time_s: f64,
+    /// What the radio has done so far; missing where it is perfect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radio: Option<GroundTruthRadio>,
+}
+
+/// What the radio has done so far, both ways together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GroundTruthRadio {
+    /// Whether it is out now.
+    pub out: bool,
+    /// Datagrams sent over it.
+    pub sent: u64,
+    /// Datagrams lost on it.
+    pub lost: u64,
+    /// The longest outage, seconds.
+    pub longest_outage_s: f64,
+}
+
+impl GroundTruthTick {
+    /// A wheel whose rim is slower than this is at rest, m/s.
+    pub const AT_REST_M_S: f64 = 0.01;
+    /// Clearance where nothing stands, metres: JSON has no infinity.
+    pub const NOTHING_NEAR: f64 = 1e9;
+}

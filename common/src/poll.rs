@@ -1,0 +1,91 @@
+//! Waiting for descriptors: the one place that calls `poll`, and calls it again when a signal interrupts it.
+
+use std::{
+    io,
+    os::fd::{AsFd, BorrowedFd},
+    time::{Duration, Instant},
+};
+
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    io::Errno,
+};
+
+/// Wait until one of `descriptors` is readable, closed or broken, or `timeout` has passed; for ever without one.
+/// Returns for each whether it is.
+///
+/// # Errors
+/// When the system refuses to wait.
+pub fn readable(
+    descriptors: &[BorrowedFd<'_>],
+    timeout: Option<Duration>,
+) -> io::Result<Vec<bool>> {
+    let mut polled: Vec<PollFd<'_>> = descriptors
+        .iter()
+        .map(|&descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
+        .collect();
+    wait(&mut polled, timeout)?;
+    Ok(polled
+        .iter()
+        .map(|descriptor| !descriptor.revents().is_empty())
+        .collect())
+}
+
+/// Whether `descriptor` is readable, closed or broken within `timeout`.
+///
+/// # Errors
+/// As [`readable`].
+pub fn is_readable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
+    Ok(readable(&[descriptor.as_fd()], Some(timeout))?.contains(&true))
+}
+
+/// Whether `descriptor` is writable, closed or broken within `timeout`.
+///
+/// # Errors
+/// As [`readable`].
+pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
+    wait(
+        &mut [PollFd::new(&descriptor, PollFlags::OUT)],
+        Some(timeout),
+    )
+}
+
+/// Whether anything came within `timeout`; it is in the entries of `polled`.
+fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
+    let began = Instant::now();
+    loop {
+        let left = timeout.map(|timeout| timeout.saturating_sub(began.elapsed()));
+        // A time that the system cannot count is for ever.
+        let left = left.and_then(|left| Timespec::try_from(left).ok());
+        match poll(polled, left.as_ref()) {
+            Err(Errno::INTR) => {}
+            came => return Ok(came? > 0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{io::Write as _, os::unix::net::UnixStream};
+
+    const AT_ONCE: Option<Duration> = Some(Duration::ZERO);
+
+    #[test]
+    fn each_descriptor_is_told_apart() {
+        let (idle, _other) = UnixStream::pair().unwrap();
+        let (written, mut other) = UnixStream::pair().unwrap();
+        let both = [idle.as_fd(), written.as_fd()];
+        assert_eq!(readable(&both, AT_ONCE).unwrap(), [false, false]);
+        other.write_all(b"x").unwrap();
+        assert_eq!(readable(&both, None).unwrap(), [false, true]);
+    }
+
+    #[test]
+    fn a_closed_end_is_readable() {
+        let (end, other) = UnixStream::pair().unwrap();
+        assert!(!is_readable(&end, Duration::ZERO).unwrap());
+        drop(other);
+        assert!(is_readable(&end, Duration::ZERO).unwrap());
+    }
+}

@@ -1,0 +1,138 @@
+//! How a stage's process takes its place in a run: as a child of the supervisor. `external` is the other way.
+
+use std::{fs::File, os::fd::OwnedFd, path::PathBuf};
+
+use thiserror::Error;
+
+use crate::{
+    bus::{Bus, BusError},
+    checkpoint::CheckpointError,
+    domain::{Domain, RobotName},
+    run::{Run, RunError},
+};
+
+/// Which process of a stage's in a run this is: each start of a stage is a generation.
+#[derive(Clone, Debug)]
+pub struct Generation {
+    /// The stage's name in the table.
+    pub stage: &'static str,
+    /// Where `run.toml` and the checkpoints lie.
+    pub directory: PathBuf,
+    /// 1 for the first generation.
+    pub number: u32,
+    /// Ticks before this one are an earlier generation's.
+    pub first_tick: u64,
+}
+
+/// How a stage's process came to be.
+#[derive(Clone, Debug)]
+pub enum Start {
+    /// The supervisor started it.
+    Child {
+        /// Which generation it is.
+        generation: Generation,
+        /// The supervisor's process, its parent: when that ends, this one is to end.
+        supervisor: u32,
+    },
+    /// Something else started it (systemd, a person), for a supervisor that only watches; it finds the rest itself.
+    External {
+        /// Which stage it is.
+        stage: &'static str,
+        /// For which robot.
+        robot: RobotName,
+    },
+}
+
+/// A process that has taken its place.
+pub(crate) struct Joined {
+    pub(crate) generation: Generation,
+    pub(crate) run: Run,
+    pub(crate) bus: Bus,
+    /// Becomes readable when the supervisor has ended; a child gets a signal instead.
+    pub(crate) supervisor: Option<OwnedFd>,
+    pub(crate) stage_lock: File,
+}
+
+/// Why a stage's process ended.
+#[derive(Debug, Error)]
+pub enum StageError {
+    /// Shared memory.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The run file.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The stage's checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// What only this stage does.
+    #[error("{0}")]
+    Other(String),
+    /// Signals or process attributes.
+    #[error("cannot {action}: {source}; this needs Linux 5.4 or newer")]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// What the system reports.
+        source: std::io::Error,
+    },
+}
+
+/// Take the place that the supervisor, the parent, says.
+pub(crate) fn join_as_child(
+    generation: &Generation,
+    supervisor: u32,
+) -> Result<Joined, StageError> {
+    become_child(generation.stage, supervisor)?;
+    let run = Run::load(&generation.directory)?;
+    let domain = Domain::of(run.robot.clone());
+    let stage_lock = enter(&domain)?;
+    let bus = Bus::join(&domain, generation.stage)?;
+    Ok(Joined {
+        generation: generation.clone(),
+        run,
+        bus,
+        supervisor: None,
+        stage_lock,
+    })
+}
+
+/// Count as a process of `domain`, until the result is dropped.
+pub(crate) fn enter(domain: &Domain) -> Result<File, StageError> {
+    domain
+        .enter()
+        .map_err(system("enter the robot's directory"))
+}
+
+pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {
+    move |source| StageError::System { action, source }
+}
+
+/// Take a name that `ps` and `pkill` show, and get SIGTERM when `supervisor` ends.
+///
+/// # Errors
+/// When the supervisor has ended already, or the system is no Linux.
+pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageError> {
+    name_process(process_name)?;
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
+        .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
+    // It may have ended before that took effect.
+    let parent = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get() as u32);
+    if parent == supervisor {
+        Ok(())
+    } else {
+        Err(StageError::Other(format!(
+            "supervisor {supervisor} has ended; start stages through `firsthand run`"
+        )))
+    }
+}
+
+/// Take a name that `ps` and `pkill` show.
+pub(crate) fn name_process(name: &str) -> Result<(), StageError> {
+    // A name with a zero byte cannot come from the table.
+    if let Ok(name) = std::ffi::CString::new(name) {
+        rustix::thread::set_name(&name)
+            .map_err(|errno| system("name the process")(errno.into()))?;
+    }
+    Ok(())
+}

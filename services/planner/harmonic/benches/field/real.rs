@@ -1,0 +1,29 @@
+//! Maps of real places, a cell a pixel.
+
+use std::path::Path;
+
+use harmonic::{Cell, Domain};
+
+/// As the ROS map_server reads them: darker than this is not free.
+const FREE_FROM: u8 = 206;
+
+/// The map in a PGM, its target the free cell nearest to the middle.
+pub(crate) fn load(file: &Path) -> Domain {
+    let grey = image::open(file).expect("a PGM").into_luma8();
+    let (width, height) = (grey.width() as usize, grey.height() as usize);
+    let mut blocked: Vec<bool> = grey.iter().map(|&grey| grey < FREE_FROM).collect();
+    for (at, blocked) in blocked.iter_mut().enumerate() {
+        let (col, row) = (at % width, at / width);
+        *blocked |= col == 0 || row == 0 || col == width - 1 || row == height - 1;
+    }
+    let from_middle = |at: &usize| {
+        let (col, row) = (at % width, at / width);
+        col.abs_diff(width / 2).pow(2) + row.abs_diff(height / 2).pow(2)
+    };
+    let target = (0..blocked.len())
+        .filter(|&at| !blocked[at])
+        .min_by_key(from_middle)
+        .expect("a free cell");
+    let target = Cell::new(target % width, target / width);
+    Domain::new(width, height, blocked, target).expect("a valid map")
+}

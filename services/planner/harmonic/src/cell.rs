@@ -1,0 +1,29 @@
+//! A cell of a map, and a change to one.
+
+/// Longest side of a map, in cells.
+pub const MAX_SIDE: usize = 16_384;
+
+/// A cell of the map.
+#[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
+pub struct Cell {
+    /// Column, from 0.
+    pub col: usize,
+    /// Row, from 0.
+    pub row: usize,
+}
+
+impl Cell {
+    /// The cell of column `col` and row `row`.
+    pub const fn new(col: usize, row: usize) -> Self {
+        Self { col, row }
+    }
+}
+
+/// A cell that became blocked or free since the field was solved.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct Change {
+    /// The cell.
+    pub cell: Cell,
+    /// Whether it is blocked from now on.
+    pub blocked: bool,
+}

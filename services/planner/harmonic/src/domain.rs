@@ -1,0 +1,174 @@
+//! The map a field is solved on: free and blocked cells, the target, the screening.
+
+use crate::cell::{Cell, Change, MAX_SIDE};
+use crate::error::SolveError;
+use crate::screening::{Coefficients, MIN_SCREENING_CELLS, Screening};
+
+/// A map of `width` x `height` cells with its target and screening, row-major: index = row * width + col.
+///
+/// Cells outside the map count as blocked, so the rim of a map need not be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Domain {
+    width: usize,
+    height: usize,
+    blocked: Vec<bool>,
+    screening: Coefficients,
+    target: Cell,
+}
+
+impl Domain {
+    /// A map without screening. `blocked` is row-major.
+    ///
+    /// # Errors
+    /// [`SolveError::MapEmpty`], [`SolveError::MapTooLarge`], [`SolveError::WrongLength`], [`SolveError::Outside`] and
+    /// [`SolveError::TargetBlocked`].
+    pub fn new(
+        width: usize,
+        height: usize,
+        blocked: Vec<bool>,
+        target: Cell,
+    ) -> Result<Self, SolveError> {
+        if width == 0 || height == 0 {
+            return Err(SolveError::MapEmpty { width, height });
+        }
+        if width > MAX_SIDE || height > MAX_SIDE {
+            return Err(SolveError::MapTooLarge { width, height });
+        }
+        let expected = width * height;
+        if blocked.len() != expected {
+            return Err(SolveError::WrongLength {
+                what: "the blocked mask",
+                found: blocked.len(),
+                expected,
+            });
+        }
+        let mut domain = Self {
+            width,
+            height,
+            blocked,
+            screening: Coefficients::NONE,
+            target,
+        };
+        domain.set_target(target)?;
+        Ok(domain)
+    }
+
+    /// The same map with another screening.
+    ///
+    /// # Errors
+    /// [`SolveError::WrongLength`] and [`SolveError::ScreeningLength`].
+    pub fn with_screening(mut self, screening: &Screening) -> Result<Self, SolveError> {
+        let check = |index: usize, cells: f64| {
+            if cells >= MIN_SCREENING_CELLS {
+                Ok(())
+            } else {
+                Err(SolveError::ScreeningLength { index, cells })
+            }
+        };
+        match screening {
+            Screening::None => {}
+            Screening::Uniform { length, cell } => check(0, length / cell)?,
+            Screening::PerCell(lengths) => {
+                let expected = self.blocked.len();
+                if lengths.len() != expected {
+                    return Err(SolveError::WrongLength {
+                        what: "the screening",
+                        found: lengths.len(),
+                        expected,
+                    });
+                }
+                for (index, &length) in lengths.iter().enumerate() {
+                    check(index, f64::from(length))?;
+                }
+            }
+        }
+        self.screening = Coefficients::of(screening);
+        Ok(self)
+    }
+
+    /// Moves the target.
+    ///
+    /// # Errors
+    /// [`SolveError::Outside`] and [`SolveError::TargetBlocked`]; the target then stays where it was.
+    pub fn set_target(&mut self, target: Cell) -> Result<(), SolveError> {
+        let index = self.checked_index(target, "the target")?;
+        if self.blocked[index] {
+            return Err(SolveError::TargetBlocked { target });
+        }
+        self.target = target;
+        Ok(())
+    }
+
+    /// Blocks or frees cells.
+    ///
+    /// # Errors
+    /// [`SolveError::Outside`], and [`SolveError::TargetBlocked`] when the target itself would be blocked; the map is
+    /// then unchanged.
+    pub fn apply(&mut self, changes: &[Change]) -> Result<(), SolveError> {
+        for change in changes {
+            self.checked_index(change.cell, "a changed cell")?;
+            if change.blocked && change.cell == self.target {
+                return Err(SolveError::TargetBlocked {
+                    target: self.target,
+                });
+            }
+        }
+        for change in changes {
+            let index = self.index(change.cell);
+            self.blocked[index] = change.blocked;
+        }
+        Ok(())
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The target's cell; it is free.
+    pub fn target(&self) -> Cell {
+        self.target
+    }
+
+    /// The mask of blocked cells, row-major.
+    pub fn blocked(&self) -> &[bool] {
+        &self.blocked
+    }
+
+    /// Whether `cell` is blocked or outside the map.
+    pub fn is_blocked(&self, cell: Cell) -> bool {
+        cell.col >= self.width || cell.row >= self.height || self.blocked[self.index(cell)]
+    }
+
+    /// The screening coefficient k of the cell with row-major `index`, 0 beyond the map.
+    pub fn screening_coefficient(&self, index: usize) -> f64 {
+        self.screening.at(index)
+    }
+
+    /// The screening coefficients of all cells.
+    pub(crate) fn screening(&self) -> &Coefficients {
+        &self.screening
+    }
+
+    /// Row-major index of a cell known to lie inside the map.
+    pub(crate) fn index(&self, cell: Cell) -> usize {
+        cell.row * self.width + cell.col
+    }
+
+    fn checked_index(&self, cell: Cell, what: &'static str) -> Result<usize, SolveError> {
+        if cell.col >= self.width || cell.row >= self.height {
+            return Err(SolveError::Outside {
+                what,
+                cell,
+                width: self.width,
+                height: self.height,
+            });
+        }
+        Ok(self.index(cell))
+    }
+}

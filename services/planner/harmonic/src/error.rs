@@ -1,0 +1,99 @@
+//! What can be wrong with a map or a solve, and what to do about it.
+
+use thiserror::Error;
+
+use crate::cell::{Cell, MAX_SIDE};
+use crate::screening::MIN_SCREENING_CELLS;
+
+/// Why there is no field.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SolveError {
+    /// The map has no cells.
+    #[error("the map is empty ({width} x {height} cells): give it at least one cell")]
+    MapEmpty {
+        /// Columns of the map.
+        width: usize,
+        /// Rows of the map.
+        height: usize,
+    },
+    /// The map is wider or higher than [`MAX_SIDE`].
+    #[error(
+        "the map is too large ({width} x {height} cells): at most {MAX_SIDE} a side; use larger cells"
+    )]
+    MapTooLarge {
+        /// Columns of the map.
+        width: usize,
+        /// Rows of the map.
+        height: usize,
+    },
+    /// A per-cell input does not have one value for each cell.
+    #[error(
+        "{what} has {found} values, the map {expected} cells: give one value a cell, row by row"
+    )]
+    WrongLength {
+        /// Which input.
+        what: &'static str,
+        /// Values it has.
+        found: usize,
+        /// Cells of the map.
+        expected: usize,
+    },
+    /// A cell was named that the map does not have.
+    #[error("{what} (column {}, row {}) lies outside the map of {width} x {height} cells", cell.col, cell.row)]
+    Outside {
+        /// What the cell was given as.
+        what: &'static str,
+        /// The cell.
+        cell: Cell,
+        /// Columns of the map.
+        width: usize,
+        /// Rows of the map.
+        height: usize,
+    },
+    /// The target lies on a blocked cell.
+    #[error("the target (column {}, row {}) is blocked: choose a free cell or free that one", target.col, target.row)]
+    TargetBlocked {
+        /// The target's cell.
+        target: Cell,
+    },
+    /// A screening length is not a number or shorter than [`MIN_SCREENING_CELLS`].
+    #[error(
+        "a screening length of {cells} cells at cell index {index}: it must be at least {MIN_SCREENING_CELLS}; an \
+         infinite length is no screening"
+    )]
+    ScreeningLength {
+        /// Row-major index of the first such cell; 0 for a uniform screening.
+        index: usize,
+        /// The length found, in cells.
+        cells: f64,
+    },
+    /// A field was given to be updated that belongs to another map or target.
+    #[error("the field does not belong to this domain (sizes or targets differ): solve it first")]
+    ForeignField,
+    /// The [`Cancellation`](crate::Cancellation) was used.
+    #[error("the solve was cancelled")]
+    Cancelled,
+    /// No method could finish within the memory allowed.
+    #[error(
+        "no iterative method converged and the multifrontal factorisation would need {needed} bytes, {allowed} are \
+         allowed: raise `Settings::memory_limit` or use larger cells"
+    )]
+    TooCostly {
+        /// Bytes the factorisation would need.
+        needed: u64,
+        /// Bytes the settings allow.
+        allowed: u64,
+    },
+    /// No method produced a field that passes verification; the field is not handed out.
+    #[error(
+        "the field failed verification (worst relative residual {worst_residual:e}, {local_maxima} cells without a better \
+         neighbour): report this map"
+    )]
+    Unverified {
+        /// Worst componentwise relative residual found.
+        worst_residual: f64,
+        /// Reachable cells without a strictly better neighbour.
+        local_maxima: usize,
+    },
+}

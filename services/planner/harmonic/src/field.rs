@@ -1,0 +1,196 @@
+//! The harmonic field: u of every cell, with what was verified of it.
+
+use crate::cell::Cell;
+use crate::domain::Domain;
+use crate::patch::Patch;
+use crate::scaled::Scaled;
+use crate::store::Store;
+use crate::verification::Verification;
+
+/// The field of one domain: u = 1 at the target, 0 where blocked or cut off, positive wherever the target can be reached.
+///
+/// Row-major, as [`Domain`](crate::Domain); cells outside the map count as blocked.
+#[derive(Clone, Debug)]
+pub struct Field {
+    width: usize,
+    height: usize,
+    target: Cell,
+    store: Store,
+    verification: Verification,
+    /// Local updates since the field was solved.
+    patches: Vec<Patch>,
+}
+
+impl Field {
+    pub(crate) fn new(
+        (width, height): (usize, usize),
+        target: Cell,
+        store: Store,
+        verification: Verification,
+    ) -> Self {
+        Self {
+            width,
+            height,
+            target,
+            store,
+            verification,
+            patches: Vec::new(),
+        }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The target the field leads to.
+    pub fn target(&self) -> Cell {
+        self.target
+    }
+
+    /// What was verified when the field was last solved in full.
+    pub fn verification(&self) -> &Verification {
+        &self.verification
+    }
+
+    /// u of `cell`; zero where blocked, cut off from the target, or outside the map.
+    pub fn u(&self, cell: Cell) -> Scaled {
+        if cell.col >= self.width || cell.row >= self.height {
+            return Scaled::ZERO;
+        }
+        let (value, exponent) = self.store.raw(cell.row * self.width + cell.col);
+        Scaled::new(value, exponent)
+    }
+
+    /// Replaces u of a reachable cell by `u`, which must not be zero: a fault injected on purpose, to see what follows a
+    /// wrong field. Other cells are left as they are. The [`verification`](Self::verification) no longer holds.
+    pub fn overwrite(&mut self, cell: Cell, u: Scaled) {
+        if self.is_reachable(cell) && !u.is_zero() {
+            let index = cell.row * self.width + cell.col;
+            self.store.set(index, u.mantissa, u.exponent);
+        }
+    }
+
+    /// Whether the target can be reached from `cell`.
+    pub fn is_reachable(&self, cell: Cell) -> bool {
+        !self.u(cell).is_zero()
+    }
+
+    /// Whether `cell` was blocked when the field was computed, or lies outside the map.
+    pub fn is_blocked(&self, cell: Cell) -> bool {
+        cell.col >= self.width
+            || cell.row >= self.height
+            || self.store.raw(cell.row * self.width + cell.col).0 < 0.0
+    }
+
+    /// log10 of the smallest u of a reachable cell: how far below the range of a floating-point number the field goes.
+    pub fn log10_u_min(&self) -> f64 {
+        let mut least = Scaled::ONE;
+        for index in 0..self.width * self.height {
+            let (value, exponent) = self.store.raw(index);
+            let u = Scaled::new(value, exponent);
+            if !u.is_zero() && u < least {
+                least = u;
+            }
+        }
+        least.log10()
+    }
+
+    /// The neighbour with the largest u as seen from `cell`, `None` where u is zero and at the target.
+    ///
+    /// This is steepest ascent cell by cell; it ends at the target from every reachable cell.
+    pub fn ascent(&self, cell: Cell) -> Option<Cell> {
+        if cell == self.target || !self.is_reachable(cell) {
+            return None;
+        }
+        let (col, row) = (cell.col as i64, cell.row as i64);
+        let [dc, dr] = self.steepest_ascent(col, row);
+        Some(Cell::new((col + dc) as usize, (row + dr) as usize))
+    }
+
+    /// The step, along columns or rows, to the neighbour with the largest u.
+    pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
+        let mut best = (Scaled::ZERO, [0; 2]);
+        for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+            let u = self.seen((col, row), (col + dc, row + dr));
+            if u > best.0 {
+                best = (u, [dc, dr]);
+            }
+        }
+        best.1
+    }
+
+    /// u of the cell `there` relative to its neighbour `here`: u(there) such that its ratio to u(here) is right.
+    ///
+    /// A local update changes u in a window and nowhere else, though u of all cells downstream should be scaled by what u
+    /// at the window's rim changed by. That is done here, rather than in every cell: across an outflow edge of a patch the
+    /// ratio is that before the update.
+    pub(crate) fn seen(&self, here: (i64, i64), there: (i64, i64)) -> Scaled {
+        let u = self.u_at(there.0, there.1);
+        if self.patches.is_empty() {
+            return u;
+        }
+        let patch_of = |cell| self.patches.iter().position(|patch| patch.contains(cell));
+        let (from, to) = (patch_of(here), patch_of(there));
+        if from == to {
+            return u;
+        }
+        let before = |cell: (i64, i64), patch: Option<usize>| {
+            patch.map_or_else(
+                || self.u_at(cell.0, cell.1),
+                |patch| self.patches[patch].before(cell),
+            )
+        };
+        let (from_before, to_before) = (before(here, from), before(there, to));
+        // Patches keep a distance, so exactly one of the two lies in one.
+        let (outside, inside) = if from.is_none() {
+            (from_before, to_before)
+        } else {
+            (to_before, from_before)
+        };
+        // In single precision, as the window was solved.
+        let rounded = |u: Scaled| Scaled::new(f64::from(u.mantissa as f32), u.exponent);
+        if outside.is_zero() || inside.is_zero() || rounded(outside) > rounded(inside) {
+            return u;
+        }
+        let own = self.u_at(here.0, here.1);
+        Scaled::new(
+            own.mantissa * to_before.mantissa / from_before.mantissa,
+            own.exponent + to_before.exponent - from_before.exponent,
+        )
+    }
+
+    /// Whether this is a field of a map of the same size and the same target.
+    pub(crate) fn fits(&self, domain: &Domain) -> bool {
+        (self.width, self.height, self.target) == (domain.width(), domain.height(), domain.target())
+    }
+
+    pub(crate) fn store(&self) -> &Store {
+        &self.store
+    }
+
+    pub(crate) fn store_mut(&mut self) -> &mut Store {
+        &mut self.store
+    }
+
+    pub(crate) fn patches(&self) -> &[Patch] {
+        &self.patches
+    }
+
+    pub(crate) fn patches_mut(&mut self) -> &mut Vec<Patch> {
+        &mut self.patches
+    }
+
+    /// u at a signed column and row: zero outside the map.
+    pub(crate) fn u_at(&self, col: i64, row: i64) -> Scaled {
+        match (usize::try_from(col), usize::try_from(row)) {
+            (Ok(col), Ok(row)) => self.u(Cell { col, row }),
+            _ => Scaled::ZERO,
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! The direction to follow at any position, equation (11): grad u / |grad u|.
+//!
+//! At a cell's centre the gradient is the central difference of u, blocked cells counting as 0. Between centres it is
+//! interpolated bilinearly between the free cells among the four centres around, which keeps it continuous; cells that
+//! meet only across a blocked corner are left out. Near a wall its component into the wall decreases with the distance to
+//! 0, so that it never leads into a blocked cell. Only ratios of neighbouring u enter: the common
+//! exponent is removed out first.
+
+use crate::cell::Cell;
+use crate::field::Field;
+
+/// What the field answers at a position. Directions are unit vectors (along columns, along rows).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Guidance {
+    /// Free space: follow this direction.
+    Along([f64; 2]),
+    /// The position lies in the target's cell.
+    AtTarget,
+    /// The position lies in a blocked cell or outside the map: this way lies the nearest free cell that can reach the
+    /// target.
+    WayOut([f64; 2]),
+    /// No path leads from here to the target, or the position is not a number.
+    Unreachable,
+}
+
+/// Distance from a wall, in cells, below which the gradient's component into the wall decreases.
+const WALL_REACH: f64 = 0.5;
+
+/// Gradients shorter than this fraction of the local u are those of saddle points, where the direction is that to the
+/// neighbour of largest u. It is above the rounding of the stored u and far below the gradient of other cells.
+const SADDLE: f64 = 1e-7;
+
+impl Field {
+    /// The guidance at a position in cell units (cell centres at the integers).
+    pub fn guidance(&self, col: f64, row: f64) -> Guidance {
+        if !(col.is_finite() && row.is_finite()) {
+            return Guidance::Unreachable;
+        }
+        // Saturating: positions beyond the map are outside whatever their distance.
+        let here = (col.round() as i64, row.round() as i64);
+        if self.blocked_at(here.0, here.1) {
+            return self.way_out(col, row);
+        }
+        if self.u_at(here.0, here.1).is_zero() {
+            return Guidance::Unreachable;
+        }
+        let cell = Cell {
+            col: here.0 as usize,
+            row: here.1 as usize,
+        };
+        if cell == self.target() {
+            return Guidance::AtTarget;
+        }
+        let position = [col, row];
+        let gradient =
+            self.interpolate(here, position, |c, r| self.central_difference(here, (c, r)));
+        let kept = self.without_wall_component(here, position, gradient);
+        // The component removed is replaced by steepest ascent from cell to cell, which leads around walls; a gradient
+        // straight into a wall would otherwise keep its direction, however small it gets.
+        let removed = (gradient[0] - kept[0]).hypot(gradient[1] - kept[1]);
+        let mut total = kept;
+        if removed > 0.0 {
+            let ascent = self.interpolate(here, position, |c, r| {
+                self.steepest_ascent(c, r).map(|step| step as f64)
+            });
+            let ascent = self.without_wall_component(here, position, ascent);
+            total = [kept[0] + removed * ascent[0], kept[1] + removed * ascent[1]];
+        }
+        unit(total, SADDLE)
+            .or_else(|| self.toward_best_neighbour(here, position))
+            .map_or(Guidance::Unreachable, Guidance::Along)
+    }
+
+    /// The direction at a cell's centre, or `None` where there is none to give (blocked, cut off, the target): what
+    /// [`guidance`](Self::guidance) answers there, where no wall is near enough to matter, for whole maps of cells.
+    pub fn direction(&self, cell: Cell) -> Option<[f64; 2]> {
+        if cell == self.target() || !self.is_reachable(cell) {
+            return None;
+        }
+        let here = (cell.col as i64, cell.row as i64);
+        let gradient = self.central_difference(here, here);
+        unit(gradient, SADDLE)
+            .or_else(|| self.toward_best_neighbour(here, [cell.col as f64, cell.row as f64]))
+    }
+
+    fn blocked_at(&self, col: i64, row: i64) -> bool {
+        match (usize::try_from(col), usize::try_from(row)) {
+            (Ok(col), Ok(row)) => self.is_blocked(Cell { col, row }),
+            _ => true,
+        }
+    }
+
+    /// The bilinear mean of `value` over the reachable cells among the four centres around `position`, which lies in the
+    /// reachable cell `here`.
+    fn interpolate(
+        &self,
+        here: (i64, i64),
+        position: [f64; 2],
+        value: impl Fn(i64, i64) -> [f64; 2],
+    ) -> [f64; 2] {
+        let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
+        let side = |o: f64| if o < 0.0 { -1 } else { 1 };
+        let (col, row) = (here.0 + side(offset[0]), here.1 + side(offset[1]));
+        let [x, y] = [offset[0].abs(), offset[1].abs()];
+
+        let free = |c: i64, r: i64| !self.u_at(c, r).is_zero();
+        let beside = free(col, here.1);
+        let below = free(here.0, row);
+        let diagonal = (beside || below) && free(col, row);
+
+        let mut sum = [0.0; 2];
+        for (used, (c, r), weight) in [
+            (true, here, (1.0 - x) * (1.0 - y)),
+            (beside, (col, here.1), x * (1.0 - y)),
+            (below, (here.0, row), (1.0 - x) * y),
+            (diagonal, (col, row), x * y),
+        ] {
+            if used && weight > 0.0 {
+                let value = value(c, r);
+                sum = [sum[0] + weight * value[0], sum[1] + weight * value[1]];
+            }
+        }
+        sum
+    }
+
+    /// Central difference of u at `there`, which is `here` or one of its eight neighbours, in units of u(here).
+    fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
+        let own = self.u_at(there.0, there.1);
+        let u = |dc: i64, dr: i64| {
+            let seen = self.seen(there, (there.0 + dc, there.1 + dr));
+            seen.relative_to(own.exponent) / own.mantissa
+        };
+        let relative = [0.5 * (u(1, 0) - u(-1, 0)), 0.5 * (u(0, 1) - u(0, -1))];
+        let weight = self.ratio(here, there);
+        relative.map(|component| weight * component)
+    }
+
+    /// u(there) / u(here) of the same cell, a neighbour, or a diagonal neighbour by way of a free cell beside both.
+    fn ratio(&self, here: (i64, i64), there: (i64, i64)) -> f64 {
+        let step = |from: (i64, i64), to: (i64, i64)| {
+            let own = self.u_at(from.0, from.1);
+            self.seen(from, to).relative_to(own.exponent) / own.mantissa
+        };
+        if here == there {
+            1.0
+        } else if here.0 == there.0 || here.1 == there.1 {
+            step(here, there)
+        } else {
+            let beside = (there.0, here.1);
+            let zero = self.u_at(beside.0, beside.1).is_zero();
+            let between = if zero { (here.0, there.1) } else { beside };
+            step(here, between) * step(between, there)
+        }
+    }
+
+    /// Removes from `gradient` the component into blocked cells: all of it at the wall, nothing half a cell away.
+    ///
+    /// Each blocked neighbour acts through the point of it nearest to the position. A diagonal one counts only where both
+    /// cells beside it are free, else a wall running past the corner would stop the motion along it. At most two of them,
+    /// at right angles, are ever within reach of one position, so their order does not matter.
+    fn without_wall_component(
+        &self,
+        here: (i64, i64),
+        position: [f64; 2],
+        gradient: [f64; 2],
+    ) -> [f64; 2] {
+        let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
+        let blocked = |dc: i64, dr: i64| self.blocked_at(here.0 + dc, here.1 + dr);
+        let mut kept = gradient;
+        for (dc, dr) in [
+            (1, 0),
+            (-1, 0),
+            (0, 1),
+            (0, -1),
+            (1, 1),
+            (-1, 1),
+            (1, -1),
+            (-1, -1),
+        ] {
+            let diagonal = dc != 0 && dr != 0;
+            if !blocked(dc, dr) || (diagonal && (blocked(dc, 0) || blocked(0, dr))) {
+                continue;
+            }
+            let component = |step: i64, o: f64| {
+                if step == 0 {
+                    0.0
+                } else {
+                    step as f64 * 0.5 - o
+                }
+            };
+            let toward = [component(dc, offset[0]), component(dr, offset[1])];
+            let distance = toward[0].hypot(toward[1]);
+            if distance >= WALL_REACH {
+                continue;
+            }
+            let normal = if distance > 0.0 {
+                [toward[0] / distance, toward[1] / distance]
+            } else {
+                let length = (dc as f64).hypot(dr as f64);
+                [dc as f64 / length, dr as f64 / length]
+            };
+            let inward = kept[0] * normal[0] + kept[1] * normal[1];
+            if inward > 0.0 {
+                let share = inward * (1.0 - distance / WALL_REACH);
+                kept = [kept[0] - share * normal[0], kept[1] - share * normal[1]];
+            }
+        }
+        kept
+    }
+
+    /// Straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way
+    /// there is free from anywhere in this one, and leads away from every wall it touches.
+    fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
+        let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
+        unit(
+            [
+                here.0 as f64 + dc - position[0],
+                here.1 as f64 + dr - position[1],
+            ],
+            0.0,
+        )
+    }
+
+    /// The direction to the centre of the nearest reachable cell, by rings of growing distance.
+    fn way_out(&self, col: f64, row: f64) -> Guidance {
+        let (width, height) = (self.width() as i64, self.height() as i64);
+        // Far outside, the search starts at the map's own rim.
+        let from = (
+            (col.round() as i64).clamp(-1, width),
+            (row.round() as i64).clamp(-1, height),
+        );
+        let mut best: Option<(f64, (i64, i64))> = None;
+        for ring in 1..=width.max(height) + 1 {
+            // Every cell of this ring and beyond is at least `ring` away.
+            if best.is_some_and(|(distance, _)| distance <= ring as f64) {
+                break;
+            }
+            for (c, r) in ring_cells(from, ring, width, height) {
+                if !self.u_at(c, r).is_zero() {
+                    let distance = (c as f64 - from.0 as f64).hypot(r as f64 - from.1 as f64);
+                    if best.is_none_or(|(least, _)| distance < least) {
+                        best = Some((distance, (c, r)));
+                    }
+                }
+            }
+        }
+        best.and_then(|(_, cell)| toward(cell, [col, row]))
+            .map_or(Guidance::Unreachable, Guidance::WayOut)
+    }
+}
+
+/// The cells inside the map at Chebyshev distance `ring` from `centre`.
+fn ring_cells(
+    centre: (i64, i64),
+    ring: i64,
+    width: i64,
+    height: i64,
+) -> impl Iterator<Item = (i64, i64)> {
+    let columns = (centre.0 - ring).max(0)..=(centre.0 + ring).min(width - 1);
+    let rows = (centre.1 - ring + 1).max(0)..=(centre.1 + ring - 1).min(height - 1);
+    let edges = [centre.1 - ring, centre.1 + ring]
+        .into_iter()
+        .filter(move |r| (0..height).contains(r));
+    let sides = [centre.0 - ring, centre.0 + ring]
+        .into_iter()
+        .filter(move |c| (0..width).contains(c));
+    edges
+        .flat_map(move |r| columns.clone().map(move |c| (c, r)))
+        .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
+}
+
+fn toward(cell: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
+    unit(
+        [cell.0 as f64 - position[0], cell.1 as f64 - position[1]],
+        0.0,
+    )
+}
+
+/// `vector` at unit length, or `None` if it is no longer than `least`.
+fn unit(vector: [f64; 2], least: f64) -> Option<[f64; 2]> {
+    let length = vector[0].hypot(vector[1]);
+    (length > least && length.is_finite()).then(|| [vector[0] / length, vector[1] / length])
+}

@@ -1,0 +1,132 @@
+//! Harmonic potential fields on grid maps: from free and blocked cells and a target to a direction at any position.
+//!
+//! # The problem
+//! A robot on a map of cells wants a direction wherever it stands, such that following it ends at the target and never
+//! touches an obstacle. Potential functions built from attraction and repulsion have local maxima in which a robot stays for
+//! ever. A harmonic function has none: inside the free space it takes neither a maximum nor a minimum, so steepest ascent
+//! from any cell that can reach the target ends there.
+//!
+//! # The equation
+//! u is 1 at the target and 0 on every blocked cell and outside the map. On every other cell it is the mean of its four
+//! neighbours, divided by 1 + k:
+//!
+//! ```text
+//! u(c, r) = (u(c - 1, r) + u(c + 1, r) + u(c, r - 1) + u(c, r + 1)) / (4 (1 + k))
+//! ```
+//!
+//! With k = 0 this is the five-point form of Laplace's equation. With k > 0 it is the screened equation,
+//! laplacian u = u / L^2, in which u falls by a further factor of e in the screening length L; [`Screening`] states L, and
+//! k = (h / (2 L))^2 on cells of side h. A short screening length makes the field prefer short ways over wide ones.
+//!
+//! u is a probability: that a random walk which starts at the cell, steps to each neighbour with equal chance, and ends at
+//! every step with chance k / (1 + k), meets the target before it meets a blocked cell. Its gradient, normalised, is the
+//! guidance.
+//!
+//! # The range of u
+//! In a corridor of width w, u falls like exp(-pi x / w): in a maze it reaches 1e-70000, and an `f64` ends at 1e-308. So u
+//! is a [`Scaled`] number, a mantissa and an exponent of 32 bits. Directions are computed from ratios of neighbouring
+//! cells, which are ordinary numbers however small u is. Fields that span less are stored as `f32` or `f64` with one common
+//! exponent.
+//!
+//! # The solvers
+//! [`Solver`] estimates the cost of each [`Method`] from the shape of the free space and falls back to the next one where a
+//! field fails verification:
+//! - Multigrid with interpolation by the equations (after Dendy's BoxMG), in `f32` or `f64`: a few dozen sweeps' worth of
+//!   work, where passages are wide.
+//! - Multigrid in bands of u, where wide maps are screened so strongly that u leaves the range of `f64`.
+//! - Multifrontal factorisation in order of distance from the target, in extended range: where passages are narrow; its cost
+//!   does not depend on the range of u but grows with the square of the passages' width.
+//!
+//! # Verification
+//! No field is handed out unless every cell was checked: the relative residual of its equation is at most 2e-4, and one of
+//! its neighbours has a larger u. The first is relative to u of that cell, since a norm over the map says nothing about
+//! cells where u is 1e-50; the second makes steepest ascent end at the target. [`Field::verification`] tells what was
+//! found; a solve that cannot be verified ends in [`SolveError::Unverified`].
+//!
+//! # Local updates and their limits
+//! When a few cells become blocked or free, [`Solver::update`] solves again in a window around them, in a fraction of a
+//! millisecond whatever the size of the map. A change alters u everywhere downstream, so the window cannot be right
+//! everywhere: steepest ascent still ends at the target, directions near the change are right, and the [`Verdict`] says
+//! whether those far away are, or whether a passage was closed, in which case the field must not be followed. Every
+//! local update is provisional: follow it by a full solve, on another thread if need be ([`Solver::solve_near`] starts from
+//! the field at hand, [`Cancellation`] stops it).
+//!
+//! # Units and frames
+//! Cells are named by column and row from 0; arrays are row-major. Positions are continuous in units of a cell, with the
+//! centres at the integers: the cell (c, r) covers c - 0.5 ..= c + 0.5. Directions are unit vectors (along growing columns,
+//! along growing rows). Angles are radians. Screening lengths are in cells, or in any unit the side of a cell is given in.
+//!
+//! # Example
+//! ```
+//! use harmonic::{Cancellation, Cell, Change, Domain, Guidance, Screening, Solver, Verdict};
+//!
+//! // 20 x 10 free cells with the target near the right end; u falls by a further factor of e every 8 cells.
+//! let mut domain = Domain::new(20, 10, vec![false; 200], Cell::new(17, 5))?
+//!     .with_screening(&Screening::cells(8.0))?;
+//! let mut solver = Solver::default();
+//! let mut field = solver.solve(&domain, &Cancellation::new())?;
+//! assert!(field.verification().worst_residual < 2e-4);
+//! assert!(matches!(field.guidance(3.2, 5.0), Guidance::Along([x, _]) if x > 0.9));
+//!
+//! // An obstacle appears; the field is brought up to date.
+//! let obstacle = [Change { cell: Cell::new(10, 5), blocked: true }];
+//! let verdict = solver.update(&mut domain, &mut field, &obstacle, &Cancellation::new())?;
+//! assert_eq!(verdict, Verdict::Accurate);
+//! assert!(field.is_blocked(Cell::new(10, 5)));
+//! # Ok::<(), harmonic::SolveError>(())
+//! ```
+//!
+//! # Errors
+//! [`SolveError`] tells apart what is wrong with a map ([`MapEmpty`](SolveError::MapEmpty),
+//! [`MapTooLarge`](SolveError::MapTooLarge), [`WrongLength`](SolveError::WrongLength), [`Outside`](SolveError::Outside),
+//! [`TargetBlocked`](SolveError::TargetBlocked), [`ScreeningLength`](SolveError::ScreeningLength)) and why a solve has no
+//! field ([`ForeignField`](SolveError::ForeignField), [`Cancelled`](SolveError::Cancelled),
+//! [`TooCostly`](SolveError::TooCostly), [`Unverified`](SolveError::Unverified)). A position without a direction is no
+//! error: [`Guidance`] says which it is.
+//!
+//! # Layout
+//! Each layer uses those above it in this list alone:
+//! - Values: [`Cell`] and [`Change`] (`cell.rs`), [`Scaled`], [`Screening`], [`SolveError`], [`Cancellation`], [`Domain`];
+//!   `real.rs` the two precisions, `simd.rs` vector instructions chosen at run time.
+//! - Storage: u of a map (`store.rs`), u before a local update (`patch.rs`).
+//! - The field: `verification.rs`, [`Field`], [`Guidance`].
+//! - Engines: `multigrid/`, `multigrid_bands.rs`, `multifrontal/`, and `local/` for windows.
+//! - [`Solver`] (`solver/`): the choice of a method, full solves, updates.
+//!
+//! The feature `testing` adds generated maps and a slow reference solver. The library has no clock, files or unsafe code, and
+//! starts no thread unless [`Settings::threads`] asks for it; the same input gives the same field to the bit.
+
+mod cancellation;
+mod cell;
+mod domain;
+mod error;
+mod field;
+mod guidance;
+mod local;
+mod method;
+mod multifrontal;
+mod multigrid;
+mod multigrid_bands;
+mod patch;
+mod real;
+mod scaled;
+mod screening;
+mod simd;
+mod solver;
+mod store;
+#[cfg(feature = "testing")]
+pub mod testing;
+mod verification;
+
+pub use cancellation::Cancellation;
+pub use cell::{Cell, Change, MAX_SIDE};
+pub use domain::Domain;
+pub use error::SolveError;
+pub use field::Field;
+pub use guidance::Guidance;
+pub use local::Verdict;
+pub use method::Method;
+pub use scaled::Scaled;
+pub use screening::{MIN_SCREENING_CELLS, Screening};
+pub use solver::{Phase, Settings, Solver};
+pub use verification::Verification;

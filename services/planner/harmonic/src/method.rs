@@ -1,0 +1,27 @@
+//! The methods a field can be computed by.
+
+/// How a field was computed.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[non_exhaustive]
+pub enum Method {
+    /// Multifrontal factorisation in order of decreasing distance from the target, in extended range.
+    Multifrontal,
+    /// Multigrid in single precision.
+    MultigridSingle,
+    /// Multigrid in double precision.
+    MultigridDouble,
+    /// Multigrid in double precision, one band of u after the other, each with an exponent of its own.
+    MultigridBands,
+}
+
+impl Method {
+    /// The method's name, for logs and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Multifrontal => "multifrontal",
+            Self::MultigridSingle => "multigrid f32",
+            Self::MultigridDouble => "multigrid f64",
+            Self::MultigridBands => "multigrid bands",
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Multifrontal factorisation, cells in order of decreasing distance from the target.
+//!
+//! Cells are eliminated from the farthest inwards, a few distances at a time. What has been eliminated beyond a distance
+//! falls into connected pieces, and pieces join as the distance shrinks: a tree of fronts, each a small dense matrix over
+//! the cells it eliminates and their neighbours nearer to the target. The target itself is never eliminated, so there is no
+//! right-hand side to carry inwards, and u follows outwards from u(target) = 1: each cell's u is a sum, with positive
+//! weights of moderate size, of the u of cells nearer to the target. Nothing is iterated, nothing cancels and nothing
+//! underflows, whatever the range of u. The cost is about the cube of the fronts' width: right for corridors, not halls.
+//!
+//! - [`tree`]: which cells go together, and in what order where many passages run side by side.
+//! - [`dense`]: the matrix of a front.
+//! - [`back_substitution`]: from the factors to u.
+//! - [`gauss_seidel`]: corrects the cells that `f64` factors cannot reach.
+//! - [`breadth_first`]: the order of the cells.
+//! - [`workspace`]: the factors, and memory kept between solves.
+
+mod back_substitution;
+mod breadth_first;
+mod dense;
+mod gauss_seidel;
+mod tree;
+mod workspace;
+
+use crate::cancellation::Cancellation;
+use crate::domain::Domain;
+use crate::error::SolveError;
+use crate::screening::Coefficients;
+use crate::store::Store;
+pub(crate) use breadth_first::BreadthFirst;
+pub(crate) use gauss_seidel::relax;
+pub(crate) use tree::Tree;
+pub(crate) use workspace::Workspace;
+
+/// The solution of the five-point equations on `domain`, exact but for rounding.
+pub(crate) fn solve(
+    domain: &Domain,
+    pass: &BreadthFirst,
+    tree: &Tree,
+    memory_limit: u64,
+    workspace: &mut Workspace,
+    cancellation: &Cancellation,
+) -> Result<Store, SolveError> {
+    if tree.cost.bytes > memory_limit {
+        return Err(SolveError::TooCostly {
+            needed: tree.cost.bytes,
+            allowed: memory_limit,
+        });
+    }
+    let solved = factor(domain, pass, tree, workspace, cancellation)
+        .and_then(|()| back_substitution::substitute(domain, pass, tree, workspace, cancellation));
+    workspace.trim();
+    solved
+}
+
+/// The cell is not part of the front.
+const NOWHERE: u32 = u32::MAX;
+
+/// The factors of all fronts.
+fn factor(
+    domain: &Domain,
+    pass: &BreadthFirst,
+    tree: &Tree,
+    workspace: &mut Workspace,
+    cancellation: &Cancellation,
+) -> Result<(), SolveError> {
+    let Workspace { factors, slot, .. } = workspace;
+    factors.rows.clear();
+    factors.rows.reserve(tree.cost.weights);
+    factors.lengths.clear();
+    factors.lengths.reserve(pass.len());
+    slot.clear();
+    slot.resize(pass.len(), NOWHERE);
+    // What each front leaves on its boundary, until its parent takes it in; spent buffers are used again.
+    let mut left: Vec<Vec<f64>> = vec![Vec::new(); tree.fronts.len()];
+    let mut spent: Vec<Vec<f64>> = Vec::new();
+    let mut slots = Vec::new();
+    let mut matrix = dense::Matrix::default();
+
+    for (index, front) in tree.fronts.iter().enumerate() {
+        cancellation.check()?;
+        let cells = tree.cells(front);
+        let own = front.own as usize;
+        for (at, &place) in cells.iter().enumerate() {
+            slot[place as usize] = at as u32;
+        }
+        matrix.reset(cells.len(), own);
+        for child in tree.children(front) {
+            let boundary = tree.boundary(&tree.fronts[child]);
+            slots.clear();
+            slots.extend(boundary.iter().map(|&place| slot[place as usize]));
+            let update = std::mem::take(&mut left[child]);
+            matrix.add_update(&slots, &update);
+            spent.push(update);
+        }
+        for (at, &place) in cells[..own].iter().enumerate() {
+            let k = match domain.screening() {
+                Coefficients::Uniform(k) => *k,
+                per_cell @ Coefficients::PerCell(_) => per_cell.at(pass.cell(place)),
+            };
+            matrix.add(at, at, 4.0 * (1.0 + k));
+            for neighbour in pass.neighbours(place) {
+                // Cells eliminated before, in a child, have no slot here; pairs within the front are met twice.
+                let other = slot.get(neighbour as usize).copied().unwrap_or(NOWHERE);
+                if other != NOWHERE && other as usize > at {
+                    matrix.add(at, other as usize, -1.0);
+                }
+            }
+        }
+        matrix.eliminate();
+        for row in 0..own {
+            let (pivot, rest) = matrix.row(row);
+            let scale = -1.0 / pivot;
+            factors.rows.extend(rest.iter().map(|&entry| entry * scale));
+            factors.lengths.push(rest.len() as u32);
+        }
+        if front.has_parent {
+            let mut update = spent.pop().unwrap_or_default();
+            update.clear();
+            matrix.copy_rest(&mut update);
+            left[index] = update;
+        }
+        for &place in cells {
+            slot[place as usize] = NOWHERE;
+        }
+    }
+    Ok(())
+}

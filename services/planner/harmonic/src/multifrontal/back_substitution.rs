@@ -1,0 +1,202 @@
+//! Back substitution: from the factors to u, outwards from u(target) = 1, in extended range.
+
+use super::breadth_first::BreadthFirst;
+use super::tree::Tree;
+use super::workspace::Workspace;
+use crate::cancellation::Cancellation;
+use crate::domain::Domain;
+use crate::error::SolveError;
+use crate::scaled::Scaled;
+use crate::store::{BLOCKED, Store};
+
+/// Binary orders of magnitude a front may span to be computed in plain `f64` with one common exponent.
+const PLAIN_SPAN: i32 = 300;
+
+/// Below this, sums in plain `f64` may have unreached terms to underflow.
+const PLAIN_LEAST: f64 = 1e-180;
+
+/// Exponent of the largest u in a plain store: so high that four of it can be added.
+const TOP: i32 = 1020;
+
+/// Exponent of the smallest: so low that it keeps all of its digits.
+const BOTTOM: i32 = -960;
+
+/// u of every cell of `domain`.
+///
+/// # Errors
+/// [`SolveError::Cancelled`].
+pub(super) fn substitute(
+    domain: &Domain,
+    pass: &BreadthFirst,
+    tree: &Tree,
+    workspace: &mut Workspace,
+    cancellation: &Cancellation,
+) -> Result<Store, SolveError> {
+    let Workspace { factors, u, .. } = workspace;
+    // By place: the cells of a front lie close together there.
+    u.clear();
+    u.resize(pass.len(), Scaled::ZERO);
+    u[0] = Scaled::ONE;
+    let mut plain = Vec::new();
+    let (mut rows, mut lengths) = (&factors.rows[..], &factors.lengths[..]);
+    for front in tree.fronts.iter().rev() {
+        cancellation.check()?;
+        let cells = tree.cells(front);
+        let own = front.own as usize;
+        let (before, lengths_here) = lengths.split_at(lengths.len() - own);
+        lengths = before;
+        let taken: u32 = lengths_here.iter().sum();
+        let (before, rows_here) = rows.split_at(rows.len() - taken as usize);
+        rows = before;
+        let here = Rows {
+            rows: rows_here,
+            lengths: lengths_here,
+        };
+        if !in_plain_range(u, cells, here, &mut plain) {
+            in_extended_range(u, cells, here);
+        }
+    }
+    Ok(store(domain, pass, u))
+}
+
+/// The store of `u`, given by place.
+fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled]) -> Store {
+    let (width, height) = (domain.width(), domain.height());
+    let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();
+    let at = |place: u32| u.get(place as usize).copied().unwrap_or(Scaled::ZERO);
+    let raw = |u: Scaled, blocked: bool, value: f64| match (blocked, u.is_zero()) {
+        (true, _) => BLOCKED,
+        (false, true) => 0.0,
+        (false, false) => value,
+    };
+    let least = u.iter().filter(|u| !u.is_zero()).map(|u| u.exponent).min();
+    if least.is_some_and(|least| least >= BOTTOM - TOP) {
+        let mut values = Vec::with_capacity(width * height);
+        for row in 0..height {
+            values.extend(
+                pass.row(row)
+                    .iter()
+                    .zip(blocked(row))
+                    .map(|(&place, &blocked)| {
+                        let u = at(place);
+                        raw(u, blocked, u.relative_to(-TOP))
+                    }),
+            );
+        }
+        return Store::Double {
+            values,
+            exponent: -TOP,
+        };
+    }
+    let mut mantissas = Vec::with_capacity(width * height);
+    let mut exponents = Vec::with_capacity(width * height);
+    for row in 0..height {
+        for (&place, &blocked) in pass.row(row).iter().zip(blocked(row)) {
+            let u = at(place);
+            mantissas.push(raw(u, blocked, u.mantissa));
+            exponents.push(u.exponent);
+        }
+    }
+    Store::Extended {
+        mantissas,
+        exponents,
+    }
+}
+
+/// The weights of a front.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    rows: &'a [f64],
+    lengths: &'a [u32],
+}
+
+impl<'a> Rows<'a> {
+    /// Last eliminated first, each with its position.
+    fn backwards(self) -> impl Iterator<Item = (usize, &'a [f64])> {
+        let mut rest = self.rows;
+        self.lengths
+            .iter()
+            .enumerate()
+            .rev()
+            .map(move |(row, &length)| {
+                let (before, weights) = rest.split_at(rest.len() - length as usize);
+                rest = before;
+                (row, weights)
+            })
+    }
+}
+
+/// Computes a front with one common exponent; false, with nothing written, if its range is too wide for that.
+fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut Vec<f64>) -> bool {
+    let own = rows.lengths.len();
+    let boundary = cells[own..]
+        .iter()
+        .map(|&place| u[place as usize])
+        .filter(|u| !u.is_zero());
+    let (least, largest) = boundary.fold((i32::MAX, i32::MIN), |(low, high), u| {
+        (low.min(u.exponent), high.max(u.exponent))
+    });
+    if largest == i32::MIN || largest - least > PLAIN_SPAN {
+        return false;
+    }
+    plain.clear();
+    plain.resize(own, 0.0);
+    plain.extend(
+        cells[own..]
+            .iter()
+            .map(|&place| u[place as usize].relative_to(largest)),
+    );
+    for (row, weights) in rows.backwards() {
+        let sum = dot(weights, &plain[row + 1..][..weights.len()]);
+        if sum < PLAIN_LEAST {
+            return false;
+        }
+        plain[row] = sum;
+    }
+    for (&place, &value) in cells[..own].iter().zip(plain.iter()) {
+        u[place as usize] = Scaled::new(value, largest);
+    }
+    true
+}
+
+/// Computes a front with an exponent for every term.
+fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
+    for (row, weights) in rows.backwards() {
+        let terms = || {
+            weights
+                .iter()
+                .zip(&cells[row + 1..])
+                .map(|(&weight, &place)| {
+                    let u = u[place as usize];
+                    Scaled::new(weight * u.mantissa, u.exponent)
+                })
+        };
+        let largest = terms()
+            .filter(|term| !term.is_zero())
+            .map(|term| term.exponent)
+            .max();
+        let sum = largest.map_or(Scaled::ZERO, |largest| {
+            Scaled::new(
+                terms()
+                    .filter(|term| !term.is_zero())
+                    .map(|term| term.relative_to(largest))
+                    .sum(),
+                largest,
+            )
+        });
+        u[cells[row] as usize] = sum;
+    }
+}
+
+/// Scalar product in four partial sums, which the compiler can keep in vector registers.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    for (x, y) in a4.iter().zip(b4) {
+        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *sum += x * y;
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+}

@@ -1,0 +1,128 @@
+//! One breadth-first pass from the target over the free cells.
+
+use crate::cancellation::Cancellation;
+use crate::domain::Domain;
+use crate::error::SolveError;
+
+/// The cell has no place in the order: blocked, or cut off from the target.
+pub(crate) const ABSENT: u32 = u32::MAX;
+
+/// Distances between two checks of the cancellation: at most some hundred microseconds on the largest maps.
+const CHECKED_EVERY: usize = 64;
+
+/// The reachable cells in order of their distance from the target.
+pub(crate) struct BreadthFirst {
+    /// Indices into the padded map of the reachable cells, the target first, by distance.
+    order: Vec<u32>,
+    /// Place in `order` of each cell of the padded map, or [`ABSENT`].
+    place: Vec<u32>,
+    /// Places at which a new distance starts: distance d takes `level[d] .. level[d + 1]`.
+    pub levels: Vec<u32>,
+    width: usize,
+}
+
+impl BreadthFirst {
+    /// Visits `domain` from its target.
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`].
+    pub(crate) fn from_target(
+        domain: &Domain,
+        cancellation: &Cancellation,
+    ) -> Result<Self, SolveError> {
+        let (width, height) = (domain.width(), domain.height());
+        // One absent cell all around spares every visit the question whether a neighbour exists.
+        const UNSEEN: u32 = u32::MAX - 1;
+        let stride = width + 2;
+        let mut place = vec![ABSENT; stride * (height + 2)];
+        let mut free = 0;
+        for (row, cells) in domain.blocked().chunks_exact(width).enumerate() {
+            let start = (row + 1) * stride + 1;
+            for (slot, &blocked) in place[start..start + width].iter_mut().zip(cells) {
+                *slot = if blocked { ABSENT } else { UNSEEN };
+                free += usize::from(!blocked);
+            }
+        }
+
+        let target = (domain.target().row + 1) * stride + domain.target().col + 1;
+        let mut order = Vec::with_capacity(free);
+        order.push(target as u32);
+        place[target] = 0;
+        let mut levels = vec![0, 1];
+        let mut next = 0;
+        while next < order.len() {
+            if levels.len() % CHECKED_EVERY == 0 {
+                cancellation.check()?;
+            }
+            let end = order.len();
+            while next < end {
+                let cell = order[next] as usize;
+                next += 1;
+                for neighbour in [cell - stride, cell - 1, cell + 1, cell + stride] {
+                    if place[neighbour] == UNSEEN {
+                        place[neighbour] = order.len() as u32;
+                        order.push(neighbour as u32);
+                    }
+                }
+            }
+            if order.len() > end {
+                levels.push(order.len() as u32);
+            }
+        }
+        if order.len() < free {
+            for slot in &mut place {
+                if *slot == UNSEEN {
+                    *slot = ABSENT;
+                }
+            }
+        }
+        Ok(Self {
+            order,
+            place,
+            levels,
+            width,
+        })
+    }
+
+    /// Cells with a place.
+    pub(crate) fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Row-major index of the cell at `place`.
+    pub(crate) fn cell(&self, place: u32) -> usize {
+        let padded = self.order[place as usize];
+        let stride = self.width as u32 + 2;
+        let (row, col) = (padded / stride - 1, padded % stride - 1);
+        row as usize * self.width + col as usize
+    }
+
+    /// Places of the cells of one row of the map.
+    pub(crate) fn row(&self, row: usize) -> &[u32] {
+        let start = (row + 1) * (self.width + 2) + 1;
+        &self.place[start..start + self.width]
+    }
+
+    /// Places of the four neighbours of the cell at `place`: west, east, north, south.
+    pub(crate) fn neighbours(&self, place: u32) -> [u32; 4] {
+        let padded = self.order[place as usize] as usize;
+        let stride = self.width + 2;
+        [padded - 1, padded + 1, padded - stride, padded + stride]
+            .map(|neighbour| self.place[neighbour])
+    }
+
+    /// Mean width of the passages, cells: between two walls each cell has 2 / width blocked neighbours. Of a sample.
+    pub(crate) fn width(&self) -> f64 {
+        const EVERY: usize = 16;
+        let (mut cells, mut walls) = (0_usize, 0_usize);
+        for place in (0..self.len() as u32).step_by(EVERY) {
+            cells += 1;
+            walls += self
+                .neighbours(place)
+                .into_iter()
+                .filter(|&neighbour| neighbour == ABSENT)
+                .count();
+        }
+        2.0 * cells as f64 / walls.max(1) as f64
+    }
+}

@@ -1,0 +1,51 @@
+//! Gauss-Seidel relaxation in extended range, for cells that `f64` factors cannot reach.
+//!
+//! A weight below the smallest `f64` becomes zero. That matters only where a cell takes its u from such a weight: in a long
+//! narrow passage whose far end is reached by a much wider one, u grows again towards that end, but cells just behind the
+//! turning point see the wide passage through weights of 1e-400. There the values next to them are right, and a few sweeps
+//! of relaxation in extended range carry them over, because in such passages u changes by orders of magnitude a cell.
+
+use super::breadth_first::{ABSENT, BreadthFirst};
+use crate::domain::Domain;
+use crate::scaled::Scaled;
+use crate::store::Store;
+
+/// Most sweeps, each in both directions.
+const SWEEPS: usize = 200;
+
+/// Largest relative change of a sweep that ends them.
+const CONVERGED: f64 = 1e-7;
+
+/// Relaxes `store` from the farthest cell to the nearest and back, until it converges.
+pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &mut Store) {
+    for _ in 0..SWEEPS {
+        let mut change = 0.0_f64;
+        let places = 1..pass.len() as u32;
+        for place in places.clone().rev().chain(places) {
+            let mut largest = i32::MIN;
+            let around = pass.neighbours(place).map(|place| {
+                let u = if place == ABSENT {
+                    Scaled::ZERO
+                } else {
+                    store.u(pass.cell(place))
+                };
+                if !u.is_zero() {
+                    largest = largest.max(u.exponent);
+                }
+                u
+            });
+            let sum: f64 = around.iter().map(|u| u.relative_to(largest)).sum();
+            let index = pass.cell(place);
+            let u = Scaled::new(
+                0.25 * sum / (1.0 + domain.screening_coefficient(index)),
+                largest,
+            );
+            let before = store.u(index);
+            change = change.max((before.relative_to(u.exponent) / u.mantissa - 1.0).abs());
+            store.set(index, u.mantissa, u.exponent);
+        }
+        if change <= CONVERGED {
+            break;
+        }
+    }
+}

@@ -1,0 +1,419 @@
+//! The tree of fronts: which cells are eliminated together, and at what cost.
+//!
+//! Cells are eliminated stage by stage, from the farthest inwards. Where the free space is one passage, a stage is a few
+//! distances. Where many passages run side by side and loops join them, everything beyond a distance is one piece, and its
+//! fronts are as wide as all passages together; so there the space between two distances, a slab, is eliminated first,
+//! passage by passage, and only the separators, one distance in many, have wide fronts:
+//!
+//! ```text
+//! target ... separator | slab: stages inwards | separator | slab ...
+//!                8     <--7---6---5---4---3---      2
+//! ```
+//!
+//! Each separator is eliminated once both slabs beside it are, so what it then touches is the next separator inwards, a
+//! bounded number of cells nearer to the target: weights stay far above the smallest `f64` as they do without slabs.
+
+use std::cmp::Reverse;
+use std::ops::Range;
+
+use super::breadth_first::BreadthFirst;
+use crate::cancellation::Cancellation;
+use crate::error::SolveError;
+
+/// Cells that are eliminated together, followed by those it leaves an update on.
+#[derive(Clone, Copy)]
+pub(crate) struct Front {
+    first: usize,
+    /// Cells the front eliminates.
+    pub own: u32,
+    /// Cells eliminated later on which it leaves an update.
+    pub boundary: u32,
+    /// Whether a later front eliminates its boundary; otherwise that is the target alone.
+    pub has_parent: bool,
+    first_child: u32,
+    next_sibling: u32,
+}
+
+/// No front.
+const NONE: u32 = u32::MAX;
+
+/// The cost of a factorisation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Cost {
+    /// Multiplications.
+    pub operations: f64,
+    /// Weights kept for the substitution, at most.
+    pub weights: usize,
+    /// Bytes, of all that is allocated.
+    pub bytes: u64,
+}
+
+/// How the distances are divided into stages.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    /// Distances a stage takes at once.
+    thickness: usize,
+    /// Distances from one separator to the next; none for no separators.
+    slab: Option<usize>,
+}
+
+impl Shape {
+    fn of(pass: &BreadthFirst) -> Self {
+        let passage = pass.width();
+        let frontier = pass.len() as f64 / pass.levels.len() as f64;
+        let many = frontier > MANY * passage;
+        let (thickness, slab) = match passage {
+            ..NARROW => (7, 8),
+            ..MIDDLING if !many => (2, 0),
+            _ => (1, 24),
+        };
+        Self {
+            thickness,
+            slab: many.then_some(slab),
+        }
+    }
+}
+
+/// Passages up to these widths, cells, are eliminated several distances at a time: their fronts would be too small.
+const NARROW: f64 = 1.5;
+const MIDDLING: f64 = 10.0;
+
+/// Passages side by side from which on slabs reduce the cost.
+const MANY: f64 = 6.0;
+
+/// Stages between two checks of the cancellation.
+const CHECKED_EVERY: usize = 16;
+
+/// Fronts in order of elimination, children before their parents.
+pub(crate) struct Tree {
+    pub fronts: Vec<Front>,
+    places: Vec<u32>,
+    pub cost: Cost,
+}
+
+impl Tree {
+    /// The tree over all cells of `pass` but the target.
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`].
+    pub(crate) fn of(pass: &BreadthFirst, cancellation: &Cancellation) -> Result<Self, SolveError> {
+        let shape = Shape::of(pass);
+        let mut builder = Builder::new(pass);
+        let mut stages = 0_usize;
+        let distances = pass.levels.len() - 1;
+        let slab = shape.slab.unwrap_or(distances);
+        let at = |distance: usize| pass.levels[distance.min(distances)];
+        // Distance 0, the target, stands in for the innermost separator.
+        for inner in (0..distances).step_by(slab).rev() {
+            let outer = at(inner + slab)..at(inner + slab + 1);
+            builder.begin_slab();
+            let mut end = (inner + slab).min(distances);
+            while end > inner + 1 {
+                if stages.is_multiple_of(CHECKED_EVERY) {
+                    cancellation.check()?;
+                }
+                stages += 1;
+                let start = end.saturating_sub(shape.thickness).max(inner + 1);
+                let next = if start > inner + 1 {
+                    Next::Stage
+                } else {
+                    Next::Separator
+                };
+                builder.add_stage(&(at(start)..at(end)), &outer, end - start > 1, next);
+                end = start;
+            }
+            builder.add_separator(&outer);
+        }
+        let mut tree = builder.tree;
+        tree.cost.bytes = tree.bytes(pass);
+        Ok(tree)
+    }
+
+    /// Places of the cells of a front: its own, then its boundary.
+    pub(crate) fn cells(&self, front: &Front) -> &[u32] {
+        &self.places[front.first..front.first + (front.own + front.boundary) as usize]
+    }
+
+    /// Places of the boundary of a front, those of the outer separator last.
+    pub(crate) fn boundary(&self, front: &Front) -> &[u32] {
+        &self.cells(front)[front.own as usize..]
+    }
+
+    /// The fronts whose boundary `front` eliminates.
+    pub(super) fn children(&self, front: &Front) -> impl Iterator<Item = usize> {
+        let mut next = front.first_child;
+        std::iter::from_fn(move || {
+            let child = (next != NONE).then_some(next as usize)?;
+            next = self.fronts[child].next_sibling;
+            Some(child)
+        })
+    }
+
+    fn bytes(&self, pass: &BreadthFirst) -> u64 {
+        // Places of the pass and slots, updates alive at once bounded by the largest few fronts.
+        let fixed =
+            pass.len() * 12 + self.places.len() * 4 + self.fronts.len() * size_of::<Front>();
+        let largest = self
+            .fronts
+            .iter()
+            .map(|front| u64::from(front.own + front.boundary))
+            .max()
+            .unwrap_or(0);
+        fixed as u64 + 8 * self.cost.weights as u64 + 16 * largest * largest
+    }
+}
+
+impl Cost {
+    fn add_front(&mut self, own: usize, boundary: usize) {
+        let size = (own + boundary) as f64;
+        let rest = boundary as f64;
+        // The sum of (n - k)^2 / 2 over the pivots k, and a constant a cell for the assembly.
+        self.operations += (size * size * size - rest * rest * rest) / 6.0 + 60.0 * size;
+        self.weights += (own + boundary) * (own + boundary) / 2 - boundary * boundary / 2;
+    }
+}
+
+/// What comes inwards of a stage.
+#[derive(Clone, Copy, Eq, PartialEq)]
+enum Next {
+    /// Another stage of the same slab.
+    Stage,
+    /// The inner separator, or the target.
+    Separator,
+}
+
+/// A tree under construction.
+struct Builder<'a> {
+    pass: &'a BreadthFirst,
+    tree: Tree,
+    pieces: Pieces,
+    /// The front on whose boundary a place was last put.
+    seen: Vec<u32>,
+    /// Fronts that wait for the next stage of this slab, for its outer separator, and for its inner one.
+    for_stage: Vec<u32>,
+    for_outer: Vec<u32>,
+    for_inner: Vec<u32>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(pass: &'a BreadthFirst) -> Self {
+        Self {
+            pass,
+            tree: Tree {
+                fronts: Vec::with_capacity(pass.len() / 4),
+                places: Vec::with_capacity(pass.len() * 3),
+                cost: Cost::default(),
+            },
+            pieces: Pieces::default(),
+            seen: vec![NONE; pass.len()],
+            for_stage: Vec::new(),
+            for_outer: Vec::new(),
+            for_inner: Vec::new(),
+        }
+    }
+
+    /// Moves on to the next slab inwards.
+    fn begin_slab(&mut self) {
+        self.for_outer.append(&mut self.for_inner);
+    }
+
+    /// Adds the fronts of a stage inside the slab whose outer separator takes the places `outer`.
+    fn add_stage(&mut self, stage: &Range<u32>, outer: &Range<u32>, thick: bool, next: Next) {
+        self.pieces.reset(stage.len());
+        if thick {
+            for place in stage.clone() {
+                for neighbour in self.pass.neighbours(place) {
+                    if neighbour > place && neighbour < stage.end {
+                        self.pieces
+                            .join(place - stage.start, neighbour - stage.start);
+                    }
+                }
+            }
+        }
+        let mut waiting = std::mem::take(&mut self.for_stage);
+        self.adopt(stage, &waiting);
+        waiting.clear();
+        self.for_stage = waiting;
+        for piece in 0..self.pieces.count() {
+            let (index, touches_outer) = self.add_front(piece, stage, Some(outer));
+            match next {
+                Next::Stage => self.for_stage.push(index),
+                Next::Separator if touches_outer => self.for_outer.push(index),
+                Next::Separator => self.for_inner.push(index),
+            }
+        }
+    }
+
+    /// Adds the fronts of a separator, the slabs on both sides of which are eliminated.
+    fn add_separator(&mut self, separator: &Range<u32>) {
+        self.pieces.reset(separator.len());
+        let mut waiting = std::mem::take(&mut self.for_outer);
+        self.adopt(separator, &waiting);
+        waiting.clear();
+        self.for_outer = waiting;
+        for piece in 0..self.pieces.count() {
+            let (index, _) = self.add_front(piece, separator, None);
+            self.for_inner.push(index);
+        }
+    }
+
+    /// Joins the pieces of a stage by the boundaries of the fronts that waited for it, and gives it those as children.
+    fn adopt(&mut self, stage: &Range<u32>, waiting: &[u32]) {
+        for &child in waiting {
+            let boundary = self.tree.boundary(&self.tree.fronts[child as usize]);
+            let mut here = boundary.iter().filter(|place| stage.contains(place));
+            if let Some(first) = here.next() {
+                for other in here {
+                    self.pieces.join(first - stage.start, other - stage.start);
+                }
+            }
+        }
+        self.pieces.number();
+        for &child in waiting {
+            let boundary = self.tree.boundary(&self.tree.fronts[child as usize]);
+            let Some(first) = boundary.iter().find(|place| stage.contains(place)) else {
+                continue;
+            };
+            let piece = self.pieces.piece[(first - stage.start) as usize] as usize;
+            let front = &mut self.tree.fronts[child as usize];
+            front.has_parent = true;
+            front.next_sibling = std::mem::replace(&mut self.pieces.first_child[piece], child);
+        }
+    }
+
+    /// Adds the front of one piece: of a separator, or of a stage of the slab inside the separator `outer`. Returns its
+    /// index and whether it touches that.
+    fn add_front(
+        &mut self,
+        piece: usize,
+        stage: &Range<u32>,
+        outer: Option<&Range<u32>>,
+    ) -> (u32, bool) {
+        // Of a separator's own neighbours none remains.
+        let (inwards, outer) = outer.map_or((0, 0..0), |outer| (stage.start, outer.clone()));
+        let tree = &mut self.tree;
+        let index = tree.fronts.len() as u32;
+        let first = tree.places.len();
+        let members = self.pieces.members(piece);
+        tree.places
+            .extend(members.iter().map(|local| local + stage.start));
+        let own = members.len();
+        for at in first..first + own {
+            for neighbour in self.pass.neighbours(tree.places[at]) {
+                // What else lies farther out is eliminated.
+                let remains = neighbour < inwards || outer.contains(&neighbour);
+                if remains && self.seen[neighbour as usize] != index {
+                    self.seen[neighbour as usize] = index;
+                    tree.places.push(neighbour);
+                }
+            }
+        }
+        let first_child = self.pieces.first_child[piece];
+        let mut child = first_child;
+        while child != NONE {
+            let front = tree.fronts[child as usize];
+            let boundary = front.first + front.own as usize;
+            for at in boundary..boundary + front.boundary as usize {
+                let place = tree.places[at];
+                if !stage.contains(&place) && self.seen[place as usize] != index {
+                    self.seen[place as usize] = index;
+                    tree.places.push(place);
+                }
+            }
+            child = front.next_sibling;
+        }
+        // The next stage first and the outer separator last: so the rows of an update mostly stay in order on their way
+        // up the tree.
+        let boundary = &mut tree.places[first + own..];
+        boundary.sort_unstable_by_key(|&place| (outer.contains(&place), Reverse(place)));
+        let touches_outer = boundary.last().is_some_and(|place| outer.contains(place));
+        let boundary = boundary.len();
+        tree.cost.add_front(own, boundary);
+        tree.fronts.push(Front {
+            first,
+            own: own as u32,
+            boundary: boundary as u32,
+            has_parent: false,
+            first_child,
+            next_sibling: NONE,
+        });
+        (index, touches_outer)
+    }
+}
+
+/// Connected pieces of one stage, by union and find; kept between stages for its memory.
+#[derive(Default)]
+struct Pieces {
+    parent: Vec<u32>,
+    /// Piece of each cell.
+    piece: Vec<u32>,
+    /// Where the members of each piece end.
+    ends: Vec<u32>,
+    members: Vec<u32>,
+    first_child: Vec<u32>,
+}
+
+impl Pieces {
+    fn reset(&mut self, len: usize) {
+        self.parent.clear();
+        self.parent.extend(0..len as u32);
+    }
+
+    fn root(&mut self, mut at: u32) -> u32 {
+        while self.parent[at as usize] != at {
+            let above = self.parent[self.parent[at as usize] as usize];
+            self.parent[at as usize] = above;
+            at = above;
+        }
+        at
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        // The smaller becomes the root, so a root comes before its members.
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+
+    /// Numbers the pieces and lists their members, once all are joined.
+    fn number(&mut self) {
+        let len = self.parent.len();
+        self.piece.clear();
+        self.piece.resize(len, 0);
+        self.ends.clear();
+        for at in 0..len as u32 {
+            let root = self.root(at);
+            if root == at {
+                self.piece[at as usize] = self.ends.len() as u32;
+                self.ends.push(1);
+            } else {
+                let piece = self.piece[root as usize];
+                self.piece[at as usize] = piece;
+                self.ends[piece as usize] += 1;
+            }
+        }
+        let mut sum = 0;
+        for end in &mut self.ends {
+            sum += std::mem::replace(end, sum);
+        }
+        // Each end counts up from the start of its piece as the members come in.
+        self.members.clear();
+        self.members.resize(len, 0);
+        for at in (0..len as u32).rev() {
+            let end = &mut self.ends[self.piece[at as usize] as usize];
+            self.members[*end as usize] = at;
+            *end += 1;
+        }
+        self.first_child.clear();
+        self.first_child.resize(self.ends.len(), NONE);
+    }
+
+    fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The members of a piece in descending order.
+    fn members(&self, piece: usize) -> &[u32] {
+        let start = if piece == 0 { 0 } else { self.ends[piece - 1] };
+        &self.members[start as usize..self.ends[piece] as usize]
+    }
+}

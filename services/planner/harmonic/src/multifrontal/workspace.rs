@@ -1,0 +1,38 @@
+//! The factors, and the memory a factorisation works in.
+
+use crate::scaled::Scaled;
+
+/// Memory kept between solves: fresh pages from the system cost as much as filling them.
+#[derive(Debug, Default)]
+pub(crate) struct Workspace {
+    pub(super) factors: Factors,
+    /// Position in the current front of each place; all `NOWHERE` between fronts.
+    pub(super) slot: Vec<u32>,
+    /// u by place.
+    pub(super) u: Vec<Scaled>,
+}
+
+/// Most memory kept, in bytes: what a maze of half a million cells takes. A map that needs more takes so long that fresh
+/// pages no longer count.
+const KEPT: usize = 64 << 20;
+
+impl Workspace {
+    /// Frees the memory if it is more than is kept between solves.
+    pub(super) fn trim(&mut self) {
+        let bytes = size_of::<f64>() * self.factors.rows.capacity()
+            + size_of::<u32>() * (self.factors.lengths.capacity() + self.slot.capacity())
+            + size_of::<Scaled>() * self.u.capacity();
+        if bytes > KEPT {
+            *self = Self::default();
+        }
+    }
+}
+
+/// The rows of the factor that the back substitution needs.
+#[derive(Debug, Default)]
+pub(super) struct Factors {
+    /// For every eliminated cell, the weights of the cells after it in its front, up to the last that is not zero.
+    pub(super) rows: Vec<f64>,
+    /// The number of weights of each cell.
+    pub(super) lengths: Vec<u32>,
+}

@@ -1,0 +1,407 @@
+//! Multigrid with interpolation by the equations themselves (after Dendy's BoxMG).
+//!
+//! Every second column and row makes the next level. The interpolation follows the equations, so it stops at walls, and
+//! the coarse equations are the Galerkin product, so corrections do not leak through them: that, and not a norm, is what
+//! makes the solution relatively right in cells where u is 1e-40. The set-up depends on the map alone, the target is a
+//! source of inflow in the solve, and u is divided by its own value there at the end.
+//!
+//! - [`grid`]: the layout in four parity planes.
+//! - [`finest`], [`coarse`], [`coarsest`]: relaxation and transfer on the three kinds of level.
+//! - [`galerkin`]: the equations of a level from those of the finer one.
+//! - [`sources`]: the inflow on the coarse levels.
+
+mod coarse;
+mod coarsest;
+mod finest;
+mod galerkin;
+mod grid;
+mod sources;
+#[cfg(test)]
+mod tests;
+
+use coarse::Coarse;
+use coarsest::Coarsest;
+pub(crate) use finest::Progress;
+use finest::{Finest, Source};
+use grid::Grid;
+
+use std::ops::Range;
+
+use crate::cell::Cell;
+use crate::domain::Domain;
+use crate::real::Real;
+use crate::scaled::pow2;
+use crate::screening::Coefficients;
+use crate::simd::Simd;
+
+/// Sweeps after the last correction.
+const SMOOTHING: usize = 2;
+
+/// The level visited twice in every cycle, as in a W-cycle, counted from the first coarse one. One visit of the levels below
+/// is not exact, and its error reaches far into cells where u is much smaller; here, on a sixteenth of the map's cells, a
+/// second visit is cheap, and saves up to every third cycle.
+const VISITED_TWICE: usize = 1;
+
+/// On maps whose longer side is at most this, the second visit and the second sweep save fewer cycles than they cost.
+const SMALL_SIDE: usize = 128;
+
+/// Full sweeps in a pass over the finest level of a large map: the second reads no more from memory.
+const SWEEPS: usize = 2;
+
+/// The same where no more than one cell in `FEW` has not converged: those lie in dead ends a few cells wide, which the
+/// coarser levels do not resolve.
+const SWEEPS_FOR_FEW: usize = 6;
+const FEW: usize = 64;
+
+/// Levels end when neither side is longer.
+const COARSEST_SIDE: usize = 5;
+
+/// The levels of one map, in one precision.
+#[derive(Debug)]
+pub(crate) struct Multigrid<R> {
+    finest: Finest<R>,
+    coarse: Vec<Coarse<R>>,
+    coarsest: Coarsest,
+    /// Full sweeps in the next pass of a cycle; one in the first, so that no solve depends on the one before.
+    sweeps: usize,
+    simd: Simd,
+}
+
+impl<R: Real> Multigrid<R> {
+    /// Levels for maps of this size, with no equations yet.
+    pub(crate) fn new(width: usize, height: usize) -> Self {
+        let mut grid = Grid::new(width, height);
+        let finest = Finest::new(grid);
+        let mut coarse = Vec::new();
+        loop {
+            grid = Grid::new(grid.columns, grid.rows);
+            coarse.push(Coarse::new(grid));
+            if grid.width.max(grid.height) <= COARSEST_SIDE {
+                break;
+            }
+        }
+        Self {
+            finest,
+            coarse,
+            coarsest: Coarsest::default(),
+            sweeps: 1,
+            simd: Simd::default(),
+        }
+    }
+
+    /// Sets the equations that depend on `rows` of the map, and no others, on all levels.
+    pub(crate) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
+        let finest = &mut self.finest;
+        let width = domain.width();
+        self.simd.run(
+            #[inline(always)]
+            || {
+                for row in rows.clone() {
+                    let cells = row * width..(row + 1) * width;
+                    let blocked = &domain.blocked()[cells.clone()];
+                    match domain.screening() {
+                        Coefficients::Uniform(k) => {
+                            let inverse = R::of(0.25 / (1.0 + k));
+                            finest.set_row(row, blocked, |_| inverse);
+                        }
+                        Coefficients::PerCell(all) => {
+                            let all = &all[cells];
+                            finest.set_row(row, blocked, |col| {
+                                R::of(0.25 / (1.0 + f64::from(all[col])))
+                            });
+                        }
+                    }
+                }
+            },
+        );
+        self.set_up_levels(rows);
+    }
+
+    /// Interpolation and coarse equations, where they depend on `rows` of the finest level.
+    fn set_up_levels(&mut self, mut rows: Range<usize>) {
+        let (finest, first) = (&mut self.finest, &mut self.coarse[0]);
+        let count = finest.grid.rows;
+        self.simd.run(
+            #[inline(always)]
+            || {
+                finest.interpolate_rows(rows_of_interpolation(&rows, count));
+                finest.coarsen(first, rows_of_next(&rows, count));
+            },
+        );
+        for level in 1..self.coarse.len() {
+            rows = rows_of_next(&rows, self.coarse[level - 1].grid.height);
+            let (fine, next) = self.coarse.split_at_mut(level);
+            let (fine, next) = (&mut fine[level - 1], &mut next[0]);
+            let count = fine.grid.rows;
+            self.simd.run(
+                #[inline(always)]
+                || {
+                    fine.interpolate(rows_of_interpolation(&rows, count));
+                    fine.coarsen(next, rows_of_next(&rows, count));
+                },
+            );
+        }
+        if let Some(last) = self.coarse.last() {
+            self.coarsest.set_up(last);
+        }
+    }
+
+    /// Makes `target` the only inflow and starts from the coarsest level's solution.
+    pub(crate) fn start(&mut self, target: Cell) {
+        let (plane, at) = self.finest.grid.locate(target.col, target.row);
+        let value = R::of(pow2(R::TOP));
+        self.finest.sources = vec![Source {
+            plane,
+            row: target.row / 2,
+            at,
+            value,
+        }];
+        self.start_from_sources();
+    }
+
+    /// Makes `target` the only inflow and starts from a first guess, given row by row with 2^TOP at the target.
+    pub(crate) fn start_near(&mut self, target: Cell, mut guess: impl FnMut(usize, &mut [R])) {
+        self.sweeps = 1;
+        let finest = &mut self.finest;
+        let grid = finest.grid;
+        let mut buffer = vec![R::default(); 2 * grid.columns];
+        for row in 0..grid.height {
+            guess(row, &mut buffer[..grid.width]);
+            grid::split_row(&grid, &mut finest.u, row, &buffer);
+        }
+        // The inflow that satisfies the target's own equation; the sweeps relax the others.
+        let u = |col: Option<usize>, row: Option<usize>| match (col, row) {
+            (Some(col), Some(row)) if col < grid.width && row < grid.height => {
+                let (plane, at) = grid.locate(col, row);
+                finest.inverse[plane][at].is_active() * finest.u[plane][at]
+            }
+            _ => R::default(),
+        };
+        let (col, row) = (target.col, target.row);
+        let around = u(col.checked_sub(1), Some(row)) + u(Some(col + 1), Some(row));
+        let around = around + u(Some(col), row.checked_sub(1)) + u(Some(col), Some(row + 1));
+        let (plane, at) = grid.locate(col, row);
+        let value = finest.inverse[plane][at].inverse() * finest.u[plane][at] - around;
+        finest.sources = vec![Source {
+            plane,
+            row: row / 2,
+            at,
+            value,
+        }];
+        for plane in &mut self.coarse[0].u {
+            plane.fill(R::default());
+        }
+    }
+
+    /// Starts from the coarser levels' solution for the inflow, each interpolated from the next and improved by a cycle (full
+    /// multigrid).
+    pub(crate) fn start_from_sources(&mut self) {
+        self.sweeps = 1;
+        for plane in &mut self.finest.u {
+            plane.fill(R::default());
+        }
+        sources::restrict(&self.finest, &mut self.coarse);
+        let last = self.coarse.len() - 1;
+        self.coarsest.solve(&mut self.coarse[last]);
+        for level in (0..last).rev() {
+            for plane in &mut self.coarse[level].u {
+                plane.fill(R::default());
+            }
+            self.ascend(level);
+            if self.is_large() && level >= VISITED_TWICE {
+                self.second_visit(level);
+            }
+        }
+    }
+
+    fn is_large(&self) -> bool {
+        let Grid { width, height, .. } = self.finest.grid;
+        width.max(height) > SMALL_SIDE
+    }
+
+    /// Loads equations other than a map's: for each row 1 / diagonal (0 for a cell that stays zero) and a first
+    /// guess, and the inflow by cell. Every pair of neighbours is coupled by one.
+    pub(crate) fn load<'a>(
+        &mut self,
+        rows: impl Fn(usize) -> (&'a [R], &'a [R]),
+        inflow: impl Iterator<Item = (Cell, R)>,
+    ) {
+        self.sweeps = 1;
+        let finest = &mut self.finest;
+        let (grid, width, height) = (finest.grid, finest.grid.width, finest.grid.height);
+        let mut buffer = vec![R::default(); 2 * grid.columns];
+        for row in 0..height {
+            let (inverse, guess) = rows(row);
+            buffer[..width].copy_from_slice(inverse);
+            grid::split_row(&grid, &mut finest.inverse, row, &buffer);
+            buffer[..width].copy_from_slice(guess);
+            grid::split_row(&grid, &mut finest.u, row, &buffer);
+        }
+        finest.sources.clear();
+        finest.sources.extend(inflow.map(|(cell, value)| {
+            let (plane, at) = grid.locate(cell.col, cell.row);
+            Source {
+                plane,
+                row: cell.row / 2,
+                at,
+                value,
+            }
+        }));
+        finest
+            .sources
+            .sort_unstable_by_key(|source| (source.plane, source.row));
+        self.set_up_levels(0..height);
+        for plane in &mut self.coarse[0].u {
+            plane.fill(R::default());
+        }
+    }
+
+    /// u of every cell as it is, given row by row.
+    pub(crate) fn unload(&self, mut row_is: impl FnMut(usize, &[R])) {
+        let grid = &self.finest.grid;
+        let mut buffer = vec![R::default(); 2 * grid.columns];
+        for row in 0..grid.height {
+            grid::join_row(grid, &self.finest.u, row, &mut buffer);
+            row_is(row, &buffer[..grid.width]);
+        }
+    }
+
+    /// One cycle; corrections above `tolerance` times u count as unconverged.
+    pub(crate) fn cycle(&mut self, tolerance: f64) -> Progress {
+        let progress = self.pass(self.sweeps, true, tolerance);
+        if self.is_large() {
+            let Grid { width, height, .. } = self.finest.grid;
+            let few = progress.unconverged <= width * height / FEW;
+            self.sweeps = if few { SWEEPS_FOR_FEW } else { SWEEPS };
+        }
+        self.correct();
+        progress
+    }
+
+    /// As [`cycle`](Self::cycle), but without the coarser levels if all cells had converged; says whether they had. For small
+    /// maps, whose coarser levels cost more than the finest. End with [`smooth`](Self::smooth), not [`finish`](Self::finish).
+    pub(crate) fn cycle_unless_converged(&mut self, tolerance: f64) -> bool {
+        let converged = self.pass(1, true, tolerance).unconverged == 0;
+        if !converged {
+            self.correct();
+        }
+        converged
+    }
+
+    /// Solves the residual equation of the finest level on the coarser ones.
+    fn correct(&mut self) {
+        let last = self.coarse.len() - 1;
+        if self.is_large() && last > VISITED_TWICE {
+            (0..VISITED_TWICE).for_each(|level| self.descend(level));
+            self.solve_level(VISITED_TWICE);
+            self.second_visit(VISITED_TWICE);
+            (0..VISITED_TWICE)
+                .rev()
+                .for_each(|level| self.ascend(level));
+        } else {
+            self.solve_level(0);
+        }
+    }
+
+    /// Solves on a coarse level, from zero, by one cycle through it and those below.
+    fn solve_level(&mut self, level: usize) {
+        let last = self.coarse.len() - 1;
+        for level in level..last {
+            self.descend(level);
+        }
+        self.coarsest.solve(&mut self.coarse[last]);
+        for level in (level..last).rev() {
+            self.ascend(level);
+        }
+    }
+
+    /// The second visit of a W-cycle: solves for the residual that the first one left on a coarse level. The right-hand side
+    /// is overwritten.
+    fn second_visit(&mut self, level: usize) {
+        let fine = &mut self.coarse[level];
+        self.simd.run(
+            #[inline(always)]
+            || fine.begin_second_visit(),
+        );
+        self.solve_level(level);
+        self.coarse[level].end_second_visit();
+    }
+
+    fn descend(&mut self, level: usize) {
+        let (fine, next) = self.coarse.split_at_mut(level + 1);
+        let fine = &mut fine[level];
+        self.simd.run(
+            #[inline(always)]
+            || fine.descend(&mut next[0]),
+        );
+    }
+
+    /// Interpolates the last coarse correction to the finest level, for u to be read, and smoothes the error that leaves from
+    /// cell to cell: near a saddle point the direction depends on the last digits. Cycles may follow.
+    pub(crate) fn finish(&mut self) {
+        self.pass(1, false, 0.0);
+        self.smooth();
+    }
+
+    /// Relaxes without a correction.
+    pub(crate) fn smooth(&mut self) {
+        for plane in &mut self.coarse[0].u {
+            plane.fill(R::default());
+        }
+        self.pass(SMOOTHING, false, 0.0);
+    }
+
+    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: f64) -> Progress {
+        let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
+        let tolerance = R::of(tolerance);
+        self.simd.run(
+            #[inline(always)]
+            || finest.pass(next, sweeps, descend, tolerance),
+        )
+    }
+
+    fn ascend(&mut self, level: usize) {
+        let (fine, next) = self.coarse.split_at_mut(level + 1);
+        let fine = &mut fine[level];
+        self.simd.run(
+            #[inline(always)]
+            || fine.ascend(&next[0]),
+        );
+    }
+
+    /// u of every cell, row by row, times 2^TOP over u(target); `blocked` where the map is.
+    pub(crate) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
+        let grid = &self.finest.grid;
+        let (plane, at) = grid.locate(target.col, target.row);
+        let top = pow2(R::TOP);
+        let scale = R::of(top / self.finest.u[plane][at].wide());
+        into.clear();
+        into.resize(grid.width * grid.height, R::default());
+        let mut u = vec![R::default(); 2 * grid.columns];
+        let mut inverse = u.clone();
+        for (row, out) in into.chunks_exact_mut(grid.width).enumerate() {
+            grid::join_row(grid, &self.finest.u, row, &mut u);
+            grid::join_row(grid, &self.finest.inverse, row, &mut inverse);
+            for ((out, u), inverse) in out.iter_mut().zip(&u).zip(&inverse) {
+                // Cells that have not converged may be below zero; the verification finds a zero there.
+                let u = if *u > R::default() {
+                    *u * scale
+                } else {
+                    R::default()
+                };
+                *out = if *inverse > R::default() { u } else { blocked };
+            }
+        }
+        into[target.row * grid.width + target.col] = R::of(top);
+    }
+}
+
+/// Rows of a level's planes whose interpolation depends on `rows` of its cells.
+fn rows_of_interpolation(rows: &Range<usize>, count: usize) -> Range<usize> {
+    (rows.start / 2).saturating_sub(1)..(rows.end / 2 + 2).min(count)
+}
+
+/// Rows of the next level whose equations depend on `rows` of a level's cells: one more on either side.
+fn rows_of_next(rows: &Range<usize>, count: usize) -> Range<usize> {
+    (rows.start / 2).saturating_sub(2)..(rows.end / 2 + 3).min(count)
+}

@@ -1,0 +1,351 @@
+//! The finest level: the five-point equation itself.
+//!
+//! Even-even and odd-odd cells are red, the others black; red cells have black neighbours alone and the reverse. One pass
+//! over the rows does all of the level's work between two visits to the coarser ones, so the level is read from memory
+//! once a cycle: the coarse correction goes to the black cells, red is relaxed from black (and needs no correction of its
+//! own), black from red, then red again. The changes of that last half sweep, summed over the red neighbours of a black cell,
+//! are exactly its residual, which is restricted at once.
+
+use super::coarse::Coarse;
+use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
+use crate::real::Real;
+
+/// An inflow at one cell: the right-hand side of its equation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Source<R> {
+    pub plane: usize,
+    pub row: usize,
+    /// Place in the plane.
+    pub at: usize,
+    pub value: R,
+}
+
+/// The cells of the map and their interpolation from the next level.
+#[derive(Debug)]
+pub(super) struct Finest<R> {
+    pub grid: Grid,
+    pub u: Planes<R>,
+    /// 1 / diagonal, 0 where blocked.
+    pub inverse: Planes<R>,
+    /// Weight of the coarse cell to the west in each odd-even cell.
+    pub west: Vec<R>,
+    pub east: Vec<R>,
+    /// Weight of the coarse cell to the north in each even-odd cell.
+    pub north: Vec<R>,
+    pub south: Vec<R>,
+    /// By plane and row.
+    pub sources: Vec<Source<R>>,
+    scratch: Scratch<R>,
+}
+
+/// What a pass tells of the convergence.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Progress {
+    /// Black cells whose coarse correction was above the tolerance, relatively to their u.
+    pub unconverged: usize,
+}
+
+impl<R: Real> Finest<R> {
+    pub(super) fn new(grid: Grid) -> Self {
+        Self {
+            grid,
+            u: grid.planes(),
+            inverse: grid.planes(),
+            west: grid.plane(),
+            east: grid.plane(),
+            north: grid.plane(),
+            south: grid.plane(),
+            sources: Vec::new(),
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Sets one row of cells; `inverse` gives 1 / diagonal of a free cell by its column.
+    #[inline(always)]
+    pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: impl Fn(usize) -> R) {
+        let Grid { width, columns, .. } = self.grid;
+        let (plane, start) = self.grid.locate(0, row);
+        let (first, second) = self.inverse.split_at_mut(plane + 1);
+        let even = &mut first[plane][start..][..columns];
+        let odd = &mut second[0][start..][..columns];
+        let value = |col: usize| {
+            if blocked[col] {
+                R::default()
+            } else {
+                inverse(col)
+            }
+        };
+        for x in 0..width / 2 {
+            even[x] = value(2 * x);
+            odd[x] = value(2 * x + 1);
+        }
+        if width % 2 == 1 {
+            even[columns - 1] = value(width - 1);
+        }
+    }
+
+    /// Interpolation by the equation itself: an odd-even cell takes its neighbours to the north and south to be its
+    /// equals, which leaves those to the west and east. Blocked cells give and take nothing.
+    #[inline(always)]
+    pub(super) fn interpolate_rows(&mut self, rows: std::ops::Range<usize>) {
+        let Grid {
+            columns: n, stride, ..
+        } = self.grid;
+        let least = R::of(1e-4);
+        for row in rows {
+            let o = self.grid.start(row);
+            let of = |plane: usize, start: usize| &self.inverse[plane][start..start + n];
+            let weights = |d: R, a: R, b: R| {
+                let rest = d - a.is_active() - b.is_active();
+                if rest > least * d {
+                    R::ONE / rest
+                } else {
+                    R::default()
+                }
+            };
+            let (own, west, east, north, south) = (
+                of(OE, o),
+                of(EE, o),
+                of(EE, o + 1),
+                of(OO, o - stride),
+                of(OO, o),
+            );
+            let (to_west, to_east) = (&mut self.west[o..o + n], &mut self.east[o..o + n]);
+            for x in 0..n {
+                let weight = weights(own[x].inverse(), north[x], south[x]);
+                to_west[x] = west[x].is_active() * weight;
+                to_east[x] = east[x].is_active() * weight;
+            }
+            let (own, north, south, west, east) = (
+                of(EO, o),
+                of(EE, o),
+                of(EE, o + stride),
+                of(OO, o - 1),
+                of(OO, o),
+            );
+            let (to_north, to_south) = (&mut self.north[o..o + n], &mut self.south[o..o + n]);
+            for x in 0..n {
+                let weight = weights(own[x].inverse(), west[x], east[x]);
+                to_north[x] = north[x].is_active() * weight;
+                to_south[x] = south[x].is_active() * weight;
+            }
+        }
+    }
+
+    /// The weights of the odd-odd cell at `at` on the coarse cells north-west, north-east, south-west and south-east of
+    /// it: its own equation, with its neighbours interpolated.
+    pub(super) fn corner_weights(&self, at: usize) -> [R; 4] {
+        let m = self.inverse[OO][at];
+        let below = at + self.grid.stride;
+        [
+            m * (self.west[at] + self.north[at]),
+            m * (self.east[at] + self.north[at + 1]),
+            m * (self.west[below] + self.south[at]),
+            m * (self.east[below] + self.south[at + 1]),
+        ]
+    }
+
+    /// One pass: correction from `next`, so many full `sweeps`, and if `descend` a half sweep more, whose changes are
+    /// restricted to `next` as the residual.
+    #[inline(always)]
+    pub(super) fn pass(
+        &mut self,
+        next: &mut Coarse<R>,
+        sweeps: usize,
+        descend: bool,
+        tolerance: R,
+    ) -> Progress {
+        let Grid {
+            columns: n,
+            rows,
+            stride,
+            ..
+        } = self.grid;
+        let grid = self.grid;
+        let mut progress = Progress::default();
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.reset(&grid, &next.grid);
+        let Scratch {
+            upper,
+            lower,
+            restricted,
+            change_ee,
+            change_oo,
+            residual_eo,
+            residual_oe,
+            ..
+        } = &mut scratch;
+        join_row(&next.grid, &next.u, 0, upper);
+
+        for y in 0..rows + sweeps + 2 {
+            if y < rows {
+                join_row(&next.grid, &next.u, y + 1, lower);
+                progress.unconverged += self.correct_black(y, upper, lower, tolerance);
+                std::mem::swap(upper, lower);
+            }
+            // Every sweep follows the one before at a distance of one row.
+            for sweep in 0..sweeps {
+                if (sweep..rows + sweep).contains(&y) {
+                    self.relax(EE, y - sweep, None);
+                }
+                if (sweep + 1..=rows + sweep).contains(&y) {
+                    for plane in [OO, OE, EO] {
+                        self.relax(plane, y - sweep - 1, None);
+                    }
+                }
+            }
+            if !descend || y < sweeps {
+                continue;
+            }
+            let y = y - sweeps;
+            // Beyond the last row the change is that of the margin: none.
+            change_ee.swap(0, 1);
+            change_oo.swap(0, 1);
+            if y < rows {
+                self.relax(EE, y, Some(&mut change_ee[1]));
+            } else {
+                change_ee[1].fill(R::default());
+            }
+            if (1..=rows).contains(&y) {
+                let y = y - 1;
+                self.relax(OO, y, Some(&mut change_oo[1]));
+                residual_eo.swap(0, 1);
+                let [above, here] = &mut *residual_eo;
+                residual_on_black(
+                    n,
+                    [&change_ee[0], &change_ee[1]],
+                    [&change_oo[0], &change_oo[1]],
+                    residual_oe,
+                    here,
+                );
+                let o = grid.start(y);
+                let m = MARGIN;
+                let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
+                let (north, south) = (&self.north[o..][..n], &self.south[o - stride..][..n]);
+                let (b, b_west) = (&residual_oe[m..][..n], &residual_oe[m - 1..][..n]);
+                let (h, a) = (&here[m..][..n], &above[m..][..n]);
+                let out = &mut restricted[..n];
+                for x in 0..n {
+                    let sum = (west[x] * b[x] + east[x] * b_west[x])
+                        + (north[x] * h[x] + south[x] * a[x]);
+                    out[x] = sum.flushed();
+                }
+                split_row(&next.grid, &mut next.f, y, restricted);
+            }
+        }
+        self.scratch = scratch;
+        progress
+    }
+
+    /// Adds the coarse correction to the black cells of row `y`; returns how many it moved by more than the tolerance.
+    #[inline(always)]
+    fn correct_black(&mut self, y: usize, upper: &[R], lower: &[R], tolerance: R) -> usize {
+        let n = self.grid.columns;
+        let o = self.grid.start(y);
+        let mut unconverged = 0_u32;
+        let (c, east, south) = (&upper[..n], &upper[1..=n], &lower[..n]);
+        let (to_west, to_east) = (&self.west[o..][..n], &self.east[o..][..n]);
+        let u = &mut self.u[OE][o..][..n];
+        for x in 0..n {
+            let correction = to_west[x] * c[x] + to_east[x] * east[x];
+            u[x] += correction;
+            unconverged += u32::from(correction.size() > tolerance * u[x]);
+        }
+        let (to_north, to_south) = (&self.north[o..][..n], &self.south[o..][..n]);
+        let u = &mut self.u[EO][o..][..n];
+        for x in 0..n {
+            let correction = to_north[x] * c[x] + to_south[x] * south[x];
+            u[x] += correction;
+            unconverged += u32::from(correction.size() > tolerance * u[x]);
+        }
+        unconverged as usize
+    }
+
+    /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes what each cell changes by.
+    #[inline(always)]
+    fn relax(&mut self, plane: usize, y: usize, mut change: Option<&mut [R]>) {
+        let Grid {
+            columns: n, stride, ..
+        } = self.grid;
+        let o = self.grid.start(y);
+        let mut row = std::mem::take(&mut self.u[plane]);
+        let [ee, oe, eo, oo] = &self.u;
+        let [a, b, c, d] = match plane {
+            EE => [&oe[o..], &oe[o - 1..], &eo[o..], &eo[o - stride..]],
+            OE => [&ee[o..], &ee[o + 1..], &oo[o..], &oo[o - stride..]],
+            EO => [&ee[o..], &ee[o + stride..], &oo[o..], &oo[o - 1..]],
+            _ => [&oe[o..], &oe[o + stride..], &eo[o..], &eo[o + 1..]],
+        };
+        let around = [&a[..n], &b[..n], &c[..n], &d[..n]];
+        let inverse = &self.inverse[plane][o..][..n];
+        match &mut change {
+            Some(change) => relax_noting(&mut row[o..][..n], inverse, around, change),
+            None => relax(&mut row[o..][..n], inverse, around),
+        }
+        self.u[plane] = row;
+        self.add_sources(plane, y, change);
+    }
+
+    /// Adds what flows into the cells of one row, to u and to its noted change.
+    #[inline(always)]
+    fn add_sources(&mut self, plane: usize, row: usize, mut change: Option<&mut [R]>) {
+        let first = self
+            .sources
+            .partition_point(|source| (source.plane, source.row) < (plane, row));
+        for source in &self.sources[first..] {
+            if (source.plane, source.row) != (plane, row) {
+                break;
+            }
+            let inflow = self.inverse[plane][source.at] * source.value;
+            self.u[plane][source.at] += inflow;
+            if let Some(change) = change.as_deref_mut() {
+                change[source.at - self.grid.start(row) + MARGIN] += inflow;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn relax<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4]) {
+    let n = u.len();
+    let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
+    for x in 0..n {
+        u[x] = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
+    }
+}
+
+#[inline(always)]
+fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], change: &mut [R]) {
+    let n = u.len();
+    let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
+    let change = &mut change[MARGIN..][..n];
+    for x in 0..n {
+        let new = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
+        change[x] = new - u[x];
+        u[x] = new;
+    }
+}
+
+/// The residual of one row of black cells: the sum of what their red neighbours changed by. Blocked cells get one too;
+/// their interpolation weights are zero.
+#[inline(always)]
+fn residual_on_black<R: Real>(
+    n: usize,
+    [even, even_below]: [&[R]; 2],
+    [odd_above, odd]: [&[R]; 2],
+    odd_even: &mut [R],
+    even_odd: &mut [R],
+) {
+    let m = MARGIN;
+    let (west, east) = (&even[m..][..n], &even[m + 1..][..n]);
+    let (above, here) = (&odd_above[m..][..n], &odd[m..][..n]);
+    let out = &mut odd_even[m..][..n];
+    for x in 0..n {
+        out[x] = (west[x] + east[x]) + (above[x] + here[x]);
+    }
+    let (below, left) = (&even_below[m..][..n], &odd[m - 1..][..n]);
+    let out = &mut even_odd[m..][..n];
+    for x in 0..n {
+        out[x] = (west[x] + below[x]) + (left[x] + here[x]);
+    }
+}

@@ -1,0 +1,154 @@
+//! A level's cells, split by the parity of column and row into four planes.
+//!
+//! The cells of one colour lie side by side in a plane, so every kernel runs over whole rows with plain loads and no
+//! masks; the even-even plane is the next coarser grid. Around each plane lies a margin of zeros, so that no kernel asks
+//! whether a neighbour exists.
+
+use crate::real::Real;
+
+/// Even column, even row: the cells of the next coarser level.
+pub(super) const EE: usize = 0;
+/// Odd column, even row.
+pub(super) const OE: usize = 1;
+/// Even column, odd row.
+pub(super) const EO: usize = 2;
+/// Odd column, odd row.
+pub(super) const OO: usize = 3;
+
+/// Zeros before the first row; one would do, eight keep the rows aligned.
+pub(super) const MARGIN: usize = 8;
+
+/// One value a cell, by plane.
+pub(super) type Planes<R> = [Vec<R>; 4];
+
+/// The shape of a level.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) struct Grid {
+    /// Columns of the level.
+    pub width: usize,
+    /// Rows of the level.
+    pub height: usize,
+    /// Columns of each plane.
+    pub columns: usize,
+    /// Rows of each plane.
+    pub rows: usize,
+    /// Values from one row of a plane to the next.
+    pub stride: usize,
+}
+
+impl Grid {
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        let (columns, rows) = (width.div_ceil(2), height.div_ceil(2));
+        Self {
+            width,
+            height,
+            columns,
+            rows,
+            // At least one zero between rows.
+            stride: (columns + 1).next_multiple_of(8),
+        }
+    }
+
+    /// Values of a plane, its margin included.
+    pub(super) fn len(&self) -> usize {
+        self.stride * (self.rows + 2) + MARGIN
+    }
+
+    /// Where row `row` of a plane starts.
+    #[inline(always)]
+    pub(super) fn start(&self, row: usize) -> usize {
+        (row + 1) * self.stride + MARGIN
+    }
+
+    /// The plane of a cell and its place in it.
+    #[inline(always)]
+    pub(super) fn locate(&self, col: usize, row: usize) -> (usize, usize) {
+        ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
+    }
+
+    /// Four planes of zeros.
+    pub(super) fn planes<R: Real>(&self) -> Planes<R> {
+        std::array::from_fn(|_| self.plane())
+    }
+
+    /// One plane of zeros.
+    pub(super) fn plane<R: Real>(&self) -> Vec<R> {
+        vec![R::default(); self.len()]
+    }
+
+    /// A row of values with the margins of a plane's row, and zeros in it.
+    pub(super) fn row_buffer<R: Real>(&self) -> Vec<R> {
+        vec![R::default(); self.stride + MARGIN]
+    }
+}
+
+/// Row buffers of a pass over a level, kept between passes.
+#[derive(Debug, Default)]
+pub(super) struct Scratch<R> {
+    /// Rows of the next level in column order.
+    pub upper: Vec<R>,
+    pub lower: Vec<R>,
+    pub restricted: Vec<R>,
+    /// What even-even and odd-odd cells changed by in the last two rows.
+    pub change_ee: [Vec<R>; 2],
+    pub change_oo: [Vec<R>; 2],
+    /// Residuals of even-odd cells in the last two rows, of odd-even and of even-even cells in one.
+    pub residual_eo: [Vec<R>; 2],
+    pub residual_oe: Vec<R>,
+    pub residual_ee: Vec<R>,
+}
+
+impl<R: Real> Scratch<R> {
+    /// Makes all rows zero, and as long as `grid` and the `next` need them.
+    pub(super) fn reset(&mut self, grid: &Grid, next: &Grid) {
+        let reset = |row: &mut Vec<R>, len: usize| {
+            row.clear();
+            row.resize(len, R::default());
+        };
+        for row in [&mut self.upper, &mut self.lower, &mut self.restricted] {
+            reset(row, 2 * next.columns + 2);
+        }
+        let pairs = self
+            .change_ee
+            .iter_mut()
+            .chain(&mut self.change_oo)
+            .chain(&mut self.residual_eo);
+        for row in pairs.chain([&mut self.residual_oe, &mut self.residual_ee]) {
+            reset(row, grid.stride + MARGIN);
+        }
+    }
+}
+
+/// Writes row `row` of a level, given in column order, to the planes.
+#[inline(always)]
+pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize, values: &[R]) {
+    let start = grid.start(row / 2);
+    let (first, second) = planes.split_at_mut(2);
+    let pair = if row.is_multiple_of(2) { first } else { second };
+    let (even, odd) = pair.split_at_mut(1);
+    let even = &mut even[0][start..start + grid.columns];
+    let odd = &mut odd[0][start..start + grid.columns];
+    let values = &values[..2 * grid.columns];
+    for ((even, odd), pair) in even.iter_mut().zip(odd).zip(values.chunks_exact(2)) {
+        *even = pair[0];
+        *odd = pair[1];
+    }
+}
+
+/// Reads row `row` of a level from the planes, in column order; zeros beyond the last row.
+#[inline(always)]
+pub(super) fn join_row<R: Real>(grid: &Grid, planes: &Planes<R>, row: usize, values: &mut [R]) {
+    let values = &mut values[..2 * grid.columns];
+    if row >= grid.height {
+        values.fill(R::default());
+        return;
+    }
+    let start = grid.start(row / 2);
+    let first = 2 * (row & 1);
+    let even = &planes[first][start..start + grid.columns];
+    let odd = &planes[first + 1][start..start + grid.columns];
+    for ((even, odd), pair) in even.iter().zip(odd).zip(values.chunks_exact_mut(2)) {
+        pair[0] = *even;
+        pair[1] = *odd;
+    }
+}

@@ -1,0 +1,217 @@
+//! The algebra of the levels against dense matrices.
+
+use super::grid::{EE, EO, OE};
+use super::*;
+use crate::screening::Screening;
+
+type Dense = Vec<Vec<f64>>;
+
+/// A map with walls, corners and single cells.
+fn domain() -> Domain {
+    let rows = [
+        "...........",
+        "..#....##..",
+        "..#..#..#..",
+        "..#####.#..",
+        "........#..",
+        "####.####..",
+        "....#......",
+        ".##.#.####.",
+        "....#......",
+    ];
+    let blocked = rows
+        .iter()
+        .flat_map(|row| row.bytes().map(|cell| cell == b'#'))
+        .collect();
+    let domain = Domain::new(11, 9, blocked, Cell::new(0, 0)).unwrap();
+    // k = 0.1.
+    domain
+        .with_screening(&Screening::cells(0.5 / 0.1_f64.sqrt()))
+        .unwrap()
+}
+
+fn levels() -> Multigrid<f64> {
+    let mut levels = Multigrid::new(11, 9);
+    levels.set_up_rows(&domain(), 0..9);
+    levels
+}
+
+/// Interpolation to a level of `grid` from the next, by the weights that level stores.
+fn interpolation(
+    grid: &Grid,
+    active: impl Fn(usize, usize) -> bool,
+    weights: impl Fn(usize) -> [f64; 4],
+    corner: impl Fn(usize) -> [f64; 4],
+) -> Dense {
+    let mut matrix = vec![vec![0.0; grid.columns * grid.rows]; grid.width * grid.height];
+    for row in 0..grid.height {
+        for col in 0..grid.width {
+            let (plane, at) = grid.locate(col, row);
+            let [west, east, north, south] = weights(at);
+            let parts = match plane {
+                EE => vec![(0, 0, if active(plane, at) { 1.0 } else { 0.0 })],
+                OE => vec![(0, 0, west), (1, 0, east)],
+                EO => vec![(0, 0, north), (0, 1, south)],
+                _ => [(0, 0), (1, 0), (0, 1), (1, 1)]
+                    .into_iter()
+                    .zip(corner(at))
+                    .map(|((x, y), w)| (x, y, w))
+                    .collect(),
+            };
+            for (dx, dy, weight) in parts {
+                let (x, y) = (col / 2 + dx, row / 2 + dy);
+                if weight != 0.0 {
+                    matrix[row * grid.width + col][y * grid.columns + x] = weight;
+                }
+            }
+        }
+    }
+    matrix
+}
+
+fn galerkin(equations: &Dense, interpolation: &Dense) -> Dense {
+    let coarse = interpolation[0].len();
+    let mut product = vec![vec![0.0; coarse]; coarse];
+    for (i, row) in equations.iter().enumerate() {
+        for (j, &a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+            for (c, &p) in interpolation[i]
+                .iter()
+                .enumerate()
+                .filter(|(_, p)| **p != 0.0)
+            {
+                for (d, &q) in interpolation[j].iter().enumerate() {
+                    product[c][d] += p * a * q;
+                }
+            }
+        }
+    }
+    product
+}
+
+/// The equations a coarse level stores, zero for inactive cells.
+fn stored(level: &Coarse<f64>) -> Dense {
+    let grid = &level.grid;
+    let mut matrix = vec![vec![0.0; grid.width * grid.height]; grid.width * grid.height];
+    for row in 0..grid.height {
+        for col in 0..grid.width {
+            let (plane, at) = grid.locate(col, row);
+            let i = row * grid.width + col;
+            matrix[i][i] = level.inverse[plane][at].inverse();
+            for (direction, dx, dy) in [(0, 1, 0), (1, 0, 1), (2, 1, 1), (3, -1, 1)] {
+                let (x, y) = (col as isize + dx, row + dy);
+                if (0..grid.width as isize).contains(&x) && y < grid.height {
+                    let j = y * grid.width + x as usize;
+                    matrix[i][j] = -level.coupling[direction][plane][at];
+                    matrix[j][i] = matrix[i][j];
+                }
+            }
+        }
+    }
+    matrix
+}
+
+fn assert_equal(found: &Dense, expected: &Dense) {
+    for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+        for (j, (found, expected)) in found.iter().zip(expected).enumerate() {
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "entry {i}, {j}: {found}, expected {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_first_coarse_equations_are_the_galerkin_product() {
+    let (levels, domain) = (levels(), domain());
+    let mut equations = vec![vec![0.0; 99]; 99];
+    for i in (0..99).filter(|&i| !domain.blocked()[i]) {
+        equations[i][i] = 4.4;
+        let (col, row) = (i % 11, i / 11);
+        for j in [(col < 10).then_some(i + 1), (row < 8).then_some(i + 11)]
+            .into_iter()
+            .flatten()
+        {
+            if !domain.blocked()[j] {
+                equations[i][j] = -1.0;
+                equations[j][i] = -1.0;
+            }
+        }
+    }
+    let fine = &levels.finest;
+    let interpolation = interpolation(
+        &fine.grid,
+        |plane, at| fine.inverse[plane][at] > 0.0,
+        |at| [fine.west[at], fine.east[at], fine.north[at], fine.south[at]],
+        |at| fine.corner_weights(at),
+    );
+    assert_equal(
+        &stored(&levels.coarse[0]),
+        &galerkin(&equations, &interpolation),
+    );
+}
+
+#[test]
+fn the_coarser_equations_are_the_galerkin_product() {
+    let levels = levels();
+    let fine = &levels.coarse[0];
+    let interpolation = interpolation(
+        &fine.grid,
+        |plane, at| fine.inverse[plane][at] > 0.0,
+        |at| [fine.west[at], fine.east[at], fine.north[at], fine.south[at]],
+        |at| fine.corner_weights(at),
+    );
+    assert_equal(
+        &stored(&levels.coarse[1]),
+        &galerkin(&stored(fine), &interpolation),
+    );
+}
+
+#[test]
+fn a_converged_solution_satisfies_every_equation() {
+    let (mut levels, domain) = (levels(), domain());
+    levels.start(domain.target());
+    for _ in 0..40 {
+        levels.cycle(1e-3);
+    }
+    levels.finish();
+    let mut u = Vec::new();
+    levels.read(domain.target(), -1.0, &mut u);
+    let at = |col: isize, row: isize| {
+        let inside = (0..11).contains(&col) && (0..9).contains(&row);
+        if inside {
+            u[(row * 11 + col) as usize].max(0.0)
+        } else {
+            0.0
+        }
+    };
+    for row in 0..9 {
+        for col in 0..11 {
+            if (col, row) == (0, 0) || at(col, row) == 0.0 {
+                continue;
+            }
+            let mean =
+                (at(col - 1, row) + at(col + 1, row) + at(col, row - 1) + at(col, row + 1)) / 4.4;
+            assert!((mean / at(col, row) - 1.0).abs() < 1e-12, "at {col}, {row}");
+        }
+    }
+}
+
+#[test]
+fn a_solve_on_a_large_map_leaves_nothing_behind_for_the_next() {
+    let blocked = (0..200 * 150).map(|i| i % 37 == 5).collect();
+    let domain = Domain::new(200, 150, blocked, Cell::new(20, 30)).unwrap();
+    let mut levels = Multigrid::<f64>::new(200, 150);
+    levels.set_up_rows(&domain, 0..150);
+    let mut solve = || {
+        levels.start(domain.target());
+        let converged = (0..60).any(|_| levels.cycle(1e-6).unconverged == 0);
+        levels.finish();
+        let mut u = Vec::new();
+        levels.read(domain.target(), -1.0, &mut u);
+        (converged, u)
+    };
+    let first = solve();
+    assert!(first.0);
+    assert_eq!(first, solve());
+}

@@ -1,0 +1,103 @@
+//! The two precisions of multigrid and of the verification.
+
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+/// A floating-point type.
+pub(crate) trait Real:
+    Copy
+    + Default
+    + PartialOrd
+    + Add<Output = Self>
+    + AddAssign
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + std::fmt::Debug
+    + Send
+    + Sync
+    + 'static
+{
+    const ONE: Self;
+    /// Power of two at which the target's u is put, so that both ends of the exponent's range serve.
+    const TOP: i32;
+
+    /// Below this, numbers are taken for zero.
+    const TINY: Self;
+
+    fn of(value: f64) -> Self;
+    fn wide(self) -> f64;
+    fn size(self) -> Self;
+
+    /// 1 / self where positive, 0 elsewhere: how inactive cells drop out of every sum.
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        if self > Self::default() {
+            Self::ONE / self
+        } else {
+            Self::default()
+        }
+    }
+
+    /// The number, or 0 for one so small that it, or its product with a weight, would be subnormal: those cost a hundred
+    /// times as much as others, and the first cycles are full of them.
+    #[inline(always)]
+    fn flushed(self) -> Self {
+        if self.size() > Self::TINY {
+            self
+        } else {
+            Self::default()
+        }
+    }
+
+    /// 1 where positive, 0 elsewhere.
+    #[inline(always)]
+    fn is_active(self) -> Self {
+        if self > Self::default() {
+            Self::ONE
+        } else {
+            Self::default()
+        }
+    }
+}
+
+impl Real for f32 {
+    const ONE: Self = 1.0;
+    const TOP: i32 = 100;
+    const TINY: Self = 1e-34;
+
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+}
+
+impl Real for f64 {
+    const ONE: Self = 1.0;
+    const TOP: i32 = 900;
+    const TINY: Self = 1e-300;
+
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        self
+    }
+
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+}

@@ -1,0 +1,259 @@
+//! One full solve: the planned method, its check, and the costlier methods where the check fails.
+
+use std::ops::Range;
+
+use super::plan::plan;
+use super::settings::{Phase, Settings};
+use crate::cancellation::Cancellation;
+use crate::domain::Domain;
+use crate::error::SolveError;
+use crate::field::Field;
+use crate::method::Method;
+use crate::multifrontal::{self, BreadthFirst, Tree};
+use crate::multigrid::Multigrid;
+use crate::multigrid_bands;
+use crate::real::Real;
+use crate::screening::Coefficients;
+use crate::store::{BLOCKED, Store};
+use crate::verification::{self, Check, Verification};
+
+/// Coarse corrections above this fraction of u mean that a cell has not converged. The next cycle reduces them by a factor
+/// of three or more, which leaves directions well within a degree.
+const TOLERANCE: f64 = 5e-3;
+
+/// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count as unconverged.
+const FIRST_CHECK: usize = 4;
+
+/// The same for a solve that starts from the field of a similar map.
+const FIRST_CHECK_NEAR: usize = 2;
+
+/// Cycles between a check that failed and the next.
+const BETWEEN_CHECKS: usize = 1;
+
+/// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
+const SINGLE_CYCLES: usize = 60;
+const DOUBLE_CYCLES: usize = 450;
+
+/// What is asked of a full solve.
+#[derive(Clone, Copy)]
+pub(super) struct Task<'a> {
+    pub settings: &'a Settings,
+    pub domain: &'a Domain,
+    /// The field of a similar map, to start from.
+    pub near: Option<&'a Field>,
+    pub cancellation: &'a Cancellation,
+}
+
+/// What full solves keep between them.
+#[derive(Debug, Default)]
+pub(super) struct Full {
+    single: Prepared<f32>,
+    double: Prepared<f64>,
+    multifrontal: multifrontal::Workspace,
+}
+
+/// The levels of one precision, and the map they were set up for.
+#[derive(Debug)]
+struct Prepared<R> {
+    levels: Option<Multigrid<R>>,
+    width: usize,
+    blocked: Vec<bool>,
+    screening: Coefficients,
+}
+
+impl<R> Default for Prepared<R> {
+    fn default() -> Self {
+        Self {
+            levels: None,
+            width: 0,
+            blocked: Vec::new(),
+            screening: Coefficients::NONE,
+        }
+    }
+}
+
+impl Full {
+    /// As [`Solver::solve_observed`](super::Solver::solve_observed).
+    pub(super) fn solve(
+        &mut self,
+        task: Task<'_>,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<Field, SolveError> {
+        let Task {
+            settings,
+            domain,
+            cancellation,
+            ..
+        } = task;
+        cancellation.check()?;
+        let mut plan = plan(domain, settings.memory_limit, cancellation)?;
+        let mut failed = Check::default();
+        for method in plan.methods {
+            let (store, check) = match method {
+                Method::MultigridSingle => {
+                    let store = |values| Store::Single {
+                        values,
+                        exponent: -f32::TOP,
+                    };
+                    self.single.solve(task, SINGLE_CYCLES, store, observe)?
+                }
+                Method::MultigridDouble => {
+                    let store = |values| Store::Double {
+                        values,
+                        exponent: -f64::TOP,
+                    };
+                    self.double.solve(task, DOUBLE_CYCLES, store, observe)?
+                }
+                Method::MultigridBands => {
+                    let store = multigrid_bands::solve(domain, cancellation)?;
+                    observe(Phase::Solved);
+                    let check = verification::check(domain, &store, settings.threads);
+                    observe(Phase::Verified);
+                    (store, check)
+                }
+                Method::Multifrontal => {
+                    let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
+                        planned
+                    } else {
+                        let pass = BreadthFirst::from_target(domain, cancellation)?;
+                        let tree = Tree::of(&pass, cancellation)?;
+                        (pass, tree)
+                    };
+                    observe(Phase::SetUp);
+                    let mut store = multifrontal::solve(
+                        domain,
+                        &pass,
+                        &tree,
+                        settings.memory_limit,
+                        &mut self.multifrontal,
+                        cancellation,
+                    )?;
+                    observe(Phase::Solved);
+                    let mut check = verification::check(domain, &store, settings.threads);
+                    observe(Phase::Verified);
+                    if !check.holds() {
+                        multifrontal::relax(domain, &pass, &mut store);
+                        observe(Phase::Solved);
+                        check = verification::check(domain, &store, settings.threads);
+                        observe(Phase::Verified);
+                    }
+                    (store, check)
+                }
+            };
+            if check.holds() {
+                let verification = Verification {
+                    worst_residual: check.worst_residual,
+                    method,
+                    reachable: check.reachable,
+                };
+                return Ok(Field::new(
+                    (domain.width(), domain.height()),
+                    domain.target(),
+                    store,
+                    verification,
+                ));
+            }
+            failed = check;
+        }
+        Err(SolveError::Unverified {
+            worst_residual: failed.worst_residual,
+            local_maxima: failed.local_maxima + failed.unreached,
+        })
+    }
+}
+
+impl<R: Real> Prepared<R> {
+    /// Cycles until every cell has converged and the check holds, or this precision is given up; returns what there is then.
+    fn solve(
+        &mut self,
+        task: Task<'_>,
+        most_cycles: usize,
+        store: impl Fn(Vec<R>) -> Store,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<(Store, Check), SolveError> {
+        let Task {
+            settings,
+            domain,
+            near,
+            cancellation,
+        } = task;
+        let levels = self.prepare(domain);
+        observe(Phase::SetUp);
+        let mut next_check = FIRST_CHECK;
+        match near {
+            Some(near) if near.fits(domain) => {
+                let width = domain.width();
+                let mut plain = vec![0.0; width];
+                levels.start_near(domain.target(), |row, guess| {
+                    near.store()
+                        .read_row_wide(row * width..(row + 1) * width, -R::TOP, &mut plain);
+                    for (guess, &u) in guess.iter_mut().zip(&plain) {
+                        *guess = R::of(u);
+                    }
+                });
+                next_check = FIRST_CHECK_NEAR;
+            }
+            _ => levels.start(domain.target()),
+        }
+        for cycle in 1.. {
+            cancellation.check()?;
+            let converged = levels.cycle(TOLERANCE).unconverged == 0;
+            let last = cycle == most_cycles;
+            if !(last || (converged && cycle >= next_check)) {
+                continue;
+            }
+            levels.finish();
+            let mut values = Vec::new();
+            levels.read(domain.target(), R::of(BLOCKED), &mut values);
+            let store = store(values);
+            observe(Phase::Solved);
+            let check = verification::check(domain, &store, settings.threads);
+            observe(Phase::Verified);
+            // All converged and some unreached: u goes below what this precision holds.
+            if check.holds() || check.unreached > 0 || last {
+                return Ok((store, check));
+            }
+            next_check = cycle + BETWEEN_CHECKS;
+        }
+        Err(SolveError::Cancelled)
+    }
+
+    /// The levels for `domain`: new, patched where it changed, or as they are.
+    fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
+        let same_size =
+            self.width == domain.width() && self.blocked.len() == domain.blocked().len();
+        let changed = if same_size && self.levels.is_some() && self.screening == *domain.screening()
+        {
+            changed_rows(&self.blocked, domain)
+        } else {
+            Some(0..domain.height())
+        };
+        if !same_size {
+            self.levels = None;
+        }
+        let levels = self
+            .levels
+            .get_or_insert_with(|| Multigrid::new(domain.width(), domain.height()));
+        if let Some(rows) = changed {
+            levels.set_up_rows(domain, rows);
+            self.width = domain.width();
+            self.blocked.clear();
+            self.blocked.extend_from_slice(domain.blocked());
+            self.screening.clone_from(domain.screening());
+        }
+        levels
+    }
+}
+
+/// The rows between the first and the last in which the map differs from `before`.
+fn changed_rows(before: &[bool], domain: &Domain) -> Option<Range<usize>> {
+    let width = domain.width();
+    let mut differ = before
+        .chunks_exact(width)
+        .zip(domain.blocked().chunks_exact(width))
+        .enumerate()
+        .filter(|(_, (before, now))| before != now)
+        .map(|(row, _)| row);
+    let first = differ.next()?;
+    Some(first..differ.next_back().unwrap_or(first) + 1)
+}

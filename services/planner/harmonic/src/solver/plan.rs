@@ -1,0 +1,143 @@
+//! Which method to try first, from the shape of the free space.
+//!
+//! Multigrid costs some nanoseconds a cell for every few orders of magnitude that u spans; the multifrontal
+//! factorisation costs the square of the passages' width a cell, whatever u spans. The mean width of the free space is
+//! counted first. Where it is large, multigrid is chosen at once; elsewhere one breadth-first pass from the target gives
+//! the length of the ways, with that the range of u, and the exact cost of the factorisation.
+
+use crate::cancellation::Cancellation;
+use crate::domain::Domain;
+use crate::error::SolveError;
+use crate::method::Method;
+use crate::multifrontal::{BreadthFirst, Tree};
+
+/// Free space of this mean width, cells, is left to multigrid without a further look.
+const WIDE: f64 = 32.0;
+
+/// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
+const SINGLE_DECADES: f64 = 62.0;
+
+/// The same of double precision.
+const DOUBLE_DECADES: f64 = 570.0;
+const TWICE_DOUBLE_DECADES: f64 = 2.0 * DOUBLE_DECADES;
+
+/// Measured on one machine; only their ratios matter. Nanoseconds.
+const SET_UP_PER_CELL: f64 = 3.0;
+const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
+const DOUBLE_CYCLE_PER_CELL: f64 = 2.5;
+const MULTIFRONTAL_PER_CELL: f64 = 65.0;
+const MULTIFRONTAL_PER_OPERATION: f64 = 0.15;
+
+/// Cycles multigrid takes for a range of u: in narrow passages one converges three to four orders of magnitude.
+fn cycles(decades: f64) -> f64 {
+    6.0 + decades / 3.5
+}
+
+/// What to try, and what was computed to decide it.
+pub(super) struct Plan {
+    /// Methods in the order in which to try them; the multifrontal factorisation is the last resort in any case.
+    pub methods: Vec<Method>,
+    /// The breadth-first pass and the tree of fronts, if they were needed.
+    pub multifrontal: Option<(BreadthFirst, Tree)>,
+}
+
+/// The plan for `domain`; the multifrontal factorisation may take `memory_limit` bytes.
+///
+/// # Errors
+/// [`SolveError::Cancelled`].
+pub(super) fn plan(
+    domain: &Domain,
+    memory_limit: u64,
+    cancellation: &Cancellation,
+) -> Result<Plan, SolveError> {
+    use Method::{Multifrontal, MultigridBands, MultigridDouble, MultigridSingle};
+    let width = mean_width(domain);
+    // Screening makes u fall by this much a cell on its own: cosh(1 / L) = 1 + 2 k.
+    let screened = (1.0 + 2.0 * domain.screening().least()).acosh() / std::f64::consts::LN_10;
+    if width >= WIDE {
+        // Ways in wide space are not much longer than the map's diagonal.
+        let length = (domain.width() as f64).hypot(domain.height() as f64);
+        let first = match screened * length {
+            ..SINGLE_DECADES => MultigridSingle,
+            ..DOUBLE_DECADES => MultigridDouble,
+            _ => MultigridBands,
+        };
+        return Ok(Plan {
+            methods: costlier(first, &[MultigridDouble, MultigridBands, Multifrontal]),
+            multifrontal: None,
+        });
+    }
+    let pass = BreadthFirst::from_target(domain, cancellation)?;
+    let cells = pass.len() as f64;
+    // Along a passage of width w, u falls like exp(-pi x / w). The runs along a passage count into the mean width too; on
+    // mazes that makes it about 1.7 times too large.
+    let confined = 1.7 * std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
+    let decades = pass.levels.len() as f64 * confined.hypot(screened);
+    let (method, per_cycle) = match decades {
+        ..SINGLE_DECADES => (MultigridSingle, SINGLE_CYCLE_PER_CELL),
+        // The estimate is rather too large than too small, so doubles get a chance beyond their range.
+        ..TWICE_DOUBLE_DECADES => (MultigridDouble, DOUBLE_CYCLE_PER_CELL),
+        _ => (MultigridBands, DOUBLE_CYCLE_PER_CELL),
+    };
+    let multigrid = costlier(method, &[MultigridDouble, MultigridBands, Multifrontal]);
+    let cost = domain.blocked().len() as f64 * (SET_UP_PER_CELL + per_cycle * cycles(decades));
+    // The factorisation costs more than this on any map: no need to build its tree.
+    if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
+        return Ok(Plan {
+            methods: multigrid,
+            multifrontal: None,
+        });
+    }
+    let tree = Tree::of(&pass, cancellation)?;
+    let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
+    let methods = if tree.cost.bytes <= memory_limit && exact <= cost {
+        vec![Multifrontal]
+    } else {
+        multigrid
+    };
+    Ok(Plan {
+        methods,
+        multifrontal: Some((pass, tree)),
+    })
+}
+
+/// The method `first` and those of `rest` that come after it.
+fn costlier(first: Method, rest: &[Method]) -> Vec<Method> {
+    let after = rest
+        .iter()
+        .position(|&method| method == first)
+        .map_or(0, |at| at + 1);
+    std::iter::once(first)
+        .chain(rest[after..].iter().copied())
+        .collect()
+}
+
+/// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.
+fn mean_width(domain: &Domain) -> f64 {
+    let width = domain.width();
+    let walls = vec![true; width];
+    let mut above: &[bool] = &walls;
+    let (mut free, mut along_rows, mut along_columns) = (0_usize, 0_usize, 0_usize);
+    for row in domain.blocked().chunks_exact(width) {
+        // Short sums in bytes, which the compiler adds up sixteen or more at a time.
+        for (row, above) in row.chunks(128).zip(above.chunks(128)) {
+            let (mut open, mut starts) = (0_u8, 0_u8);
+            for (&here, &above) in row.iter().zip(above) {
+                open += u8::from(!here);
+                starts += u8::from(!here & above);
+            }
+            free += usize::from(open);
+            along_columns += usize::from(starts);
+        }
+        along_rows += usize::from(!row[0]);
+        for (before, here) in row[..width - 1].chunks(128).zip(row[1..].chunks(128)) {
+            let mut starts = 0_u8;
+            for (&before, &here) in before.iter().zip(here) {
+                starts += u8::from(before & !here);
+            }
+            along_rows += usize::from(starts);
+        }
+        above = row;
+    }
+    free as f64 / along_rows.max(along_columns).max(1) as f64
+}

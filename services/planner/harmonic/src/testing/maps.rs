@@ -1,0 +1,272 @@
+//! Generated maps: the kinds of place a ground robot meets, and the ones that break solvers.
+
+use super::random::Random;
+use crate::cell::Cell;
+use crate::domain::Domain;
+use crate::error::SolveError;
+
+/// A kind of generated map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Nothing but the outer walls.
+    Empty,
+    /// Round obstacles over a fifth of the floor.
+    Drums,
+    /// Eight by eight rooms joined by doors.
+    Office,
+    /// A spanning tree of corridors of this width, a twentieth of the walls opened again.
+    Maze {
+        /// Corridor width, cells.
+        corridor: usize,
+    },
+    /// One corridor of this width, folded over the whole map.
+    Serpentine {
+        /// Corridor width, cells.
+        corridor: usize,
+    },
+    /// A U-shaped wall that opens away from the target.
+    Trap,
+    /// Every cell blocked with this chance: islands, pockets, diagonal leaks.
+    Noise {
+        /// Chance of a cell to be blocked.
+        density: f64,
+    },
+}
+
+/// A map under construction: blocked cells and a target.
+#[derive(Clone, Debug)]
+pub struct Map {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Row-major mask.
+    pub blocked: Vec<bool>,
+    /// A free cell.
+    pub target: Cell,
+}
+
+impl Map {
+    /// A map of `kind`, its rim blocked, its target free.
+    pub fn generate(kind: Kind, width: usize, height: usize, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut map = Self {
+            width,
+            height,
+            blocked: vec![false; width * height],
+            target: Cell::new(0, 0),
+        };
+        let wanted = match kind {
+            Kind::Empty | Kind::Noise { .. } => (width / 3, height / 4),
+            Kind::Drums | Kind::Office => (width / 6, height / 5),
+            Kind::Maze { corridor } | Kind::Serpentine { corridor } => {
+                (1 + corridor / 2, 1 + corridor / 2)
+            }
+            Kind::Trap => (width * 9 / 10, height / 2),
+        };
+        match kind {
+            Kind::Empty => {}
+            Kind::Drums => map.drums(&mut random),
+            Kind::Office => map.office(&mut random),
+            Kind::Maze { corridor } => map.maze(corridor.max(1), &mut random),
+            Kind::Serpentine { corridor } => map.serpentine(corridor.max(1)),
+            Kind::Trap => map.trap(),
+            Kind::Noise { density } => {
+                for cell in &mut map.blocked {
+                    *cell = random.unit() < density;
+                }
+            }
+        }
+        map.fill(0..width, 0..1, true);
+        map.fill(0..width, height.saturating_sub(1)..height, true);
+        map.fill(0..1, 0..height, true);
+        map.fill(width.saturating_sub(1)..width, 0..height, true);
+        map.aim(wanted);
+        map
+    }
+
+    /// The domain of this map.
+    ///
+    /// # Errors
+    /// As [`Domain::new`].
+    pub fn domain(&self) -> Result<Domain, SolveError> {
+        Domain::new(self.width, self.height, self.blocked.clone(), self.target)
+    }
+
+    /// Sets a rectangle, clipped to the map.
+    pub fn fill(
+        &mut self,
+        cols: std::ops::Range<usize>,
+        rows: std::ops::Range<usize>,
+        blocked: bool,
+    ) {
+        for row in rows.start..rows.end.min(self.height) {
+            for col in cols.start..cols.end.min(self.width) {
+                self.blocked[row * self.width + col] = blocked;
+            }
+        }
+    }
+
+    /// Puts the target on the free cell nearest to `wanted`, freeing that one if there is none.
+    pub fn aim(&mut self, wanted: (usize, usize)) {
+        let wanted = (wanted.0.min(self.width - 1), wanted.1.min(self.height - 1));
+        let nearest = (0..self.blocked.len())
+            .filter(|&i| !self.blocked[i])
+            .min_by_key(|&i| {
+                let (dc, dr) = (
+                    (i % self.width).abs_diff(wanted.0),
+                    (i / self.width).abs_diff(wanted.1),
+                );
+                dc * dc + dr * dr
+            });
+        let index = nearest.unwrap_or(wanted.1 * self.width + wanted.0);
+        self.blocked[index] = false;
+        self.target = Cell::new(index % self.width, index / self.width);
+    }
+
+    fn drums(&mut self, random: &mut Random) {
+        let largest = (self.width.min(self.height) as f64 / 24.0).max(1.5);
+        let mut covered = 0;
+        while covered * 5 < self.blocked.len() {
+            let radius = random.between(0.3, 1.0) * largest;
+            let centre = (
+                random.between(0.0, self.width as f64),
+                random.between(0.0, self.height as f64),
+            );
+            let range = |c: f64, end: usize| {
+                (c - radius).max(0.0) as usize..((c + radius) as usize + 2).min(end)
+            };
+            for row in range(centre.1, self.height) {
+                for col in range(centre.0, self.width) {
+                    let cell = &mut self.blocked[row * self.width + col];
+                    if !*cell && (col as f64 - centre.0).hypot(row as f64 - centre.1) < radius {
+                        *cell = true;
+                        covered += 1;
+                    }
+                }
+            }
+        }
+    }
+
+    fn office(&mut self, random: &mut Random) {
+        const ROOMS: usize = 8;
+        let (wide, high) = (self.width / ROOMS, self.height / ROOMS);
+        if wide < 6 || high < 6 {
+            return;
+        }
+        let wall = if wide.min(high) >= 24 { 2 } else { 1 };
+        for i in 1..ROOMS {
+            self.fill(0..self.width, i * high..i * high + wall, true);
+            self.fill(i * wide..i * wide + wall, 0..self.height, true);
+        }
+        for (a, b) in spanning_tree(ROOMS, ROOMS, 0.2, random) {
+            if a.0 == b.0 {
+                let door = (wide / 8).max(2);
+                let at = a.0 * wide + wall + random.below(wide - wall - door);
+                let row = a.1.max(b.1) * high;
+                self.fill(at..at + door, row..row + wall, false);
+            } else {
+                let door = (high / 8).max(2);
+                let at = a.1 * high + wall + random.below(high - wall - door);
+                let col = a.0.max(b.0) * wide;
+                self.fill(col..col + wall, at..at + door, false);
+            }
+        }
+    }
+
+    fn maze(&mut self, corridor: usize, random: &mut Random) {
+        let pitch = corridor + 1;
+        let (wide, high) = (
+            self.width.saturating_sub(1) / pitch,
+            self.height.saturating_sub(1) / pitch,
+        );
+        self.fill(0..self.width, 0..self.height, true);
+        for (a, b) in spanning_tree(wide, high, 0.05, random) {
+            let (left, right) = (a.0.min(b.0) * pitch + 1, a.0.max(b.0) * pitch + 1);
+            let (top, bottom) = (a.1.min(b.1) * pitch + 1, a.1.max(b.1) * pitch + 1);
+            self.fill(left..right + corridor, top..bottom + corridor, false);
+        }
+    }
+
+    fn serpentine(&mut self, corridor: usize) {
+        for (turn, row) in (corridor + 1..self.height.saturating_sub(1))
+            .step_by(corridor + 1)
+            .enumerate()
+        {
+            self.fill(0..self.width, row..row + 1, true);
+            if turn % 2 == 0 {
+                self.fill(
+                    self.width.saturating_sub(1 + corridor)..self.width - 1,
+                    row..row + 1,
+                    false,
+                );
+            } else {
+                self.fill(1..1 + corridor, row..row + 1, false);
+            }
+        }
+    }
+
+    fn trap(&mut self) {
+        let wall = (self.width / 64).max(2);
+        let (left, right) = (self.width / 4, self.width * 3 / 4);
+        let (top, bottom) = (self.height / 4, self.height * 3 / 4);
+        self.fill(left..right, top..top + wall, true);
+        self.fill(left..right, bottom..bottom + wall, true);
+        self.fill(right..right + wall, top..bottom + wall, true);
+    }
+}
+
+/// Pairs of neighbouring rooms that a door joins: a random spanning tree, and each other pair with chance `more`.
+fn spanning_tree(
+    wide: usize,
+    high: usize,
+    more: f64,
+    random: &mut Random,
+) -> Vec<((usize, usize), (usize, usize))> {
+    let mut seen = vec![false; wide * high];
+    let mut doors = Vec::new();
+    let mut path = Vec::new();
+    if !seen.is_empty() {
+        seen[0] = true;
+        path.push((0, 0));
+    }
+    while let Some(&room) = path.last() {
+        let open: Vec<_> = neighbours(room, wide, high)
+            .filter(|n| !seen[n.1 * wide + n.0])
+            .collect();
+        if open.is_empty() {
+            path.pop();
+        } else {
+            let next = open[random.below(open.len())];
+            seen[next.1 * wide + next.0] = true;
+            doors.push((room, next));
+            path.push(next);
+        }
+    }
+    for row in 0..high {
+        for col in 0..wide {
+            for next in [(col + 1, row), (col, row + 1)] {
+                if next.0 < wide && next.1 < high && random.unit() < more {
+                    doors.push(((col, row), next));
+                }
+            }
+        }
+    }
+    doors
+}
+
+fn neighbours(
+    room: (usize, usize),
+    wide: usize,
+    high: usize,
+) -> impl Iterator<Item = (usize, usize)> {
+    let (col, row) = room;
+    [
+        (col.wrapping_sub(1), row),
+        (col + 1, row),
+        (col, row.wrapping_sub(1)),
+        (col, row + 1),
+    ]
+    .into_iter()
+    .filter(move |n| n.0 < wide && n.1 < high)
+}

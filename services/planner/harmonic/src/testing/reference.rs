@@ -1,0 +1,238 @@
+//! A slow solver that shares nothing with the fast ones: banded elimination in row order, the right-hand side carried in
+//! extended range, then polished and its residual measured.
+
+use crate::cell::Cell;
+use crate::domain::Domain;
+use crate::field::Field;
+use crate::scaled::Scaled;
+
+/// u of every cell to about 1e-12, relatively.
+pub struct Reference {
+    width: usize,
+    height: usize,
+    target: Cell,
+    u: Vec<Scaled>,
+    /// Largest relative residual of any cell with u > 0.
+    pub worst_residual: f64,
+}
+
+impl Reference {
+    /// Solves `domain`. Takes width^3 * height operations and width^2 * height numbers: for small or narrow maps.
+    pub fn solve(domain: &Domain) -> Self {
+        let (width, height) = (domain.width(), domain.height());
+        let cells = width * height;
+        let target = domain.target().row * width + domain.target().col;
+        let free = |i: usize| !domain.blocked()[i];
+        // Row i keeps its couplings (positive, i.e. minus the entry) to i + 1 ..= i + width, and its diagonal.
+        let mut coupling = vec![0.0; cells * width];
+        let mut diagonal = vec![1.0; cells];
+        let mut right = vec![Scaled::ZERO; cells];
+        for i in (0..cells).filter(|&i| free(i) && i != target) {
+            diagonal[i] = 4.0 * (1.0 + domain.screening_coefficient(i));
+            let (col, row) = (i % width, i / width);
+            let east = (col + 1 < width).then_some(i + 1);
+            let south = (row + 1 < height).then_some(i + width);
+            for next in [east, south]
+                .into_iter()
+                .flatten()
+                .filter(|&n| free(n) && n != target)
+            {
+                coupling[i * width + (next - i - 1)] += 1.0;
+            }
+            if neighbours(i, width, height).contains(&Some(target)) {
+                right[i] = Scaled::ONE;
+            }
+        }
+        for i in (0..cells).filter(|&i| free(i) && i != target) {
+            let row: Vec<f64> = coupling[i * width..(i + 1) * width].to_vec();
+            for (a, &weight) in row.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                let j = i + 1 + a;
+                let share = weight / diagonal[i];
+                right[j] = sum([right[j], scale(right[i], share)]);
+                diagonal[j] -= share * weight;
+                for (b, &other) in row
+                    .iter()
+                    .enumerate()
+                    .skip(a + 1)
+                    .filter(|(_, w)| **w > 0.0)
+                {
+                    coupling[j * width + (b - a - 1)] += share * other;
+                }
+            }
+        }
+        let mut u = vec![Scaled::ZERO; cells];
+        for i in (0..cells).rev().filter(|&i| free(i)) {
+            let row = &coupling[i * width..(i + 1) * width];
+            let terms = row
+                .iter()
+                .enumerate()
+                .filter(|(_, w)| **w > 0.0)
+                .map(|(a, &w)| scale(u[i + 1 + a], w));
+            let total = terms.fold(right[i], |total, term| sum([total, term]));
+            u[i] = if i == target {
+                Scaled::ONE
+            } else {
+                scale(total, 1.0 / diagonal[i])
+            };
+        }
+        let mut reference = Self {
+            width,
+            height,
+            target: domain.target(),
+            u,
+            worst_residual: f64::INFINITY,
+        };
+        for _ in 0..4 {
+            reference.worst_residual = reference.polish(domain);
+        }
+        reference
+    }
+
+    /// u of a cell of the map.
+    pub fn u(&self, cell: Cell) -> Scaled {
+        self.u[cell.row * self.width + cell.col]
+    }
+
+    /// Central difference of u in units of the largest u around, and that largest; `None` where u is zero.
+    pub fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
+        let i = cell.row * self.width + cell.col;
+        let [west, east, north, south] =
+            neighbours(i, self.width, self.height).map(|n| n.map_or(Scaled::ZERO, |n| self.u[n]));
+        let largest = [west, east, north, south, self.u[i]]
+            .into_iter()
+            .fold(Scaled::ZERO, |a, b| if b > a { b } else { a });
+        if self.u[i].is_zero() {
+            return None;
+        }
+        let relative = |u: Scaled| u.relative_to(largest.exponent) / largest.mantissa;
+        Some([
+            relative(east) - relative(west),
+            relative(south) - relative(north),
+        ])
+    }
+
+    /// Share of directions of `field` more than one degree off, and the worst angle in degrees among the cells whose
+    /// gradient is above 1e-4 of the largest u around.
+    pub fn compare(&self, field: &Field) -> (f64, f64) {
+        let (mut off, mut seen, mut worst) = (0, 0, 0.0_f64);
+        for index in 0..self.u.len() {
+            let cell = Cell::new(index % self.width, index / self.width);
+            let Some(gradient) = self.gradient(cell).filter(|_| cell != self.target) else {
+                continue;
+            };
+            let error = match field.direction(cell) {
+                Some(direction) => angle(gradient, direction),
+                None => 180.0,
+            };
+            seen += 1;
+            off += usize::from(error > 1.0);
+            if gradient[0].hypot(gradient[1]) > 1e-4 {
+                worst = worst.max(error);
+            }
+        }
+        (off as f64 / f64::from(seen.max(1)), worst)
+    }
+
+    /// The size of the map.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// Two Gauss-Seidel passes; returns the largest relative change of the second.
+    fn polish(&mut self, domain: &Domain) -> f64 {
+        let target = self.target.row * self.width + self.target.col;
+        let mut worst = 0.0_f64;
+        let order: Vec<usize> = (0..self.u.len()).collect();
+        for (pass, order) in [order.clone(), order.into_iter().rev().collect()]
+            .into_iter()
+            .enumerate()
+        {
+            for i in order {
+                if self.u[i].is_zero() || i == target {
+                    continue;
+                }
+                let around = neighbours(i, self.width, self.height)
+                    .map(|n| n.map_or(Scaled::ZERO, |n| self.u[n]));
+                let mean = scale(sum(around), 0.25 / (1.0 + domain.screening_coefficient(i)));
+                if pass == 1 {
+                    let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
+                    worst = worst.max((ratio - 1.0).abs());
+                }
+                self.u[i] = mean;
+            }
+        }
+        worst
+    }
+}
+
+/// The angle between two vectors, degrees.
+pub fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] * b[1] - a[1] * b[0])
+        .atan2(a[0] * b[0] + a[1] * b[1])
+        .abs()
+        .to_degrees()
+}
+
+/// Share of the reachable cells from which steepest ascent ends at the target.
+pub fn follow(field: &Field) -> f64 {
+    let width = field.width();
+    let cell = |index: usize| Cell::new(index % width, index / width);
+    // Whether the walk from a cell arrives, once known.
+    let mut arrives = vec![None; width * field.height()];
+    arrives[field.target().row * width + field.target().col] = Some(true);
+    let (mut arrived, mut all) = (0_usize, 0_usize);
+    for start in (0..arrives.len()).filter(|&index| field.is_reachable(cell(index))) {
+        let mut path = Vec::new();
+        let mut here = start;
+        let result = loop {
+            if let Some(known) = arrives[here] {
+                break known;
+            }
+            // Not until proven: a walk that meets itself does not arrive.
+            arrives[here] = Some(false);
+            path.push(here);
+            match field.ascent(cell(here)) {
+                Some(next) => here = next.row * width + next.col,
+                None => break false,
+            }
+        };
+        for index in path {
+            arrives[index] = Some(result);
+        }
+        arrived += usize::from(arrives[start] == Some(true));
+        all += 1;
+    }
+    arrived as f64 / all.max(1) as f64
+}
+
+fn neighbours(i: usize, width: usize, height: usize) -> [Option<usize>; 4] {
+    let (col, row) = (i % width, i / width);
+    [
+        (col > 0).then(|| i - 1),
+        (col + 1 < width).then(|| i + 1),
+        (row > 0).then(|| i - width),
+        (row + 1 < height).then(|| i + width),
+    ]
+}
+
+fn scale(a: Scaled, factor: f64) -> Scaled {
+    Scaled::new(a.mantissa * factor, a.exponent)
+}
+
+fn sum<const N: usize>(terms: [Scaled; N]) -> Scaled {
+    let largest = terms
+        .into_iter()
+        .filter(|t| !t.is_zero())
+        .map(|t| t.exponent)
+        .max();
+    largest.map_or(Scaled::ZERO, |largest| {
+        Scaled::new(
+            terms
+                .into_iter()
+                .filter(|t| !t.is_zero())
+                .map(|t| t.relative_to(largest))
+                .sum(),
+            largest,
+        )
+    })
+}

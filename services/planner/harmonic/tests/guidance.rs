@@ -1,0 +1,179 @@
+//! Guidance at any position of a solved map.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests may stop at the first broken promise"
+)]
+
+use harmonic::testing::{Kind, Map, Random, angle};
+use harmonic::{Cancellation, Cell, Domain, Field, Guidance, Solver};
+
+fn solve(domain: &Domain) -> Field {
+    Solver::default()
+        .solve(domain, &Cancellation::new())
+        .expect("the map has a field")
+}
+
+fn generated(kind: Kind, seed: u64) -> (Domain, Field) {
+    let domain = Map::generate(kind, 40, 30, seed)
+        .domain()
+        .expect("a valid map");
+    let field = solve(&domain);
+    (domain, field)
+}
+
+const KINDS: [Kind; 5] = [
+    Kind::Drums,
+    Kind::Maze { corridor: 1 },
+    Kind::Maze { corridor: 3 },
+    Kind::Trap,
+    Kind::Noise { density: 0.35 },
+];
+
+#[test]
+fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell() {
+    for (seed, kind) in KINDS.into_iter().enumerate() {
+        let (domain, field) = generated(kind, seed as u64);
+        let mut random = Random::new(seed as u64);
+        let mut walks = 0;
+        while walks < 60 {
+            let mut at = [random.between(0.0, 39.0), random.between(0.0, 29.0)];
+            if !matches!(field.guidance(at[0], at[1]), Guidance::Along(_)) {
+                continue;
+            }
+            walks += 1;
+            let start = at;
+            for step in 0.. {
+                match field.guidance(at[0], at[1]) {
+                    Guidance::Along(d) => at = [at[0] + 0.02 * d[0], at[1] + 0.02 * d[1]],
+                    Guidance::AtTarget => break,
+                    other => panic!("{kind:?}: {other:?} at {at:?}, from {start:?}"),
+                }
+                assert!(
+                    step < 200_000,
+                    "{kind:?}: no arrival from {start:?}, stuck at {at:?}"
+                );
+                assert!(
+                    !domain.is_blocked(Cell::new(at[0].round() as usize, at[1].round() as usize)),
+                    "{kind:?} {at:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn guidance_never_points_into_a_wall_it_touches() {
+    for (seed, kind) in KINDS.into_iter().enumerate() {
+        let (domain, field) = generated(kind, 7 + seed as u64);
+        let mut random = Random::new(3);
+        for row in 1..domain.height() - 1 {
+            for col in 1..domain.width() - 1 {
+                if !field.is_reachable(Cell::new(col, row)) {
+                    continue;
+                }
+                for (dc, dr) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+                    let beside = Cell::new((col as f64 + dc) as usize, (row as f64 + dr) as usize);
+                    if !domain.is_blocked(beside) {
+                        continue;
+                    }
+                    let along = random.between(-0.499, 0.499);
+                    let at = [
+                        col as f64 + 0.499_999_9 * dc + along * dr,
+                        row as f64 + 0.499_999_9 * dr + along * dc,
+                    ];
+                    if let Guidance::Along(d) = field.guidance(at[0], at[1]) {
+                        // Where the saddle rule decides it may lean towards the cell's centre line, never outwards.
+                        assert!(
+                            d[0] * dc + d[1] * dr < 1e-4,
+                            "{kind:?}: {d:?} into the wall at {at:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn guidance_is_continuous_across_cell_borders_in_open_space() {
+    let (domain, field) = generated(Kind::Drums, 5);
+    let mut random = Random::new(11);
+    let mut compared = 0;
+    for _ in 0..20_000 {
+        let (col, row) = (2 + random.below(35), 2 + random.below(25));
+        if domain.is_blocked(Cell::new(col, row)) || domain.is_blocked(Cell::new(col + 1, row)) {
+            continue;
+        }
+        // Just left and just right of the border between two cells, and of a line of centres.
+        for border in [col as f64 + 0.5, col as f64] {
+            let y = row as f64 + random.between(-0.49, 0.49);
+            let (a, b) = (
+                field.guidance(border - 1e-7, y),
+                field.guidance(border + 1e-7, y),
+            );
+            if let (Guidance::Along(a), Guidance::Along(b)) = (a, b) {
+                compared += 1;
+                assert!(
+                    angle(a, b) < 0.5,
+                    "a jump of {} degrees at ({border}, {y})",
+                    angle(a, b)
+                );
+            }
+        }
+    }
+    assert!(compared > 10_000);
+}
+
+#[test]
+fn at_a_saddle_point_the_better_neighbour_decides() {
+    // The target straight behind a wall, everything mirrored about row 4: at the middle of the wall's face the gradient
+    // along the wall is zero by symmetry, and that across it points off the wall.
+    let mut map = Map::generate(Kind::Empty, 13, 9, 0);
+    map.fill(7..8, 1..8, true);
+    map.fill(7..8, 1..2, false);
+    map.fill(7..8, 7..8, false);
+    map.aim((10, 4));
+    let field = solve(&map.domain().expect("a valid map"));
+    for col in 1..7 {
+        assert!(
+            matches!(field.guidance(col as f64, 4.0), Guidance::Along(d) if d[0].hypot(d[1]) > 0.999),
+            "{col}"
+        );
+    }
+}
+
+#[test]
+fn every_position_gets_its_typed_answer() {
+    let mut map = Map::generate(Kind::Empty, 12, 12, 0);
+    map.fill(6..12, 0..12, true);
+    map.fill(8..10, 4..6, false);
+    map.aim((2, 2));
+    let field = solve(&map.domain().expect("a valid map"));
+    assert_eq!(field.guidance(2.4, 1.7), Guidance::AtTarget);
+    assert_eq!(field.guidance(8.0, 5.0), Guidance::Unreachable);
+    assert_eq!(field.guidance(f64::NAN, 5.0), Guidance::Unreachable);
+    assert_eq!(field.guidance(6.2, 5.0), Guidance::WayOut([-1.0, 0.0]));
+    assert!(matches!(field.guidance(-1e300, 3.0), Guidance::WayOut(d) if d[0] > 0.99));
+    assert!(matches!(field.guidance(11.0, 11.0), Guidance::WayOut(d) if d[0] < 0.0));
+}
+
+#[test]
+fn the_direction_of_a_cell_is_the_guidance_at_its_centre() {
+    for kind in KINDS {
+        let domain = Map::generate(kind, 60, 45, 3)
+            .domain()
+            .expect("a valid map");
+        let field = solve(&domain);
+        for row in 0..45 {
+            for col in 0..60 {
+                let at_centre = match field.guidance(col as f64, row as f64) {
+                    Guidance::Along(direction) => Some(direction),
+                    _ => None,
+                };
+                let cell = Cell::new(col, row);
+                assert_eq!(field.direction(cell), at_centre, "{kind:?} {cell:?}");
+            }
+        }
+    }
+}
