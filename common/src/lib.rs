@@ -25,6 +25,7 @@
 //! | [`start`] | how a stage's process takes its place in a run |
 //! | `external` | the same for a stage that the supervisor did not start |
 //! | [`shell`] | the process shell every stage runs in |
+//! | [`step`] | what a stage computes: the trait of every stage's pure step |
 
 pub mod address;
 pub mod bus;
@@ -48,11 +49,12 @@ pub mod samples;
 pub mod shell;
 pub mod signals;
 pub mod start;
+pub mod step;
 pub mod topics;
 pub mod waiter;
 pub mod wire;
 
-/// The README's Rust is compiled with the doc tests.
+/// The guide's Rust is compiled with the doc tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-pub struct Readme;
+#[doc = include_str!("../../supervisor/guide/attach.md")]
+pub struct Attach;

@@ -1,5 +1,7 @@
 //! The subcommands: one file each.
 
+use std::io::{self, Write as _};
+
 #[cfg(feature = "tools")]
 pub(crate) mod chaos;
 pub(crate) mod check;
@@ -7,6 +9,7 @@ mod directories;
 pub(crate) mod fault;
 #[cfg(feature = "tools")]
 pub(crate) mod field;
+pub(crate) mod help;
 pub(crate) mod install;
 #[cfg(feature = "tools")]
 pub(crate) mod latency;
@@ -21,3 +24,26 @@ pub(crate) mod tables;
 
 /// What a subcommand fails with: one clear sentence.
 type Failure = Box<dyn std::error::Error>;
+
+/// Write `text` to standard output. A reader that went away has read enough (`firsthand help tables | head`).
+fn print_text(text: &str) -> io::Result<()> {
+    unless_closed(io::stdout().write_all(text.as_bytes()))
+}
+
+fn unless_closed(written: io::Result<()>) -> io::Result<()> {
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reader_that_went_away_is_no_failure() {
+        assert!(unless_closed(Err(io::ErrorKind::BrokenPipe.into())).is_ok());
+        assert!(unless_closed(Err(io::ErrorKind::StorageFull.into())).is_err());
+    }
+}

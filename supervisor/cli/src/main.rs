@@ -21,13 +21,18 @@ use clap::{Parser, Subcommand};
 use commands::sim;
 #[cfg(feature = "tools")]
 use commands::{chaos, field, latency};
-use commands::{check, fault, install, missions, operate, run, stage, status, tables};
+use commands::{check, fault, help, install, missions, operate, run, stage, status, tables};
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
 ///
 /// Without a subcommand: `firsthand run obstacle-course`.
 #[derive(Debug, Parser)]
-#[command(name = "firsthand", version, after_help = EXIT_CODES)]
+#[command(
+    name = "firsthand",
+    version,
+    disable_help_subcommand = true,
+    after_help = format!("{}\n{EXIT_CODES}", help::topics())
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
@@ -60,6 +65,7 @@ enum Command {
     Stages(tables::StageArguments),
     Failsafe(tables::FailsafeArguments),
     Faults(tables::FaultArguments),
+    Help(help::Arguments),
 }
 
 /// What `run` ends with.
@@ -113,6 +119,7 @@ fn main() -> ExitCode {
         Command::Stages(arguments) => tables::stages(&arguments),
         Command::Failsafe(arguments) => tables::failsafe(&arguments),
         Command::Faults(arguments) => tables::faults(&arguments),
+        Command::Help(arguments) => help::main(&arguments),
     };
     match result {
         Ok(code) => code,

@@ -242,7 +242,8 @@ fn single_changes(kinds: &[Kind], degrees: f64) -> [Count; 2] {
 }
 
 #[test]
-fn directions_called_accurate_are_within_a_degree_of_a_full_solve_in_99_of_100_cases() {
+fn around_a_change_directions_called_accurate_are_within_a_degree_of_a_full_solve_in_99_of_100_cases()
+ {
     let wide = [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap];
     let [accurate, _] = single_changes(&wide, 1.0);
     assert!(accurate.cases > 300, "{accurate:?}");

@@ -135,19 +135,19 @@ mod tests {
     }
 
     #[test]
-    fn the_mission_in_the_readme_is_valid_and_shows_the_defaults() {
-        let readme = include_str!("../../../../README.md");
-        let text = readme
+    fn the_mission_in_the_guide_is_valid_and_shows_the_defaults() {
+        let guide = include_str!("../../../guide/mission-file.md");
+        let text = guide
             .split("```toml\n")
             .nth(1)
             .unwrap()
             .split("```")
             .next()
             .unwrap();
-        let mut shown = Mission::parse(text, Path::new("README.md")).unwrap();
+        let mut shown = Mission::parse(text, Path::new("mission-file.md")).unwrap();
         shown.known = common::geometry::Shapes::default();
         shown.world = common::geometry::Shapes::default();
-        let plain = Mission::parse("target = [4.0, 0.0]", Path::new("README.md")).unwrap();
+        let plain = Mission::parse("target = [4.0, 0.0]", Path::new("mission-file.md")).unwrap();
         assert_eq!(shown, plain);
     }
 

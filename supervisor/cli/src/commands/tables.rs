@@ -1,4 +1,4 @@
-//! `firsthand topics`, `stages`, `failsafe` and `faults`: the tables, as the README shows them.
+//! `firsthand topics`, `stages`, `failsafe` and `faults`: the tables, as the guide shows them.
 
 use std::{fmt::Write as _, process::ExitCode};
 
@@ -9,7 +9,7 @@ use common::{
 };
 use x80_link::failsafe;
 
-use super::Failure;
+use super::{Failure, print_text};
 use supervisor::stages;
 
 /// Print the table of topics.
@@ -28,32 +28,28 @@ pub(crate) struct FailsafeArguments {}
 #[derive(Debug, Args)]
 pub(crate) struct FaultArguments {}
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn topics(_: &TopicArguments) -> Result<ExitCode, Failure> {
-    print!("{}", topic_table());
+    print_text(&topic_table())?;
     Ok(ExitCode::SUCCESS)
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn stages(_: &StageArguments) -> Result<ExitCode, Failure> {
-    print!("{}", stage_table());
+    print_text(&stage_table())?;
     Ok(ExitCode::SUCCESS)
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn failsafe(_: &FailsafeArguments) -> Result<ExitCode, Failure> {
-    print!("{}", failsafe_table());
+    print_text(&failsafe_table())?;
     Ok(ExitCode::SUCCESS)
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn faults(_: &FaultArguments) -> Result<ExitCode, Failure> {
-    print!("{}", fault_table());
+    print_text(&fault_table())?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// The topics as a Markdown table.
-pub(crate) fn topic_table() -> String {
+fn topic_table() -> String {
     let mut table =
         String::from("| topic | payload | written by | rate | meaning |\n|---|---|---|---|---|\n");
     for topic in topics::TABLE {
@@ -90,7 +86,7 @@ pub(crate) fn topic_table() -> String {
 }
 
 /// The stages as a Markdown table.
-pub(crate) fn stage_table() -> String {
+fn stage_table() -> String {
     let mut table = String::from(
         "| stage | reads | writes | ready within | beats within | answers within | each, for a million cells more | while it is down the robot |\n|---|---|---|---|---|---|---|---|\n",
     );
@@ -121,7 +117,7 @@ pub(crate) fn stage_table() -> String {
 }
 
 /// The rules of the link's failsafe as a Markdown table.
-pub(crate) fn failsafe_table() -> String {
+fn failsafe_table() -> String {
     let mut table = String::from("| cause | when | the robot | until |\n|---|---|---|---|\n");
     for rule in failsafe::TABLE {
         let _ = writeln!(
@@ -137,7 +133,7 @@ pub(crate) fn failsafe_table() -> String {
 }
 
 /// The faults as a Markdown table.
-pub(crate) fn fault_table() -> String {
+fn fault_table() -> String {
     let mut table = String::from("| stage | fault | what it does | until |\n|---|---|---|---|\n");
     for fault in &faults::TABLE {
         let stage = fault
@@ -157,8 +153,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_readme_shows_the_tables_as_they_are() {
-        let readme = include_str!("../../../../README.md");
+    fn the_guide_shows_the_tables_as_they_are() {
+        let guide = include_str!("../../../guide/tables.md");
         let tables = [
             ("topics", topic_table()),
             ("stages", stage_table()),
@@ -167,8 +163,8 @@ mod tests {
         ];
         for (command, table) in tables {
             assert!(
-                readme.contains(&table),
-                "README.md is behind; paste the output of `firsthand {command}`:\n{table}"
+                guide.contains(&table),
+                "supervisor/guide/tables.md is behind; paste the output of `firsthand {command}`:\n{table}"
             );
         }
     }

@@ -1,0 +1,319 @@
+//! What README and guide say of commands, files and tests.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::Parser as _;
+
+use super::*;
+use crate::commands::missions;
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// A document: its path from the root, and its text.
+struct Document {
+    path: PathBuf,
+    text: String,
+}
+
+fn documents() -> Vec<Document> {
+    let pages = GUIDE
+        .iter()
+        .map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
+    std::iter::once(PathBuf::from("README.md"))
+        .chain(pages)
+        .map(|path| Document {
+            text: fs::read_to_string(root().join(&path)).unwrap(),
+            path,
+        })
+        .collect()
+}
+
+impl Document {
+    /// Lines of the blocks that a shell would read, and what stands in backticks elsewhere.
+    fn code(&self) -> Vec<String> {
+        let mut code = Vec::new();
+        let mut fence = None;
+        for line in self.text.lines() {
+            match (line.strip_prefix("```"), fence) {
+                (Some(_), Some(_)) => fence = None,
+                (Some(language), None) => fence = Some(language),
+                (None, Some("sh")) => code.push(line.to_owned()),
+                (None, Some(_)) => {}
+                (None, None) => {
+                    // A code span may hold backticks between longer rows of them.
+                    let line = line.replace("``", "\u{1}");
+                    let (odd, plain) = line
+                        .split('\u{1}')
+                        .enumerate()
+                        .partition::<Vec<_>, _>(|(at, _)| at % 2 == 1);
+                    code.extend(odd.into_iter().map(|(_, text)| text.to_owned()));
+                    for (_, text) in plain {
+                        code.extend(text.split('`').skip(1).step_by(2).map(str::to_owned));
+                    }
+                }
+            }
+        }
+        code
+    }
+
+    /// Where its links lead to, from the root.
+    fn links(&self) -> Vec<PathBuf> {
+        let targets = self.text.split("](").skip(1);
+        targets
+            .map(|rest| rest.split(')').next().unwrap())
+            .filter(|target| !target.contains("://"))
+            .map(|target| {
+                let file = target.split('#').next().unwrap();
+                self.path.parent().unwrap().join(file)
+            })
+            .collect()
+    }
+}
+
+/// The simple commands of a line of shell, in words, with placeholders filled in.
+fn commands(line: &str) -> Vec<Vec<String>> {
+    let mut commands = vec![Vec::new()];
+    let mut word = None::<String>;
+    let mut quote = None;
+    for letter in line.chars().chain([' ']) {
+        match letter {
+            _ if quote == Some(letter) => quote = None,
+            _ if quote.is_some() => word.get_or_insert_default().push(letter),
+            '\'' | '"' => {
+                quote = Some(letter);
+                word.get_or_insert_default();
+            }
+            '#' if word.is_none() => break,
+            ' ' | ';' | '|' | '&' | '>' => {
+                commands
+                    .last_mut()
+                    .unwrap()
+                    .extend(word.take().map(|word| filled_in(&word)));
+                if letter != ' ' {
+                    commands.push(Vec::new());
+                }
+            }
+            _ => word.get_or_insert_default().push(letter),
+        }
+    }
+    commands
+}
+
+/// `word` with a value in place of what stands for one.
+fn filled_in(word: &str) -> String {
+    let value = |word: &str| match word {
+        "S" | "N" | "H" | "K" | "$s" => Some("256"),
+        "NAME" | "STAGE" => Some("planner"),
+        "FAULT" => Some("saddle"),
+        "TOPIC" => Some("deploy"),
+        _ => None,
+    };
+    let (key, last) = match word.rsplit_once('=') {
+        Some((key, last)) => (format!("{key}="), last),
+        None => (String::new(), word),
+    };
+    value(last).map_or(word.to_owned(), |value| format!("{key}{value}"))
+}
+
+/// What `firsthand` is given, if this command runs it.
+fn arguments(command: &[String]) -> Option<&[String]> {
+    let words: Vec<&str> = command.iter().map(String::as_str).collect();
+    let at = match words.as_slice() {
+        ["sudo", "-u", _, "firsthand", ..] => 4,
+        ["do" | "sudo", "firsthand", ..] => 2,
+        ["cargo", "run", "--", ..] => 3,
+        ["cargo", "run", "--release"] => 3,
+        ["firsthand", ..] => 1,
+        _ => return None,
+    };
+    Some(&command[at..])
+}
+
+#[test]
+fn every_command_line_in_readme_and_guide_is_understood() {
+    let mut checked = 0;
+    for document in documents() {
+        let code = document.code();
+        let commands: Vec<_> = code.iter().flat_map(|line| commands(line)).collect();
+        for command in commands.iter().filter_map(|command| arguments(command)) {
+            let line = command.join(" ");
+            let at = document.path.display();
+            let words = std::iter::once("firsthand").chain(command.iter().map(String::as_str));
+            let parsed = match crate::Arguments::try_parse_from(words) {
+                // A subcommand alone is named rather than called.
+                Err(error)
+                    if error.kind() == ErrorKind::MissingRequiredArgument && command.len() == 1 =>
+                {
+                    continue;
+                }
+                parsed => parsed.unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}")),
+            };
+            let set: Vec<String> = command
+                .windows(2)
+                .filter(|pair| pair[0] == "--set")
+                .map(|pair| pair[1].clone())
+                .collect();
+            missions::load("obstacle-course", &set)
+                .unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}"));
+            if let Some(crate::Command::Help(Arguments { topic: Some(topic) })) = parsed.command {
+                assert!(
+                    page(&topic).is_some()
+                        || crate::Arguments::command()
+                            .find_subcommand(&topic)
+                            .is_some(),
+                    "{at}: firsthand help {topic}"
+                );
+            }
+            checked += 1;
+        }
+    }
+    assert!(checked > 60, "only {checked} command lines were found");
+}
+
+#[test]
+fn a_command_line_with_an_option_or_key_that_does_not_exist_is_found() {
+    let wrong = [
+        "firsthand run --sed 7",
+        "for s in $(seq 50); do firsthand runs --seed $s; done",
+        "sudo -u firsthand firsthand states",
+        "firsthand kill --signal ABRT",
+    ];
+    for line in wrong {
+        let found = commands(line);
+        let command = found.iter().find_map(|command| arguments(command)).unwrap();
+        let words = std::iter::once("firsthand").chain(command.iter().map(String::as_str));
+        assert!(crate::Arguments::try_parse_from(words).is_err(), "{line}");
+    }
+}
+
+#[test]
+fn every_link_and_path_in_readme_and_guide_exists() {
+    let of_the_tree = ["common/", "services/", "supervisor/", "tests/", ".ci/"];
+    for document in documents() {
+        let at = document.path.display();
+        for link in document.links() {
+            assert!(root().join(&link).exists(), "{at}: {}", link.display());
+        }
+        let code = document.code();
+        let words = code.iter().flat_map(|code| code.split_whitespace());
+        let paths = words.filter(|word| of_the_tree.iter().any(|top| word.starts_with(top)));
+        for path in paths {
+            // The crate that the reader makes.
+            if !path.contains("odometer") {
+                assert!(root().join(path).exists(), "{at}: {path}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_capability_has_a_verdict_and_every_contract_a_test() {
+    let page = page("capabilities").unwrap().text;
+    let rows = page.lines().filter_map(|line| {
+        let cells: Vec<_> = line.trim_matches('|').split(" | ").map(str::trim).collect();
+        <[&str; 3]>::try_from(cells).ok()
+    });
+    let mut contracts = 0;
+    for [capability, test, verdict] in rows {
+        let tested = test.split(", ").all(|test| {
+            let path = root().join(test.trim_matches('`'));
+            let text = if path.is_dir() {
+                "#[test]".to_owned()
+            } else {
+                fs::read_to_string(path).unwrap_or_default()
+            };
+            text.contains("#[test]") || text.contains("doctest") || test.contains(".ci/")
+        });
+        match verdict {
+            "Contract" => {
+                assert!(tested, "{capability}: {test} has no test");
+                contracts += 1;
+            }
+            "Smoke" => assert!(tested, "{capability}: {test}"),
+            "Measured" => assert!(test.starts_with("`firsthand "), "{capability}: {test}"),
+            "Gap" | "verdict" => {}
+            other => panic!("{capability}: {other} is no verdict"),
+        }
+    }
+    assert!(contracts > 40, "only {contracts} contracts were found");
+}
+
+#[test]
+fn every_test_that_a_figure_names_exists() {
+    let tests: String = fs::read_dir(root().join("tests"))
+        .unwrap()
+        .filter_map(|entry| fs::read_to_string(entry.unwrap().path()).ok())
+        .collect();
+    let named = "cargo test -p firsthand ";
+    let code = documents().into_iter().flat_map(|document| document.code());
+    for line in code.filter(|line| line.starts_with(named)) {
+        let test = line[named.len()..].split(' ').next().unwrap();
+        let exists = test.starts_with('-') || tests.contains(&format!("fn {test}"));
+        assert!(exists, "{line}");
+    }
+}
+
+#[test]
+fn every_crate_has_a_row_in_the_readme_and_every_row_a_crate() {
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = toml::from_str(&manifest).unwrap();
+    let mut crates = BTreeSet::from(["tests".to_owned()]);
+    for member in manifest["workspace"]["members"].as_array().unwrap() {
+        let member = member.as_str().unwrap();
+        match member.strip_suffix("/*") {
+            None => {
+                crates.insert(member.to_owned());
+            }
+            Some(folder) => {
+                let entries = fs::read_dir(root().join(folder)).unwrap();
+                let found = entries.map(|entry| entry.unwrap().path());
+                crates.extend(
+                    found
+                        .filter(|path| path.join("Cargo.toml").exists())
+                        .map(|path| path.strip_prefix(root()).unwrap().display().to_string()),
+                );
+            }
+        }
+    }
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let layout = readme.split("## Layout").nth(1).unwrap();
+    let rows: BTreeSet<String> = layout
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split('`').next())
+        .map(str::to_owned)
+        .collect();
+    assert_eq!(rows, crates);
+}
+
+#[test]
+fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
+    let help = crate::Arguments::command().render_long_help().to_string();
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let package = fs::read_to_string(root().join(".ci/package-files")).unwrap();
+    for page in &GUIDE {
+        let topic = page.topic();
+        assert!(page.text.starts_with("# "), "{topic} has no title");
+        assert!(help.contains(page.title()), "{topic}");
+        assert!(readme.contains(&format!("`{topic}`")), "{topic}");
+        let file = format!("supervisor/guide/{}.md", page.file);
+        assert!(package.contains(&file), "{file}");
+        let commands = crate::Arguments::command();
+        assert!(commands.find_subcommand(&topic).is_none(), "{topic}");
+    }
+    let files = fs::read_dir(root().join("supervisor/guide")).unwrap();
+    let written = files.filter(|file| file.as_ref().unwrap().path().extension().is_some());
+    assert_eq!(written.count(), GUIDE.len(), "a page that no topic shows");
+}
+
+#[test]
+fn the_readme_is_shorter_than_200_lines() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    assert!(readme.lines().count() < 200);
+}
