@@ -19,6 +19,7 @@
 //! | [`faults`] | THE table of what can be broken in a stage on purpose |
 //! | [`run`] | what the supervisor tells the stages of a run |
 //! | [`signals`] | signals as something to wait for |
+//! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`shell`] | the process shell every stage runs in |
 //! | `external` | how a stage that the supervisor did not start finds its place |
 //! | [`wire`] | the X80's protocol: frames and messages |
@@ -41,6 +42,7 @@ pub mod run;
 pub mod samples;
 pub mod shell;
 pub mod signals;
+pub mod step;
 pub mod topics;
 pub mod truth;
 pub mod waiter;

@@ -39,14 +39,14 @@
 //! # Ok::<(), planner::SolveError>(())
 //! ```
 
-pub mod beside;
+mod active_sensing;
+pub mod background_solver;
 mod cancellation;
 mod domain;
 mod error;
 mod fault;
 mod field;
 mod guidance;
-mod lookout;
 mod repair;
 mod scaled;
 pub mod shell;
