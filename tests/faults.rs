@@ -44,7 +44,10 @@ fn stalls(directory: &Path) -> Vec<Value> {
 
 /// How many of them were met by `recovery`.
 fn count(stalls: &[Value], recovery: &str) -> usize {
-    stalls.iter().filter(|stall| stall["recovery"] == recovery).count()
+    stalls
+        .iter()
+        .filter(|stall| stall["recovery"] == recovery)
+        .count()
 }
 
 /// A mission of open-room in which `stage` is broken on the way: summary, stalls, and what the supervisor logged.

@@ -42,7 +42,7 @@ pub struct TruthTick {
     /// The longest so far that a wheel turned after the last motion command the robot heard, seconds: how far
     /// it goes on its own when the host falls silent. Slower than [`TruthTick::AT_REST_M_S`] is at rest.
     #[serde(default)]
-    pub unattended_s: f64,
+    pub stopping_time_s: f64,
     /// What the radio has done so far; missing where it is perfect.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radio: Option<TruthRadio>,

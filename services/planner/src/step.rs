@@ -42,7 +42,8 @@ enum Advisor {
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
-    absorption: f64,
+    /// k of u = mean of the neighbours / (1 + k).
+    screening: f64,
     advisor: Advisor,
     solver: Solver,
     grid: Replica<u8>,
@@ -87,7 +88,7 @@ impl Step for Planner {
     fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
-            absorption: mission.absorption(),
+            screening: mission.screening(),
             advisor: match mission.method {
                 Method::Paper => Advisor::Follow,
                 Method::Evidential => Advisor::LookFirst(ActiveSensing::new(mission)),
@@ -162,7 +163,7 @@ impl Planner {
         let target = frame.cell_at(self.target);
         let target = target.map_or(Cell::new(side, side), field_cell);
         let domain = Domain::new(side, side, blocked.collect(), target)?
-            .with_absorption(Absorption::Uniform(self.absorption))?;
+            .with_absorption(Absorption::Uniform(self.screening))?;
         let field = self.solver.solve(&domain, &Cancellation::default())?;
         self.full_solves += 1;
         self.live = Some(Live {

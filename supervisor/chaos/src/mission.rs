@@ -108,7 +108,7 @@ pub(super) fn attack(
         reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
         collisions: summary["collisions"].as_u64().unwrap_or_default(),
         pose_excess_m: number(&summary, "pose_error_m") - number(calm, "pose_error_m"),
-        unattended_s: number(&summary, "unattended_s"),
+        stopping_time_s: number(&summary, "stopping_time_s"),
         // What a count that was lost may cost, for each of them.
         pose_allowance_m: f64::from(kills) * options.loaded.body().metres_per_count(),
         kills,
@@ -118,7 +118,7 @@ pub(super) fn attack(
         let truth = robot.truth();
         let last = truth.last();
         end.collisions = last.map_or(0, |tick| tick.contacts);
-        end.unattended_s = last.map_or(0.0, |tick| tick.unattended_s);
+        end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - number(calm, "pose_error_m");
     }

@@ -29,7 +29,7 @@ pub struct Report {
     worst_pose_excess_m: f64,
     worst_pose_kills: u32,
     /// The longest that a wheel turned after the last command the robot had heard, mission seconds.
-    longest_unattended_s: f64,
+    longest_stopping_time_s: f64,
     /// Files, shared memory, processes that outlived a mission.
     pub leftovers: usize,
     /// The most that a supervisor held more at the end of its life than when its robot began to drive.
@@ -87,7 +87,7 @@ pub struct End {
     pub pose_excess_m: f64,
     /// The most that may be.
     pub pose_allowance_m: f64,
-    pub unattended_s: f64,
+    pub stopping_time_s: f64,
     pub kills: u32,
 }
 
@@ -102,7 +102,7 @@ impl Report {
             recovery_ms: BTreeMap::new(),
             worst_pose_excess_m: 0.0,
             worst_pose_kills: 0,
-            longest_unattended_s: 0.0,
+            longest_stopping_time_s: 0.0,
             leftovers: 0,
             most_won: Possessions::default(),
             took_s: 0.0,
@@ -137,7 +137,7 @@ impl Report {
     pub fn ended(&mut self, end: &End) -> bool {
         self.missions += 1;
         self.collisions += end.collisions;
-        self.longest_unattended_s = self.longest_unattended_s.max(end.unattended_s);
+        self.longest_stopping_time_s = self.longest_stopping_time_s.max(end.stopping_time_s);
         if end.pose_excess_m > self.worst_pose_excess_m {
             self.worst_pose_excess_m = end.pose_excess_m;
             self.worst_pose_kills = end.kills;
@@ -276,7 +276,7 @@ impl fmt::Display for Report {
         writeln!(
             to,
             "a wheel turned at most {:.2} s of mission time after the last command",
-            self.longest_unattended_s
+            self.longest_stopping_time_s
         )?;
         let Possessions {
             descriptors,

@@ -39,7 +39,7 @@ pub(crate) struct Summary {
     pub(crate) pose_error_m: Option<f64>,
     /// The longest that a wheel turned after the last command the robot had heard: command limit and speed loop
     /// together, in an outage or when a stage dies.
-    pub(crate) unattended_s: Option<f64>,
+    pub(crate) stopping_time_s: Option<f64>,
     pub(crate) safety_events: u64,
     pub(crate) full_solves: u64,
     pub(crate) local_updates: u64,
@@ -109,7 +109,7 @@ impl Summary {
             pose_error_m: pose
                 .zip(truth.last())
                 .map(|(pose, truth)| (pose.x_m - truth.x).hypot(pose.y_m - truth.y)),
-            unattended_s: truth.last().map(|tick| tick.unattended_s),
+            stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves,
             local_updates,
@@ -148,9 +148,10 @@ impl Summary {
                 self.tick_latency_us,
                 self.ticks,
                 self.restarted(),
-                self.unattended_s.map_or(String::new(), |seconds| format!(
-                    " · at rest {seconds:.2} s after a last command at the latest"
-                )),
+                self.stopping_time_s
+                    .map_or(String::new(), |seconds| format!(
+                        " · at rest {seconds:.2} s after a last command at the latest"
+                    )),
             ),
         ];
         stalls.into_iter().chain(numbers).collect()

@@ -24,7 +24,7 @@ pub(crate) mod record;
 const STALLED_AFTER: Duration = Duration::from_secs(3);
 /// Mission time without a way to the target that is no passing false echo.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// A careful robot that is cut off turns so often on the spot first, at half the speed it is told to.
+/// By the evidential method a robot that is cut off turns so often on the spot first, at half the speed commanded.
 const LOOKS_AROUND: f64 = 1.2;
 /// A robot that gets on turns no more often than so at one place, at the slower of its two rates.
 const TURNS_AT_A_PLACE: f64 = 2.0;

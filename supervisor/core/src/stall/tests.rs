@@ -95,7 +95,7 @@ fn a_robot_cut_off_forgets_three_times_and_gives_up() {
 }
 
 #[test]
-fn a_careful_robot_cut_off_looks_around_before_its_belief_is_blamed() {
+fn an_evidential_robot_cut_off_looks_around_before_its_belief_is_blamed() {
     let path = std::path::Path::new("test.toml");
     let mission = Mission::parse("target = [3, 0]", path).unwrap();
     let mut watch = StallWatch::new(&mission);
