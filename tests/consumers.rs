@@ -44,12 +44,12 @@ fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
         }
         while let Some(sample) = grid.take().unwrap() {
             let before = heard.grid.version();
-            heard.grid.apply(&sample.header().part.revision(), &sample);
+            heard.grid.apply(&sample.header().part, &sample);
             heard.grid_changes += usize::from(heard.grid.version() > before && before > 0);
         }
         while let Some(sample) = field.take().unwrap() {
             let before = heard.field.version();
-            heard.field.apply(&sample.header().part.revision(), &sample);
+            heard.field.apply(&sample.header().part, &sample);
             heard.field_changes += usize::from(heard.field.version() > before && before > 0);
         }
     }

@@ -74,7 +74,7 @@ fn record(robot: &str) -> Recording {
         // Asked first: what was published until then is received below.
         let over = !run.is_running();
         while let Ok(Some(part)) = grids.take() {
-            grid.apply(&part.header().part.revision(), &part);
+            grid.apply(&part.header().part, &part);
             received.grids.insert(grid.version(), grid.cells().to_vec());
         }
         while let Ok(Some(sample)) = ranges.take() {

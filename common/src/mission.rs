@@ -1,4 +1,4 @@
-//! The mission file: everything a run is told, validated before anything starts.
+//! The mission file: everything that a run depends on, validated before anything starts.
 //!
 //! Metres, seconds, radians inside; degrees where a person writes them (`_deg`). All positions are in
 //! the mission frame: its origin is where the robot starts and, unless `start.heading_deg` says
@@ -83,6 +83,9 @@ pub struct Mission {
     /// How the simulated robot behaves.
     #[serde(default)]
     pub simulation: Simulation,
+    /// What its reader should know of a file that is valid, a line each: keys or values that go by another name now.
+    #[serde(skip)]
+    pub remarks: Vec<String>,
 }
 
 /// How the robot is brought to its target.
@@ -92,7 +95,7 @@ pub enum Method {
     /// It looks before it goes: evidence for and against hazard, ground that was swept, speed that fits
     /// what is known of the way ahead.
     #[default]
-    #[serde(alias = "careful")]
+    #[serde(alias = "careful")] // Its name before; [`Mission::remarks`] says so.
     Evidential,
     /// As printed: every hit is a hazard with its margin, (19), the map only grows, (10), the robot goes
     /// where the field points, (15), (16).
@@ -145,7 +148,7 @@ pub struct Mapper {
     /// The paper's method: how far around a hit cells are marked with it, metres:
     /// [`Mission::margin_cells`] is Im of (19).
     pub margin_m: f64,
-    /// The careful method: what is left free between the body and a hit, metres.
+    /// The evidential method: what is left free between the body and a hit, metres.
     pub clearance_m: f64,
     /// Hits farther than this are no safety event yet, metres.
     pub map_within_m: f64,
@@ -155,15 +158,15 @@ pub struct Mapper {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
-    /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without it the paper's method has
-    /// no screening, which is exactly (11), and the careful one takes
+    /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without
+    /// it the paper's method has no screening, which is exactly (11), and the evidential one takes
     /// [`Planner::EVIDENTIAL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
 }
 
 impl Planner {
-    /// What the careful method takes where a mission says nothing: short enough that the field keeps
+    /// What the evidential method takes where a mission says nothing: short enough that the field keeps
     /// heading for a gap that an echo narrows.
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
@@ -176,7 +179,7 @@ pub struct Controller {
     pub speed_m_s: f64,
     /// wd: the most turn rate asked for, rad/s.
     pub turn_rad_s: f64,
-    /// The careful method: the most turn rate on the spot, rad/s. A sonar of 7 Hz and 15 degrees of half cone still
+    /// The evidential method: the most turn rate on the spot, rad/s. A sonar of 7 Hz and 15 degrees of half cone still
     /// hears everything twice at 1.4.
     pub look_rad_s: f64,
     /// Rc: where slowing down before the target begins, metres.
@@ -318,34 +321,4 @@ fn read_bounded(path: &Path) -> io::Result<String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn with_cells(cells: u32) -> Mission {
-        let text = format!(
-            "target = [1, 0]\nperimeter = {{ width_m = 10, cells = {cells} }}\n\
-             mapper = {{ margin_m = 0.25 }}\nplanner = {{ screening_m = 0.5 }}"
-        );
-        Mission::parse(&text, Path::new("test.toml")).unwrap()
-    }
-
-    #[test]
-    fn a_margin_in_metres_is_covered_on_any_grid_and_by_no_cell_more() {
-        for (cells, margin) in [(10, 0), (100, 2), (200, 5), (1000, 25)] {
-            assert_eq!(with_cells(cells).margin_cells(), margin, "{cells} cells");
-        }
-    }
-
-    #[test]
-    fn the_papers_method_has_no_screening_unless_the_mission_says_so() {
-        let paper = "target = [1, 0]\nmethod = 'paper'";
-        let parse = |text: &str| Mission::parse(text, Path::new("test.toml")).unwrap();
-        assert_eq!(parse(paper).screening_length_m(), None);
-        let screened = format!("{paper}\nplanner = {{ screening_m = 0.5 }}");
-        assert_eq!(parse(&screened).screening_length_m(), Some(0.5));
-        assert_eq!(
-            parse("target = [1, 0]").screening_length_m(),
-            Some(Planner::EVIDENTIAL_SCREENING_M)
-        );
-    }
-}
+mod tests;

@@ -82,8 +82,6 @@ stamped!(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::{GridFrame, Revision};
-    use glam::DVec2;
 
     #[test]
     fn an_unknown_byte_is_read_as_the_safe_state() {
@@ -99,21 +97,5 @@ mod tests {
         assert_eq!(name_str(&name("dead-reckoning")), "dead-reckoning");
         assert_eq!(name_str(&name(&"x".repeat(40))).len(), 24);
         assert_eq!(name_str(&[0xff; 24]), "");
-    }
-
-    #[test]
-    fn a_revision_survives_shared_memory() {
-        let frame = GridFrame {
-            cells: 40,
-            resolution_m: 0.1,
-            centre: DVec2::new(1.0, -2.0),
-        };
-        let revision = Revision {
-            frame,
-            window: frame.whole(),
-            version: 7,
-            keyframe: true,
-        };
-        assert_eq!(Part::from(revision).revision(), revision);
     }
 }

@@ -74,6 +74,7 @@ pub(super) fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> 
             .file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     }
+    mission.remarks = remarks(text, origin, tree.get_ref());
     match Checker::default().run(&mission) {
         Ok(()) => Ok(mission),
         Err(Objection {
@@ -88,6 +89,21 @@ pub(super) fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> 
             remedy,
         }),
     }
+}
+
+/// What goes by another name now.
+fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>) -> Vec<String> {
+    let method = tree
+        .get("method")
+        .and_then(|value| value.get_ref().as_str());
+    let renamed = method.filter(|name| *name == "careful").map(|_| {
+        let line = line_of(text, span_of(tree, "method"));
+        let file = origin.display();
+        format!(
+            "{file}:{line}: method: \"careful\" is called \"evidential\" now; both are accepted"
+        )
+    });
+    renamed.into_iter().collect()
 }
 
 /// 1-based line of byte `offset`.
@@ -452,75 +468,4 @@ fn start_is_free(mission: &Mission) -> Result<(), Objection> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn refusal(text: &str) -> String {
-        match parse(text, Path::new("m.toml")) {
-            Ok(_) => panic!("accepted: {text}"),
-            Err(error) => error.to_string(),
-        }
-    }
-
-    #[test]
-    fn a_target_is_all_a_mission_needs() {
-        let mission = parse("target = [3, 0.5]", Path::new("dir/short.toml")).unwrap();
-        assert_eq!(mission.name, "short");
-        assert_eq!(mission.grid_frame().resolution_m, 0.1);
-        assert_eq!(mission.body().counts_per_turn, 1200.0);
-    }
-
-    #[test]
-    fn a_mission_written_out_reads_back_the_same() {
-        let text = "target = [3, 0.5]\n[[world.drum]]\nat = [1.5, 1]\nradius_m = 0.3\n[robot]\nmodel = 'x80sv'";
-        let mission = parse(text, Path::new("m.toml")).unwrap();
-        let written = toml::to_string(&mission).unwrap();
-        assert_eq!(parse(&written, Path::new("x")).unwrap(), mission);
-    }
-
-    #[test]
-    fn every_refusal_names_line_and_key() {
-        let cases = [
-            ("target = [30, 0]", "m.toml:1: target: "),
-            ("target = [nan, 0]", "m.toml:1: target: "),
-            (
-                "target = [3, 0]\n[perimeter]\ncells = 4",
-                "m.toml:3: perimeter.cells: ",
-            ),
-            (
-                "target = [3, 0]\n[perimeter]\ncells = 100000",
-                "m.toml:3: perimeter.cells: ",
-            ),
-            (
-                "target = [3, 0]\nspeeed = 3",
-                "m.toml:2: unknown field `speeed`",
-            ),
-            (
-                "target = [3, 0]\n\n[controller]\nspeed_m_s = nan",
-                "m.toml:4: controller.speed_m_s: ",
-            ),
-            ("target = 3", "m.toml:1: invalid type"),
-            ("target = [3, 0", "m.toml:1: "),
-            (
-                "target = [3, 0]\n[[world.drum]]\nat = [0.3, 0]\nradius_m = 0.2",
-                "m.toml:2: world: something stands 0.10 m from the start",
-            ),
-            (
-                "target = [3, 0]\n[robot]\nleft = { channel = 1, reversed = true }",
-                "m.toml:3: robot.left: ",
-            ),
-            (
-                "target = [3, 0]\n[robot]\naddress = 'http://x80:80'",
-                "m.toml:3: robot.address: ",
-            ),
-            (
-                "description = 'no target'",
-                "m.toml:1: missing field `target`",
-            ),
-        ];
-        for (text, start) in cases {
-            let refusal = refusal(text);
-            assert!(refusal.starts_with(start), "{text:?} gave {refusal:?}");
-        }
-    }
-}
+mod tests;

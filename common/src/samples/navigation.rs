@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::{Stamp, ZeroCopySend},
-    grid::{GridFrame, Revision, Window},
+    grid::Part,
     kinematics::{Pose2, Twist},
 };
 
@@ -50,72 +50,6 @@ impl PoseSample {
         Twist {
             v: self.v_m_s,
             omega: self.omega_rad_s,
-        }
-    }
-}
-
-/// How a map lies and which part of which version came along.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Part")]
-#[repr(C)]
-pub struct Part {
-    /// The version the map has with these cells. Consecutive versions differ in one window.
-    pub version: u64,
-    /// N: the map is N x N cells.
-    pub cells: u32,
-    /// First column of the window.
-    pub col: u32,
-    /// First row of the window.
-    pub row: u32,
-    /// Columns of the window.
-    pub width: u32,
-    /// Rows of the window.
-    pub height: u32,
-    /// 1: the window is the whole map.
-    pub keyframe: u32,
-    /// Delta: side of a cell, metres.
-    pub resolution_m: f64,
-    /// Where cell (N/2, N/2) lies, metres.
-    pub centre_x_m: f64,
-    /// Where cell (N/2, N/2) lies, metres.
-    pub centre_y_m: f64,
-}
-
-impl Part {
-    /// The part as [`crate::grid::Replica`] takes it.
-    #[must_use]
-    pub const fn revision(&self) -> Revision {
-        Revision {
-            frame: GridFrame {
-                cells: self.cells,
-                resolution_m: self.resolution_m,
-                centre: DVec2::new(self.centre_x_m, self.centre_y_m),
-            },
-            window: Window {
-                col: self.col,
-                row: self.row,
-                width: self.width,
-                height: self.height,
-            },
-            version: self.version,
-            keyframe: self.keyframe == 1,
-        }
-    }
-}
-
-impl From<Revision> for Part {
-    fn from(revision: Revision) -> Self {
-        Self {
-            version: revision.version,
-            cells: revision.frame.cells,
-            col: revision.window.col,
-            row: revision.window.row,
-            width: revision.window.width,
-            height: revision.window.height,
-            keyframe: revision.keyframe.into(),
-            resolution_m: revision.frame.resolution_m,
-            centre_x_m: revision.frame.centre.x,
-            centre_y_m: revision.frame.centre.y,
         }
     }
 }
@@ -172,20 +106,37 @@ pub struct GuidanceSample {
     pub status: u8,
     /// Mission time of the pose it was computed for, nanoseconds.
     pub pose_ns: u64,
+    /// That pose, metres in the mission frame.
+    pub x_m: f64,
+    /// That pose, metres in the mission frame.
+    pub y_m: f64,
+    /// That pose, radians counter-clockwise from x; not wrapped.
+    pub heading_rad: f64,
     /// The version of `grid` it was computed from.
     pub grid_version: u64,
     /// That version's safety events.
     pub safety_events: u64,
     /// That version's belief epoch.
     pub epoch: u64,
-    /// Full solves in this life of the planner.
+    /// Full solves in this generation of the planner.
     pub full_solves: u64,
-    /// Local updates in this life of the planner.
+    /// Local updates in this generation of the planner.
     pub local_updates: u64,
     /// Wall-clock of the last full solve, nanoseconds.
     pub full_solve_ns: u64,
     /// Wall-clock of the last local update, nanoseconds.
     pub local_update_ns: u64,
+}
+
+impl GuidanceSample {
+    /// The pose it was computed for.
+    #[must_use]
+    pub const fn pose(&self) -> Pose2 {
+        Pose2 {
+            position: DVec2::new(self.x_m, self.y_m),
+            heading: self.heading_rad,
+        }
+    }
 }
 
 /// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.

@@ -1,6 +1,9 @@
 //! The velocity synchroniser: guidance to wheel speeds, equations (14)-(17).
 //!
-//! [`step`] is the whole of it, pure; [`shell`] wires it to the topics `guidance`, `pose`, `command`.
+//! | module | holds |
+//! |---|---|
+//! | [`step`] | the whole of it, pure: one `guidance` sample to one `command` |
+//! | [`shell`] | wires it to the topics |
 
 pub mod shell;
 pub mod step;

@@ -1,9 +1,10 @@
-//! `guidance` and `pose` in, `command` out.
+//! `guidance` in, `command` out.
 
 use common::{
     bus::{Reader, Writer},
-    samples::{CommandSample, GuidanceSample, PoseSample},
+    samples::{CommandSample, GuidanceSample},
     shell::{Context, Process, Progress, StageError},
+    step::Step as _,
     topics,
 };
 
@@ -13,10 +14,8 @@ use crate::step::Controller;
 #[derive(Debug)]
 pub struct Shell {
     guidance: Reader<GuidanceSample>,
-    pose: Reader<PoseSample>,
     command: Writer<CommandSample>,
     controller: Controller,
-    latest_pose: Option<PoseSample>,
     progress: Progress,
 }
 
@@ -25,12 +24,10 @@ impl Process for Shell {
         context.waiter.on(context.bus.wakeup(&topics::GUIDANCE)?);
         Ok(Self {
             guidance: context.bus.reader(&topics::GUIDANCE)?,
-            pose: context.bus.reader(&topics::POSE)?,
             command: context
                 .bus
                 .writer(&topics::COMMAND, context.generation.number)?,
             controller: Controller::new(&context.run.mission),
-            latest_pose: None,
             progress: Progress::default(),
         })
     }
@@ -39,25 +36,10 @@ impl Process for Shell {
         let Some(guidance) = self.guidance.newest()? else {
             return Ok(self.progress);
         };
-        if let Some(pose) = self.pose.newest()? {
-            self.latest_pose = Some(pose);
-        }
-        // The pose of a tick is published before its guidance; without one, the guidance is of a tick
-        // that began before this life did.
-        let Some(pose) = self.latest_pose else {
-            return Ok(self.progress);
-        };
-        let command = CommandSample {
-            pose_ns: pose.stamp.stamp_ns.min(guidance.pose_ns),
-            guidance_ns: guidance.stamp.stamp_ns,
-            ..self.controller.step(pose.pose(), &guidance)
-        };
-        self.progress = Progress {
-            tick: guidance.stamp.tick,
-            time: guidance.stamp.time(),
-        };
-        self.command
-            .publish(self.progress.tick, self.progress.time, command)?;
+        let (tick, time) = (guidance.stamp.tick, guidance.stamp.time());
+        let command = self.controller.step(&guidance, time);
+        self.command.publish(tick, time, command)?;
+        self.progress = Progress { tick, time };
         Ok(self.progress)
     }
 }

@@ -1,9 +1,11 @@
 //! Align the robot with the guidance, and let alignment set the speed.
 
 use common::{
-    kinematics::{DifferentialDrive, Pose2, Twist},
+    clock::MissionTime,
+    kinematics::{DifferentialDrive, Twist},
     mission::{Method, Mission},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
+    step::{ForeignState, Step},
 };
 use glam::DVec2;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -54,6 +56,18 @@ impl Side {
     }
 }
 
+/// How alignment becomes speed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SpeedLaw {
+    /// The paper's (16): the robot drives while it turns.
+    Paper {
+        /// Whether alignment slows it at all.
+        modulated: bool,
+    },
+    /// The evidential method's: it turns on the spot until it faces its way, then drives no faster than guidance allows.
+    Evidential,
+}
+
 /// The controller of (15)-(17).
 #[derive(Clone, Debug)]
 pub struct Controller {
@@ -65,16 +79,18 @@ pub struct Controller {
     look: f64,
     slow_radius: f64,
     dead_zone: f64,
-    modulated: bool,
-    careful: bool,
+    law: SpeedLaw,
     side: Side,
     arrived: bool,
 }
 
-impl Controller {
-    /// For a mission's robot.
-    #[must_use]
-    pub fn new(mission: &Mission) -> Self {
+impl Step for Controller {
+    type Input<'a> = &'a GuidanceSample;
+    type Output = CommandSample;
+    /// None: a robot that arrived is at the target for its next controller, too.
+    type State = ();
+
+    fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let settings = &mission.controller;
         let top = body.top_speed_m_s / body.wheel_radius_m;
@@ -87,59 +103,104 @@ impl Controller {
             look: settings.look_rad_s,
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
-            modulated: settings.modulated,
-            careful: mission.method == Method::Evidential,
+            law: match mission.method {
+                Method::Paper => SpeedLaw::Paper {
+                    modulated: settings.modulated,
+                },
+                Method::Evidential => SpeedLaw::Evidential,
+            },
             side: Side::Left,
             arrived: false,
         }
     }
 
-    /// The command for a robot at `pose` under `guidance`.
-    pub fn step(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample {
+    fn state(&self) -> &() {
+        &()
+    }
+
+    fn restore(&mut self, (): ()) -> Result<(), ForeignState> {
+        Ok(())
+    }
+
+    /// The command under `guidance`, for the pose it was computed for.
+    fn step(&mut self, guidance: &GuidanceSample, _: MissionTime) -> CommandSample {
+        let pose = guidance.pose();
         let distance = pose.position.distance(self.target);
         // Latched: a robot at rest on the edge of the circle must not start again over a count.
         self.arrived |= distance <= self.tolerance;
+        let command = CommandSample {
+            distance_m: distance,
+            pose_ns: guidance.pose_ns,
+            guidance_ns: guidance.stamp.stamp_ns,
+            ..CommandSample::default()
+        };
         if self.arrived {
-            return stand(CommandState::Arrived, distance);
+            return CommandSample {
+                state: CommandState::Arrived.into(),
+                ..command
+            };
         }
         let direction = DVec2::new(guidance.ex, guidance.ey);
-        let status = GuidanceStatus::from_byte(guidance.status);
-        let goes = matches!(status, GuidanceStatus::Along | GuidanceStatus::WayOut);
-        let looks = match status {
-            GuidanceStatus::Look => true,
-            // The paper's method gives no direction then.
-            GuidanceStatus::Unreachable => self.careful,
-            _ => false,
-        };
         // Shared memory is outside too: only a direction is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
-        if !((goes || looks) && unit && distance.is_finite() && pose.heading.is_finite()) {
-            return stand(CommandState::Halt, distance);
-        }
+        let sane = unit && distance.is_finite() && pose.heading.is_finite();
+        let status = GuidanceStatus::from_byte(guidance.status);
         let alignment = Alignment::of(pose.axis(), direction);
-        let omega = self.angular(alignment);
-        let v = if looks {
-            0.0
-        } else if self.careful {
-            self.cautious(alignment, distance, guidance.speed_limit_m_s)
+        let twist = if sane {
+            self.motion(status, alignment, distance, guidance.speed_limit_m_s)
         } else {
-            self.tangential(alignment, omega, distance)
+            None
         };
-        let on_the_spot = looks || self.careful && v == 0.0;
-        let omega = if on_the_spot {
-            self.turn_to(alignment)
-        } else {
-            omega
+        let Some(twist) = twist else {
+            return CommandSample {
+                state: CommandState::Halt.into(),
+                ..command
+            };
         };
-        let wheels = self.drive.wheels(Twist { v, omega });
+        let wheels = self.drive.wheels(twist);
         CommandSample {
             left_rad_s: wheels.left,
             right_rad_s: wheels.right,
-            v_m_s: v,
-            omega_rad_s: omega,
-            distance_m: distance,
+            v_m_s: twist.v,
+            omega_rad_s: twist.omega,
             state: CommandState::Driving.into(),
-            ..CommandSample::default()
+            ..command
+        }
+    }
+}
+
+impl Controller {
+    /// How to move under guidance of that status; none to stand.
+    fn motion(
+        &mut self,
+        status: GuidanceStatus,
+        alignment: Alignment,
+        distance: f64,
+        limit: f64,
+    ) -> Option<Twist> {
+        let on_the_spot = |controller: &mut Self| Twist {
+            v: 0.0,
+            omega: controller.turn_to(alignment),
+        };
+        match (status, self.law) {
+            // The paper's method gives no direction where the target is unreachable.
+            (GuidanceStatus::Look, _) | (GuidanceStatus::Unreachable, SpeedLaw::Evidential) => {
+                Some(on_the_spot(self))
+            }
+            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Paper { modulated }) => {
+                let omega = self.angular(alignment);
+                let v = self.tangential(modulated, alignment, omega, distance);
+                Some(Twist { v, omega })
+            }
+            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
+                let v = self.cautious(alignment, distance, limit);
+                if v == 0.0 {
+                    return Some(on_the_spot(self));
+                }
+                let omega = self.angular(alignment);
+                Some(Twist { v, omega })
+            }
+            _ => None,
         }
     }
 
@@ -156,7 +217,7 @@ impl Controller {
         self.turn * self.side.sign()
     }
 
-    /// The careful method's wc on the spot: to the guidance and no farther, and never so slowly that the
+    /// The evidential method's wc on the spot: to the guidance and no farther, and never so slowly that the
     /// wheels stick.
     fn turn_to(&mut self, alignment: Alignment) -> f64 {
         let angle = alignment.sine.atan2(alignment.cosine).abs();
@@ -165,7 +226,7 @@ impl Controller {
         side * (TURN_GAIN * angle).clamp(least, self.look)
     }
 
-    /// The careful method's vc: none before the robot faces within 45 degrees of the guidance, never more than
+    /// The evidential method's vc: none before the robot faces within 45 degrees of the guidance, never more than
     /// `limit`, and never so little that the wheels stick.
     fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
         let sharp = (alignment.cosine - FRAC_1_SQRT_2) / (1.0 - FRAC_1_SQRT_2);
@@ -186,8 +247,8 @@ impl Controller {
 
     /// (16): vc. Slowing down for the target multiplies what alignment allows; printed as a case of its
     /// own it would override it.
-    fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
-        let aligned = if !self.modulated {
+    fn tangential(&self, modulated: bool, alignment: Alignment, omega: f64, distance: f64) -> f64 {
+        let aligned = if !modulated {
             1.0
         } else if alignment.cosine < 0.0 {
             f64::midpoint(alignment.cosine, 1.0)
@@ -195,14 +256,6 @@ impl Controller {
             1.0 - (omega / self.turn).abs() / 2.0
         };
         self.speed * aligned * (distance / self.slow_radius).min(1.0)
-    }
-}
-
-fn stand(state: CommandState, distance: f64) -> CommandSample {
-    CommandSample {
-        distance_m: distance,
-        state: state.into(),
-        ..CommandSample::default()
     }
 }
 

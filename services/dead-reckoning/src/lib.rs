@@ -1,6 +1,9 @@
-//! Naive dead reckoning: encoder counts to pose, equations (20) and (21).
+//! Dead reckoning: encoder counts to pose, equations (20) and (21).
 //!
-//! [`step`] is the whole of it, pure; [`shell`] wires it to the topics `wheels` and `pose`.
+//! | module | holds |
+//! |---|---|
+//! | [`step`] | the whole of it, pure: one `wheels` sample to one `pose` |
+//! | [`shell`] | wires it to the topics, saves its state |
 
 pub mod shell;
 pub mod step;

@@ -1,4 +1,4 @@
-//! `wheels` in, `pose` out, the state kept before it is told.
+//! `wheels` in, `pose` out, the state saved before the pose is published.
 
 use std::path::Path;
 
@@ -8,19 +8,20 @@ use common::{
     run,
     samples::{PoseSample, WheelSample},
     shell::{Context, Process, Progress, StageError},
+    step::Step as _,
     topics,
 };
 
-use crate::step::{DeadReckoning, State};
+use crate::step::{DeadReckoning, Reckoned, State};
 
 /// Room for the encoded state, bytes: it is under 100.
 const CHECKPOINT_CAPACITY: usize = 256;
 
-/// What the process of the run in `directory` has kept; none before its first tick.
+/// The state that the process of the run in `directory` saved; none before its first tick.
 ///
 /// # Errors
 /// When the file system refuses.
-pub fn kept_state(directory: &Path) -> Result<Option<State>, CheckpointError> {
+pub fn saved_state(directory: &Path) -> Result<Option<State>, CheckpointError> {
     let file = run::checkpoint_file(directory, "dead-reckoning");
     Ok(Checkpoint::open(&file, CHECKPOINT_CAPACITY)?.1)
 }
@@ -38,11 +39,13 @@ pub struct Shell {
 impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let mut reckoning = DeadReckoning::new(&context.run.mission);
-        let (checkpoint, kept) =
+        let (checkpoint, saved) =
             Checkpoint::open::<State>(&context.checkpoint_file(), CHECKPOINT_CAPACITY)?;
-        if let Some(state) = kept {
-            tracing::info!(?state, "pose restored");
-            reckoning.restore(state);
+        if let Some(state) = saved {
+            match reckoning.restore(state) {
+                Ok(()) => tracing::info!(?state, "pose restored"),
+                Err(foreign) => tracing::warn!("{foreign}"),
+            }
         }
         context.waiter.on(context.bus.wakeup(&topics::WHEELS)?);
         Ok(Self {
@@ -58,21 +61,17 @@ impl Process for Shell {
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(wheels) = self.wheels.take()? {
-            let disbelieved = self.reckoning.disbelieved();
-            let pose = self.reckoning.step(&wheels);
-            if self.reckoning.disbelieved() > disbelieved {
+            let (tick, time) = (wheels.stamp.tick, wheels.stamp.time());
+            let Reckoned { pose, rejected } = self.reckoning.step(&wheels, time);
+            if rejected {
                 tracing::warn!(
-                    tick = wheels.stamp.tick,
+                    tick,
                     "the encoder counts began anew or jumped; the pose stays"
                 );
             }
             self.checkpoint.save(self.reckoning.state())?;
-            self.progress = Progress {
-                tick: wheels.stamp.tick,
-                time: wheels.stamp.time(),
-            };
-            self.pose
-                .publish(self.progress.tick, self.progress.time, pose)?;
+            self.progress = Progress { tick, time };
+            self.pose.publish(tick, time, pose)?;
         }
         Ok(self.progress)
     }

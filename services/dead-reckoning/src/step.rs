@@ -5,15 +5,16 @@ use common::{
     kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
     mission::{Body, Integration, Mission},
     samples::{PoseSample, WheelSample},
+    step::{ForeignState, Step},
     wire::{counts_between, counts_restarted},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// How much faster than its top speed a wheel may seem to turn before the counts are disbelieved: a
+/// How much faster than its top speed a wheel may seem to turn before the counts are rejected: a
 /// robot that slides or is pushed does not reach it, a counter that restarted nearly always does.
 const PLAUSIBLE: f64 = 2.0;
-/// Counts always believed, whatever the time between: timestamps jitter by about a tick.
+/// Counts never rejected, whatever the time between: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
 
 /// No robot is switched off and on again and answers sooner, seconds; a link that was killed is back in a tenth.
@@ -43,11 +44,20 @@ struct Last {
     time: MissionTime,
     left: u16,
     right: u16,
-    /// The life of the link that gave it, and the robot's restarts it knew of.
+    /// The generation of the link that gave it, and the robot's restarts it knew of.
     generation: u32,
     restarts: u32,
     v: f64,
     omega: f64,
+}
+
+/// What one wheel sample gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reckoned {
+    /// The pose with it.
+    pub pose: PoseSample,
+    /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays.
+    pub rejected: bool,
 }
 
 /// The integrator of (20) and (21).
@@ -57,13 +67,14 @@ pub struct DeadReckoning {
     body: Body,
     integration: Integration,
     state: State,
-    disbelieved: u64,
 }
 
-impl DeadReckoning {
-    /// At the mission's start.
-    #[must_use]
-    pub fn new(mission: &Mission) -> Self {
+impl Step for DeadReckoning {
+    type Input<'a> = &'a WheelSample;
+    type Output = Reckoned;
+    type State = State;
+
+    fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let start = mission.start_pose();
         Self {
@@ -76,40 +87,35 @@ impl DeadReckoning {
                 travelled: 0.0,
                 last: None,
             },
-            disbelieved: 0,
         }
     }
 
-    /// Go on from a state that was kept.
-    pub const fn restore(&mut self, state: State) {
-        self.state = state;
-    }
-
-    /// What to keep.
-    #[must_use]
-    pub const fn state(&self) -> &State {
+    fn state(&self) -> &State {
         &self.state
     }
 
-    /// Times the counts jumped farther than wheels can turn: the robot restarted its counters.
-    #[must_use]
-    pub const fn disbelieved(&self) -> u64 {
-        self.disbelieved
+    fn restore(&mut self, state: State) -> Result<(), ForeignState> {
+        self.state = state;
+        Ok(())
     }
 
     /// Integrate up to one wheel sample. A tick given twice gives the same pose twice.
-    pub fn step(&mut self, wheels: &WheelSample) -> PoseSample {
-        let time = wheels.stamp.time();
+    fn step(&mut self, wheels: &WheelSample, now: MissionTime) -> Reckoned {
         let (left, right) = (wheels.left_counts, wheels.right_counts);
         let (mut v, mut omega) = (0.0, 0.0);
+        let mut rejected = false;
         if let Some(last) = self.state.last {
             if last.tick == wheels.stamp.tick {
-                return self.sample();
+                return Reckoned {
+                    pose: self.sample(),
+                    rejected,
+                };
             }
-            let elapsed = time.since(last.time).as_secs_f64();
+            let elapsed = now.since(last.time).as_secs_f64();
             let turned = self.turned(last, wheels, elapsed);
+            rejected = turned.is_none();
             // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.
-            let motion = self.drive.twist(turned);
+            let motion = self.drive.twist(turned.unwrap_or_default());
             let pose = Pose2 {
                 position: self.state.position,
                 heading: self.state.heading,
@@ -127,7 +133,7 @@ impl DeadReckoning {
         }
         self.state.last = Some(Last {
             tick: wheels.stamp.tick,
-            time,
+            time: now,
             left,
             right,
             generation: wheels.stamp.generation,
@@ -135,11 +141,16 @@ impl DeadReckoning {
             v,
             omega,
         });
-        self.sample()
+        Reckoned {
+            pose: self.sample(),
+            rejected,
+        }
     }
+}
 
+impl DeadReckoning {
     /// Wheel angles since `last`, radians; none if the counts cannot have come from turning wheels.
-    fn turned(&mut self, last: Last, wheels: &WheelSample, elapsed: f64) -> WheelSpeeds {
+    fn turned(&self, last: Last, wheels: &WheelSample, elapsed: f64) -> Option<WheelSpeeds> {
         let (left, right) = (
             counts_between(last.left, wheels.left_counts),
             counts_between(last.right, wheels.right_counts),
@@ -148,13 +159,12 @@ impl DeadReckoning {
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
         if f64::from(left.abs().max(right.abs())) > limit || restarted(last, wheels, elapsed) {
-            self.disbelieved += 1;
-            return WheelSpeeds::default();
+            return None;
         }
-        WheelSpeeds {
+        Some(WheelSpeeds {
             left: f64::from(left) * per_count,
             right: f64::from(right) * per_count,
-        }
+        })
     }
 
     fn sample(&self) -> PoseSample {
@@ -182,7 +192,7 @@ impl DeadReckoning {
 }
 
 /// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only
-/// what happened between two lives of it has to be told from the counts themselves.
+/// what happened between two generations of it has to be told from the counts themselves.
 fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
     if last.generation == wheels.stamp.generation {
         return last.restarts != wheels.restarts;

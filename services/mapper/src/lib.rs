@@ -1,10 +1,19 @@
 //! The on-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).
 //!
-//! [`step`] is the whole of it, pure; [`shell`] wires it to the topics `pose`, `range` and `grid`.
+//! | module | holds |
+//! |---|---|
+//! | [`step`] | the mapper itself, pure: poses with ranges in, the window of the grid that changed out |
+//! | `sonar_model` | THE numbers that say what an echo, and its absence, tell of the cells around |
+//! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
+//! | `inflation` | occupied cells grown by the robot's body |
+//! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
+//! | `fault` | hazard believed on purpose |
+//! | [`shell`] | wires the step to the topics `pose`, `range`, `directive` and `grid`, saves its state |
 
-mod careful;
-mod dilation;
-mod evidence;
+mod evidence_grid;
+mod evidential;
 mod fault;
+mod inflation;
 pub mod shell;
+mod sonar_model;
 pub mod step;

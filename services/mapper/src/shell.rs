@@ -1,4 +1,4 @@
-//! `pose` and `range` in, `grid` out: a window for each change, a keyframe for each newcomer and now and
+//! `pose`, `range` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
 //! then, nothing but a stamp otherwise, so that every tick goes on to the planner.
 
 use std::time::Duration;
@@ -6,38 +6,18 @@ use std::time::Duration;
 use common::{
     bus::{Reader, SliceWriter},
     clock::MissionTime,
-    grid::{Revision, Window},
+    grid::Part,
     journal::Journal,
     samples::{DirectiveSample, FaultKind, GridHeader, PoseSample, RangeSample},
     shell::{Context, Process, Progress, StageError},
+    step::Step as _,
     topics,
 };
 
-use serde::{Deserialize, Serialize};
+use crate::step::{Belief, Change, Input, Mapper};
 
-use crate::step::{Belief, Mapper};
-
-/// Mission time after which the whole map is said again.
+/// Mission time after which the whole map is published again.
 const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
-
-/// What a belief is made of; a new life makes it again.
-#[derive(Debug, Serialize, Deserialize)]
-enum Event {
-    /// A tick was mapped.
-    Tick {
-        /// Where the robot was.
-        pose: PoseSample,
-        /// What it heard.
-        range: Option<RangeSample>,
-    },
-    /// What was sensed was forgotten.
-    Forget {
-        /// The epoch that began.
-        epoch: u64,
-    },
-    /// It was broken on purpose.
-    Fault(FaultKind),
-}
 
 /// The mapper process.
 #[derive(Debug)]
@@ -56,23 +36,15 @@ pub struct Shell {
 impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let mut mapper = Mapper::new(&context.run.mission);
-        let (journal, kept) =
-            Journal::open::<Belief, Event>(&context.checkpoint_file(), mapper.kept_bytes())?;
-        if kept.state.is_some_and(|belief| !mapper.restore(belief)) {
-            tracing::warn!("the kept belief is of another map; starting from the perimeter");
+        let (journal, saved) =
+            Journal::open::<Belief, Input>(&context.checkpoint_file(), mapper.saved_bytes())?;
+        if let Some(Err(foreign)) = saved.state.map(|belief| mapper.restore(belief)) {
+            tracing::warn!("{foreign}");
         }
-        for event in &kept.entries {
-            match event {
-                Event::Tick { pose, range } => {
-                    mapper.step(pose, range.as_ref());
-                }
-                Event::Forget { epoch } => {
-                    mapper.forget(*epoch);
-                }
-                Event::Fault(fault) => mapper.inject(*fault),
-            }
+        for input in saved.entries {
+            mapper.step(input, MissionTime::default());
         }
-        let version = mapper.belief().version();
+        let version = mapper.state().version();
         if version > 1 {
             tracing::info!(version, "belief restored");
         }
@@ -90,40 +62,32 @@ impl Process for Shell {
             mapper,
             latest_range: None,
             last_keyframe: None,
-            // Of no tick that is open: what is said before the first pose answers nobody.
+            // Of no tick that is open: what is published before the first pose answers nobody.
             progress: Progress::default(),
         })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.pose.take()? {
-            let range = self.range_of(pose.stamp.tick)?;
-            let changed = self.mapper.step(&pose, range.as_ref());
-            self.progress = Progress {
-                tick: pose.stamp.tick,
-                time: pose.stamp.time(),
-            };
-            self.journal.append(&Event::Tick { pose, range })?;
-            self.send(changed, false)?;
+            let (tick, time) = (pose.stamp.tick, pose.stamp.time());
+            let range = self.range_of(tick)?;
+            self.progress = Progress { tick, time };
+            self.take(Input::Tick { pose, range })?;
         }
-        if let Some(directive) = self.directive.newest()?
-            && self.mapper.forget(directive.epoch)
-        {
-            tracing::warn!(epoch = directive.epoch, "sensed belief reset");
-            let epoch = directive.epoch;
-            self.journal.append(&Event::Forget { epoch })?;
-            self.tell_whole()?;
+        if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()? {
+            self.take(Input::Forget { epoch })?;
         }
         if self.grid.has_new_reader() {
-            self.tell_whole()?;
+            self.publish_whole()?;
         }
         Ok(self.progress)
     }
 
-    /// A belief that is wrong is wrong in its checkpoint, too.
+    /// A belief that is wrong is wrong in its journal, too.
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
-        self.mapper.inject(fault);
-        self.journal.append(&Event::Fault(fault))?;
+        let input = Input::Fault(fault);
+        self.mapper.step(input, self.progress.time);
+        self.journal.append(&input)?;
         Ok(true)
     }
 
@@ -131,17 +95,37 @@ impl Process for Shell {
     fn idle(&mut self) -> Result<(), StageError> {
         let due = |last| self.progress.time.since(last) >= KEYFRAME_EVERY;
         if self.last_keyframe.is_none_or(due) {
-            self.tell_whole()?;
+            self.publish_whole()?;
         }
         if self.journal.is_long() {
-            self.journal.snapshot(self.mapper.belief())?;
+            self.journal.snapshot(self.mapper.state())?;
         }
         Ok(())
     }
 }
 
 impl Shell {
-    /// The range sample of `tick`; those before it are dropped, one after it is kept for later.
+    /// Step, save what happened, publish what changed.
+    fn take(&mut self, input: Input) -> Result<(), StageError> {
+        let change = self.mapper.step(input, self.progress.time);
+        if change == Change::None {
+            return Ok(());
+        }
+        if let Input::Forget { epoch } = input {
+            tracing::warn!(epoch, "sensed belief reset");
+        }
+        self.journal.append(&input)?;
+        match change {
+            Change::Window(window) => {
+                let version = self.mapper.state().version();
+                self.publish(Part::of(self.mapper.frame(), window, version))
+            }
+            Change::Whole => self.publish_whole(),
+            Change::None => Ok(()),
+        }
+    }
+
+    /// The range sample of `tick`; those before it are dropped, one after it waits for its pose.
     fn range_of(&mut self, tick: u64) -> Result<Option<RangeSample>, StageError> {
         while self
             .latest_range
@@ -155,29 +139,18 @@ impl Shell {
         Ok(self.latest_range.filter(|range| range.stamp.tick == tick))
     }
 
-    fn tell_whole(&mut self) -> Result<(), StageError> {
+    fn publish_whole(&mut self) -> Result<(), StageError> {
         self.last_keyframe = Some(self.progress.time);
-        self.send(self.mapper.frame().whole(), true)
+        let version = self.mapper.state().version();
+        self.publish(Part::whole(self.mapper.frame(), version))
     }
 
-    fn send(&mut self, window: Window, keyframe: bool) -> Result<(), StageError> {
-        let belief = self.mapper.belief();
-        let frame = self.mapper.frame();
-        let header = GridHeader {
-            part: Revision {
-                frame,
-                window,
-                version: belief.version(),
-                keyframe,
-            }
-            .into(),
-            safety_events: belief.safety_events(),
-            epoch: belief.epoch(),
-            ..GridHeader::default()
-        };
+    fn publish(&mut self, part: Part) -> Result<(), StageError> {
         let Progress { tick, time } = self.progress;
-        self.grid
-            .publish(tick, time, header, frame.cells_of(window, belief.cells()))?;
+        let header = self.mapper.header(part);
+        let cells = self.mapper.state().cells();
+        let cells = self.mapper.frame().cells_of(part.window(), cells);
+        self.grid.publish(tick, time, header, cells)?;
         Ok(())
     }
 }

@@ -1,25 +1,65 @@
 //! The belief: which cells are hazard.
 //!
 //! The paper's map only grows, (10); what it must never swallow is the target's cell, the cells under
-//! the robot, and nothing ever changes the perimeter, (18). The careful method's map follows the evidence,
-//! both ways ([`Memory`]).
+//! the robot, and nothing ever changes the perimeter, (18). The evidential method's map follows the evidence,
+//! both ways ([`Sensed::Evidence`]).
 
 use common::{
-    grid::{Cell, CellState, GridFrame, Window},
+    clock::MissionTime,
+    grid::{Cell, CellState, GridFrame, Part, Window},
     mission::{Method, Mission},
-    samples::{FaultKind, PoseSample, RangeSample, RangeStatus},
+    samples::{FaultKind, GridHeader, PoseSample, RangeSample, RangeStatus},
+    step::{ForeignState, Step},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    careful::{Memory, Reading, united},
-    evidence::Evidence,
+    evidential::{EvidenceMap, Evidential, Reading},
     fault,
 };
 
 /// "4 cm or nearer" is mapped at 4 cm.
 const CONTACT_M: f64 = 0.04;
+
+/// What the mapper takes. The belief is the fold of its inputs, so they are what its journal holds, too.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Input {
+    /// The pose of a tick, and what the sonar gave in it.
+    Tick {
+        /// Where the robot was.
+        pose: PoseSample,
+        /// The reading; none if it did not come.
+        range: Option<RangeSample>,
+    },
+    /// The supervisor's reset of the sensed belief.
+    Forget {
+        /// The epoch that begins; one that has begun already is ignored.
+        epoch: u64,
+    },
+    /// Break the belief like this, on purpose, from the next tick on.
+    Fault(FaultKind),
+}
+
+/// What an input did to the map: what is to be published.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Nothing, and nobody waits for an answer.
+    None,
+    /// This window may have changed; an empty one answers the tick.
+    Window(Window),
+    /// All of it.
+    Whole,
+}
+
+/// What was sensed, by the method that the mission chose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+enum Sensed {
+    /// The paper's: hits are in the cells themselves, and stay.
+    Hits,
+    /// The evidential method's: evidence, from which the cells follow.
+    Evidence(EvidenceMap),
+}
 
 /// What must survive the process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,8 +81,8 @@ pub struct Belief {
     heading: f64,
     /// What its wheels had rolled on average, turns on the spot included, metres.
     rolled: f64,
-    /// What was heard; none in the paper's method.
-    evidence: Option<Evidence>,
+    /// What the sonar gave.
+    sensed: Sensed,
     /// What it was broken by on purpose.
     fault: FaultKind,
 }
@@ -65,25 +105,17 @@ impl Belief {
     pub const fn safety_events(&self) -> u64 {
         self.safety_events
     }
-
-    /// Resets of the sensed belief.
-    #[must_use]
-    pub const fn epoch(&self) -> u64 {
-        self.epoch
-    }
 }
 
-/// The mapper of (19), or of the careful method.
+/// The mapper of (19), or of the evidential method.
 #[derive(Clone, Debug)]
 pub struct Mapper {
     frame: GridFrame,
     target_m: DVec2,
     target: Option<Cell>,
+    /// The paper's Im of (19).
     margin: i64,
-    /// How far a surface blocks the cells around it, metres.
-    reach: f64,
-    /// What turns evidence into hazard; none in the paper's method.
-    memory: Option<Memory>,
+    evidential: Evidential,
     map_within: f64,
     sensor_forward: f64,
     sensor_bearing: f64,
@@ -92,21 +124,27 @@ pub struct Mapper {
     belief: Belief,
 }
 
-impl Mapper {
+impl Step for Mapper {
+    type Input<'a> = Input;
+    type Output = Change;
+    type State = Belief;
+
     /// (18) and what the mission knows beforehand.
-    #[must_use]
-    pub fn new(mission: &Mission) -> Self {
+    fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
         let margin = mission.margin_cells();
-        let memory = (mission.method == Method::Evidential).then(|| Memory::new(mission));
-        // A known surface blocks what a hit on it would: its cell and the margin around.
-        let around_a_hit = (f64::from(margin) + 0.5) * frame.resolution_m;
+        let evidential = Evidential::new(mission);
+        let (sensed, reach) = match mission.method {
+            // A known surface blocks what a hit on it would: its cell and the margin around.
+            Method::Paper => (Sensed::Hits, (f64::from(margin) + 0.5) * frame.resolution_m),
+            Method::Evidential => (Sensed::Evidence(evidential.empty()), evidential.reach()),
+        };
         let mut mapper = Self {
             frame,
             target_m: mission.target,
             target: frame.cell_at(mission.target),
             margin: i64::from(margin),
-            reach: memory.as_ref().map_or(around_a_hit, Memory::reach),
+            evidential,
             map_within: mission.mapper.map_within_m,
             sensor_forward: mission.sonar.forward_m,
             sensor_bearing: mission.sonar.bearing_deg.to_radians(),
@@ -121,18 +159,75 @@ impl Mapper {
                 robot: DVec2::ZERO,
                 heading: mission.start_pose().heading,
                 rolled: 0.0,
-                evidence: memory.as_ref().map(Memory::unheard),
+                sensed,
                 fault: FaultKind::Nothing,
             },
-            memory,
         };
-        mapper.lay_foundation(mission);
+        mapper.mark_known(mission, reach);
         mapper
     }
 
-    fn lay_foundation(&mut self, mission: &Mission) {
+    fn state(&self) -> &Belief {
+        &self.belief
+    }
+
+    fn restore(&mut self, mut belief: Belief) -> Result<(), ForeignState> {
+        match (&self.belief.sensed, &mut belief.sensed) {
+            (Sensed::Hits, Sensed::Hits) => {}
+            (Sensed::Evidence(_), Sensed::Evidence(map)) => self.evidential.complete(map)?,
+            _ => return Err(ForeignState),
+        }
+        if belief.cells.len() != self.frame.area() {
+            return Err(ForeignState);
+        }
+        self.belief = belief;
+        Ok(())
+    }
+
+    fn step(&mut self, input: Input, _: MissionTime) -> Change {
+        match input {
+            Input::Tick { pose, range } => Change::Window(self.map(&pose, range.as_ref())),
+            Input::Forget { epoch } if self.forget(epoch) => Change::Whole,
+            Input::Forget { .. } => Change::None,
+            Input::Fault(fault) => {
+                self.belief.fault = fault;
+                Change::None
+            }
+        }
+    }
+}
+
+impl Mapper {
+    /// How the map lies.
+    #[must_use]
+    pub const fn frame(&self) -> GridFrame {
+        self.frame
+    }
+
+    /// Bytes that an encoded belief has at most.
+    #[must_use]
+    pub const fn saved_bytes(&self) -> usize {
+        let evidence = match self.belief.sensed {
+            Sensed::Hits => 0,
+            Sensed::Evidence(_) => self.evidential.saved_bytes(),
+        };
+        self.frame.area() + evidence + 128
+    }
+
+    /// The header of a `grid` sample with `part` of this belief.
+    #[must_use]
+    pub fn header(&self, part: Part) -> GridHeader {
+        GridHeader {
+            part,
+            safety_events: self.belief.safety_events,
+            epoch: self.belief.epoch,
+            ..GridHeader::default()
+        }
+    }
+
+    /// Everything within `reach` metres of what the mission knows is hazard, and so is the perimeter.
+    fn mark_known(&mut self, mission: &Mission, reach: f64) {
         let frame = self.frame;
-        let reach = self.reach;
         let last = f64::from(frame.cells) - 1.0;
         for piece in mission.known.pieces() {
             let (least, greatest) = piece.bounds();
@@ -157,42 +252,9 @@ impl Mapper {
         }
     }
 
-    /// How the map lies.
-    #[must_use]
-    pub const fn frame(&self) -> GridFrame {
-        self.frame
-    }
-
-    /// What is believed, and what to keep.
-    #[must_use]
-    pub const fn belief(&self) -> &Belief {
-        &self.belief
-    }
-
-    /// Go on from a belief that was kept; one of another map is refused.
-    pub fn restore(&mut self, belief: Belief) -> bool {
-        let evidence_fits = match (&mut self.memory, &belief.evidence) {
-            (Some(memory), Some(evidence)) => memory.restore(evidence),
-            (None, None) => true,
-            _ => false,
-        };
-        let fits = evidence_fits && belief.cells.len() == self.frame.area();
-        if fits {
-            self.belief = belief;
-        }
-        fits
-    }
-
-    /// Bytes that a belief to keep has at most.
-    #[must_use]
-    pub fn kept_bytes(&self) -> usize {
-        let evidence = self.memory.as_ref().map_or(0, Memory::kept_bytes);
-        self.frame.area() + evidence + 128
-    }
-
     /// Map one reading taken at `pose`. Returns the window that changed, empty for none. A tick given
     /// twice is mapped once.
-    pub fn step(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
+    fn map(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
         if self.belief.tick == Some(pose.stamp.tick) {
             return Window::default();
         }
@@ -202,12 +264,11 @@ impl Mapper {
         self.belief.rolled += last.distance(now.position)
             + self.half_track * (now.heading - self.belief.heading).abs();
         (self.belief.robot, self.belief.heading) = (now.position, now.heading);
-        let changed = if self.memory.is_some() {
-            self.weigh(pose, range, rolled)
-        } else {
-            self.mark_hit(pose, range)
+        let changed = match &self.belief.sensed {
+            Sensed::Hits => self.mark_hit(pose, range),
+            Sensed::Evidence(_) => self.weigh(pose, range, rolled),
         };
-        let changed = united(changed, self.falsify());
+        let changed = changed.union(self.falsify());
         self.belief.version += u64::from(changed.area() > 0);
         changed
     }
@@ -228,9 +289,9 @@ impl Mapper {
         changed
     }
 
-    /// The careful method: what the reading says for and against hazard, and where it looked.
+    /// The evidential method: what the reading says for and against hazard, and where it looked.
     fn weigh(&mut self, pose: &PoseSample, range: Option<&RangeSample>, rolled: f64) -> Window {
-        let (Some(memory), Some(evidence)) = (&mut self.memory, &mut self.belief.evidence) else {
+        let Sensed::Evidence(map) = &mut self.belief.sensed else {
             return Window::default();
         };
         let robot = pose.pose();
@@ -243,9 +304,9 @@ impl Mapper {
             axis: DVec2::from_angle(robot.heading + self.sensor_bearing),
             echo,
         });
-        let stale = memory.roll(evidence, rolled, self.belief.rolled);
-        let news = memory.take(evidence, robot.position, reading);
-        let changed = self.redraw(united(stale, news.window));
+        let stale = self.evidential.roll(map, rolled, self.belief.rolled);
+        let news = self.evidential.take(map, robot.position, reading);
+        let changed = self.redraw(stale.union(news.window));
         self.belief.safety_events += u64::from(news.safety_event);
         changed
     }
@@ -253,7 +314,7 @@ impl Mapper {
     /// Bring the cells of `window` up to date with the evidence; the window that changed.
     fn redraw(&mut self, window: Window) -> Window {
         let mut changed = Window::default();
-        let (Some(memory), Some(evidence)) = (&self.memory, &self.belief.evidence) else {
+        let Sensed::Evidence(map) = &self.belief.sensed else {
             return changed;
         };
         for row in window.row..window.row + window.height {
@@ -262,7 +323,7 @@ impl Mapper {
                 let index = self.frame.index(cell);
                 let state = match CellState::from_byte(self.belief.cells[index]) {
                     fixed @ (CellState::Known | CellState::Perimeter) => fixed,
-                    _ => memory.state(evidence, cell, Some(cell) == self.target),
+                    _ => self.evidential.state(map, cell, Some(cell) == self.target),
                 } as u8;
                 if self.belief.cells[index] != state {
                     self.belief.cells[index] = state;
@@ -303,18 +364,21 @@ impl Mapper {
     }
 
     /// Forget what was sensed, if `epoch` is newer than the belief's: back to the perimeter and what
-    /// was known beforehand; the careful method keeps what was heard near the robot. Says whether it did.
-    pub fn forget(&mut self, epoch: u64) -> bool {
+    /// was known beforehand; the evidential method keeps what was heard near the robot. Says whether it did.
+    fn forget(&mut self, epoch: u64) -> bool {
         if epoch <= self.belief.epoch {
             return false;
         }
-        if let (Some(memory), Some(evidence)) = (&mut self.memory, &mut self.belief.evidence) {
-            memory.forget(evidence, self.belief.robot, epoch);
-            self.redraw(self.frame.whole());
-        } else {
-            for cell in &mut self.belief.cells {
-                if *cell == CellState::Sensed as u8 {
-                    *cell = CellState::Free as u8;
+        match &mut self.belief.sensed {
+            Sensed::Evidence(map) => {
+                self.evidential.forget(map, self.belief.robot, epoch);
+                self.redraw(self.frame.whole());
+            }
+            Sensed::Hits => {
+                for cell in &mut self.belief.cells {
+                    if *cell == CellState::Sensed as u8 {
+                        *cell = CellState::Free as u8;
+                    }
                 }
             }
         }
@@ -323,11 +387,6 @@ impl Mapper {
         self.belief.epoch = epoch;
         self.belief.version += 1;
         true
-    }
-
-    /// Break the belief like this, on purpose, from the next tick on.
-    pub fn inject(&mut self, fault: FaultKind) {
-        self.belief.fault = fault;
     }
 
     /// What the fault in it puts on the map; the window that changed.
@@ -340,8 +399,9 @@ impl Mapper {
             for col in 0..self.frame.cells {
                 let cell = Cell { col, row };
                 let state = &mut self.belief.cells[self.frame.index(cell)];
-                let spared = Some(cell) == self.target || CellState::from_byte(*state).is_hazard();
-                if !spared && area.covers(self.frame.centre_of(cell), self.frame.resolution_m) {
+                let kept_free =
+                    Some(cell) == self.target || CellState::from_byte(*state).is_hazard();
+                if !kept_free && area.covers(self.frame.centre_of(cell), self.frame.resolution_m) {
                     *state = CellState::Sensed as u8;
                     changed = changed.including(cell);
                 }

@@ -4,10 +4,10 @@
 //!
 //! - [`step`]: follows the `grid`, keeps the field up to date, answers for a pose; pure.
 //! - [`shell`]: wires it to the topics.
-//! - [`beside`]: the thread of full solves beside the live field.
+//! - [`background_solver`]: the thread of full solves beside the live field.
 
-pub mod beside;
+mod active_sensing;
+pub mod background_solver;
 mod fault;
-mod lookout;
 pub mod shell;
 pub mod step;

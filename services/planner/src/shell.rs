@@ -5,23 +5,19 @@ use std::time::Instant;
 use common::{
     bus::{Reader, SliceReader, SliceWriter, Writer},
     clock::{MissionClock, MissionTime},
-    grid::Revision,
+    grid::Part,
     samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
+    step::Step as _,
     topics::{self, AnyTopic as _},
 };
 
 use harmonic::SolveError;
 
 use crate::{
-    beside::{BesideSolver, Solved},
-    step::{Planner, Work},
+    background_solver::BackgroundSolver,
+    step::{Input, Planner, Solved, Work},
 };
-
-/// On a clock of ticks the result of a full solve beside the live field is swapped in so many ticks after
-/// it began, sooner never and later never, so that a run can be repeated. At 7 Hz the largest map is solved
-/// by then on a wall clock, too.
-const SWAP_AFTER_TICKS: u64 = 2;
 
 /// The planner process.
 #[derive(Debug)]
@@ -31,7 +27,7 @@ pub struct Shell {
     guidance: Writer<GuidanceSample>,
     field: SliceWriter<FieldHeader, FieldCell>,
     planner: Planner,
-    beside: BesideSolver,
+    background: BackgroundSolver,
     /// On a clock of ticks, the tick at which the job that runs is swapped in.
     swap_at: Option<u64>,
     in_ticks: bool,
@@ -43,9 +39,9 @@ pub struct Shell {
     field_version: u64,
     field_changed: bool,
     /// The policy that consumers hold.
-    told: Vec<FieldCell>,
-    change_told: Option<MissionTime>,
-    keyframe_told: Option<MissionTime>,
+    published: Vec<FieldCell>,
+    change_published: Option<MissionTime>,
+    keyframe_published: Option<MissionTime>,
     progress: Progress,
 }
 
@@ -55,10 +51,10 @@ impl Process for Shell {
         let mission = &context.run.mission;
         let longest = mission.grid_frame().area();
         context.waiter.on(context.bus.wakeup(&topics::GRID)?);
-        let beside = BesideSolver::start().map_err(|error| {
+        let background = BackgroundSolver::start().map_err(|error| {
             StageError::Other(format!("cannot start the thread of full solves: {error}"))
         })?;
-        context.waiter.on_readable(&beside)?;
+        context.waiter.on_readable(&background)?;
         Ok(Self {
             grid: context.bus.slice_reader(&topics::GRID)?,
             pose: context.bus.reader(&topics::POSE)?,
@@ -67,7 +63,7 @@ impl Process for Shell {
                 .bus
                 .slice_writer(&topics::FIELD, generation, longest)?,
             planner: Planner::new(mission),
-            beside,
+            background,
             swap_at: None,
             in_ticks: matches!(context.run.clock, MissionClock::Ticks { .. }),
             latest_pose: None,
@@ -76,9 +72,9 @@ impl Process for Shell {
             local_update_ns: 0,
             field_version: 0,
             field_changed: false,
-            told: Vec::new(),
-            change_told: None,
-            keyframe_told: None,
+            published: Vec::new(),
+            change_published: None,
+            keyframe_published: None,
             progress: Progress::default(),
         })
     }
@@ -93,15 +89,13 @@ impl Process for Shell {
     }
 
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
-        let robot = self.latest_pose.unwrap_or_default().pose();
-        let broken = self.planner.inject(fault, robot.position);
-        self.field_changed |= broken;
-        Ok(broken)
+        let robot = self.latest_pose.unwrap_or_default().pose().position;
+        Ok(self.work(Input::Fault { fault, robot })?.changed())
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
-        self.begin_beside();
-        self.tell_field()
+        self.begin_background_solve()?;
+        self.publish_field()
     }
 }
 
@@ -111,21 +105,21 @@ fn no_field(error: SolveError) -> StageError {
 }
 
 impl Shell {
-    /// Swap in the full solves that ran beside the live field. Says whether there was one.
+    /// Swap in what the background solver gave. Says whether there was anything.
     fn swap_in_what_is_due(&mut self) -> Result<bool, StageError> {
         let tick = self.progress.tick;
         let mut swapped = false;
-        if self.planner.beside().is_none() {
+        if self.planner.running_job().is_none() {
             self.swap_at = None;
         }
         if !self.in_ticks {
-            while let Some(solved) = self.beside.take() {
+            while let Some(solved) = self.background.take() {
                 swapped |= self.swap_in(solved)?;
             }
         } else if self.swap_at.is_some_and(|at| tick >= at) {
             self.swap_at = None;
-            let number = self.planner.beside();
-            while let Some(solved) = self.beside.wait() {
+            let number = self.planner.running_job();
+            while let Some(solved) = self.background.wait() {
                 let awaited = Some(solved.number) == number;
                 swapped |= self.swap_in(solved)?;
                 if awaited {
@@ -136,76 +130,59 @@ impl Shell {
         Ok(swapped)
     }
 
+    /// An input that may change the field.
+    fn work(&mut self, input: Input<'_>) -> Result<Work, StageError> {
+        let outcome = self.planner.step(input, self.progress.time);
+        let work = outcome.map_err(no_field)?.work;
+        self.field_changed |= work.changed();
+        Ok(work)
+    }
+
     /// Begin the full solve that is called for, if one is.
-    fn begin_beside(&mut self) {
-        let Some(job) = self.planner.begin_beside() else {
-            return;
-        };
-        tracing::debug!(
-            number = job.number,
-            urgent = job.urgent,
-            "full solve begins"
-        );
-        // A robot that waits for it waits no longer than it must.
-        let after = if job.urgent { 1 } else { SWAP_AFTER_TICKS };
-        self.swap_at = Some(self.progress.tick + after);
-        self.beside.begin(job);
+    fn begin_background_solve(&mut self) -> Result<(), StageError> {
+        let outcome = self.planner.step(Input::Lull, self.progress.time);
+        if let Some(job) = outcome.map_err(no_field)?.job {
+            let (number, urgent) = (job.number, job.urgent);
+            tracing::debug!(number, urgent, "full solve begins");
+            self.swap_at = Some(self.progress.tick + job.swap_after_ticks());
+            self.background.begin(job);
+        }
+        Ok(())
     }
 
     fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
-        let Solved {
-            number,
-            result,
-            took_ns,
-        } = solved;
-        match result {
-            Ok((domain, field)) => {
-                let swapped = self
-                    .planner
-                    .swap_in(number, domain, field)
-                    .map_err(no_field)?;
-                if swapped {
-                    self.field_changed = true;
-                    self.full_solve_ns = took_ns;
-                }
-                Ok(swapped)
-            }
-            Err(SolveError::Cancelled) => Ok(false),
-            Err(error) => Err(no_field(error)),
+        let took_ns = solved.took_ns;
+        let swapped = self.work(Input::Solved(solved))? == Work::SwappedIn;
+        if swapped {
+            self.full_solve_ns = took_ns;
         }
+        Ok(swapped)
     }
 
     /// Follow every grid sample that came. Says whether an answer is due.
     fn follow_grid(&mut self) -> Result<bool, StageError> {
         let mut asked = false;
         while let Some(grid) = self.grid.take()? {
+            let GridHeader { stamp, part, .. } = *grid.header();
             let began = Instant::now();
-            let work = self
-                .planner
-                .take_grid(grid.header(), &grid)
-                .map_err(no_field)?;
-            let took = began.elapsed().as_nanos() as u64;
+            let work = self.work(Input::Grid {
+                header: grid.header(),
+                cells: &grid,
+            })?;
+            let took_ns = began.elapsed().as_nanos() as u64;
             match work {
                 Work::Missed => {
-                    tracing::warn!(
-                        version = grid.header().part.version,
-                        "missed a grid version"
-                    );
+                    tracing::warn!(version = part.version, "missed a grid version");
                     continue;
                 }
-                Work::None => {}
                 Work::FullSolve => {
-                    self.full_solve_ns = took;
-                    self.field_changed = true;
-                    tracing::info!(took_us = took / 1000, "full solve");
+                    self.full_solve_ns = took_ns;
+                    tracing::info!(took_us = took_ns / 1000, "full solve");
                 }
-                Work::LocalUpdate => {
-                    self.local_update_ns = took;
-                    self.field_changed = true;
-                }
+                Work::LocalUpdate => self.local_update_ns = took_ns,
+                Work::None | Work::SwappedIn | Work::Broken => {}
             }
-            let GridHeader { stamp, part, .. } = *grid.header();
-            // The whole map, told again behind the tick it belongs to, asks for nothing; a tick that is
+            // The whole map, published again behind the tick it belongs to, asks for nothing; a tick that is
             // given again was not answered to the end.
             asked |= part.keyframe == 0 || self.answered != Some(stamp.tick) || work != Work::None;
             self.progress = Progress {
@@ -221,31 +198,34 @@ impl Shell {
         if let Some(pose) = self.pose.newest()? {
             self.latest_pose = Some(pose);
         }
-        // A grid for newcomers may be of a tick that is over.
+        // A grid for new readers may be of a tick that is over.
         let tick = self.progress.tick;
         let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) else {
             return Ok(());
         };
-        let guidance = GuidanceSample {
-            pose_ns: pose.stamp.stamp_ns,
-            full_solve_ns: self.full_solve_ns,
-            local_update_ns: self.local_update_ns,
-            ..self.planner.guide(&pose.pose())
-        };
         let Progress { tick, time } = self.progress;
-        self.guidance.publish(tick, time, guidance)?;
+        let outcome = self.planner.step(Input::Pose(&pose), time);
+        if let Some(guidance) = outcome.map_err(no_field)?.guidance {
+            let guidance = GuidanceSample {
+                full_solve_ns: self.full_solve_ns,
+                local_update_ns: self.local_update_ns,
+                ..guidance
+            };
+            self.guidance.publish(tick, time, guidance)?;
+        }
         self.answered = Some(tick);
         Ok(())
     }
 
     /// The field for consumers, after the robot has its guidance: what changed, or all of it when it was
-    /// not told for long or somebody new listens.
-    fn tell_field(&mut self) -> Result<(), StageError> {
-        let since = |told: Option<MissionTime>| told.map(|told| self.progress.time.since(told));
+    /// not published for long or there is a new reader.
+    fn publish_field(&mut self) -> Result<(), StageError> {
+        let since = |then: Option<MissionTime>| then.map(|then| self.progress.time.since(then));
         let keyframe = self.field.has_new_reader()
-            || since(self.keyframe_told).is_none_or(|age| age >= topics::FIELD.restated_every());
+            || since(self.keyframe_published)
+                .is_none_or(|age| age >= topics::FIELD.restated_every());
         let change = self.field_changed
-            && since(self.change_told)
+            && since(self.change_published)
                 .is_none_or(|age| age >= topics::FIELD.changes_at_most_every());
         if !(keyframe || change) {
             return Ok(());
@@ -254,10 +234,10 @@ impl Shell {
             return Ok(());
         };
         self.field_changed = false;
-        self.change_told = Some(self.progress.time);
-        let comparable = self.told.len() == cells.len();
+        self.change_published = Some(self.progress.time);
+        let comparable = self.published.len() == cells.len();
         let changed = if comparable {
-            frame.changed_window(&self.told, &cells)
+            frame.changed_window(&self.published, &cells)
         } else {
             frame.whole()
         };
@@ -267,24 +247,18 @@ impl Shell {
         } else if !keyframe {
             return Ok(());
         }
-        let window = if keyframe { frame.whole() } else { changed };
-        if keyframe {
-            self.keyframe_told = Some(self.progress.time);
-        }
-        let header = FieldHeader {
-            part: Revision {
-                frame,
-                window,
-                version: self.field_version,
-                keyframe,
-            }
-            .into(),
-            ..header
+        let version = self.field_version;
+        let part = if keyframe {
+            self.keyframe_published = Some(self.progress.time);
+            Part::whole(frame, version)
+        } else {
+            Part::of(frame, changed, version)
         };
+        let header = FieldHeader { part, ..header };
         let Progress { tick, time } = self.progress;
-        let part = frame.cells_of(window, &cells);
-        self.field.publish(tick, time, header, part)?;
-        self.told = cells;
+        let window = frame.cells_of(part.window(), &cells);
+        self.field.publish(tick, time, header, window)?;
+        self.published = cells;
         Ok(())
     }
 }

@@ -1,10 +1,16 @@
 //! The stage, pure: follow the `grid`, keep the field right, answer for a pose.
 
+mod input;
+
 use common::{
-    grid::{Applied, CellState, GridFrame, Replica, Window},
+    clock::MissionTime,
+    grid::{self, Applied, CellState, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
-    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus},
+    samples::{
+        FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample,
+    },
+    step::{ForeignState, Step},
 };
 use glam::DVec2;
 use harmonic::{
@@ -12,29 +18,27 @@ use harmonic::{
     Verdict,
 };
 
+use crate::active_sensing::{ActiveSensing, Advice, View};
 use crate::{
     fault::lead_astray,
-    lookout::{Advice, Lookout, View},
 };
+
+pub use input::{Input, Job, Outcome, Solved, Work};
 
 /// Maps of at most this many cells are solved in full at once where a local update is not enough: that takes less
 /// than a thread takes to begin.
 const SMALL: usize = 1 << 14;
 
-/// How fast a careful robot leaves a hazard it stands in, m/s: something is near.
+/// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// What taking a grid sample led to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Work {
-    /// Nothing changed.
-    None,
-    /// The field was computed anew.
-    FullSolve,
-    /// The field was brought up to date around what changed.
-    LocalUpdate,
-    /// A version is missing: the field is as it was until a keyframe comes.
-    Missed,
+/// What a direction of the field is checked for before it is given.
+#[derive(Clone, Copy, Debug)]
+enum Advisor {
+    /// The paper's method: nothing, the robot goes where the field points.
+    Follow,
+    /// The evidential method: whether the sonar looked there.
+    LookFirst(ActiveSensing),
 }
 
 /// The planner of (11).
@@ -42,83 +46,103 @@ pub enum Work {
 pub struct Planner {
     target: DVec2,
     screening: Screening,
-    /// None in the paper's method.
-    lookout: Option<Lookout>,
+    advisor: Advisor,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
-    solved: Option<Solved>,
-    /// A full solve would do the field good.
-    advised: bool,
+    live: Option<Live>,
+    /// A full solve is called for: the field was brought up to date as well as that goes.
+    solve_advised: bool,
     /// Until then the field is not to be followed: a passage closed or opened.
     unsafe_until_solved: bool,
     /// Broken on purpose: no direction is given, wherever the robot is.
     on_a_saddle: bool,
-    beside: Option<Beside>,
+    running: Option<Running>,
     jobs: u64,
     full_solves: u64,
     local_updates: u64,
 }
 
-/// A field and the domain it is of.
+/// The live field and the domain it is of.
 #[derive(Debug)]
-struct Solved {
+struct Live {
     frame: GridFrame,
     domain: Domain,
     field: Field,
 }
 
-/// The full solve that runs beside the live field.
+/// The job that the background solver runs.
 #[derive(Debug)]
-struct Beside {
+struct Running {
     number: u64,
     urgent: bool,
     /// What changed since its map was taken.
     since: Vec<Change>,
 }
 
-/// A full solve to run beside the live field.
-#[derive(Debug)]
-pub struct Job {
-    /// Names it.
-    pub number: u64,
-    /// Whether the live field waits for it.
-    pub urgent: bool,
-    /// The map to solve.
-    pub domain: Domain,
-}
+impl Step for Planner {
+    type Input<'a> = Input<'a>;
+    type Output = Result<Outcome, SolveError>;
+    /// None: the mapper publishes a keyframe for each new planner.
+    type State = ();
 
-impl Planner {
-    /// For a mission; it knows nothing until the first keyframe.
-    #[must_use]
-    pub fn new(mission: &Mission) -> Self {
+    /// It knows nothing until the first keyframe.
+    fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
             screening: screening(mission),
-            lookout: (mission.method == Method::Evidential).then(|| Lookout::new(mission)),
+            advisor: match mission.method {
+                Method::Paper => Advisor::Follow,
+                Method::Evidential => Advisor::LookFirst(ActiveSensing::new(mission)),
+            },
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
             belief: GridHeader::default(),
-            solved: None,
-            advised: false,
+            live: None,
+            solve_advised: false,
             unsafe_until_solved: false,
             on_a_saddle: false,
-            beside: None,
+            running: None,
             jobs: 0,
             full_solves: 0,
             local_updates: 0,
         }
     }
 
-    /// Follow one grid sample.
-    ///
+    fn state(&self) -> &() {
+        &()
+    }
+
+    fn restore(&mut self, (): ()) -> Result<(), ForeignState> {
+        Ok(())
+    }
+
     /// # Errors
-    /// When the field cannot be solved: the target's cell is hazard, or the map is no map.
-    pub fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
-        let work = match self.grid.apply(&header.part.revision(), cells) {
+    /// When there is no field: the target's cell is hazard, or the map is no map.
+    fn step(&mut self, input: Input<'_>, _: MissionTime) -> Result<Outcome, SolveError> {
+        Ok(match input {
+            Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
+            Input::Pose(pose) => Outcome {
+                guidance: Some(self.guide(pose)),
+                ..Outcome::default()
+            },
+            Input::Lull => Outcome {
+                job: self.begin_job(),
+                ..Outcome::default()
+            },
+            Input::Solved(solved) => self.swap_in(solved)?.into(),
+            Input::Fault { fault, robot } => self.corrupt(fault, robot).into(),
+        })
+    }
+}
+
+impl Planner {
+    /// Follow one grid sample.
+    fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
+        let work = match self.grid.apply(&header.part, cells) {
             Applied::Missed => Work::Missed,
             Applied::Whole => self.solve()?,
-            Applied::Window(window) if window.area() == 0 && self.solved.is_some() => Work::None,
+            Applied::Window(window) if window.area() == 0 && self.live.is_some() => Work::None,
             Applied::Window(window) => self.update(window)?,
         };
         if work != Work::Missed {
@@ -128,22 +152,23 @@ impl Planner {
     }
 
     fn solve(&mut self) -> Result<Work, SolveError> {
-        self.solved = None;
-        self.beside = None;
-        self.advised = false;
+        self.live = None;
+        self.running = None;
+        self.solve_advised = false;
         self.unsafe_until_solved = false;
         let Some(frame) = self.grid.frame() else {
             return Ok(Work::Missed);
         };
         let side = frame.cells as usize;
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
-        let target = frame.to_cells(self.target).round().as_u64vec2();
-        let target = Cell::new(target.x as usize, target.y as usize);
+        // The solver refuses a target outside the map.
+        let target = frame.cell_at(self.target);
+        let target = target.map_or(Cell::new(side, side), field_cell);
         let domain =
             Domain::new(side, side, blocked.collect(), target)?.with_screening(&self.screening)?;
         let field = self.solver.solve(&domain, &Cancellation::default())?;
         self.full_solves += 1;
-        self.solved = Some(Solved {
+        self.live = Some(Live {
             frame,
             domain,
             field,
@@ -152,26 +177,24 @@ impl Planner {
     }
 
     fn update(&mut self, window: Window) -> Result<Work, SolveError> {
-        let Some(solved) = &mut self.solved else {
+        let Some(live) = &mut self.live else {
             return self.solve();
         };
-        let changes = changes_in(&solved.domain, &solved.frame, window, self.grid.cells());
+        let changes = changes_in(&live.domain, &live.frame, window, self.grid.cells());
         if changes.is_empty() {
             return Ok(Work::None);
         }
-        if let Some(beside) = &mut self.beside {
-            beside.since.extend_from_slice(&changes);
+        if let Some(running) = &mut self.running {
+            running.since.extend_from_slice(&changes);
         }
         let verdict = self.solver.update(
-            &mut solved.domain,
-            &mut solved.field,
+            &mut live.domain,
+            &mut live.field,
             &changes,
             &Cancellation::default(),
         )?;
-        if verdict != Verdict::Accurate && solved.frame.area() <= SMALL {
-            solved.field = self
-                .solver
-                .solve(&solved.domain, &Cancellation::default())?;
+        if verdict != Verdict::Accurate && live.frame.area() <= SMALL {
+            live.field = self.solver.solve(&live.domain, &Cancellation::default())?;
             self.full_solves += 1;
             return Ok(Work::FullSolve);
         }
@@ -181,101 +204,99 @@ impl Planner {
     }
 
     fn heed(&mut self, verdict: Verdict) {
-        self.advised |= verdict != Verdict::Accurate;
+        self.solve_advised |= verdict != Verdict::Accurate;
         self.unsafe_until_solved |= verdict == Verdict::PassageClosed;
     }
 
-    /// The full solve to begin beside the live field, if one is called for. One runs at a time and is
+    /// The full solve for the background solver, if one is called for. One runs at a time and is
     /// left to finish, or a robot that senses in every tick would never see one finish; only a passage
     /// that closed makes the newest map win at once: then the job before is stale, its result unwanted.
-    pub fn begin_beside(&mut self) -> Option<Job> {
+    fn begin_job(&mut self) -> Option<Job> {
         let busy = self
-            .beside
+            .running
             .as_ref()
-            .is_some_and(|beside| beside.urgent || !self.unsafe_until_solved);
-        if !self.advised || busy {
+            .is_some_and(|running| running.urgent || !self.unsafe_until_solved);
+        if !self.solve_advised || busy {
             return None;
         }
-        let domain = self.solved.as_ref()?.domain.clone();
-        self.advised = false;
+        let domain = self.live.as_ref()?.domain.clone();
+        self.solve_advised = false;
         self.jobs += 1;
-        self.beside = Some(Beside {
-            number: self.jobs,
-            urgent: self.unsafe_until_solved,
+        let (number, urgent) = (self.jobs, self.unsafe_until_solved);
+        self.running = Some(Running {
+            number,
+            urgent,
             since: Vec::new(),
         });
         Some(Job {
-            number: self.jobs,
-            urgent: self.unsafe_until_solved,
+            number,
+            urgent,
             domain,
         })
     }
 
-    /// The job that runs beside the live field, if any.
+    /// The job whose result is waited for, if any.
     #[must_use]
-    pub fn beside(&self) -> Option<u64> {
-        self.beside.as_ref().map(|beside| beside.number)
+    pub fn running_job(&self) -> Option<u64> {
+        self.running.as_ref().map(|running| running.number)
     }
 
-    /// Swap in what job `number` solved, brought up to date with what changed meanwhile. Says whether
-    /// the live field is another now; the result of a stale job changes nothing.
-    ///
-    /// # Errors
-    /// When it cannot be brought up to date; the live field stays.
-    pub fn swap_in(
-        &mut self,
-        number: u64,
-        mut domain: Domain,
-        mut field: Field,
-    ) -> Result<bool, SolveError> {
-        let Some(beside) = self.beside.take_if(|beside| beside.number == number) else {
-            return Ok(false);
+    /// Swap in what a job gave, brought up to date with what changed meanwhile; the result of a stale job changes
+    /// nothing. When it cannot be brought up to date the live field stays.
+    fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
+        let (mut domain, mut field) = match solved.result {
+            Ok(solved) => solved,
+            Err(SolveError::Cancelled) => return Ok(Work::None),
+            Err(error) => return Err(error),
+        };
+        let number = solved.number;
+        let Some(running) = self.running.take_if(|running| running.number == number) else {
+            return Ok(Work::None);
         };
         self.unsafe_until_solved = false;
-        if !beside.since.is_empty() {
+        if !running.since.is_empty() {
             let verdict = self.solver.update(
                 &mut domain,
                 &mut field,
-                &beside.since,
+                &running.since,
                 &Cancellation::default(),
             )?;
             self.heed(verdict);
         }
-        if let Some(solved) = &mut self.solved {
-            solved.domain = domain;
-            solved.field = field;
+        if let Some(live) = &mut self.live {
+            live.domain = domain;
+            live.field = field;
             self.full_solves += 1;
         }
-        Ok(true)
+        Ok(Work::SwappedIn)
     }
 
-    /// Break like this, on purpose, with the robot at `position`. Says whether that could be done: whether the fault is
-    /// the planner's, and there is a field.
-    pub fn inject(&mut self, fault: FaultKind, position: DVec2) -> bool {
-        match (fault, &mut self.solved) {
-            (FaultKind::CorruptField, Some(solved)) => {
-                let at = solved.frame.to_cells(position);
-                lead_astray(&mut solved.field, [at.x, at.y]);
-                true
+    /// Break the field, if the fault is the planner's and there is a field.
+    fn corrupt(&mut self, fault: FaultKind, robot: DVec2) -> Work {
+        match (fault, &mut self.live) {
+            (FaultKind::CorruptField, Some(live)) => {
+                let at = live.frame.to_cells(robot);
+                lead_astray(&mut live.field, [at.x, at.y]);
+                Work::Broken
             }
             (FaultKind::Saddle, _) => {
                 self.on_a_saddle = true;
-                true
+                Work::Broken
             }
-            _ => false,
+            _ => Work::None,
         }
     }
 
-    /// The reference direction for a robot at `pose`.
-    #[must_use]
-    pub fn guide(&self, pose: &Pose2) -> GuidanceSample {
+    /// The reference direction for the robot of that pose.
+    fn guide(&self, sample: &PoseSample) -> GuidanceSample {
+        let pose = sample.pose();
         let to_target = self.target - pose.position;
-        let (status, direction) = match &self.solved {
+        let (status, direction) = match &self.live {
             None => (GuidanceStatus::Waiting, DVec2::ZERO),
             Some(_) if self.unsafe_until_solved => (GuidanceStatus::Waiting, DVec2::ZERO),
-            Some(solved) => {
-                let at = solved.frame.to_cells(pose.position);
-                match solved.field.guidance(at.x, at.y) {
+            Some(live) => {
+                let at = live.frame.to_cells(pose.position);
+                match live.field.guidance(at.x, at.y) {
                     Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
                     Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
                     // Within the target's cell the field has said all it knows; the rest is straight.
@@ -287,7 +308,7 @@ impl Planner {
         let (status, direction, limit) = if self.on_a_saddle {
             (GuidanceStatus::Along, DVec2::ZERO, 0.0)
         } else {
-            self.look_first(pose, status, direction)
+            self.advise(&pose, status, direction)
         };
         GuidanceSample {
             ex: direction.x,
@@ -295,6 +316,10 @@ impl Planner {
             distance_m: to_target.length(),
             speed_limit_m_s: limit,
             status: status.into(),
+            pose_ns: sample.stamp.stamp_ns,
+            x_m: sample.x_m,
+            y_m: sample.y_m,
+            heading_rad: sample.heading_rad,
             grid_version: self.grid.version(),
             safety_events: self.belief.safety_events,
             epoch: self.belief.epoch,
@@ -304,23 +329,23 @@ impl Planner {
         }
     }
 
-    /// The careful method's word on a direction: status, direction and speed limit to give.
-    fn look_first(
+    /// Status, direction and speed limit to give where the field says `status` and `direction`.
+    fn advise(
         &self,
         pose: &Pose2,
         status: GuidanceStatus,
         direction: DVec2,
     ) -> (GuidanceStatus, DVec2, f64) {
-        let (Some(lookout), Some(solved)) = (&self.lookout, &self.solved) else {
+        let (Advisor::LookFirst(sensing), Some(live)) = (&self.advisor, &self.live) else {
             return (status, direction, f64::INFINITY);
         };
         let view = View {
-            frame: solved.frame,
+            frame: live.frame,
             cells: self.grid.cells(),
-            field: &solved.field,
+            field: &live.field,
         };
         match status {
-            GuidanceStatus::Along => match lookout.advise(&view, pose, direction) {
+            GuidanceStatus::Along => match sensing.advise(&view, pose, direction) {
                 Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
                 Advice::Go(limit) => (status, direction, limit),
             },
@@ -335,7 +360,7 @@ impl Planner {
     /// the first solve.
     #[must_use]
     pub fn policy(&self) -> Option<(FieldHeader, GridFrame, Vec<FieldCell>)> {
-        let Solved { frame, field, .. } = self.solved.as_ref()?;
+        let Live { frame, field, .. } = self.live.as_ref()?;
         let verification = field.verification();
         let header = FieldHeader {
             grid_version: self.grid.version(),
@@ -376,14 +401,20 @@ fn changes_in(domain: &Domain, frame: &GridFrame, window: Window, cells: &[u8]) 
     let mut changes = Vec::new();
     for row in window.row..window.row + window.height {
         for col in window.col..window.col + window.width {
-            let cell = Cell::new(col as usize, row as usize);
-            let blocked = is_hazard(cells[frame.index(common::grid::Cell { col, row })]);
+            let cell = grid::Cell { col, row };
+            let blocked = is_hazard(cells[frame.index(cell)]);
+            let cell = field_cell(cell);
             if blocked != domain.is_blocked(cell) {
                 changes.push(Change { cell, blocked });
             }
         }
     }
     changes
+}
+
+/// A cell of the grid as the field library names it: the one place where one becomes the other.
+const fn field_cell(cell: grid::Cell) -> Cell {
+    Cell::new(cell.col as usize, cell.row as usize)
 }
 
 const fn is_hazard(cell: u8) -> bool {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use common::{clock::MissionClock, mission::Mission};
+use common::{clock::Pace, mission::Mission};
 
 use crate::backoff::Backoff;
 
@@ -31,6 +31,8 @@ pub struct Absence {
 /// The robot's presence on the wire.
 #[derive(Clone, Debug)]
 pub struct Presence {
+    /// How long it may say nothing in mission time, and on the machine's clock.
+    limit: Duration,
     silence: Duration,
     wire_open: bool,
     connected: bool,
@@ -43,9 +45,11 @@ pub struct Presence {
 impl Presence {
     /// Of the robot of `mission`, which has not been heard yet, on a wire that is open.
     #[must_use]
-    pub fn new(mission: &Mission, clock: MissionClock) -> Self {
+    pub fn new(mission: &Mission) -> Self {
+        let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
         Self {
-            silence: drain(mission, clock),
+            limit,
+            silence: limit,
             wire_open: true,
             connected: false,
             heard_ns: None,
@@ -53,6 +57,14 @@ impl Presence {
             pings: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
             losses: 0,
         }
+    }
+
+    /// Mission time passes at that pace.
+    pub fn set_pace(&mut self, pace: Pace) {
+        self.silence = match pace {
+            Pace::Rate(rate) if rate > 0.0 => self.limit.div_f64(rate).max(LEAST_SILENCE),
+            _ => self.limit,
+        };
     }
 
     /// Whether it answers.
@@ -128,14 +140,5 @@ impl Presence {
             pings: self.pings.attempts(),
             next_ping_ns: self.pings.wait_ns(now_ns),
         }
-    }
-}
-
-/// How long a robot may say nothing, on the machine's clock, before it is lost.
-fn drain(mission: &Mission, clock: MissionClock) -> Duration {
-    let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
-    match clock {
-        MissionClock::Wall { rate, .. } if rate > 0.0 => limit.div_f64(rate).max(LEAST_SILENCE),
-        _ => limit,
     }
 }

@@ -2,19 +2,20 @@
 
 use common::{
     bus::{Reader, Writer},
-    clock::monotonic_ns,
+    clock::{MissionClock, Pace, monotonic_ns},
     latency::Histogram,
     samples::{
         CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order, PowerSample,
         RangeSample, SurroundingsSample, WheelSample,
     },
     shell::{Context, Process, Progress, StageError},
+    step::Step as _,
     topics::{self, AnyTopic as _},
 };
 
 use crate::{
     failsafe::{self, Charge, Decision},
-    step::{Effect, Event, Link},
+    step::{Effect, Event, Input, Link, State},
     telemetry::BatteryChange,
     transport::{Transport, TransportError},
 };
@@ -48,6 +49,7 @@ pub struct Shell {
     pending: Pending,
     /// Opened once the link works.
     telemetry: Option<Telemetry>,
+    clock: MissionClock,
     link: Link,
     latency: Histogram,
     latency_ns: u64,
@@ -63,6 +65,16 @@ impl Process for Shell {
         context.waiter.on(context.bus.wakeup(&topics::DIRECTIVE)?);
         let generation = context.generation.number;
         let run = &context.run;
+        let mut link = Link::new(&run.mission);
+        let state = State {
+            pace: match run.clock {
+                MissionClock::Ticks { .. } => Pace::Max,
+                MissionClock::Wall { rate, .. } => Pace::Rate(rate),
+            },
+            next_tick: context.generation.first_tick,
+        };
+        link.restore(state)
+            .map_err(|foreign| StageError::Other(foreign.to_string()))?;
         Ok(Self {
             transport,
             command: context.bus.reader(&topics::COMMAND)?,
@@ -72,7 +84,8 @@ impl Process for Shell {
             state: context.bus.writer(&topics::LINK, generation)?,
             pending: Pending::default(),
             telemetry: None,
-            link: Link::new(&run.mission, run.clock, context.generation.first_tick),
+            clock: run.clock,
+            link,
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
@@ -84,25 +97,27 @@ impl Process for Shell {
         self.tend()?;
         if let Some(directive) = self.directive.newest()? {
             let order = Order::from_byte(directive.order);
-            let word = Event::Order(order, HoldReason::from_byte(directive.reason));
-            let effects = self.link.step(word, monotonic_ns());
-            self.carry_out(effects)?;
+            let reason = HoldReason::from_byte(directive.reason);
+            self.take(Event::Order(order, reason), monotonic_ns())?;
         }
         while let Some(command) = self.command.take()? {
-            let effects = self.link.step(Event::Command(&command), monotonic_ns());
-            self.carry_out(effects)?;
+            self.take(Event::Command(&command), monotonic_ns())?;
         }
         loop {
             let now_ns = monotonic_ns();
             let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
                 break;
             };
-            let effects = self.link.step(Event::Datagram(bytes), now_ns);
+            let input = Input {
+                event: Event::Datagram(bytes),
+                machine_ns: now_ns,
+            };
+            let now = self.clock.at(self.link.state().next_tick, now_ns);
+            let effects = self.link.step(input, now);
             self.carry_out(effects)?;
         }
         self.tend()?;
-        let effects = self.link.step(Event::Quiet, monotonic_ns());
-        self.carry_out(effects)?;
+        self.take(Event::Quiet, monotonic_ns())?;
         if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
             self.state()?;
         }
@@ -137,10 +152,10 @@ impl Process for Shell {
     }
 
     fn stop(&mut self) -> Result<(), StageError> {
-        for bytes in self.link.farewell() {
+        for bytes in self.link.final_stops() {
             self.transport.send(&bytes).map_err(wire_broke)?;
         }
-        tracing::info!("robot told to stand");
+        tracing::info!("stop sent to the robot");
         Ok(())
     }
 }
@@ -150,7 +165,7 @@ fn wire_broke(error: TransportError) -> StageError {
     StageError::Other(error.to_string())
 }
 
-fn tell_battery(change: &BatteryChange) {
+fn log_battery(change: &BatteryChange) {
     let BatteryChange {
         pack,
         volts,
@@ -173,7 +188,7 @@ fn tell_battery(change: &BatteryChange) {
     }
 }
 
-fn tell_decision(before: Decision, now: Decision) {
+fn log_decision(before: Decision, now: Decision) {
     let robot = failsafe::effect(now.action);
     let cause = failsafe::name(now.cause);
     if now.action > before.action {
@@ -188,10 +203,15 @@ impl Shell {
     fn tend(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.tend(now_ns).map_err(wire_broke)? {
-            let effects = self.link.step(Event::Wire(open), now_ns);
-            self.carry_out(effects)?;
+            self.take(Event::Wire(open), now_ns)?;
         }
         Ok(())
+    }
+
+    fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
+        let now = self.clock.at(self.link.state().next_tick, machine_ns);
+        let effects = self.link.step(Input { event, machine_ns }, now);
+        self.carry_out(effects)
     }
 
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
@@ -214,7 +234,7 @@ impl Shell {
                     self.state()?;
                 }
                 Effect::Decided { before, now } => {
-                    tell_decision(before, now);
+                    log_decision(before, now);
                     self.state()?;
                 }
                 Effect::Connected(true) => {
@@ -232,13 +252,13 @@ impl Shell {
                 Effect::Infrared(sample) => self.pending.infrared = Some(sample),
                 Effect::Power(sample) => self.pending.power = Some(sample),
                 Effect::Surroundings(sample) => self.pending.surroundings = Some(sample),
-                Effect::Battery(change) => tell_battery(&change),
+                Effect::Battery(change) => log_battery(&change),
             }
         }
         Ok(())
     }
 
-    /// Say how the wire is.
+    /// Publish how the wire is.
     fn state(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         self.stated_ns = now_ns;
@@ -257,7 +277,7 @@ impl Shell {
             cause: self.link.decision().cause.into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
-            foreign_datagrams: carried.strangers,
+            foreign_datagrams: carried.foreign_datagrams,
             unsent: carried.unsent,
             losses: self.link.losses(),
             reboots: self.link.restarts().into(),

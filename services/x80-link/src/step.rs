@@ -2,7 +2,7 @@
 //!
 //! A tick starts with a motor frame and takes the newest sonar frame with it; it ends with the command
 //! computed from it. On a clock of ticks (a simulated robot at `--pace max`) the robot waits for that
-//! command, so a tick that gets none, because a stage died, is given again. On a wall clock the robot
+//! command, so a tick that gets none, because a stage ended, is given again. On a wall clock the robot
 //! moves on, so an unanswered tick is abandoned for the next.
 
 mod event;
@@ -12,12 +12,13 @@ mod wire;
 use std::time::Duration;
 
 use common::{
-    clock::{MissionClock, MissionTime},
+    clock::{MissionTime, Pace},
     mission::Mission,
     samples::{
         Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, RangeStatus,
         WheelSample,
     },
+    step::{ForeignState, Step},
     wire::{Decoder, DecoderTally, Echo, MotorSensors},
 };
 
@@ -29,7 +30,7 @@ use crate::{
     telemetry::Telemetry,
 };
 
-pub use event::{Effect, Event, Tally};
+pub use event::{Effect, Event, Input, State, Tally};
 
 /// Between pings of a robot that owes a tick.
 const PING_EVERY: Duration = Duration::from_millis(200);
@@ -39,7 +40,7 @@ const REPEAT_AFTER: Duration = Duration::from_millis(100);
 const LEAST_LEFT: Duration = Duration::from_millis(1);
 /// A stop is sent so often: one datagram may be lost.
 const STOPS: u32 = 3;
-/// While the robot stands by our decision it is told again: all of them may be lost in a fade, and a
+/// While the robot stands by our decision the stop is sent again: all of them may be lost in a fade, and a
 /// robot may ignore the time limit of the command before.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
@@ -62,9 +63,9 @@ struct Repeat {
     due: MissionTime,
 }
 
-/// The supervisor's last word.
+/// The supervisor's newest directive.
 #[derive(Clone, Copy, Debug)]
-struct Word {
+struct NewestDirective {
     order: Order,
     reason: HoldReason,
     heard_ns: u64,
@@ -73,18 +74,20 @@ struct Word {
 /// The link to one robot.
 #[derive(Debug)]
 pub struct Link {
-    clock: MissionClock,
+    state: State,
+    /// Mission time of the input that is taken.
+    now: MissionTime,
     drive: Drive,
     sonar_index: usize,
     half_period_ns: u64,
     decoder: Decoder,
-    word: Option<Word>,
+    directive: Option<NewestDirective>,
     presence: Presence,
     pinged_ns: Option<u64>,
     restart: RestartWatch,
     telemetry: Telemetry,
     sonar: Option<u8>,
-    next_tick: u64,
+    /// Mission time of the newest tick.
     time: MissionTime,
     open: Option<OpenTick>,
     newest_command: Option<CommandSample>,
@@ -93,29 +96,30 @@ pub struct Link {
     stop_sent_ns: Option<u64>,
     /// On a clock of ticks: motor frames that are due, one for each command and each ping since the order.
     due: u32,
-    /// The mission's last command has passed: on a clock of ticks there is nothing to go on for.
-    arrived: bool,
     tally: Tally,
 }
 
-impl Link {
-    /// A link for `mission` whose first tick is `first_tick`.
-    #[must_use]
-    pub fn new(mission: &Mission, clock: MissionClock, first_tick: u64) -> Self {
+impl Step for Link {
+    type Input<'a> = Input<'a>;
+    type Output = Vec<Effect>;
+    type State = State;
+
+    /// The link of a robot that waits for commands, before tick 0.
+    fn new(mission: &Mission) -> Self {
         Self {
-            clock,
+            state: State::default(),
+            now: MissionTime::default(),
             drive: Drive::new(mission),
             sonar_index: usize::from(mission.sonar.index),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             decoder: Decoder::default(),
-            word: None,
-            presence: Presence::new(mission, clock),
+            directive: None,
+            presence: Presence::new(mission),
             pinged_ns: None,
             restart: RestartWatch::new(mission),
             telemetry: Telemetry::new(mission.robot.low_battery_v),
             sonar: None,
-            next_tick: first_tick,
-            time: clock.at(first_tick, 0),
+            time: MissionTime::default(),
             open: None,
             newest_command: None,
             repeat: None,
@@ -126,11 +130,43 @@ impl Link {
             },
             stop_sent_ns: None,
             due: 0,
-            arrived: false,
             tally: Tally::default(),
         }
     }
 
+    fn state(&self) -> &State {
+        &self.state
+    }
+
+    fn restore(&mut self, state: State) -> Result<(), ForeignState> {
+        self.state = state;
+        self.presence.set_pace(state.pace);
+        Ok(())
+    }
+
+    fn step(&mut self, input: Input<'_>, now: MissionTime) -> Vec<Effect> {
+        let now_ns = input.machine_ns;
+        self.now = now;
+        let mut effects = Vec::new();
+        match input.event {
+            Event::Datagram(bytes) => {
+                self.decoder.push(bytes);
+                self.take_frames(now_ns, &mut effects);
+            }
+            Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
+            Event::Command(command) => self.take_command(command, now_ns, &mut effects),
+            Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
+            Event::Quiet => {}
+        }
+        self.keep_connected(now_ns, &mut effects);
+        self.repeat_tick(now_ns, &mut effects);
+        self.repeat_command(now_ns, &mut effects);
+        self.guard(now_ns, &mut effects);
+        effects
+    }
+}
+
+impl Link {
     /// Whether the robot answers.
     #[must_use]
     pub const fn connected(&self) -> bool {
@@ -173,44 +209,25 @@ impl Link {
         self.presence.losses()
     }
 
-    /// The tick to come and the mission time of the last one.
+    /// What is sent when the stage stops: the robot stands.
     #[must_use]
-    pub const fn progress(&self) -> (u64, MissionTime) {
-        (self.next_tick, self.time)
-    }
-
-    /// Take one event at `now_ns` of the monotonic clock.
-    pub fn step(&mut self, event: Event<'_>, now_ns: u64) -> Vec<Effect> {
-        let mut effects = Vec::new();
-        match event {
-            Event::Datagram(bytes) => {
-                self.decoder.push(bytes);
-                self.take_frames(now_ns, &mut effects);
-            }
-            Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
-            Event::Command(command) => self.take_command(command, now_ns, &mut effects),
-            Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
-            Event::Quiet => {}
-        }
-        self.keep_connected(now_ns, &mut effects);
-        self.repeat_tick(now_ns, &mut effects);
-        self.repeat_command(now_ns, &mut effects);
-        self.guard(now_ns, &mut effects);
-        effects
-    }
-
-    /// The last words: the robot stands.
-    #[must_use]
-    pub fn farewell(&self) -> Vec<Vec<u8>> {
+    pub fn final_stops(&self) -> Vec<Vec<u8>> {
         (0..STOPS).map(|_| self.drive.stop()).collect()
     }
 
     fn ordered_to_drive(&self) -> bool {
-        self.word.is_some_and(|word| word.order == Order::Drive)
+        self.directive
+            .is_some_and(|directive| directive.order == Order::Drive)
     }
 
-    const fn in_ticks(&self) -> bool {
-        matches!(self.clock, MissionClock::Ticks { .. })
+    fn in_ticks(&self) -> bool {
+        self.state.pace == Pace::Max
+    }
+
+    /// Whether the newest command was the mission's last: on a clock of ticks there is nothing to go on for.
+    fn arrived(&self) -> bool {
+        self.newest_command
+            .is_some_and(|command| CommandState::from_byte(command.state) == CommandState::Arrived)
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -220,15 +237,15 @@ impl Link {
         if self.in_ticks() {
             // Of several answers that are due only the last shows where the robot is.
             self.due = self.due.saturating_sub(1);
-            if self.open.is_some() || self.due > 0 || self.arrived {
+            if self.open.is_some() || self.due > 0 || self.arrived() {
                 return;
             }
         }
-        let tick = self.next_tick;
-        self.time = self.clock.at(tick, now_ns);
+        let tick = self.state.next_tick;
+        self.time = self.now;
         if !self.in_ticks() {
             // The number is taken whether the tick is answered or not.
-            self.next_tick += 1;
+            self.state.next_tick += 1;
         }
         let wheels = WheelSample {
             restarts: self.restart.restarts(),
@@ -254,11 +271,11 @@ impl Link {
     }
 
     /// The number of the open tick.
-    const fn open_number(&self) -> u64 {
+    fn open_number(&self) -> u64 {
         if self.in_ticks() {
-            self.next_tick
+            self.state.next_tick
         } else {
-            self.next_tick - 1
+            self.state.next_tick - 1
         }
     }
 
@@ -297,13 +314,12 @@ impl Link {
         });
         self.tally.commands += 1;
         self.due += 1;
-        self.arrived |= CommandState::from_byte(command.state) == CommandState::Arrived;
         if answers && let Some(open) = self.open.take() {
             effects.push(Effect::Answered {
                 began_ns: open.began_ns,
             });
             if self.in_ticks() {
-                self.next_tick += 1;
+                self.state.next_tick += 1;
             }
         }
     }
@@ -316,7 +332,7 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         let drives = order == Order::Drive && !self.ordered_to_drive();
-        self.word = Some(Word {
+        self.directive = Some(NewestDirective {
             order,
             reason,
             heard_ns: now_ns,
@@ -337,7 +353,7 @@ impl Link {
             open.given_ns = now_ns;
             self.open = Some(open);
             self.tally.repeated_ticks += 1;
-            effects.push(self.tick_effect(self.next_tick, &open));
+            effects.push(self.tick_effect(self.state.next_tick, &open));
         }
     }
 
@@ -348,7 +364,7 @@ impl Link {
         if self.in_ticks() {
             return;
         }
-        let now = self.clock.at(self.next_tick, now_ns);
+        let now = self.now;
         let Some(repeat) = self.repeat.take_if(|repeat| repeat.due <= now) else {
             return;
         };

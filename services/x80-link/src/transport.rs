@@ -39,7 +39,7 @@ pub struct TransportError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Datagrams from another address than the robot's, dropped.
-    pub strangers: u64,
+    pub foreign_datagrams: u64,
     /// Messages to the robot that the wire did not take, lost.
     pub unsent: u64,
 }
@@ -94,7 +94,7 @@ impl Transport {
     }
 
     /// Open what is down when that is due, send what is left of a message; at `now_ns` of the monotonic
-    /// clock. Says whether the wire is open, when that was not told yet. No opening hides a closing: both
+    /// clock. Says whether the wire is open, when that was not said yet. No opening hides a closing: both
     /// are told, in turn.
     ///
     /// # Errors

@@ -11,8 +11,8 @@
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |
-//! | [`kept`] | what of a robot outlives its process |
-//! | [`shell`] | the process: transport, pace, truth |
+//! | [`saved_state`] | the state of a robot that the next process restores |
+//! | [`shell`] | the process: transport, pace, ground truth |
 //!
 //! A robot is stepped by whoever holds it; only [`shell`] and its transports know sockets and clocks:
 //!
@@ -32,16 +32,16 @@
 //! let frame = decoder.next_frame().unwrap();
 //! assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Motion);
 //! robot.advance_to_next_tick();
-//! assert!(robot.truth().x > 0.0);
+//! assert!(robot.ground_truth().x > 0.0);
 //! ```
 
 pub mod body;
 pub mod infrared;
-pub mod kept;
 pub mod motor;
 pub mod noise;
 pub mod radio;
 pub mod robot;
+pub mod saved_state;
 pub mod sensors;
 pub mod shell;
 pub mod sonar;

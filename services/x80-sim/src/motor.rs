@@ -14,7 +14,7 @@ use crate::noise::Noise;
 const PWM_STOP: f64 = 16_383.5;
 /// Speed per count of position error, 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
-/// Below this friction holds a wheel that is told to stand, counts per second (2 mm/s); the dead band of
+/// Below this friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
 /// starting is friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
 /// Changes of the target under way through the delay. At 5 ms a step this is more than the longest
@@ -47,7 +47,7 @@ impl PidGains {
     }
 }
 
-/// What a channel has been told and how far its wheel has turned.
+/// What a channel has been ordered and how far its wheel has turned.
 #[derive(Clone, Debug)]
 pub struct Motor {
     physics: WheelPhysics,
@@ -114,7 +114,7 @@ impl Motor {
         self.feedback
     }
 
-    /// Gains of the position loop and of the velocity loop. They are kept and reported; the simulated
+    /// Gains of the position loop and of the velocity loop. They are stored and reported; the simulated
     /// loop is the one that was measured, whatever its gains.
     #[must_use]
     pub fn gains(&self) -> (PidGains, PidGains) {
@@ -133,7 +133,7 @@ impl Motor {
         self.turned
     }
 
-    /// The counts of an earlier life, standing.
+    /// The counts of an earlier process, standing.
     pub(crate) fn restore(&mut self, turned: f64) {
         self.turned = turned;
     }

@@ -1,7 +1,7 @@
 //! The radio between host and robot: good or out in turns, late, and careless with datagrams.
 //!
-//! Whatever it does is drawn from one seeded stream, so a run can be had again; what it did is told
-//! in the truth.
+//! Whatever it does is drawn from one seeded stream, so a run can be had again; what it did is written
+//! to the ground truth.
 
 use std::collections::VecDeque;
 
@@ -245,7 +245,7 @@ impl<W: Copy + PartialEq> Radio<W> {
     }
 
     /// What it has done until mission time `now`.
-    pub fn truth(&mut self, now: f64) -> GroundTruthRadio {
+    pub fn ground_truth(&mut self, now: f64) -> GroundTruthRadio {
         GroundTruthRadio {
             out: self.fading.is_out(now, &mut self.noise),
             sent: self.sent,

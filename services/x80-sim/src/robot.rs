@@ -11,9 +11,9 @@ use common::{
 
 use crate::{
     body::{Body, Wheels},
-    kept::Kept,
     motor::Motor,
     noise::{Noise, Source},
+    saved_state::SavedState,
     sensors::{self, Ranging},
     streams::{Due, Streams},
     world::World,
@@ -29,7 +29,7 @@ const COMES_TO_REST_S: f64 = 3.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
     /// Not addressed to a robot.
-    Stranger,
+    Foreign,
     /// An acknowledgement: nothing is answered to it.
     Ack,
     /// A ping.
@@ -64,7 +64,7 @@ pub struct Robot {
     heard_at: f64,
     /// When the last motion command came.
     ordered_at: f64,
-    unattended: f64,
+    stopping_time: f64,
     addressing: Addressing,
     least_clearance: f64,
     standard: StandardSensors,
@@ -121,7 +121,7 @@ impl Robot {
             tick: 0,
             heard_at: 0.0,
             ordered_at: 0.0,
-            unattended: 0.0,
+            stopping_time: 0.0,
             addressing: Addressing::default(),
             least_clearance: f64::INFINITY,
             standard: StandardSensors::default(),
@@ -135,22 +135,22 @@ impl Robot {
 
     /// The robot of `mission` where an earlier process left it, booted anew but for its counts.
     #[must_use]
-    pub fn restored(mission: &Mission, kept: &Kept) -> Self {
+    pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
         let mut robot = Self::new(&Mission {
             // The same readings again would be no readings.
-            seed: mission.seed.wrapping_add(kept.tick + 1),
+            seed: mission.seed.wrapping_add(saved.tick + 1),
             ..mission.clone()
         });
-        robot.tick = kept.tick;
-        robot.time = kept.time_s;
-        (robot.heard_at, robot.ordered_at) = (kept.time_s, kept.time_s);
-        robot.unattended = kept.unattended_s;
-        for (motor, turned) in robot.motors.iter_mut().zip(kept.turned) {
+        robot.tick = saved.tick;
+        robot.time = saved.time_s;
+        (robot.heard_at, robot.ordered_at) = (saved.time_s, saved.time_s);
+        robot.stopping_time = saved.stopping_time_s;
+        for (motor, turned) in robot.motors.iter_mut().zip(saved.turned) {
             motor.restore(turned);
         }
-        let (centre, radius) = (kept.pose.position, robot.body.radius());
-        robot.world.advance(kept.time_s, centre, radius);
-        robot.body.put(kept.pose, kept.contacts, &robot.world);
+        let (centre, radius) = (saved.pose.position, robot.body.radius());
+        robot.world.advance(saved.time_s, centre, radius);
+        robot.body.put(saved.pose, saved.contacts, &robot.world);
         robot.least_clearance = robot.body.clearance();
         robot.measure();
         robot
@@ -158,14 +158,14 @@ impl Robot {
 
     /// What a next process needs to go on from here.
     #[must_use]
-    pub fn kept(&self) -> Kept {
-        Kept {
+    pub fn saved_state(&self) -> SavedState {
+        SavedState {
             tick: self.tick,
             time_s: self.time,
             pose: self.body.pose(),
             turned: std::array::from_fn(|channel| self.motors[channel].turned()),
             contacts: self.body.contacts(),
-            unattended_s: self.unattended,
+            stopping_time_s: self.stopping_time,
         }
     }
 
@@ -213,7 +213,7 @@ impl Robot {
     #[must_use]
     pub fn kind(frame: &Frame<'_>) -> Heard {
         if Addressing::of_robot(frame.rid).is_none() {
-            return Heard::Stranger;
+            return Heard::Foreign;
         }
         match Command::parse(frame) {
             Ok(Command::System(SystemSignal::Ack)) => Heard::Ack,
@@ -226,7 +226,7 @@ impl Robot {
     /// Take a frame from the host and append what is answered at once to `replies`.
     pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
         let Some(addressing) = Addressing::of_robot(frame.rid) else {
-            return Heard::Stranger;
+            return Heard::Foreign;
         };
         self.addressing = addressing;
         self.heard_at = self.time;
@@ -340,7 +340,7 @@ impl Robot {
             .into_iter()
             .any(|rim| rim.abs() > GroundTruthTick::AT_REST_M_S)
         {
-            self.unattended = self.unattended.max(now + dt - self.ordered_at);
+            self.stopping_time = self.stopping_time.max(now + dt - self.ordered_at);
         }
     }
 
@@ -397,7 +397,7 @@ impl Robot {
     }
 
     /// What is true at this tick. The least clearance begins anew.
-    pub fn truth(&mut self) -> GroundTruthTick {
+    pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Wiring { channel, sign } = self.wiring;
         let [left, right] = self.rims();
@@ -424,7 +424,7 @@ impl Robot {
             left_counts: counts(channel.left, sign.left),
             right_counts: counts(channel.right, sign.right),
             sonar_cm: self.ranging.front(&self.standard),
-            stopping_time_s: self.unattended,
+            stopping_time_s: self.stopping_time,
             radio: None,
         }
     }

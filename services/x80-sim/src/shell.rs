@@ -1,4 +1,4 @@
-//! The process around the robot: a socket, a pace and the truth. All else is [`crate::robot`].
+//! The process around the robot: a socket, a pace and the ground truth. All else is [`crate::robot`].
 
 mod session;
 
@@ -21,8 +21,8 @@ use thiserror::Error;
 
 use self::session::Session;
 use crate::{
-    kept::{self, Kept},
     robot::Robot,
+    saved_state::{self, SavedState},
     transport::Way,
 };
 
@@ -58,13 +58,13 @@ pub struct SimOptions {
     pub listen: SocketAddr,
     /// How to listen.
     pub transport: Transport,
-    /// Where it is kept how the robot stands; one that is kept there goes on from it. None forgets.
+    /// The file in which the robot's state is saved, and from which it goes on; none saves nothing.
     pub keep: Option<PathBuf>,
-    /// Where the truth is written: a [`common::ground_truth::GroundTruthHeader`], then a
+    /// Where the ground truth is written: a [`common::ground_truth::GroundTruthHeader`], then a
     /// [`common::ground_truth::GroundTruthTick`] each tick, one JSON object a line, each
     /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
     /// without.
-    pub truth: Option<Box<dyn Write + Send>>,
+    pub ground_truth: Option<Box<dyn Write + Send>>,
 }
 
 /// Why a simulated robot could not start or go on.
@@ -91,7 +91,7 @@ pub enum SimError {
         /// The system's word.
         source: io::Error,
     },
-    /// How it stands cannot be kept.
+    /// How it stands cannot be saved.
     #[error(transparent)]
     Keep(#[from] CheckpointError),
     /// The file that keeps how it stands cannot be had.
@@ -118,7 +118,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
         listen,
         transport,
         keep,
-        truth,
+        ground_truth,
     } = options;
     let way = Way::open(transport, listen)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
@@ -130,19 +130,19 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
                 file: file.clone(),
                 source,
             })?;
-            let (checkpoint, kept) = Checkpoint::open::<Kept>(&file, kept::CAPACITY)?;
-            let robot = match kept {
+            let (checkpoint, saved) = Checkpoint::open::<SavedState>(&file, saved_state::CAPACITY)?;
+            let robot = match saved {
                 None => Robot::new(&mission),
-                Some(kept) => {
-                    tracing::info!(?kept, "it stands where it stood");
-                    Robot::restored(&mission, &kept)
+                Some(saved) => {
+                    tracing::info!(?saved, "it stands where it stood");
+                    Robot::restored(&mission, &saved)
                 }
             };
             (robot, Some(checkpoint), Some(lock))
         }
     };
     let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time_s());
-    let mut session = Session::new(&mission, robot, pace, way, truth, checkpoint)?;
+    let mut session = Session::new(&mission, robot, pace, way, ground_truth, checkpoint)?;
     let mut buffer = vec![0; 65_536];
     loop {
         let timeout = clock.wait_for(session.next_due_s(), monotonic_ns());

@@ -15,7 +15,7 @@ use crate::{
     world::{Surface, World},
 };
 
-/// The farthest a ranger tells, metres.
+/// The farthest range a ranger gives, metres.
 pub const REACH_M: f64 = 2.55;
 /// An echo is hidden by what lies nearer than this before it, metres.
 const HIDES_M: f64 = 0.01;
@@ -95,10 +95,10 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
 
 /// What a ranger at `pose` hears: metres, infinite for nothing. Noise of the range is not in it yet.
 pub fn listen(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> f64 {
-    let ears = Ears::new(pose, physics);
+    let receiver = Receiver::new(pose, physics);
     let mut candidates: Vec<Candidate> = world
         .surfaces()
-        .flat_map(|surface| ears.candidates(surface))
+        .flat_map(|surface| receiver.candidates(surface))
         .flatten()
         .collect();
     candidates.sort_by(|a, b| a.range.total_cmp(&b.range));
@@ -151,14 +151,14 @@ fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise
     (square && range <= REACH_M).then_some(range)
 }
 
-/// A ranger's ears, turned one way.
-struct Ears<'a> {
+/// A ranger's receiver, turned one way.
+struct Receiver<'a> {
     physics: &'a SonarPhysics,
     cone: Sector,
     lobe: f64,
 }
 
-impl<'a> Ears<'a> {
+impl<'a> Receiver<'a> {
     fn new(pose: Pose2, physics: &'a SonarPhysics) -> Self {
         let half = physics.cone_deg.to_radians();
         Self {

@@ -22,7 +22,7 @@ fn forward(counts: i16) -> Vec<u8> {
     bytes
 }
 
-/// Drive in lock-step for `rounds` of so many commands sent at once: every byte that came, and the truth of
+/// Drive in lock-step for `rounds` of so many commands sent at once: every byte that came, and the ground truth of
 /// every tick.
 fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
     let mut sim = Sim::start(mission, Pace::Max);
@@ -44,7 +44,7 @@ fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<Grou
             }
         }
     }
-    // The truth of the tick whose frames came last was written before they were sent.
+    // The ground truth of the tick whose frames came last was written before they were sent.
     sim.finish();
     (bytes, std::iter::from_fn(|| sim.last_truth()).collect())
 }
@@ -53,30 +53,34 @@ const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[s
 
 #[test]
 fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
-    let (bytes, truth) = lock_step(OUT_HALF_THE_TIME, 400, 1);
+    let (bytes, ground_truth) = lock_step(OUT_HALF_THE_TIME, 400, 1);
     // Also when commands come earlier than they must: they wait until time has passed.
     for (rounds, at_once) in [(400, 1), (200, 2)] {
         let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, rounds, at_once);
         assert!(
-            bytes == again && truth == truth_again,
+            bytes == again && ground_truth == truth_again,
             "the same seed gave another run"
         );
     }
-    assert!(truth.len() > 600, "400 commands and {} ticks", truth.len());
-    let radio = truth.last().unwrap().radio.unwrap();
+    assert!(
+        ground_truth.len() > 600,
+        "400 commands and {} ticks",
+        ground_truth.len()
+    );
+    let radio = ground_truth.last().unwrap().radio.unwrap();
     assert!(
         radio.lost > 200 && radio.longest_outage_s > 0.5,
         "{radio:?}"
     );
-    let numbers: Vec<u64> = truth.iter().map(|tick| tick.tick).collect();
-    assert_eq!(numbers, (0..truth.len() as u64).collect::<Vec<_>>());
+    let numbers: Vec<u64> = ground_truth.iter().map(|tick| tick.tick).collect();
+    assert_eq!(numbers, (0..ground_truth.len() as u64).collect::<Vec<_>>());
 }
 
 #[test]
 fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
     let mission =
         "perimeter.width_m = 200\nsimulation.wheels.lag_s = 0\nsimulation.radio.loss_share = 0.3";
-    let (bytes, truth) = lock_step(mission, 200, 1);
+    let (bytes, ground_truth) = lock_step(mission, 200, 1);
     let mut decoder = Decoder::default();
     decoder.push(&bytes);
     let mut acks: u16 = 0;
@@ -88,7 +92,7 @@ fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
         "{acks} of 200 commands were acknowledged"
     );
     // 400 counts/s for the period of 1/7 s, or for all of the 150 ms where no command comes behind.
-    let counts = truth.last().unwrap().right_counts;
+    let counts = ground_truth.last().unwrap().right_counts;
     assert!(
         (acks * 57..=acks * 60).contains(&counts),
         "{counts} counts for {acks} commands"
@@ -116,10 +120,10 @@ fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
     for own in own_limits {
         let radio =
             OUT_HALF_THE_TIME.replace("[simulation.radio]", &format!("{own}\n[simulation.radio]"));
-        let (_, truth) = lock_step(&radio, 400, 1);
+        let (_, ground_truth) = lock_step(&radio, 400, 1);
         let mut out_since = None;
         let mut outages_at_rest = 0;
-        for tick in &truth {
+        for tick in &ground_truth {
             if !tick.radio.unwrap().out {
                 out_since = None;
                 continue;

@@ -62,15 +62,15 @@ fn at_max_each_motion_command_moves_time_by_one_period_and_nothing_else_does() {
     for tick in 1..=20_u64 {
         let [ack, frames] = exchange(&host, forward(500));
         assert_eq!(reports(&ack), [ACK]);
-        let truth = sim.next_truth();
-        assert_eq!(truth.tick, tick);
-        assert!((truth.time_s - tick as f64 / 7.0).abs() < 1e-9);
+        let ground_truth = sim.next_truth();
+        assert_eq!(ground_truth.tick, tick);
+        assert!((ground_truth.time_s - tick as f64 / 7.0).abs() < 1e-9);
         let Some(Report::Motor(motor)) = reports(&frames).last().copied() else {
             panic!("no motor frame in {frames:?}");
         };
         let shown = motor.encoders.map(|encoder| encoder.position);
-        let reversed = (32_768 - truth.left_counts) % 32_768;
-        assert_eq!(shown, [reversed, truth.right_counts]);
+        let reversed = (32_768 - ground_truth.left_counts) % 32_768;
+        assert_eq!(shown, [reversed, ground_truth.right_counts]);
         let [_, current] = exchange(&host, PING);
         assert_eq!(frames, current, "a ping shows the tick once more");
     }
@@ -160,7 +160,7 @@ fn a_port_in_use_is_named_with_its_remedy() {
         listen,
         transport: Transport::Udp,
         keep: None,
-        truth: None,
+        ground_truth: None,
     };
     let error = run(options, stop).expect_err("the port was free after all");
     assert!(matches!(error, SimError::Bind { address, .. } if address == listen));
@@ -176,7 +176,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
     let (reader, writer) = std::os::unix::net::UnixStream::pair().unwrap();
     drop(reader);
     let (stop, stopped) = std::os::unix::net::UnixStream::pair().unwrap();
-    // The truth would have told the port: take one that was free a moment ago.
+    // The ground truth would have told the port: take one that was free a moment ago.
     let listen: SocketAddr = {
         let probe = UdpSocket::bind("127.0.0.1:0").unwrap();
         probe.local_addr().unwrap()
@@ -187,7 +187,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
         listen,
         transport: Transport::Udp,
         keep: None,
-        truth: Some(Box::new(writer)),
+        ground_truth: Some(Box::new(writer)),
     };
     let sim = std::thread::spawn(move || run(options, stopped));
     let host = UdpSocket::bind("127.0.0.1:0").unwrap();

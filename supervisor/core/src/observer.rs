@@ -107,10 +107,10 @@ impl Observer {
         }
         while let Some(grid) = self.grid.take()? {
             stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
-            record.grid.apply(&grid.header().part.revision(), &grid);
+            record.grid.apply(&grid.header().part, &grid);
         }
         while let Some(field) = self.field.take()? {
-            record.field.apply(&field.header().part.revision(), &field);
+            record.field.apply(&field.header().part, &field);
         }
         while let Some(pose) = self.pose.take()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);

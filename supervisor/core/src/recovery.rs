@@ -10,7 +10,7 @@ use common::{
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
     run::{self, Run, RunError},
 };
-use dead_reckoning::shell::kept_state;
+use dead_reckoning::shell::saved_state;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -122,7 +122,7 @@ impl RecoveredRun {
         if simulated && !run::checkpoint_file(directory, SIMULATOR).exists() {
             return Err(ResumeError::NoRobot { directory: named() });
         }
-        let newest = kept_state(directory)?.and_then(|state| state.newest());
+        let newest = saved_state(directory)?.and_then(|state| state.newest());
         let (first_tick, time) =
             newest.map_or((0, MissionTime::default()), |(tick, time)| (tick + 1, time));
         Ok(Self {

@@ -1,4 +1,5 @@
 use super::*;
+use common::kinematics::Pose2;
 use std::{
     f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI},
     path::Path,
@@ -12,6 +13,23 @@ fn controller(extra: &str) -> Controller {
          [controller]\nspeed_m_s = 0.4\nturn_rad_s = 0.8\nslow_radius_m = 0.5\ndead_zone = 0.05\n{extra}"
     );
     Controller::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+}
+
+/// A step with the pose apart from the direction.
+trait At {
+    fn at(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample;
+}
+
+impl At for Controller {
+    fn at(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample {
+        let guidance = GuidanceSample {
+            x_m: pose.position.x,
+            y_m: pose.position.y,
+            heading_rad: pose.heading,
+            ..*guidance
+        };
+        self.step(&guidance, MissionTime(0))
+    }
 }
 
 fn facing(heading: f64) -> Pose2 {
@@ -45,28 +63,25 @@ fn equation_14_by_hand() {
 
 #[test]
 fn equation_15_ahead_is_proportional_to_the_sine() {
-    let command = controller("").step(facing(-FRAC_PI_3), &ahead());
+    let command = controller("").at(facing(-FRAC_PI_3), &ahead());
     close(command.omega_rad_s, 0.8 * 3_f64.sqrt() / 2.0);
 }
 
 #[test]
 fn equation_15_behind_turns_full_towards_the_guidance() {
-    let left = controller("").step(facing(-2.0), &ahead());
+    let left = controller("").at(facing(-2.0), &ahead());
     close(left.omega_rad_s, 0.8);
-    let right = controller("").step(facing(2.0), &ahead());
+    let right = controller("").at(facing(2.0), &ahead());
     close(right.omega_rad_s, -0.8);
 }
 
 #[test]
 fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
     let mut controller = controller("");
+    close(controller.at(facing(PI - 0.01), &ahead()).omega_rad_s, 0.8);
+    controller.at(facing(2.0), &ahead());
     close(
-        controller.step(facing(PI - 0.01), &ahead()).omega_rad_s,
-        0.8,
-    );
-    controller.step(facing(2.0), &ahead());
-    close(
-        controller.step(facing(-PI + 0.01), &ahead()).omega_rad_s,
+        controller.at(facing(-PI + 0.01), &ahead()).omega_rad_s,
         -0.8,
     );
 }
@@ -74,20 +89,16 @@ fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
 #[test]
 fn equation_16_by_hand() {
     // Aligned: all of vd. 60 degrees off: 1 - sin 60 / 2. Antipodal: nothing.
-    close(controller("").step(facing(0.0), &ahead()).v_m_s, 0.4);
-    let off = controller("").step(facing(FRAC_PI_3), &ahead());
+    close(controller("").at(facing(0.0), &ahead()).v_m_s, 0.4);
+    let off = controller("").at(facing(FRAC_PI_3), &ahead());
     close(off.v_m_s, 0.4 * (1.0 - 3_f64.sqrt() / 4.0));
-    close(controller("").step(facing(PI), &ahead()).v_m_s, 0.0);
+    close(controller("").at(facing(PI), &ahead()).v_m_s, 0.0);
 }
 
 #[test]
 fn equation_16_is_continuous_where_its_cases_meet() {
-    let just_ahead = controller("")
-        .step(facing(FRAC_PI_2 - 1e-9), &ahead())
-        .v_m_s;
-    let just_behind = controller("")
-        .step(facing(FRAC_PI_2 + 1e-9), &ahead())
-        .v_m_s;
+    let just_ahead = controller("").at(facing(FRAC_PI_2 - 1e-9), &ahead()).v_m_s;
+    let just_behind = controller("").at(facing(FRAC_PI_2 + 1e-9), &ahead()).v_m_s;
     assert!((just_ahead - just_behind).abs() < 1e-8);
     assert!((just_ahead - 0.2).abs() < 1e-8);
 }
@@ -99,26 +110,26 @@ fn near_the_target_slowing_down_multiplies_alignment() {
         position: DVec2::new(2.75, 0.0),
         heading: FRAC_PI_3,
     };
-    let command = controller("").step(pose, &ahead());
+    let command = controller("").at(pose, &ahead());
     close(command.v_m_s, 0.2 * (1.0 - 3_f64.sqrt() / 4.0));
 }
 
 #[test]
 fn without_modulation_the_speed_is_constant_up_to_rc() {
     let mut controller = controller("modulated = false");
-    close(controller.step(facing(PI), &ahead()).v_m_s, 0.4);
+    close(controller.at(facing(PI), &ahead()).v_m_s, 0.4);
 }
 
 #[test]
 fn equation_17_by_hand() {
     // vc = 0.4, wc = 0: both wheels at 4 rad/s.
-    let command = controller("").step(facing(0.0), &ahead());
+    let command = controller("").at(facing(0.0), &ahead());
     close(command.left_rad_s, 4.0);
     close(command.right_rad_s, 4.0);
 }
 
-/// The same robot, careful.
-fn careful() -> Controller {
+/// The same robot, by the evidential method.
+fn evidential() -> Controller {
     let text = "target = [3, 0]\nrobot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
                 controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4 }";
     Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
@@ -138,37 +149,37 @@ fn a_look_turns_on_the_spot_and_ends_where_it_should() {
         speed_limit_m_s: 0.0,
         ..ahead()
     };
-    let far = careful().step(facing(-2.0), &look);
+    let far = evidential().at(facing(-2.0), &look);
     assert_eq!((far.v_m_s, far.omega_rad_s), (0.0, 1.4));
-    let near = careful().step(facing(0.2), &look);
+    let near = evidential().at(facing(0.2), &look);
     assert!((-0.7..-0.5).contains(&near.omega_rad_s), "{near:?}");
 }
 
 #[test]
-fn a_careful_robot_stands_until_it_faces_within_45_degrees_of_its_way() {
+fn an_evidential_robot_stands_until_it_faces_within_45_degrees_of_its_way() {
     let guidance = ahead();
     close(
-        careful().step(facing(FRAC_PI_4 + 0.01), &guidance).v_m_s,
+        evidential().at(facing(FRAC_PI_4 + 0.01), &guidance).v_m_s,
         0.0,
     );
-    assert!(careful().step(facing(FRAC_PI_4 - 0.1), &guidance).v_m_s > 0.0);
-    close(careful().step(facing(0.0), &guidance).v_m_s, 0.4);
+    assert!(evidential().at(facing(FRAC_PI_4 - 0.1), &guidance).v_m_s > 0.0);
+    close(evidential().at(facing(0.0), &guidance).v_m_s, 0.4);
 }
 
 #[test]
-fn a_careful_robot_goes_no_faster_than_its_guidance_allows() {
-    close(careful().step(facing(0.0), &limited(0.1)).v_m_s, 0.1);
-    close(careful().step(facing(0.4), &limited(0.0)).v_m_s, 0.0);
-    close(careful().step(facing(0.4), &limited(f64::NAN)).v_m_s, 0.0);
+fn an_evidential_robot_goes_no_faster_than_its_guidance_allows() {
+    close(evidential().at(facing(0.0), &limited(0.1)).v_m_s, 0.1);
+    close(evidential().at(facing(0.4), &limited(0.0)).v_m_s, 0.0);
+    close(evidential().at(facing(0.4), &limited(f64::NAN)).v_m_s, 0.0);
 }
 
 #[test]
-fn no_careful_command_stands_in_the_dead_band_of_the_wheels() {
+fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
     // 20 counts/s after a gain of 0.78, at 1200 counts a turn.
     let dead = 20.0 / 0.78 / 1200.0 * std::f64::consts::TAU;
     for degrees in -180..180 {
         for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
-            let command = careful().step(facing(f64::from(degrees).to_radians()), &limited(limit));
+            let command = evidential().at(facing(f64::from(degrees).to_radians()), &limited(limit));
             let fastest = command.left_rad_s.abs().max(command.right_rad_s.abs());
             assert!(
                 fastest > dead,
@@ -185,12 +196,12 @@ fn arrival_is_final() {
         position: DVec2::new(2.95, 0.0),
         heading: 0.0,
     };
-    let command = controller.step(there, &ahead());
+    let command = controller.at(there, &ahead());
     assert_eq!(
         CommandState::from_byte(command.state),
         CommandState::Arrived
     );
-    let back_off = controller.step(facing(0.0), &ahead());
+    let back_off = controller.at(facing(0.0), &ahead());
     assert_eq!(
         CommandState::from_byte(back_off.state),
         CommandState::Arrived
@@ -209,7 +220,7 @@ fn without_guidance_the_robot_stands() {
         ..ahead()
     };
     for guidance in [GuidanceSample::default(), unreachable, nan] {
-        let command = controller("").step(facing(0.0), &guidance);
+        let command = controller("").at(facing(0.0), &guidance);
         assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
         close(command.v_m_s, 0.0);
         close(command.left_rad_s, 0.0);

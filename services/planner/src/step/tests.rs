@@ -1,5 +1,5 @@
 use super::*;
-use common::grid::Revision;
+use common::grid::Part;
 use std::path::Path;
 
 fn mission() -> Mission {
@@ -25,20 +25,14 @@ fn keyframe_of(
     hazard: impl Fn(DVec2) -> bool,
 ) -> (GridHeader, Vec<u8>) {
     let cells = (0..frame.area() as u32).map(|index| {
-        let cell = common::grid::Cell {
+        let cell = grid::Cell {
             col: index % frame.cells,
             row: index / frame.cells,
         };
         u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell)))
     });
     let header = GridHeader {
-        part: Revision {
-            frame,
-            window: frame.whole(),
-            version,
-            keyframe: true,
-        }
-        .into(),
+        part: Part::whole(frame, version),
         ..GridHeader::default()
     };
     (header, cells.collect())
@@ -48,10 +42,23 @@ fn status(sample: &GuidanceSample) -> GuidanceStatus {
     GuidanceStatus::from_byte(sample.status)
 }
 
-fn at(x: f64, y: f64) -> Pose2 {
-    Pose2 {
-        position: DVec2::new(x, y),
-        heading: 0.0,
+fn at(x_m: f64, y_m: f64) -> PoseSample {
+    PoseSample {
+        x_m,
+        y_m,
+        ..PoseSample::default()
+    }
+}
+
+/// The field of a job.
+fn solve(number: u64, domain: Domain) -> Solved {
+    let field = Solver::default()
+        .solve(&domain, &Cancellation::default())
+        .unwrap();
+    Solved {
+        number,
+        result: Ok((domain, field)),
+        took_ns: 0,
     }
 }
 
@@ -108,7 +115,7 @@ fn a_wall_that_appears_turns_the_guidance_aside() {
 }
 
 #[test]
-fn a_robot_walled_in_is_told_that_the_target_is_unreachable() {
+fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
     let mut planner = Planner::new(&mission());
     let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
     let (header, cells) = keyframe(1, ring);
@@ -142,8 +149,8 @@ fn in_the_targets_cell_the_rest_is_straight() {
     assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
 }
 
-/// A careful planner in a room where only what `swept` says was looked at.
-fn careful(swept: impl Fn(DVec2) -> bool) -> Planner {
+/// An evidential planner in a room where only what `swept` says was looked at.
+fn evidential(swept: impl Fn(DVec2) -> bool) -> Planner {
     let mission = Mission {
         method: Method::Evidential,
         ..mission()
@@ -151,7 +158,7 @@ fn careful(swept: impl Fn(DVec2) -> bool) -> Planner {
     let (header, mut cells) = keyframe(1, |_| false);
     let frame = mission.grid_frame();
     for (index, state) in cells.iter_mut().enumerate() {
-        let cell = common::grid::Cell {
+        let cell = grid::Cell {
             col: index as u32 % frame.cells,
             row: index as u32 / frame.cells,
         };
@@ -165,9 +172,9 @@ fn careful(swept: impl Fn(DVec2) -> bool) -> Planner {
 }
 
 #[test]
-fn a_careful_robot_looks_where_nobody_looked_before_it_goes_there() {
+fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
     // All but what lies to the left of the way ahead.
-    let planner = careful(|at| at.x < 0.2 || at.y < 0.1);
+    let planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
     let guidance = planner.guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
     assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
@@ -175,8 +182,8 @@ fn a_careful_robot_looks_where_nobody_looked_before_it_goes_there() {
 }
 
 #[test]
-fn over_swept_ground_a_careful_robot_goes_at_full_speed() {
-    let guidance = careful(|_| true).guide(&at(0.0, 0.0));
+fn over_swept_ground_an_evidential_robot_goes_at_full_speed() {
+    let guidance = evidential(|_| true).guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
 }
@@ -184,54 +191,49 @@ fn over_swept_ground_a_careful_robot_goes_at_full_speed() {
 #[test]
 fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
     let swept = |at: DVec2| at.x < 0.2 || at.y < 0.1;
-    let (one, other) = (careful(swept), careful(swept));
+    let (one, other) = (evidential(swept), evidential(swept));
     for heading in [0.0, 0.2, 0.4] {
-        let pose = Pose2 {
-            heading,
+        let pose = PoseSample {
+            heading_rad: heading,
             ..at(0.0, 0.0)
         };
         assert_eq!(one.guide(&pose), other.guide(&pose));
     }
 }
 
-/// A room of 200 x 200 cells with a wall across it and a door in the wall.
-fn large_room(version: u64, door_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
+/// A room of 200 x 200 cells with a wall across it and a gap in the wall.
+fn large_room(version: u64, gap_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
     let mission = mission_of(200);
     let hazard = |at: DVec2| {
         let wall = (at.x - 0.8).abs() < 0.03;
-        let far_door = (1.0..1.4).contains(&at.y);
-        let near_door = !door_closed && at.y.abs() < 0.2;
-        wall && !far_door && !near_door
+        let far_gap = (1.0..1.4).contains(&at.y);
+        let near_gap = !gap_closed && at.y.abs() < 0.2;
+        wall && !far_gap && !near_gap
     };
     let (header, cells) = keyframe_of(mission.grid_frame(), version, hazard);
     (mission, header, cells)
 }
 
 #[test]
-fn a_door_that_closes_halts_the_robot_until_the_full_solve_beside_is_swapped_in() {
+fn a_gap_that_closes_halts_the_robot_until_the_background_solve_is_swapped_in() {
     let (mission, header, cells) = large_room(1, false);
     let mut planner = Planner::new(&mission);
     planner.take_grid(&header, &cells).unwrap();
-    assert!(
-        planner.begin_beside().is_none(),
-        "nothing calls for a solve"
-    );
+    assert!(planner.begin_job().is_none(), "nothing calls for a solve");
     let (_, header, cells) = large_room(2, true);
     planner.take_grid(&header, &cells).unwrap();
-    let job = planner.begin_beside().unwrap();
+    let job = planner.begin_job().unwrap();
     assert!(job.urgent);
     assert_eq!(
         status(&planner.guide(&at(0.0, 0.0))),
         GuidanceStatus::Waiting
     );
-    assert!(planner.begin_beside().is_none(), "one at a time");
-    let field = Solver::default()
-        .solve(&job.domain, &Cancellation::default())
-        .unwrap();
-    assert!(planner.swap_in(job.number, job.domain, field).unwrap());
+    assert!(planner.begin_job().is_none(), "one at a time");
+    let solved = solve(job.number, job.domain);
+    assert_eq!(planner.swap_in(solved).unwrap(), Work::SwappedIn);
     let guidance = planner.guide(&at(0.5, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
-    assert!(guidance.ey > 0.4, "to the other door: {guidance:?}");
+    assert!(guidance.ey > 0.4, "to the other gap: {guidance:?}");
 }
 
 #[test]
@@ -241,11 +243,9 @@ fn the_result_of_a_stale_job_changes_nothing() {
     planner.take_grid(&header, &cells).unwrap();
     let (_, header, closed) = large_room(2, true);
     planner.take_grid(&header, &closed).unwrap();
-    let job = planner.begin_beside().unwrap();
-    let field = Solver::default()
-        .solve(&job.domain, &Cancellation::default())
-        .unwrap();
-    assert!(!planner.swap_in(job.number + 1, job.domain, field).unwrap());
+    let job = planner.begin_job().unwrap();
+    let solved = solve(job.number + 1, job.domain);
+    assert_eq!(planner.swap_in(solved).unwrap(), Work::None);
     assert_eq!(
         status(&planner.guide(&at(0.0, 0.0))),
         GuidanceStatus::Waiting
@@ -259,18 +259,15 @@ fn what_changes_while_a_job_runs_is_in_the_field_it_brings() {
     planner.take_grid(&header, &cells).unwrap();
     let (_, header, mut cells) = large_room(2, true);
     planner.take_grid(&header, &cells).unwrap();
-    let job = planner.begin_beside().unwrap();
-    // A post between the robot and the other door.
+    let job = planner.begin_job().unwrap();
+    // A post between the robot and the other gap.
     let frame = mission.grid_frame();
     let post = frame.cell_at(DVec2::new(0.4, 0.6)).unwrap();
     cells[frame.index(post)] = 1;
     let mut later = header;
     later.part.version = 3;
     planner.take_grid(&later, &cells).unwrap();
-    let field = Solver::default()
-        .solve(&job.domain, &Cancellation::default())
-        .unwrap();
-    planner.swap_in(job.number, job.domain, field).unwrap();
+    planner.swap_in(solve(job.number, job.domain)).unwrap();
     assert_eq!(
         status(&planner.guide(&at(0.4, 0.6))),
         GuidanceStatus::WayOut

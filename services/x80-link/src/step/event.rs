@@ -1,14 +1,44 @@
 //! What goes into the link and what comes out.
 
 use common::{
-    clock::MissionTime,
+    clock::{MissionTime, Pace},
     samples::{
         CommandSample, HoldReason, InfraredSample, Order, PowerSample, RangeSample,
         SurroundingsSample, WheelSample,
     },
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::{failsafe::Decision, telemetry::BatteryChange};
+
+/// How mission time passes, and where the ticks of this link begin. The run says the one, and the supervisor the other:
+/// it hears the ticks, so the link writes no checkpoint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// [`Pace::Max`] is a clock of ticks: the robot waits for each command. Any other is a wall clock, times a rate.
+    pub pace: Pace,
+    /// The number of the tick to come.
+    pub next_tick: u64,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            pace: Pace::Max,
+            next_tick: 0,
+        }
+    }
+}
+
+/// What happened, and when by the machine's clock, which the deadlines of the wire go by.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// What.
+    pub event: Event<'a>,
+    /// Reading of the monotonic clock, nanoseconds.
+    pub machine_ns: u64,
+}
 
 /// What happened.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +50,7 @@ pub enum Event<'a> {
     Wire(bool),
     /// A command of the controller.
     Command(&'a CommandSample),
-    /// The supervisor's word, and why it is not drive.
+    /// The supervisor's directive: what it orders, and why that is not drive.
     Order(Order, HoldReason),
     /// Nothing; time passed.
     Quiet,

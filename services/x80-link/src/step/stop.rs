@@ -2,39 +2,31 @@
 
 use std::time::Duration;
 
-use common::{
-    clock::{MissionClock, MissionTime},
-    samples::CommandSample,
-};
+use common::{clock::MissionTime, samples::CommandSample};
 
-use super::{Effect, Link, STOP_AGAIN, Word, passed};
+use super::{Effect, Link, NewestDirective, STOP_AGAIN, passed};
 use crate::failsafe::{self, Ages, Decision, Directive, Flags};
 
 impl Link {
     pub(super) fn decide(&self, now_ns: u64) -> Decision {
-        let directive = |word: Word| Directive {
-            order: word.order,
-            reason: word.reason,
-            age: Duration::from_nanos(now_ns.saturating_sub(word.heard_ns)),
+        let directive = |newest: NewestDirective| Directive {
+            order: newest.order,
+            reason: newest.reason,
+            age: Duration::from_nanos(now_ns.saturating_sub(newest.heard_ns)),
         };
         let flags = Flags {
-            directive: self.word.map(directive),
+            directive: self.directive.map(directive),
             connected: self.presence.connected(),
-            command: self
-                .newest_command
-                .map(|command| self.ages(&command, now_ns)),
+            command: self.newest_command.map(|command| self.ages(&command)),
             battery: self.telemetry.charge(),
         };
         failsafe::decide(&flags, self.drive.limit())
     }
 
-    pub(super) fn ages(&self, command: &CommandSample, now_ns: u64) -> Ages {
+    pub(super) fn ages(&self, command: &CommandSample) -> Ages {
         let stamp = command.stamp.time();
-        let now = match self.clock {
-            // On a clock of ticks no time passes until the command has come.
-            MissionClock::Ticks { .. } => stamp,
-            MissionClock::Wall { .. } => self.clock.at(self.next_tick, now_ns),
-        };
+        // On a clock of ticks no time passes until the command has come.
+        let now = if self.in_ticks() { stamp } else { self.now };
         // A stamp from the future would never grow old.
         let age = |then: MissionTime| {
             if then <= now {
@@ -58,7 +50,7 @@ impl Link {
         if now.stops() {
             self.repeat = None;
             if !self.in_ticks() {
-                self.tell_to_stand(!before.stops(), now_ns, effects);
+                self.send_stop(!before.stops(), now_ns, effects);
             }
         }
         if now != before {
@@ -67,9 +59,9 @@ impl Link {
     }
 
     /// Several times when the stop is new, then again now and then.
-    pub(super) fn tell_to_stand(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
+    pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
-            effects.extend(self.farewell().into_iter().map(Effect::Send));
+            effects.extend(self.final_stops().into_iter().map(Effect::Send));
         } else if self.presence.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
             effects.push(Effect::Send(self.drive.stop()));
         } else {

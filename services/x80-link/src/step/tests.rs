@@ -16,21 +16,36 @@ fn mission() -> Mission {
 }
 
 fn in_ticks() -> Link {
-    Link::new(
-        &mission(),
-        MissionClock::Ticks {
-            period_ns: PERIOD_NS,
-        },
-        0,
-    )
+    from_tick(0)
+}
+
+fn from_tick(next_tick: u64) -> Link {
+    let mut link = Link::new(&mission());
+    let pace = Pace::Max;
+    link.restore(State { pace, next_tick }).unwrap();
+    link
 }
 
 fn on_the_wall() -> Link {
-    let clock = MissionClock::Wall {
-        epoch_ns: 0,
-        rate: 1.0,
-    };
-    Link::new(&mission(), clock, 0)
+    let mut link = Link::new(&mission());
+    let (pace, next_tick) = (Pace::Rate(1.0), 0);
+    link.restore(State { pace, next_tick }).unwrap();
+    link
+}
+
+/// One event at a reading of the machine's clock, which on the wall began with the mission.
+trait At {
+    fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect>;
+}
+
+impl At for Link {
+    fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect> {
+        let now = match self.state.pace {
+            Pace::Max => self.state.next_tick * PERIOD_NS,
+            Pace::Rate(_) => machine_ns,
+        };
+        self.step(Input { event, machine_ns }, MissionTime(now))
+    }
 }
 
 /// A datagram of the robot: sonar byte and wheel positions as its channels count.
@@ -64,8 +79,8 @@ fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
 
 /// Connected, ordered to drive.
 fn driving(mut link: Link) -> Link {
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.step(Event::Order(Order::Drive, HoldReason::None), 0);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
     link
 }
 
@@ -116,15 +131,15 @@ fn ticks(effects: &[Effect]) -> Vec<(u64, RangeSample, WheelSample)> {
 fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     let mut link = on_the_wall();
     let ping = Command::System(SystemSignal::Ping);
-    assert_eq!(sent(&link.step(Event::Quiet, 0)), [ping]);
-    assert_eq!(sent(&link.step(Event::Quiet, 100 * MS)), []);
-    assert_eq!(sent(&link.step(Event::Quiet, 200 * MS)), [ping]);
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
+    assert_eq!(sent(&link.at(Event::Quiet, 0)), [ping]);
+    assert_eq!(sent(&link.at(Event::Quiet, 100 * MS)), []);
+    assert_eq!(sent(&link.at(Event::Quiet, 200 * MS)), [ping]);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     let setup = sent(&effects);
     let zero = 1;
     assert_eq!(setup.len(), 9 + zero, "{setup:?}");
-    let later = sent(&link.step(Event::Quiet, 400 * MS));
+    let later = sent(&link.at(Event::Quiet, 400 * MS));
     assert!(!later.contains(&ping), "{later:?}");
 }
 
@@ -132,13 +147,13 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
 fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() {
     let mut link = driving(on_the_wall());
     let half = &datagram(80, 0, 0)[..20];
-    link.step(Event::Datagram(half), 10 * MS);
-    let effects = link.step(Event::Wire(false), 11 * MS);
+    link.at(Event::Datagram(half), 10 * MS);
+    let effects = link.at(Event::Wire(false), 11 * MS);
     assert!(effects.contains(&Effect::Connected(false)));
-    assert_eq!(link.step(Event::Quiet, 1000 * MS), []);
-    let effects = link.step(Event::Wire(true), 1001 * MS);
+    assert_eq!(link.at(Event::Quiet, 1000 * MS), []);
+    let effects = link.at(Event::Wire(true), 1001 * MS);
     assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
-    let effects = link.step(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
+    let effects = link.at(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(ticks(&effects)[0].1.raw_cm, 80, "{effects:?}");
 }
@@ -149,7 +164,7 @@ fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
     let ping = Command::System(SystemSignal::Ping);
     let mut pings = Vec::new();
     for now in (0..8000).step_by(20) {
-        if sent(&link.step(Event::Quiet, now * MS)).contains(&ping) {
+        if sent(&link.at(Event::Quiet, now * MS)).contains(&ping) {
             pings.push(now);
         }
     }
@@ -161,29 +176,29 @@ fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
         next_ping_ns: 1100 * MS,
     };
     assert_eq!(absence, expected);
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(link.absence(7960 * MS), Absence::default());
     // Lost again, it is asked at once and often.
-    let effects = link.step(Event::Quiet, 8700 * MS);
+    let effects = link.at(Event::Quiet, 8700 * MS);
     assert!(effects.contains(&Effect::Connected(false)) && sent(&effects).contains(&ping));
-    assert!(sent(&link.step(Event::Quiet, 8900 * MS)).contains(&ping));
+    assert!(sent(&link.at(Event::Quiet, 8900 * MS)).contains(&ping));
     assert_eq!(link.losses(), 1);
 }
 
 #[test]
 fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
     let mut link = driving(on_the_wall());
-    let effects = link.step(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
     assert_eq!(ticks(&effects)[0].2.restarts, 0);
-    link.step(Event::Quiet, 1000 * MS);
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 3000 * MS);
+    link.at(Event::Quiet, 1000 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3000 * MS);
     assert!(effects.contains(&Effect::Restarted));
     assert_eq!(ticks(&effects)[0].2.restarts, 1);
     assert_eq!(link.restarts(), 1);
     // Even one that was not missed.
-    link.step(Event::Datagram(&datagram(255, 31_168, 1600)), 3500 * MS);
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 3600 * MS);
+    link.at(Event::Datagram(&datagram(255, 31_168, 1600)), 3500 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3600 * MS);
     assert!(effects.contains(&Effect::Restarted));
     let mode = |command: &Command| {
         let velocity = Parameter::Mode(Mode::Velocity);
@@ -196,9 +211,9 @@ fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
 #[test]
 fn a_robot_that_comes_back_with_its_counts_has_not_restarted() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
-    link.step(Event::Quiet, 1000 * MS);
-    let effects = link.step(Event::Datagram(&datagram(255, 32_100, 668)), 3000 * MS);
+    link.at(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
+    link.at(Event::Quiet, 1000 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 32_100, 668)), 3000 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(ticks(&effects)[0].2.restarts, 0);
 }
@@ -215,15 +230,15 @@ fn timed(effects: &[Effect]) -> Vec<(Option<i16>, Option<u16>)> {
 #[test]
 fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_its_time() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     let turn = std::f64::consts::TAU;
-    let effects = link.step(Event::Command(&command(0, 10 * MS, turn, turn)), 12 * MS);
+    let effects = link.at(Event::Command(&command(0, 10 * MS, turn, turn)), 12 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(250))]);
     // Half of 142.9 ms after the tick.
-    assert_eq!(timed(&link.step(Event::Quiet, 81 * MS)), []);
-    let effects = link.step(Event::Quiet, 90 * MS);
+    assert_eq!(timed(&link.at(Event::Quiet, 81 * MS)), []);
+    let effects = link.at(Event::Quiet, 90 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(170))]);
-    assert_eq!(timed(&link.step(Event::Quiet, 140 * MS)), [], "once");
+    assert_eq!(timed(&link.at(Event::Quiet, 140 * MS)), [], "once");
     assert_eq!(
         (link.tally().commands, link.tally().repeated_commands),
         (1, 1)
@@ -233,10 +248,10 @@ fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_it
 #[test]
 fn a_command_whose_successor_is_due_is_not_sent_again() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 75 * MS);
-    assert_eq!(timed(&link.step(Event::Quiet, 90 * MS)), []);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 75 * MS);
+    assert_eq!(timed(&link.at(Event::Quiet, 90 * MS)), []);
 }
 
 #[test]
@@ -247,10 +262,10 @@ fn a_command_that_no_longer_holds_is_not_sent_again() {
         (Event::Quiet, 270),
     ] {
         let mut link = driving(on_the_wall());
-        link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-        link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
-        link.step(event, at * MS);
-        let effects = link.step(Event::Quiet, (at + 70) * MS);
+        link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+        link.at(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
+        link.at(event, at * MS);
+        let effects = link.at(Event::Quiet, (at + 70) * MS);
         let moves = |(target, _): &(Option<i16>, _)| *target != Some(0);
         assert!(!timed(&effects).iter().any(moves), "{event:?}");
     }
@@ -259,10 +274,10 @@ fn a_command_that_no_longer_holds_is_not_sent_again() {
 #[test]
 fn on_a_clock_of_ticks_no_command_is_sent_again() {
     let mut link = driving(in_ticks());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
-    link.step(Event::Command(&command(0, 0, 1.0, 1.0)), 2);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 2);
     for now in (0..90).step_by(10) {
-        assert_eq!(timed(&link.step(Event::Quiet, now * MS)), []);
+        assert_eq!(timed(&link.at(Event::Quiet, now * MS)), []);
     }
     assert_eq!(link.tally().repeated_commands, 0);
 }
@@ -273,7 +288,7 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
     let mut bytes = datagram(255, 0, 0);
     let custom = CustomSensors::default();
     Report::Custom(custom).encode(Addressing::default(), &mut bytes);
-    let effects = link.step(Event::Datagram(&bytes), 0);
+    let effects = link.at(Event::Datagram(&bytes), 0);
     for told in [
         |effect: &Effect| matches!(effect, Effect::Infrared(_)),
         |effect: &Effect| matches!(effect, Effect::Power(_)),
@@ -288,66 +303,66 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
 fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
     // The link before this one died; the robot ignores the time limit of its last command.
     let mut link = on_the_wall();
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
-    assert!(velocities(&link.step(Event::Order(Order::Drive, HoldReason::None), MS)).is_empty());
-    let effects = link.step(Event::Quiet, 201 * MS);
+    assert!(velocities(&link.at(Event::Order(Order::Drive, HoldReason::None), MS)).is_empty());
+    let effects = link.at(Event::Quiet, 201 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
 }
 
 #[test]
 fn a_command_older_than_the_newest_is_ignored() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
-    link.step(Event::Command(&command(1, 150 * MS, 1.0, 1.0)), 151 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
+    link.at(Event::Command(&command(1, 150 * MS, 1.0, 1.0)), 151 * MS);
     let old = command(0, 10 * MS, -1.0, -1.0);
-    assert!(link.step(Event::Command(&old), 152 * MS).is_empty());
+    assert!(link.at(Event::Command(&old), 152 * MS).is_empty());
 }
 
 #[test]
 fn a_command_from_the_future_moves_nothing() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     let future = command(0, 900 * MS, 1.0, 1.0);
     let moves = |velocity: &[Option<i16>; 2]| *velocity != [Some(0), Some(0)];
-    let effects = link.step(Event::Command(&future), 11 * MS);
+    let effects = link.at(Event::Command(&future), 11 * MS);
     assert!(!velocities(&effects).iter().any(moves), "{effects:?}");
 }
 
 #[test]
 fn on_a_clock_of_ticks_a_second_answer_to_a_ping_is_no_tick() {
     let mut link = in_ticks();
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.step(Event::Order(Order::Drive, HoldReason::None), 0);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
     // The robot is slow, so it is asked again; then both answers come.
-    link.step(Event::Order(Order::Hold, HoldReason::Operator), MS);
-    link.step(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
-    assert!(ticks(&link.step(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
+    link.at(Event::Order(Order::Hold, HoldReason::Operator), MS);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
+    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
     assert_eq!(ticks(&effects).len(), 1);
 }
 
 #[test]
 fn on_a_clock_of_ticks_nothing_follows_the_arrival() {
     let mut link = driving(in_ticks());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
     let arrived = CommandSample {
         state: CommandState::Arrived.into(),
         ..command(0, 0, 0.0, 0.0)
     };
     assert_eq!(
-        velocities(&link.step(Event::Command(&arrived), 2)),
+        velocities(&link.at(Event::Command(&arrived), 2)),
         [[Some(0), Some(0)]]
     );
-    assert!(ticks(&link.step(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
+    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
 }
 
 #[test]
 fn a_tick_carries_the_newest_sonar_and_forward_counts() {
     let mut link = driving(on_the_wall());
     // Channel 0 counts down when driving forward: 32768 - 100 there is 100 counts forward.
-    let effects = link.step(Event::Datagram(&datagram(80, 32_668, 250)), 10 * MS);
+    let effects = link.at(Event::Datagram(&datagram(80, 32_668, 250)), 10 * MS);
     let [(tick, range, wheels)] = ticks(&effects)[..] else {
         panic!("{effects:?}");
     };
@@ -364,8 +379,8 @@ fn a_motor_frame_alone_makes_a_tick_without_a_reading() {
     let mut link = driving(on_the_wall());
     let mut bytes = Vec::new();
     Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
-    link.step(Event::Datagram(&datagram(80, 0, 0)), MS);
-    let effects = link.step(Event::Datagram(&bytes), 2 * MS);
+    link.at(Event::Datagram(&datagram(80, 0, 0)), MS);
+    let effects = link.at(Event::Datagram(&bytes), 2 * MS);
     assert_eq!(ticks(&effects)[0].1.status, u8::from(RangeStatus::Absent));
 }
 
@@ -383,10 +398,10 @@ fn every_sonar_byte_is_read_as_the_protocol_says() {
 #[test]
 fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     // A turn a second is 1200 counts/s, below the top speed of 2247.
     let turn = std::f64::consts::TAU;
-    let effects = link.step(
+    let effects = link.at(
         Event::Command(&command(0, 10 * MS, turn, -0.5 * turn)),
         11 * MS,
     );
@@ -401,8 +416,8 @@ fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
 #[test]
 fn no_number_moves_no_wheel() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let effects = link.step(
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    let effects = link.at(
         Event::Command(&command(0, 10 * MS, f64::NAN, 1e300)),
         11 * MS,
     );
@@ -413,20 +428,20 @@ fn no_number_moves_no_wheel() {
 #[test]
 fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let again = velocities(&link.step(Event::Quiet, 200 * MS));
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    let again = velocities(&link.at(Event::Quiet, 200 * MS));
     assert_eq!(again.len(), 1, "the command once more");
     assert!(
-        link.step(Event::Quiet, 260 * MS).is_empty(),
+        link.at(Event::Quiet, 260 * MS).is_empty(),
         "not yet over 250 ms"
     );
-    let effects = link.step(Event::Quiet, 261 * MS);
+    let effects = link.at(Event::Quiet, 261 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::CommandStale)]);
-    assert!(link.step(Event::Quiet, 262 * MS).is_empty(), "said");
+    assert!(link.at(Event::Quiet, 262 * MS).is_empty(), "said");
     assert_eq!(
-        velocities(&link.step(Event::Quiet, 462 * MS)),
+        velocities(&link.at(Event::Quiet, 462 * MS)),
         [[Some(0), Some(0)]]
     );
 }
@@ -434,23 +449,23 @@ fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
 #[test]
 fn the_supervisors_stop_stops_the_robot_and_later_commands_do_not_move_it() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let effects = link.step(Event::Order(Order::Stop, HoldReason::Ending), 20 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    let effects = link.at(Event::Order(Order::Stop, HoldReason::Ending), 20 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
-    let effects = link.step(Event::Command(&command(1, 20 * MS, 1.0, 1.0)), 21 * MS);
+    let effects = link.at(Event::Command(&command(1, 20 * MS, 1.0, 1.0)), 21 * MS);
     assert!(velocities(&effects).is_empty());
 }
 
 #[test]
 fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
     let mut link = driving(on_the_wall());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.step(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let effects = link.step(Event::Quiet, 800 * MS);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    link.at(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
+    let effects = link.at(Event::Quiet, 800 * MS);
     assert!(effects.contains(&Effect::Connected(false)));
     assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 900 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 900 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(
         ticks(&effects)[0].0,
@@ -462,14 +477,14 @@ fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
 #[test]
 fn on_a_clock_of_ticks_the_order_asks_for_tick_0_and_each_command_for_the_next() {
     let mut link = in_ticks();
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(ticks(&effects), [], "the greeting's frames start nothing");
-    let effects = link.step(Event::Order(Order::Drive, HoldReason::None), 1);
+    let effects = link.at(Event::Order(Order::Drive, HoldReason::None), 1);
     assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
     for tick in 0..3 {
-        let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 2);
+        let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
         assert_eq!(ticks(&effects)[0].0, tick);
-        let effects = link.step(
+        let effects = link.at(
             Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)),
             3,
         );
@@ -480,23 +495,23 @@ fn on_a_clock_of_ticks_the_order_asks_for_tick_0_and_each_command_for_the_next()
 #[test]
 fn on_a_clock_of_ticks_a_robot_found_after_the_order_still_starts() {
     let mut link = in_ticks();
-    link.step(Event::Order(Order::Drive, HoldReason::None), 0);
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
     assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 2);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
     assert_eq!(ticks(&effects)[0].0, 0);
 }
 
 #[test]
 fn on_a_clock_of_ticks_an_unanswered_tick_is_given_again_and_answered_once() {
     let mut link = driving(in_ticks());
-    let first = ticks(&link.step(Event::Datagram(&datagram(80, 5, 6)), 0));
-    assert_eq!(ticks(&link.step(Event::Quiet, 99 * MS)), []);
-    let again = ticks(&link.step(Event::Quiet, 100 * MS));
+    let first = ticks(&link.at(Event::Datagram(&datagram(80, 5, 6)), 0));
+    assert_eq!(ticks(&link.at(Event::Quiet, 99 * MS)), []);
+    let again = ticks(&link.at(Event::Quiet, 100 * MS));
     assert_eq!(again, first, "the same tick, to the bit");
-    let effects = link.step(Event::Command(&command(0, 0, 1.0, 1.0)), 101 * MS);
+    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 101 * MS);
     assert_eq!(velocities(&effects).len(), 1);
-    let effects = link.step(Event::Command(&command(0, 0, 1.0, 1.0)), 102 * MS);
+    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 102 * MS);
     let second = velocities(&effects);
     assert!(second.is_empty(), "a tick given twice is answered once");
 }
@@ -504,18 +519,15 @@ fn on_a_clock_of_ticks_an_unanswered_tick_is_given_again_and_answered_once() {
 #[test]
 fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
     let mut link = driving(on_the_wall());
-    let first = link.step(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let second = link.step(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
+    let first = link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
+    let second = link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
     assert_eq!((ticks(&first)[0].0, ticks(&second)[0].0), (0, 1));
 }
 
 #[test]
 fn a_successor_numbers_its_ticks_after_its_predecessors() {
-    let clock = MissionClock::Ticks {
-        period_ns: PERIOD_NS,
-    };
-    let mut link = driving(Link::new(&mission(), clock, 41));
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 0);
+    let mut link = driving(from_tick(41));
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(ticks(&effects)[0].0, 41);
 }
 

@@ -1,9 +1,6 @@
 //! What the robot says, and whether it is there.
 
-use common::{
-    clock::MissionTime,
-    wire::{Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal},
-};
+use common::wire::{Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal};
 
 use super::{Effect, Link, PING_EVERY, passed};
 use crate::drive::encoded;
@@ -39,7 +36,7 @@ impl Link {
             effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ack))));
         }
         if let Some(sensors) = &motor
-            && self.notice_restart(sensors, now_ns)
+            && self.notice_restart(sensors)
         {
             effects.push(Effect::Restarted);
             if self.presence.connected() {
@@ -47,18 +44,11 @@ impl Link {
                 effects.push(Effect::Send(self.drive.greeting()));
             }
         }
-        let now = self.clock.at(self.next_tick, now_ns);
-        self.tell_the_rest(
-            motor.as_ref(),
-            standard.as_ref(),
-            custom.as_ref(),
-            now,
-            effects,
-        );
+        self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
         if heard && self.presence.heard(now_ns) {
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
-            // It may be driving still on the word of an earlier link.
+            // It may be driving still by a command of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
                 // Those frames belong to the greeting: how many there are depends on how long the robot
@@ -79,26 +69,24 @@ impl Link {
 
     /// Whether the counts began anew. On a clock of ticks the robot is a simulated one that lives as long as
     /// its mission, and no time passes that could tell.
-    pub(super) fn notice_restart(&mut self, sensors: &MotorSensors, now_ns: u64) -> bool {
-        let now = self.clock.at(self.next_tick, now_ns);
+    pub(super) fn notice_restart(&mut self, sensors: &MotorSensors) -> bool {
         let counts = sensors.encoders.map(|encoder| encoder.position);
-        !self.in_ticks() && self.restart.step(counts, now)
+        !self.in_ticks() && self.restart.step(counts, self.now)
     }
 
     /// What the frames carry besides the tick.
-    pub(super) fn tell_the_rest(
+    pub(super) fn take_telemetry(
         &mut self,
         motor: Option<&MotorSensors>,
         standard: Option<&StandardSensors>,
         custom: Option<&CustomSensors>,
-        now: MissionTime,
         effects: &mut Vec<Effect>,
     ) {
         if let Some(motor) = motor {
             self.telemetry.take_motor(motor);
         }
         if let Some(standard) = standard {
-            let (power, surroundings, changes) = self.telemetry.take_standard(standard, now);
+            let (power, surroundings, changes) = self.telemetry.take_standard(standard, self.now);
             effects.push(Effect::Power(power));
             effects.push(Effect::Surroundings(surroundings));
             effects.extend(changes.into_iter().map(Effect::Battery));

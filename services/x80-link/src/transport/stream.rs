@@ -83,7 +83,7 @@ impl<D: Dial> Stream<D> {
 
     pub(super) const fn tally(&self) -> Tally {
         Tally {
-            strangers: 0,
+            foreign_datagrams: 0,
             unsent: self.unsent,
         }
     }

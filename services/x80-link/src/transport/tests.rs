@@ -57,16 +57,16 @@ fn expect_closing(transport: &mut Transport, now_ns: u64) {
 }
 
 #[test]
-fn a_datagram_from_a_stranger_is_dropped_and_counted() {
+fn a_foreign_datagram_is_dropped_and_counted() {
     let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let stranger = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let other = UdpSocket::bind("127.0.0.1:0").unwrap();
     let mut transport = Transport::open(&Address::Udp(robot.local_addr().unwrap())).unwrap();
     transport.send(b"where?").unwrap();
     let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
-    stranger.send_to(b"go left", link).unwrap();
+    other.send_to(b"go left", link).unwrap();
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), None);
-    assert_eq!(transport.tally().strangers, 1);
+    assert_eq!(transport.tally().foreign_datagrams, 1);
     robot.send_to(b"hello", link).unwrap();
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), Some(&b"hello"[..]));

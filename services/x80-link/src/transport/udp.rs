@@ -43,7 +43,7 @@ impl Udp {
         loop {
             match self.socket.recv_from(buffer) {
                 Ok((length, from)) if from == self.robot => return Ok(Some(length)),
-                Ok(_) => self.tally.strangers += 1,
+                Ok(_) => self.tally.foreign_datagrams += 1,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(None),
                 Err(error) if is_passing(&error) => {}
                 Err(error) => return Err(error),

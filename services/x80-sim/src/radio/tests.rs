@@ -41,10 +41,10 @@ fn it_is_out_for_its_share_of_the_time_and_never_longer_than_its_longest() {
         for number in 0..datagrams {
             radio.loses(f64::from(number) * 0.05);
         }
-        let truth = radio.truth(f64::from(datagrams) * 0.05);
-        let lost = truth.lost as f64 / truth.sent as f64;
+        let ground_truth = radio.ground_truth(f64::from(datagrams) * 0.05);
+        let lost = ground_truth.lost as f64 / ground_truth.sent as f64;
         assert!((lost - share).abs() < 0.03, "{lost} lost of {share}");
-        let longest = truth.longest_outage_s;
+        let longest = ground_truth.longest_outage_s;
         assert!((1.9..=2.0 + 1e-9).contains(&longest), "{longest} s");
     }
 }
@@ -107,5 +107,5 @@ fn a_flood_is_lost_not_hoarded() {
         radio.send(0.0, 0, &[1]);
     }
     assert_eq!(radio.in_flight.len(), MOST_IN_FLIGHT);
-    assert_eq!(radio.truth(0.0).lost, 2 * MOST_IN_FLIGHT as u64);
+    assert_eq!(radio.ground_truth(0.0).lost, 2 * MOST_IN_FLIGHT as u64);
 }

@@ -18,7 +18,7 @@ fn robot(text: &str) -> Robot {
 }
 
 /// Tell the robot `command`; what it was to it, and what it answered.
-fn tell_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Heard, Vec<u8>) {
+fn send_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Heard, Vec<u8>) {
     let mut bytes = Vec::new();
     command.encode(addressing, &mut bytes);
     let mut decoder = Decoder::default();
@@ -28,8 +28,8 @@ fn tell_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Hear
     (heard, replies)
 }
 
-fn tell(robot: &mut Robot, command: Command) -> (Heard, Vec<u8>) {
-    tell_as(robot, command, Addressing::Numbered)
+fn send(robot: &mut Robot, command: Command) -> (Heard, Vec<u8>) {
+    send_as(robot, command, Addressing::Numbered)
 }
 
 /// Both wheels forward at so many counts per second.
@@ -68,15 +68,15 @@ fn all_three_streams_run_from_boot_and_the_motor_frame_comes_last() {
 fn streams_stop_start_and_count() {
     let mut robot = robot("");
     let request = |stream, request| Command::Stream { stream, request };
-    tell(&mut robot, request(Stream::All, Request::Stop));
-    tell(&mut robot, request(Stream::Standard, Request::Count(2)));
+    send(&mut robot, request(Stream::All, Request::Stop));
+    send(&mut robot, request(Stream::Standard, Request::Count(2)));
     let dids = |robot: &mut Robot| -> Vec<u8> {
         streamed(robot).0.into_iter().map(|(_, did)| did).collect()
     };
     assert_eq!(dids(&mut robot), [125]);
     assert_eq!(dids(&mut robot), [125]);
     assert!(dids(&mut robot).is_empty());
-    tell(&mut robot, request(Stream::Motor, Request::Start));
+    send(&mut robot, request(Stream::Motor, Request::Start));
     assert_eq!(dids(&mut robot), [123]);
 }
 
@@ -93,9 +93,9 @@ fn everything_but_an_acknowledgement_is_acknowledged() {
         },
     ];
     for command in commands {
-        assert_eq!(tell(&mut robot, command).1, ack, "{command:?}");
+        assert_eq!(send(&mut robot, command).1, ack, "{command:?}");
     }
-    let (heard, replies) = tell(&mut robot, Command::System(SystemSignal::Ack));
+    let (heard, replies) = send(&mut robot, Command::System(SystemSignal::Ack));
     assert_eq!((heard, replies.len()), (Heard::Ack, 0));
     let unknown = Frame {
         rid: 8,
@@ -112,10 +112,10 @@ fn everything_but_an_acknowledgement_is_acknowledged() {
 fn one_is_answered_in_the_form_one_is_addressed_in() {
     let mut robot = robot("");
     let ping = Command::System(SystemSignal::Ping);
-    let (_, replies) = tell_as(&mut robot, ping, Addressing::Lettered);
+    let (_, replies) = send_as(&mut robot, ping, Addressing::Lettered);
     assert_eq!(replies[2], 0xb8);
     assert_eq!(streamed(&mut robot).0[0].0, 0xb8);
-    tell(&mut robot, ping);
+    send(&mut robot, ping);
     assert_eq!(streamed(&mut robot).0[0].0, 0x00);
 }
 
@@ -129,14 +129,14 @@ fn frames_that_speak_to_a_host_are_none_of_its_business() {
         did: 255,
         data: &[0],
     };
-    assert_eq!(robot.on_frame(&reflected, &mut replies), Heard::Stranger);
+    assert_eq!(robot.on_frame(&reflected, &mut replies), Heard::Foreign);
     assert!(replies.is_empty());
 }
 
 #[test]
 fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
     let mut robot = robot("[simulation.wheels]\nlag_s = 0\n[perimeter]\nwidth_m = 100");
-    tell(&mut robot, forward(1000, None));
+    send(&mut robot, forward(1000, None));
     for _ in 0..7 {
         robot.advance_to_next_tick();
     }
@@ -144,13 +144,20 @@ fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
     let sensors = motor(&mut robot);
     assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
     assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
-    let truth = robot.truth();
-    assert_eq!((truth.left_counts, truth.right_counts), (1000, 1000));
-    assert!((truth.x - 0.445_059).abs() < 1e-6, "{}", truth.x);
+    let ground_truth = robot.ground_truth();
+    assert_eq!(
+        (ground_truth.left_counts, ground_truth.right_counts),
+        (1000, 1000)
+    );
+    assert!(
+        (ground_truth.x - 0.445_059).abs() < 1e-6,
+        "{}",
+        ground_truth.x
+    );
     for _ in 0..7 * 32 {
         robot.advance_to_next_tick();
     }
-    assert_eq!(robot.truth().left_counts, 33_000 - 32_768);
+    assert_eq!(robot.ground_truth().left_counts, 33_000 - 32_768);
 }
 
 #[test]
@@ -159,21 +166,24 @@ fn wheels_may_be_wired_the_other_way_round() {
         "[robot]\nleft = { channel = 1, reversed = false }\nright = { channel = 0, reversed = true }\n[simulation.wheels]\nlag_s = 0",
     );
     // Right wheel only: the robot turns left.
-    tell(&mut robot, Command::velocity([Some(-500), None], None));
+    send(&mut robot, Command::velocity([Some(-500), None], None));
     robot.advance_to_next_tick();
-    let truth = robot.truth();
-    assert!(truth.heading > 0.0 && truth.omega > 0.0);
-    assert_eq!((truth.left_counts, truth.right_counts), (0, 71));
+    let ground_truth = robot.ground_truth();
+    assert!(ground_truth.heading > 0.0 && ground_truth.omega > 0.0);
+    assert_eq!(
+        (ground_truth.left_counts, ground_truth.right_counts),
+        (0, 71)
+    );
 }
 
 #[test]
 fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
     let moved = |text: &str| {
         let mut robot = robot(text);
-        tell(&mut robot, forward(700, 100));
+        send(&mut robot, forward(700, 100));
         robot.advance_to_next_tick();
         robot.advance_to_next_tick();
-        robot.truth().right_counts
+        robot.ground_truth().right_counts
     };
     assert_eq!(moved("[simulation.wheels]\nlag_s = 0"), 70);
     assert_eq!(
@@ -186,30 +196,30 @@ fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
 fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
     // A speed loop of 60 ms falls from 250 mm/s to the 10 mm/s that count as rest in 3.2 of them.
     let coasting = 0.06 * 25_f64.ln();
-    let unattended = |text: &str| {
+    let stopping_time = |text: &str| {
         let mut robot = robot(text);
         for _ in 0..5 {
-            tell(&mut robot, forward(562, 250));
+            send(&mut robot, forward(562, 250));
             robot.advance_to_next_tick();
         }
         for _ in 0..30 {
             robot.advance_to_next_tick();
         }
-        robot.truth().stopping_time_s
+        robot.ground_truth().stopping_time_s
     };
-    let obeyed = unattended("");
+    let obeyed = stopping_time("");
     assert!((obeyed - 0.25 - coasting).abs() < 0.02, "{obeyed}");
     let own_limit = "simulation = { ignores_time = true, stops_when_silent_s = 0.2 }";
-    let ignored = unattended(own_limit);
+    let ignored = stopping_time(own_limit);
     assert!((ignored - 0.2 - coasting).abs() < 0.02, "{ignored}");
-    assert!(unattended("simulation = { ignores_time = true }") > 4.0);
+    assert!(stopping_time("simulation = { ignores_time = true }") > 4.0);
 }
 
 #[test]
 fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
     let speed = |text: &str| {
         let mut robot = robot(text);
-        tell(&mut robot, forward(500, None));
+        send(&mut robot, forward(500, None));
         robot.advance_to(3.0);
         motor_speed(&robot)
     };
@@ -224,7 +234,7 @@ fn motor_speed(robot: &Robot) -> f64 {
 #[test]
 fn parameters_and_enabling_reach_their_channel() {
     let mut robot = robot("");
-    tell(
+    send(
         &mut robot,
         Command::Parameter {
             channel: 1,
@@ -236,7 +246,7 @@ fn parameters_and_enabling_reach_their_channel() {
     );
     let (position, velocity) = robot.motor(1).unwrap().gains();
     assert_eq!((position.kp, velocity.kp, velocity.kd), (50, 15, 5));
-    tell(
+    send(
         &mut robot,
         Command::Enable {
             on: true,
@@ -252,31 +262,31 @@ fn parameters_and_enabling_reach_their_channel() {
         },
         limit_ms: None,
     };
-    tell(&mut robot, Command::Motion(other));
+    send(&mut robot, Command::Motion(other));
     robot.advance_to_next_tick();
-    assert_eq!(robot.truth().v, 0.0, "channel 4 drives no wheel");
+    assert_eq!(robot.ground_truth().v, 0.0, "channel 4 drives no wheel");
 }
 
 #[test]
 fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
     let mut robot = robot("world.wall = [{ points = [[0.5, -1], [0.5, 1]] }]");
-    assert!((robot.truth().clearance_m - 0.31).abs() < 1e-12);
-    tell(&mut robot, forward(2000, None));
+    assert!((robot.ground_truth().clearance_m - 0.31).abs() < 1e-12);
+    send(&mut robot, forward(2000, None));
     robot.advance_to_next_tick();
-    let first = robot.truth();
+    let first = robot.ground_truth();
     assert!(first.clearance_m < 0.31 && first.contacts == 0);
     for _ in 0..7 {
         robot.advance_to_next_tick();
     }
-    let truth = robot.truth();
-    assert_eq!(truth.contacts, 1);
-    assert!((0.0..1e-6).contains(&truth.clearance_m), "{truth:?}");
-    assert_eq!(truth.v, 0.0, "the wall holds it");
+    let ground_truth = robot.ground_truth();
+    assert_eq!(ground_truth.contacts, 1);
+    assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{truth:?}");
+    assert_eq!(ground_truth.v, 0.0, "the wall holds it");
 }
 
 #[test]
 fn a_line_of_truth_has_the_names_that_its_readers_know() {
-    let line = serde_json::to_string(&robot("").truth()).unwrap();
+    let line = serde_json::to_string(&robot("").ground_truth()).unwrap();
     let names: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
     let known = "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm stopping_time_s";
     assert_eq!(names, known.split(' ').collect::<Vec<_>>());
@@ -297,7 +307,7 @@ fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
     assert_eq!(sensors.ultrasonic[1], 255);
     assert_eq!(sensors.ultrasonic[5], 255);
     assert_ne!(sensors.ultrasonic[4], 255);
-    assert_eq!(robot.truth().sonar_cm, 81);
+    assert_eq!(robot.ground_truth().sonar_cm, 81);
 }
 
 #[test]
@@ -347,12 +357,12 @@ fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
     for _ in 0..21 {
         robot.advance_to_next_tick();
     }
-    let truth = robot.truth();
-    assert!((truth.x + 0.49).abs() < 0.01, "{truth:?}");
-    assert_eq!(truth.contacts, 1);
+    let ground_truth = robot.ground_truth();
+    assert!((ground_truth.x + 0.49).abs() < 0.01, "{truth:?}");
+    assert_eq!(ground_truth.contacts, 1);
     // Pushed straight back, its wheels roll.
     let back = 0.49 / (std::f64::consts::TAU * 0.085 / 1200.0);
-    let counted = 32_768.0 - f64::from(truth.left_counts);
+    let counted = 32_768.0 - f64::from(ground_truth.left_counts);
     assert!((counted - back).abs() < 25.0, "{counted} counts for {back}");
 }
 
@@ -380,11 +390,11 @@ proptest! {
             let due = robot.next_tick_s();
             robot.advance_to_next_tick();
             prop_assert_eq!(robot.time_s(), due);
-            let truth = robot.truth();
-            prop_assert!(truth.clearance_m >= -1e-9, "{:?}", truth);
-            prop_assert!(truth.x.is_finite() && truth.y.is_finite() && truth.heading.is_finite());
-            prop_assert!(truth.v.abs() <= 1.1, "{:?}", truth);
-            prop_assert!(truth.sonar_cm >= 4);
+            let ground_truth = robot.ground_truth();
+            prop_assert!(ground_truth.clearance_m >= -1e-9, "{:?}", ground_truth);
+            prop_assert!(ground_truth.x.is_finite() && ground_truth.y.is_finite() && ground_truth.heading.is_finite());
+            prop_assert!(ground_truth.v.abs() <= 1.1, "{:?}", ground_truth);
+            prop_assert!(ground_truth.sonar_cm >= 4);
             for report in streamed(&mut robot).1 {
                 if let Report::Motor(sensors) = report {
                     prop_assert!(sensors.encoders.iter().all(|e| e.position < COUNT_CYCLE));
@@ -398,21 +408,21 @@ proptest! {
 fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_its_counts() {
     let mut first = robot("simulation.realism = 'measured'");
     for _ in 0..20 {
-        tell(&mut first, forward(800, 250));
+        send(&mut first, forward(800, 250));
         first.advance_to_next_tick();
     }
-    let driving = first.truth();
+    let driving = first.ground_truth();
     assert!(driving.v > 0.2, "{driving:?}");
     first.come_to_rest();
-    let kept = first.kept();
+    let saved = first.saved_state();
     let mission = mission("simulation.realism = 'measured'");
-    let mut next = Robot::restored(&mission, &kept);
-    assert_eq!(next.kept(), kept);
-    let stands = next.truth();
+    let mut next = Robot::restored(&mission, &saved);
+    assert_eq!(next.saved_state(), saved);
+    let stands = next.ground_truth();
     assert!(stands.x > driving.x + 0.05, "it rolled on: {stands:?}");
     assert_eq!(stands.v, 0.0);
     next.advance_to_next_tick();
-    let later = next.truth();
+    let later = next.ground_truth();
     assert_eq!((later.x, later.y), (stands.x, stands.y), "it stands");
     assert!(later.time_s > driving.time_s && later.tick > driving.tick);
     // One that counted anew would show zero.

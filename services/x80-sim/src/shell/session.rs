@@ -1,4 +1,4 @@
-//! Robot, radio, transport and truth together: what is done with bytes, and with a tick.
+//! Robot, radio, transport and ground truth together: what is done with bytes, and with a tick.
 
 use std::{io::Write, os::fd::BorrowedFd};
 
@@ -39,26 +39,26 @@ pub(super) struct Session {
     /// Whoever sent the last valid frame: all streams go there.
     peer: Option<Source>,
     /// The peer's and one other's: half a frame of the one must not garble the other's.
-    ears: Vec<Ear>,
-    truth: Option<Box<dyn Write + Send>>,
-    /// Where it is kept how the robot stands.
+    decoders: Vec<SourceDecoder>,
+    ground_truth: Option<Box<dyn Write + Send>>,
+    /// Where the robot's state is saved.
     checkpoint: Option<Checkpoint>,
 }
 
 /// What has come from one source.
-struct Ear {
+struct SourceDecoder {
     source: Source,
     decoder: Decoder,
 }
 
 impl Session {
-    /// A robot at its first tick, which is written to the truth.
+    /// A robot at its first tick, which is written to the ground truth.
     pub(super) fn new(
         mission: &Mission,
         robot: Robot,
         pace: Pace,
         way: Way,
-        truth: Option<Box<dyn Write + Send>>,
+        ground_truth: Option<Box<dyn Write + Send>>,
         checkpoint: Option<Checkpoint>,
     ) -> Result<Self, SimError> {
         let listening = way.address();
@@ -69,20 +69,20 @@ impl Session {
             way,
             radio: Some(radio).filter(|radio| !radio.is_perfect()),
             peer: None,
-            ears: Vec::new(),
-            truth,
+            decoders: Vec::new(),
+            ground_truth,
             checkpoint,
         };
-        session.tell(&GroundTruthHeader { listening });
-        session.tell_tick();
-        session.keep()?;
+        session.write(&GroundTruthHeader { listening });
+        session.write_tick();
+        session.save()?;
         Ok(session)
     }
 
-    /// Keep how the robot stands.
-    fn keep(&mut self) -> Result<(), SimError> {
+    /// Save how the robot stands.
+    fn save(&mut self) -> Result<(), SimError> {
         if let Some(checkpoint) = &mut self.checkpoint {
-            checkpoint.save(&self.robot.kept())?;
+            checkpoint.save(&self.robot.saved_state())?;
         }
         Ok(())
     }
@@ -90,7 +90,7 @@ impl Session {
     /// The process ends: the robot comes to rest, for nobody speaks to it any more.
     pub(super) fn end(mut self) -> Result<(), SimError> {
         self.robot.come_to_rest();
-        self.keep()
+        self.save()
     }
 
     /// What becomes readable when bytes have come.
@@ -109,7 +109,7 @@ impl Session {
         flight.map_or(self.next_tick_s(), |due| due.min(self.next_tick_s()))
     }
 
-    /// Take up to `most` pieces of what has come; `now` tells mission time where a clock makes it.
+    /// Take up to `most` pieces of what has come; `now` is mission time where a clock makes it.
     pub(super) fn listen(
         &mut self,
         buffer: &mut [u8],
@@ -154,7 +154,7 @@ impl Session {
         Ok(())
     }
 
-    /// Pass mission time to the next tick, tell the truth of it, and send its frames.
+    /// Pass mission time to the next tick, write the ground truth of it, and send its frames.
     fn tick(&mut self) -> Result<(), SimError> {
         let frames = self.measured()?;
         self.send(&frames);
@@ -181,51 +181,54 @@ impl Session {
         Ok(())
     }
 
-    /// The frames of the next tick, its truth told and kept.
+    /// The frames of the next tick, its ground truth told and saved.
     fn measured(&mut self) -> Result<Vec<u8>, SimError> {
         self.robot.advance_to_next_tick();
-        self.tell_tick();
-        self.keep()?;
+        self.write_tick();
+        self.save()?;
         let mut frames = Vec::with_capacity(256);
         self.robot.stream(&mut frames);
         Ok(frames)
     }
 
     fn hear(&mut self, source: Source, bytes: &[u8]) -> Result<(), SimError> {
-        let known = self.ears.iter().position(|ear| ear.source == source);
-        let mut ear = known.map_or_else(
-            || Ear {
+        let known = self
+            .decoders
+            .iter()
+            .position(|heard| heard.source == source);
+        let mut heard = known.map_or_else(
+            || SourceDecoder {
                 source,
                 decoder: Decoder::default(),
             },
-            |at| self.ears.swap_remove(at),
+            |at| self.decoders.swap_remove(at),
         );
-        ear.decoder.push(bytes);
-        while let Some(frame) = ear.decoder.next_frame() {
+        heard.decoder.push(bytes);
+        while let Some(frame) = heard.decoder.next_frame() {
             self.on_frame(source, &frame)?;
         }
         // Of others than the peer, only one is remembered.
         if self.peer != Some(source) {
             let peer = self.peer;
-            self.ears.retain(|other| Some(other.source) == peer);
-        } else if self.ears.len() > 1 {
-            self.ears.remove(0);
+            self.decoders.retain(|other| Some(other.source) == peer);
+        } else if self.decoders.len() > 1 {
+            self.decoders.remove(0);
         }
-        self.ears.push(ear);
+        self.decoders.push(heard);
         Ok(())
     }
 
     fn on_frame(&mut self, source: Source, frame: &Frame<'_>) -> Result<(), SimError> {
         let mut answer = Vec::with_capacity(16);
         if !self.lock_step {
-            if self.robot.on_frame(frame, &mut answer) != Heard::Stranger {
+            if self.robot.on_frame(frame, &mut answer) != Heard::Foreign {
                 self.peer = Some(source);
                 self.send(&answer);
             }
             return Ok(());
         }
         match Robot::kind(frame) {
-            Heard::Stranger => {}
+            Heard::Foreign => {}
             // The radio may lose the command or make it late; the period passes all the same.
             Heard::Motion => {
                 self.peer = Some(source);
@@ -277,16 +280,16 @@ impl Session {
         }
     }
 
-    fn tell_tick(&mut self) {
-        let mut truth = self.robot.truth();
-        let now = truth.time_s;
-        truth.radio = self.radio.as_mut().map(|radio| radio.truth(now));
-        self.tell(&truth);
+    fn write_tick(&mut self) {
+        let mut ground_truth = self.robot.ground_truth();
+        let now = ground_truth.time_s;
+        ground_truth.radio = self.radio.as_mut().map(|radio| radio.ground_truth(now));
+        self.write(&ground_truth);
     }
 
-    /// Write one line of truth; when nobody reads it any more, no further ones.
-    fn tell(&mut self, record: &impl Serialize) {
-        let Some(truth) = &mut self.truth else {
+    /// Write one line of ground truth; when nobody reads it any more, no further ones.
+    fn write(&mut self, record: &impl Serialize) {
+        let Some(ground_truth) = &mut self.ground_truth else {
             return;
         };
         // One write a line: a pipe charges each write far more than its bytes.
@@ -294,12 +297,12 @@ impl Session {
             .map_err(std::io::Error::from)
             .and_then(|mut line| {
                 line.push(b'\n');
-                truth.write_all(&line)
+                ground_truth.write_all(&line)
             })
-            .and_then(|()| truth.flush());
+            .and_then(|()| ground_truth.flush());
         if let Err(error) = written {
-            tracing::warn!(%error, "nobody reads the truth any more; the robot goes on without");
-            self.truth = None;
+            tracing::warn!(%error, "nobody reads the ground truth any more; the robot goes on without");
+            self.ground_truth = None;
         }
     }
 }

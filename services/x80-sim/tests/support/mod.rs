@@ -36,8 +36,8 @@ pub(crate) fn mission(text: &str) -> Mission {
 /// A running simulated robot; dropping it stops it.
 pub(crate) struct Sim {
     pub(crate) listening: String,
-    /// Lines of truth, read as they come: a robot waits for a reader that is slow.
-    truth: Receiver<String>,
+    /// Lines of ground truth, read as they come: a robot waits for a reader that is slow.
+    ground_truth: Receiver<String>,
     stop: Option<UnixStream>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
 }
@@ -56,10 +56,10 @@ impl Sim {
             listen: SocketAddr::from(([127, 0, 0, 1], 0)),
             transport,
             keep: None,
-            truth: Some(Box::new(truth_writer)),
+            ground_truth: Some(Box::new(truth_writer)),
         };
         let thread = std::thread::spawn(move || run(options, stopped));
-        let (line, truth) = channel();
+        let (line, ground_truth) = channel();
         std::thread::spawn(move || {
             for read in BufReader::new(truth_reader).lines() {
                 if line.send(read.unwrap()).is_err() {
@@ -67,18 +67,18 @@ impl Sim {
                 }
             }
         });
-        let header: GroundTruthHeader = serde_json::from_str(&truth.recv().unwrap()).unwrap();
+        let header: GroundTruthHeader = serde_json::from_str(&ground_truth.recv().unwrap()).unwrap();
         Self {
             listening: header.listening,
-            truth,
+            ground_truth,
             stop: Some(stop),
             thread: Some(thread),
         }
     }
 
-    /// The truth of the next tick.
+    /// The ground truth of the next tick.
     pub(crate) fn next_truth(&mut self) -> GroundTruthTick {
-        serde_json::from_str(&self.truth.recv_timeout(PATIENCE).unwrap()).unwrap()
+        serde_json::from_str(&self.ground_truth.recv_timeout(PATIENCE).unwrap()).unwrap()
     }
 
     /// Stop it; what it has told stays to be read.
@@ -87,9 +87,9 @@ impl Sim {
         self.thread.take().unwrap().join().unwrap().unwrap();
     }
 
-    /// The truth of the next tick of a robot that has finished.
+    /// The ground truth of the next tick of a robot that has finished.
     pub(crate) fn last_truth(&mut self) -> Option<GroundTruthTick> {
-        let line = self.truth.recv().ok()?;
+        let line = self.ground_truth.recv().ok()?;
         Some(serde_json::from_str(&line).unwrap())
     }
 

@@ -14,9 +14,12 @@ pub(crate) struct Arguments {
     file: PathBuf,
 }
 
-#[allow(clippy::print_stdout)]
+#[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mission = Mission::load(&arguments.file)?;
+    for remark in &mission.remarks {
+        eprintln!("firsthand: {remark}");
+    }
     let frame = mission.grid_frame();
     println!(
         "{}: {} m to the target, {} x {} cells of {:.3} m",

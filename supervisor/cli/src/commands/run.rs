@@ -163,6 +163,10 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let directory = &options.directory;
     // The supervisor's log goes where its stages' logs are.
     logging::to_file(&directory.join("supervisor.log"), "info")?;
+    for remark in &options.mission.remarks {
+        tracing::warn!("{remark}");
+        eprintln!("firsthand: {remark}");
+    }
     let mut console = Console::new(&options);
     let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
         Ok(finished) => finished,

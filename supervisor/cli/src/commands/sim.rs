@@ -77,7 +77,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         listen: arguments.listen,
         transport: arguments.transport.into(),
         keep: arguments.keep.clone(),
-        truth: arguments
+        ground_truth: arguments
             .ground_truth
             .then(|| Box::new(std::io::stdout()) as Box<_>),
     };

@@ -1,4 +1,4 @@
-//! What the failsafe is told, and what comes of its decisions.
+//! What the failsafe decides by, and what comes of its decisions.
 
 use super::*;
 
@@ -17,8 +17,8 @@ fn tick(link: &mut Link, number: u64, now_ns: u64) -> Vec<Effect> {
 }
 
 fn tick_by(link: &mut Link, now_ns: u64, frames: &[u8], command: &CommandSample) -> Vec<Effect> {
-    let mut effects = link.step(Event::Datagram(frames), now_ns);
-    effects.extend(link.step(Event::Command(command), now_ns + MS));
+    let mut effects = link.at(Event::Datagram(frames), now_ns);
+    effects.extend(link.at(Event::Command(command), now_ns + MS));
     effects
 }
 
@@ -38,7 +38,7 @@ fn powered(volts: f64) -> Vec<u8> {
 }
 
 #[test]
-fn a_supervisor_that_falls_silent_stops_the_robot_and_its_next_word_lets_it_go_on() {
+fn a_supervisor_that_says_nothing_stops_the_robot_and_its_next_directive_lets_it_go_on() {
     let mut link = driving(on_the_wall());
     let mut now = 0;
     for number in 0..14 {
@@ -47,14 +47,14 @@ fn a_supervisor_that_falls_silent_stops_the_robot_and_its_next_word_lets_it_go_o
         assert!(!velocities(&effects).contains(&STAND), "{now} {effects:?}");
     }
     // Between two ticks: the last command is fresh.
-    let effects = link.step(Event::Quiet, 2001 * MS);
+    let effects = link.at(Event::Quiet, 2001 * MS);
     assert_eq!(velocities(&effects), [STAND; 3]);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
     now += 143 * MS;
     let effects = tick(&mut link, 14, now);
     assert_eq!(ticks(&effects).len(), 1, "the stages work on");
     assert!(velocities(&effects).is_empty(), "{effects:?}");
-    link.step(Event::Order(Order::Drive, HoldReason::None), now + 2 * MS);
+    link.at(Event::Order(Order::Drive, HoldReason::None), now + 2 * MS);
     let effects = tick(&mut link, 15, now + 143 * MS);
     assert_eq!(velocities(&effects), [[Some(-1200), Some(1200)]]);
 }
@@ -62,20 +62,20 @@ fn a_supervisor_that_falls_silent_stops_the_robot_and_its_next_word_lets_it_go_o
 #[test]
 fn on_a_clock_of_ticks_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
     let mut link = driving(in_ticks());
-    link.step(Event::Datagram(&datagram(255, 0, 0)), 1);
-    link.step(Event::Command(&command(0, 0, TURN, TURN)), 2);
-    let effects = link.step(Event::Datagram(&datagram(255, 0, 0)), 3);
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.at(Event::Command(&command(0, 0, TURN, TURN)), 2);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3);
     assert_eq!(ticks(&effects)[0].0, 1);
     let frozen = 2001 * MS;
-    let effects = link.step(Event::Command(&command(1, PERIOD_NS, TURN, TURN)), frozen);
+    let effects = link.at(Event::Command(&command(1, PERIOD_NS, TURN, TURN)), frozen);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
     assert_eq!(sent(&effects), [], "each command would be a tick");
     let word = Event::Order(Order::Drive, HoldReason::None);
-    assert_eq!(sent(&link.step(word, frozen + MS)), []);
-    let effects = link.step(Event::Quiet, frozen + 100 * MS);
+    assert_eq!(sent(&link.at(word, frozen + MS)), []);
+    let effects = link.at(Event::Quiet, frozen + 100 * MS);
     assert_eq!(ticks(&effects)[0].0, 1, "the same tick again");
     let answer = command(1, PERIOD_NS, TURN, TURN);
-    let effects = link.step(Event::Command(&answer), frozen + 101 * MS);
+    let effects = link.at(Event::Command(&answer), frozen + 101 * MS);
     assert_eq!(velocities(&effects), [[Some(-1200), Some(1200)]]);
 }
 
@@ -122,7 +122,7 @@ fn a_pose_that_grows_old_stops_the_robot_before_the_command_does() {
     };
     let effects = tick_by(&mut link, 150 * MS, &datagram(255, 0, 0), &older);
     assert_eq!(velocities(&effects).len(), 1);
-    let effects = link.step(Event::Quiet, 251 * MS);
+    let effects = link.at(Event::Quiet, 251 * MS);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::PoseStale)]);
 }
 
@@ -141,12 +141,12 @@ fn on_a_low_battery_the_robot_goes_the_same_way_at_half_speed() {
 #[test]
 fn on_an_empty_battery_the_robot_stands_for_good() {
     for (mut link, period) in [(in_ticks(), PERIOD_NS), (on_the_wall(), PERIOD_NS)] {
-        link.step(Event::Datagram(&powered(5.9)), 0);
+        link.at(Event::Datagram(&powered(5.9)), 0);
         let mut ended = None;
         for number in 0..20 {
             let now = number * period;
             let word = Event::Order(Order::Drive, HoldReason::None);
-            link.step(word, now);
+            link.at(word, now);
             let command = command(number, now, TURN, TURN);
             let effects = tick_by(&mut link, now, &powered(5.9), &command);
             if decided(&effects).contains(&(Action::End, Cause::BatteryEmpty)) {
@@ -171,12 +171,12 @@ fn the_cause_of_a_hold_is_the_supervisors() {
     ] {
         let mut link = driving(on_the_wall());
         tick(&mut link, 0, 0);
-        let effects = link.step(Event::Order(Order::Hold, reason), 20 * MS);
+        let effects = link.at(Event::Order(Order::Hold, reason), 20 * MS);
         assert_eq!(velocities(&effects), [STAND; 3]);
         assert_eq!(decided(&effects), [(Action::Stop, cause)]);
     }
     let mut link = driving(on_the_wall());
     let over = Event::Order(Order::Stop, HoldReason::Ending);
-    let effects = link.step(over, 20 * MS);
+    let effects = link.at(over, 20 * MS);
     assert_eq!(decided(&effects), [(Action::End, Cause::MissionOver)]);
 }

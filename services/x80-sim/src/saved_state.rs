@@ -1,4 +1,4 @@
-//! What of a simulated robot outlives its process: where it stands, and what its wheels have counted.
+//! The state of a simulated robot that its next process restores: where it stands, and what its wheels have counted.
 //!
 //! A real robot stands where it came to rest when its host went away. A simulated one whose process ends with
 //! its supervisor's comes to rest at once, and its next process begins there. What was under way (an order, a
@@ -8,12 +8,12 @@
 use common::kinematics::Pose2;
 use serde::{Deserialize, Serialize};
 
-/// Room for the encoded [`Kept`], bytes.
+/// Room for the encoded [`SavedState`], bytes.
 pub(crate) const CAPACITY: usize = 256;
 
 /// A simulated robot at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
+pub struct SavedState {
     /// The last tick.
     pub(crate) tick: u64,
     /// Its mission time, seconds.
@@ -25,5 +25,5 @@ pub struct Kept {
     /// How often the body has touched something.
     pub(crate) contacts: u64,
     /// The longest that a wheel turned after the last motion command, seconds.
-    pub(crate) unattended_s: f64,
+    pub(crate) stopping_time_s: f64,
 }

@@ -1,11 +1,11 @@
-//! Look before you go: what the careful method makes of a direction.
+//! Active sensing: what the evidential method makes of a direction before the robot goes there.
 //!
 //! The one sonar looks ahead, and the body is wider than its cone where it matters. So before the robot
 //! drives over ground, the sonar must have been pointed there; and it drives no faster than it could stop
 //! before the next thing it believes in, or the next ground it has not seen.
 //!
 //! All of it is computed from the belief and the pose alone: a scan is nothing but looking, tick by tick,
-//! at ground that was not swept yet, so a planner that was killed goes on with it.
+//! at ground that was not swept yet, so the next process of a planner that was killed goes on with it.
 
 use common::{
     grid::{Cell, CellState, GridFrame},
@@ -23,8 +23,8 @@ const SWEPT_AHEAD_M: f64 = 0.25;
 const AHEAD_M: f64 = 0.4;
 /// In this time the robot must be able to stop: the sonar's period, the radio's, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// What a way may pass beyond the body, metres.
-const BESIDE_M: f64 = 0.03;
+/// What must have been swept to either side of the body, metres.
+const SIDE_M: f64 = 0.03;
 /// Cells of a fine grid are looked at no closer than this, metres.
 const GRAIN_M: f64 = 0.025;
 
@@ -50,7 +50,7 @@ pub(crate) struct View<'a> {
 
 /// The robot as the advice sees it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lookout {
+pub(crate) struct ActiveSensing {
     radius: f64,
     speed: f64,
     turn: f64,
@@ -58,11 +58,11 @@ pub(crate) struct Lookout {
     bearing: DVec2,
 }
 
-impl Lookout {
+impl ActiveSensing {
     /// For a mission's robot.
     pub(crate) fn new(mission: &Mission) -> Self {
         Self {
-            radius: mission.body().radius_m + BESIDE_M + mission.grid_frame().resolution_m / 2.0,
+            radius: mission.body().radius_m + SIDE_M + mission.grid_frame().resolution_m / 2.0,
             speed: mission.controller.speed_m_s,
             turn: mission.controller.turn_rad_s,
             bearing: DVec2::from_angle(mission.sonar.bearing_deg.to_radians()),
@@ -170,15 +170,4 @@ impl View<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_scan_turns_to_the_nearer_side_and_there_to_its_far_end() {
-        let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
-        let unseen = [at(20.0), at(50.0), at(35.0), at(-30.0), at(-80.0)];
-        let there = scan(DVec2::X, unseen.into_iter());
-        assert_eq!(there, Some(at(50.0)));
-        assert_eq!(scan(DVec2::X, std::iter::empty()), None);
-    }
-}
+mod tests;

@@ -1,4 +1,4 @@
-//! The thread on which full solves run beside the live field.
+//! The background solver: a thread on which full solves run while the live field stays in use.
 
 use std::{
     io::{self, Write},
@@ -11,36 +11,25 @@ use std::{
     time::Instant,
 };
 
-use harmonic::{Cancellation, Domain, Field, SolveError, Solver};
+use harmonic::{Cancellation, Field, Solver};
 
-use crate::step::Job;
+use crate::step::{Job, Solved};
 
-/// How much the thread gives way.
+/// Niceness of the thread: the stages that answer the robot's ticks go first.
 const NICE: i32 = 10;
 
-/// What became of a job.
-#[derive(Debug)]
-pub struct Solved {
-    /// The job's number.
-    pub number: u64,
-    /// Its map, and the field of it.
-    pub result: Result<(Domain, Field), SolveError>,
-    /// How long it took, nanoseconds of wall-clock.
-    pub took_ns: u64,
-}
-
-/// What the thread is told.
+/// What the thread is given.
 #[derive(Debug)]
 struct Order {
     job: Job,
     cancellation: Cancellation,
-    /// Do not start from the field before: whether that was finished is a matter of luck.
+    /// Do not start from the field before: whether that was finished is a matter of timing.
     afresh: bool,
 }
 
 /// A solver on a thread of its own. Dropping it cancels what runs and waits for the thread.
 #[derive(Debug)]
-pub struct BesideSolver {
+pub struct BackgroundSolver {
     jobs: Option<Sender<Order>>,
     results: Receiver<Solved>,
     done: UnixStream,
@@ -50,27 +39,27 @@ pub struct BesideSolver {
     thread: Option<JoinHandle<()>>,
 }
 
-impl BesideSolver {
+impl BackgroundSolver {
     /// Start the thread.
     ///
     /// # Errors
     /// When the system has no thread or descriptor left.
     pub fn start() -> io::Result<Self> {
-        let (jobs, taken) = channel::<Order>();
-        let (give, results) = channel();
-        let (done, mut ring) = UnixStream::pair()?;
+        let (jobs, orders) = channel::<Order>();
+        let (finished, results) = channel();
+        let (done, mut wakeup) = UnixStream::pair()?;
         done.set_nonblocking(true)?;
-        // A full pipe has rung already.
-        ring.set_nonblocking(true)?;
+        // A full pipe is readable already.
+        wakeup.set_nonblocking(true)?;
         let work = move || {
-            // The stages that answer the robot's ticks go first. Where that is refused they share.
+            // Where that is refused they share the processor.
             let _ = rustix::process::nice(NICE);
             let mut worker = Worker::default();
-            for order in taken {
-                if give.send(worker.solve(order)).is_err() {
+            for order in orders {
+                if finished.send(worker.solve(order)).is_err() {
                     return;
                 }
-                let _ = ring.write(&[1]);
+                let _ = wakeup.write(&[1]);
             }
         };
         let thread = std::thread::Builder::new()
@@ -108,7 +97,7 @@ impl BesideSolver {
         self.taken(solved)
     }
 
-    /// The next result; waits for it. None when the thread is gone.
+    /// The next result; waits for it. None when the thread has ended.
     pub fn wait(&mut self) -> Option<Solved> {
         let solved = self.results.recv().ok();
         self.drain();
@@ -124,12 +113,12 @@ impl BesideSolver {
 
     fn drain(&self) {
         use std::io::Read;
-        let mut rung = [0; 64];
-        while matches!((&self.done).read(&mut rung), Ok(read) if read > 0) {}
+        let mut wakeups = [0; 64];
+        while matches!((&self.done).read(&mut wakeups), Ok(read) if read > 0) {}
     }
 }
 
-/// The thread's own: a set-up that is kept, and the field solved last, where the next one starts.
+/// The thread's own: a solver with its set-up, and the field solved last, where the next one starts.
 #[derive(Default)]
 struct Worker {
     solver: Solver,
@@ -161,13 +150,13 @@ impl Worker {
 }
 
 /// Readable when a job is done.
-impl AsFd for BesideSolver {
+impl AsFd for BackgroundSolver {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.done.as_fd()
     }
 }
 
-impl Drop for BesideSolver {
+impl Drop for BackgroundSolver {
     fn drop(&mut self) {
         self.running.cancel();
         self.jobs = None;

@@ -1,0 +1,244 @@
+//! Cells and metres: what is believed of a cell, windows of cells, and how the cells lie in the mission frame.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// What is believed of a cell: (18), (19) and the a-priori map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum CellState {
+    /// Possibly safe: 0 in the paper's DSE.
+    Free = 0,
+    /// A safety event, or its margin, was mapped here.
+    Sensed = 1,
+    /// Hazard from the a-priori map of the mission.
+    Known = 2,
+    /// The perimeter of operation; never cleared.
+    Perimeter = 3,
+    /// Possibly safe, and the sonar looked there: only the evidential method tells it from [`Free`](Self::Free).
+    Swept = 4,
+    /// Hazard because the body would touch something sensed nearby; the sonar looked there and saw nothing.
+    Margin = 5,
+}
+
+impl CellState {
+    /// Whether the harmonic field is 0 here.
+    #[must_use]
+    pub const fn is_hazard(self) -> bool {
+        !matches!(self, Self::Free | Self::Swept)
+    }
+
+    /// Whether the sonar looked here.
+    #[must_use]
+    pub const fn is_swept(self) -> bool {
+        matches!(self, Self::Swept | Self::Margin)
+    }
+
+    /// The state a byte of the `grid` topic stands for; anything unheard of is a hazard.
+    #[must_use]
+    pub const fn from_byte(byte: u8) -> Self {
+        match byte {
+            0 => Self::Free,
+            1 => Self::Sensed,
+            2 => Self::Known,
+            4 => Self::Swept,
+            5 => Self::Margin,
+            _ => Self::Perimeter,
+        }
+    }
+}
+
+/// The most cells along a side: 4096 x 4096 is the largest field that is solved.
+pub const MAX_CELLS: u32 = 4096;
+
+/// A cell: `col` grows with x, `row` grows with y.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Cell {
+    /// Index along x.
+    pub col: u32,
+    /// Index along y.
+    pub row: u32,
+}
+
+/// A rectangle of cells; empty when either extent is 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub col: u32,
+    /// First row.
+    pub row: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Window {
+    /// Cells it covers.
+    #[must_use]
+    pub const fn area(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// The smallest window that covers `self` and `cell`.
+    #[must_use]
+    pub fn including(self, cell: Cell) -> Self {
+        if self.area() == 0 {
+            return Self {
+                col: cell.col,
+                row: cell.row,
+                width: 1,
+                height: 1,
+            };
+        }
+        let (col, row) = (self.col.min(cell.col), self.row.min(cell.row));
+        Self {
+            col,
+            row,
+            width: (self.col + self.width).max(cell.col + 1) - col,
+            height: (self.row + self.height).max(cell.row + 1) - row,
+        }
+    }
+
+    /// The smallest window that covers `self` and `other`.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        if other.area() == 0 {
+            return self;
+        }
+        let Self {
+            col,
+            row,
+            width,
+            height,
+        } = other;
+        let (last_col, last_row) = (col + width - 1, row + height - 1);
+        self.including(Cell { col, row }).including(Cell {
+            col: last_col,
+            row: last_row,
+        })
+    }
+}
+
+/// How the N x N cells of the map lie in the mission frame: (19) with the origin at the centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridFrame {
+    /// N: cells along each side.
+    pub cells: u32,
+    /// Delta: the side of a cell, metres.
+    pub resolution_m: f64,
+    /// Where the centre cell lies in the mission frame, metres.
+    pub centre: DVec2,
+}
+
+impl GridFrame {
+    /// The index of the cell at the centre, along both axes.
+    #[must_use]
+    pub const fn centre_index(&self) -> u32 {
+        self.cells / 2
+    }
+
+    /// Number of cells, N x N.
+    #[must_use]
+    pub const fn area(&self) -> usize {
+        self.cells as usize * self.cells as usize
+    }
+
+    /// `point` (metres) in cell units: cell centres lie at whole numbers.
+    #[must_use]
+    pub fn to_cells(&self, point: DVec2) -> DVec2 {
+        (point - self.centre) / self.resolution_m + DVec2::splat(f64::from(self.centre_index()))
+    }
+
+    /// The cell `point` falls in, [x / Delta] of (19); none outside the map.
+    #[must_use]
+    pub fn cell_at(&self, point: DVec2) -> Option<Cell> {
+        let index = self.to_cells(point).round();
+        let last = f64::from(self.cells) - 1.0;
+        // Written so that NaN falls out too.
+        if !(index.cmpge(DVec2::ZERO).all() && index.cmple(DVec2::splat(last)).all()) {
+            return None;
+        }
+        Some(Cell {
+            col: index.x as u32,
+            row: index.y as u32,
+        })
+    }
+
+    /// The middle of `cell` in the mission frame, metres.
+    #[must_use]
+    pub fn centre_of(&self, cell: Cell) -> DVec2 {
+        let centre = f64::from(self.centre_index());
+        let offset = DVec2::new(f64::from(cell.col) - centre, f64::from(cell.row) - centre);
+        self.centre + offset * self.resolution_m
+    }
+
+    /// Position of `cell` in a row-major slice of the whole map.
+    #[must_use]
+    pub const fn index(&self, cell: Cell) -> usize {
+        cell.row as usize * self.cells as usize + cell.col as usize
+    }
+
+    /// Whether `cell` is on the perimeter, (18).
+    #[must_use]
+    pub const fn is_rim(&self, cell: Cell) -> bool {
+        let last = self.cells - 1;
+        cell.col == 0 || cell.row == 0 || cell.col >= last || cell.row >= last
+    }
+
+    /// The window of the whole map.
+    #[must_use]
+    pub const fn whole(&self) -> Window {
+        Window {
+            col: 0,
+            row: 0,
+            width: self.cells,
+            height: self.cells,
+        }
+    }
+
+    /// The cells of `window` out of a row-major slice of the whole map, in order.
+    pub fn cells_of<'map, T: Copy>(
+        &self,
+        window: Window,
+        map: &'map [T],
+    ) -> impl ExactSizeIterator<Item = T> + use<'map, T> {
+        let (frame, width) = (*self, window.width.max(1));
+        (0..window.area() as u32).map(move |offset| {
+            map[frame.index(Cell {
+                col: window.col + offset % width,
+                row: window.row + offset / width,
+            })]
+        })
+    }
+
+    /// The smallest window outside of which two whole maps are the same; empty if they are.
+    #[must_use]
+    pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
+        let side = self.cells as usize;
+        let mut window = Window::default();
+        let rows = old.chunks_exact(side).zip(new.chunks_exact(side));
+        for (row, (old, new)) in rows.enumerate() {
+            let differs = |(old, new): (&T, &T)| old != new;
+            let first = old.iter().zip(new).position(differs);
+            let last = old.iter().zip(new).rposition(differs);
+            for col in [first, last].into_iter().flatten() {
+                window = window.including(Cell {
+                    col: col as u32,
+                    row: row as u32,
+                });
+            }
+        }
+        window
+    }
+
+    /// Whether `window` lies inside the map.
+    #[must_use]
+    pub fn contains(&self, window: Window) -> bool {
+        let fits = |from: u32, extent: u32| {
+            from.checked_add(extent)
+                .is_some_and(|end| end <= self.cells)
+        };
+        fits(window.col, window.width) && fits(window.row, window.height)
+    }
+}

@@ -1,0 +1,84 @@
+//! A follower's copy of a map that is published in keyframes and windows.
+
+use super::{
+    frame::{Cell, GridFrame, MAX_CELLS, Window},
+    part::Part,
+};
+
+/// What became of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Applied {
+    /// The whole map came, and nothing was held before to compare it with.
+    Whole,
+    /// The window changed; nothing, if it is empty.
+    Window(Window),
+    /// A version is missing, or the cells do not fit: the map is as it was, wait for a keyframe.
+    Missed,
+}
+
+/// A follower's copy of a map that is published in keyframes and windows.
+#[derive(Clone, Debug, Default)]
+pub struct Replica<T> {
+    cells: Vec<T>,
+    state: Option<(GridFrame, u64)>,
+}
+
+impl<T: Copy + PartialEq> Replica<T> {
+    /// The frame, once a keyframe has come.
+    #[must_use]
+    pub fn frame(&self) -> Option<GridFrame> {
+        self.state.map(|(frame, _)| frame)
+    }
+
+    /// The version held; 0 before the first keyframe.
+    #[must_use]
+    pub fn version(&self) -> u64 {
+        self.state.map_or(0, |(_, version)| version)
+    }
+
+    /// All cells, row-major; empty before the first keyframe.
+    #[must_use]
+    pub fn cells(&self) -> &[T] {
+        &self.cells
+    }
+
+    /// Follow one part, whose cells are `cells`.
+    pub fn apply(&mut self, part: &Part, cells: &[T]) -> Applied {
+        let (frame, window, version) = (part.frame(), part.window(), part.version);
+        let sane = (1..=MAX_CELLS).contains(&frame.cells);
+        if !sane || !frame.contains(window) || cells.len() != window.area() {
+            return Applied::Missed;
+        }
+        if part.is_keyframe() {
+            if window != frame.whole() {
+                return Applied::Missed;
+            }
+            // A keyframe for late joiners must not look like more than what changed, or a consumer that
+            // attaches would change what the others compute.
+            let known = self.state.is_some_and(|(held, _)| held == frame);
+            let changed = known.then(|| frame.changed_window(&self.cells, cells));
+            self.cells.clear();
+            self.cells.extend_from_slice(cells);
+            self.state = Some((frame, version));
+            return changed.map_or(Applied::Whole, Applied::Window);
+        }
+        let Some((held_frame, held)) = self.state else {
+            return Applied::Missed;
+        };
+        let nothing = version == held && window.area() == 0;
+        let follows = nothing || held.checked_add(1) == Some(version);
+        if held_frame != frame || !follows {
+            self.state = None;
+            return Applied::Missed;
+        }
+        for (offset, row) in cells.chunks_exact(window.width.max(1) as usize).enumerate() {
+            let start = frame.index(Cell {
+                col: window.col,
+                row: window.row + offset as u32,
+            });
+            self.cells[start..start + row.len()].copy_from_slice(row);
+        }
+        self.state = Some((frame, version));
+        Applied::Window(window)
+    }
+}

@@ -1,0 +1,217 @@
+//! The evidential method's map: evidence turned into hazard and swept ground.
+
+use common::{
+    grid::{Cell, CellState, Window},
+    mission::Mission,
+    step::ForeignState,
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    evidence_grid::{Beam, EvidenceGrid, Flip, lattice, step_m},
+    inflation::{Geometry, Inflation},
+    sonar_model::SonarModel,
+};
+
+/// The evidence, and what follows from it for the body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct EvidenceMap {
+    evidence: EvidenceGrid,
+    /// Recomputed from the evidence, so not saved.
+    #[serde(skip)]
+    inflation: Inflation,
+}
+
+/// A reading of the sonar, where it was taken.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reading {
+    /// The sensor, metres.
+    pub(crate) origin: DVec2,
+    /// Which way it looked: a unit vector.
+    pub(crate) axis: DVec2,
+    /// The echo's range, metres; none where nothing answered.
+    pub(crate) echo: Option<f64>,
+}
+
+/// What a reading brought.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct News {
+    /// The cells of the grid that may look different now.
+    pub(crate) window: Window,
+    /// Whether something was heard where nothing was believed to stand.
+    pub(crate) safety_event: bool,
+}
+
+/// How evidence becomes states of the grid's cells, for one mission.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Evidential {
+    sonar: SonarModel,
+    geometry: Geometry,
+    radius: f64,
+    map_within: f64,
+}
+
+impl Evidential {
+    /// For a mission's robot and grid.
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let sonar = SonarModel::default();
+        let grid = mission.grid_frame();
+        let radius = mission.body().radius_m;
+        Self {
+            sonar,
+            geometry: Geometry {
+                lattice: lattice(&sonar, mission),
+                grid,
+                // A position is up to half a cell off the centre that stands for it.
+                reach: radius + mission.mapper.clearance_m + grid.resolution_m / 2.0,
+            },
+            radius,
+            map_within: mission.mapper.map_within_m,
+        }
+    }
+
+    /// How far a surface blocks the cells around it, metres.
+    pub(crate) const fn reach(&self) -> f64 {
+        self.geometry.reach
+    }
+
+    /// The map a mission starts with: no evidence.
+    pub(crate) fn empty(&self) -> EvidenceMap {
+        EvidenceMap {
+            evidence: EvidenceGrid::none(&self.geometry.lattice),
+            inflation: Inflation::new(&self.geometry),
+        }
+    }
+
+    /// Bytes of a saved map.
+    pub(crate) const fn saved_bytes(&self) -> usize {
+        4 * self.geometry.lattice.area() + 64
+    }
+
+    /// Complete a map that was saved; one of another mission is refused.
+    pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
+        let lattice = self.geometry.lattice;
+        if !map.evidence.fits(&lattice) {
+            return Err(ForeignState);
+        }
+        map.inflation = Inflation::new(&self.geometry);
+        for row in 0..lattice.cells {
+            for col in 0..lattice.cells {
+                let cell = Cell { col, row };
+                if map.evidence.is_occupied(lattice.index(cell)) {
+                    let occupied = true;
+                    map.inflation
+                        .follow(&self.geometry, Flip { cell, occupied });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Take what was heard, if the sonar gave a reading at all, by a robot at `robot`.
+    pub(crate) fn take(
+        &self,
+        map: &mut EvidenceMap,
+        robot: DVec2,
+        reading: Option<Reading>,
+    ) -> News {
+        let Some(reading) = reading else {
+            return News::default();
+        };
+        let beam = Beam {
+            origin: reading.origin,
+            axis: reading.axis,
+            echo: reading.echo,
+            reach: self.map_within,
+        };
+        let mut flips = Vec::new();
+        let lattice = &self.geometry.lattice;
+        let body = (robot, self.radius);
+        let touched = map
+            .evidence
+            .take(&self.sonar, lattice, &beam, body, &mut flips);
+        let mut window = self.on_grid(touched);
+        for flip in &flips {
+            window = window.union(map.inflation.follow(&self.geometry, *flip));
+        }
+        News {
+            window,
+            safety_event: flips.iter().any(|flip| flip.occupied),
+        }
+    }
+
+    /// The wheels have rolled from `before` to `now`, metres each since the start: the window of the grid that may look
+    /// different now.
+    pub(crate) fn roll(&self, map: &mut EvidenceMap, before: f64, now: f64) -> Window {
+        let step_m = step_m(&self.sonar);
+        let steps = (now / step_m).floor() - (before / step_m).floor();
+        if steps < 1.0 {
+            return Window::default();
+        }
+        let lattice = &self.geometry.lattice;
+        self.on_grid(map.evidence.grow_stale(&self.sonar, lattice, steps as u8))
+    }
+
+    /// Forget all but what is near the robot; at every second reset that as well, for it may be what is wrong.
+    pub(crate) fn forget(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
+        let keep = if epoch % 2 == 1 {
+            self.sonar.near_m
+        } else {
+            0.0
+        };
+        let mut flips = Vec::new();
+        let lattice = &self.geometry.lattice;
+        map.evidence
+            .forget(&self.sonar, lattice, (robot, keep), &mut flips);
+        for flip in &flips {
+            map.inflation.follow(&self.geometry, *flip);
+        }
+    }
+
+    /// What is believed of a cell of the grid that is not fixed.
+    pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
+        let Geometry { lattice, grid, .. } = self.geometry;
+        let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
+        let under = lattice.cell_at(grid.centre_of(cell));
+        let is_swept = |under| map.evidence.is_swept(&self.sonar, lattice.index(under));
+        match (hazard, under.is_some_and(is_swept)) {
+            (true, true) => CellState::Margin,
+            (true, false) => CellState::Sensed,
+            (false, true) => CellState::Swept,
+            (false, false) => CellState::Free,
+        }
+    }
+
+    /// The window of the grid that shows a window of the lattice.
+    fn on_grid(&self, window: Window) -> Window {
+        if window.area() == 0 {
+            return window;
+        }
+        let corner = |col: u32, row: u32| {
+            let point = self.geometry.lattice.centre_of(Cell { col, row });
+            let last = DVec2::splat(f64::from(self.geometry.grid.cells) - 1.0);
+            self.geometry.grid.to_cells(point).clamp(DVec2::ZERO, last)
+        };
+        // A cell of the lattice shows as far as half of it, and half a cell of the grid, beyond its centre.
+        let more = 0.5 * self.geometry.lattice.resolution_m / self.geometry.grid.resolution_m + 0.5;
+        let last = DVec2::splat(f64::from(self.geometry.grid.cells) - 1.0);
+        let from = (corner(window.col, window.row) - more)
+            .floor()
+            .max(DVec2::ZERO);
+        let to = corner(
+            window.col + window.width - 1,
+            window.row + window.height - 1,
+        ) + more;
+        let to = to.ceil().min(last);
+        Window::default()
+            .including(Cell {
+                col: from.x as u32,
+                row: from.y as u32,
+            })
+            .including(Cell {
+                col: to.x as u32,
+                row: to.y as u32,
+            })
+    }
+}

@@ -1,0 +1,108 @@
+//! The sonar model: what an echo, and its absence, tell of the cells around.
+//!
+//! The X80's front sonar is one ultrasonic ranger: one byte of centimetres a frame, "nothing" included, from a cone of
+//! about 15 degrees to either side. Every number that the evidential method makes of that stands here.
+//!
+//! Angles are radians off the sonar's axis, to one side. Weights are integers in quarters of the echo that is heard in
+//! the middle of its arc; positive speaks for something that stands there, negative for free ground.
+
+use std::f64::consts::TAU;
+
+const DEGREE: f64 = TAU / 360.0;
+
+/// The inverse sensor model of the evidence grid, and how evidence is kept. [`SonarModel::default`] is the X80's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SonarModel {
+    /// Side of a cell of the evidence grid, metres. A third of the cone's width where a hit starts to matter: as fine as
+    /// the sonar can tell, and no finer.
+    pub(crate) resolution_m: f64,
+
+    /// Half the angle over which an echo is spread, and the widest angle of the model. The cone's 15 degrees, rounded up.
+    pub(crate) arc: f64,
+    /// How far from its range an echo may be, metres: noise, the byte's centimetre, half a cell.
+    pub(crate) band_m: f64,
+    /// Weight of an echo in the middle of its arc.
+    pub(crate) hit: f64,
+    /// Weight of an echo at the end of its arc, where the sound is weakest; in between it falls linearly.
+    pub(crate) hit_at_edge: f64,
+
+    /// What stands nearer than this before an echo may be its cause, metres: no beam passed there.
+    pub(crate) before_m: f64,
+    /// What lies within this behind an echo was looked at as well as can be, metres.
+    pub(crate) behind_m: f64,
+    /// Weight taken off a cell that a beam passed.
+    pub(crate) pass: i8,
+    /// The same at the beam's edge, where it may have missed.
+    pub(crate) pass_at_edge: i8,
+    /// Half the angle in which a beam speaks against an echo heard before; farther out it may have missed.
+    pub(crate) against: f64,
+    /// Half the angle in which it does so at all.
+    pub(crate) against_at_edge: f64,
+    /// Widest angle between two beams of which one speaks against an echo of the other. A smooth wall that is hit at a
+    /// slant gives no echo, which says nothing of what was heard square to it.
+    pub(crate) same_side: f64,
+
+    /// Weights are bounded below and above: a world that changes is believed after a few readings.
+    pub(crate) least: i8,
+    /// See `least`.
+    pub(crate) most: i8,
+    /// A free cell becomes occupied at this weight, ...
+    pub(crate) occupied: i8,
+    /// ... and free again at this one.
+    pub(crate) released: i8,
+    /// A cell of this weight is the cause of an echo whose arc it lies on: the rest of the arc learns nothing.
+    pub(crate) explains: i8,
+
+    /// Half the angle in which a beam without echo sweeps ground. Less than the cone has: a surface that only just
+    /// reaches into the cone throws the sound away.
+    pub(crate) swept: f64,
+    /// Ground is swept so many times farther than echoes are mapped: an echo there is too wide to be mapped, yet no echo
+    /// says that the ground is free.
+    pub(crate) swept_beyond: f64,
+    /// Half the angle in which the sonar counts as pointed at a cell that it cannot see, ...
+    pub(crate) pointed: f64,
+    /// ... how far ahead of the sensor, metres, ...
+    pub(crate) pointed_m: f64,
+    /// ... and how many readings until there is nothing more to learn from here: the cell counts as swept.
+    pub(crate) pointed_enough: u8,
+    /// Swept ground stays so while the wheels roll this far, turns on the spot included, metres: wheels slip, and by then
+    /// the pose is off by about the clearance that hazards are given.
+    pub(crate) swept_for_m: f64,
+
+    /// Of the robot's footprint so much at the rim is not sure to be free, metres: the pose drifts.
+    pub(crate) rim_m: f64,
+    /// What stands nearer than this to the robot survives the first reset of the sensed belief, metres: it may touch it.
+    pub(crate) near_m: f64,
+}
+
+impl Default for SonarModel {
+    fn default() -> Self {
+        Self {
+            resolution_m: 0.05,
+            arc: 16.0 * DEGREE,
+            band_m: 0.04,
+            hit: 4.0,
+            hit_at_edge: 2.0,
+            before_m: 0.08,
+            behind_m: 0.10,
+            pass: 2,
+            pass_at_edge: 1,
+            against: 8.0 * DEGREE,
+            against_at_edge: 13.0 * DEGREE,
+            same_side: 35.0 * DEGREE,
+            least: -8,
+            most: 12,
+            occupied: 2,
+            released: 0,
+            explains: 6,
+            swept: 12.0 * DEGREE,
+            swept_beyond: 1.25,
+            pointed: 6.0 * DEGREE,
+            pointed_m: 0.40,
+            pointed_enough: 4,
+            swept_for_m: 1.5,
+            rim_m: 0.02,
+            near_m: 0.6,
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! The evidential method, reading by reading.
+
+use super::*;
+
+/// Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead, the body's radius 0.19 m.
+fn mapper(extra: &str) -> Mapper {
+    let text = format!(
+        "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar = {{ forward_m = 0.2 }}\n{extra}"
+    );
+    Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+}
+
+/// A robot at (x, 0) facing `heading` hears an echo, or nothing.
+fn hear(mapper: &mut Mapper, tick: u64, x: f64, heading: f64, echo: Option<f64>) -> Window {
+    let stamp = Stamp {
+        tick,
+        ..Stamp::default()
+    };
+    let pose = PoseSample {
+        stamp,
+        x_m: x,
+        heading_rad: heading,
+        ..PoseSample::default()
+    };
+    let status = echo.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
+    let range = RangeSample {
+        stamp,
+        range_m: echo.unwrap_or_default(),
+        status: status.into(),
+        ..RangeSample::default()
+    };
+    mapper.hear(&pose, Some(&range))
+}
+
+fn state(mapper: &Mapper, x: f64, y: f64) -> CellState {
+    let cell = mapper.frame().cell_at(DVec2::new(x, y)).unwrap();
+    CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)])
+}
+
+#[test]
+fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept() {
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 0.0, 0.0, Some(0.7));
+    // The hit is at 0.9; the body and its clearance reach 0.22 m and half a cell around.
+    assert!(state(&mapper, 0.9, 0.0).is_hazard());
+    assert_eq!(state(&mapper, 0.7, 0.0), CellState::Margin);
+    assert_eq!(state(&mapper, 0.5, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, 0.5, 0.5), CellState::Free);
+    assert_eq!(mapper.state().safety_events(), 1);
+}
+
+#[test]
+fn a_false_echo_is_gone_after_a_look_without_an_echo_at_it() {
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 0.0, 0.0, Some(0.4));
+    assert!(state(&mapper, 0.6, 0.0).is_hazard());
+    for tick in 1..=9 {
+        let heading = 0.1 * (tick as f64 - 5.0);
+        hear(&mut mapper, tick, 0.0, heading, None);
+    }
+    assert_eq!(state(&mapper, 0.6, 0.0), CellState::Swept);
+}
+
+#[test]
+fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
+    let mut mapper = mapper("");
+    for tick in 0..3 {
+        hear(&mut mapper, tick, 0.0, 0.0, Some(0.7));
+    }
+    // From the other side of it: a smooth wall would say nothing there.
+    for tick in 3..30 {
+        hear(&mut mapper, tick, 1.9, std::f64::consts::PI, None);
+    }
+    assert!(state(&mapper, 0.9, 0.0).is_hazard());
+}
+
+#[test]
+fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
+    let mut mapper = mapper("");
+    for tick in 0..4 {
+        hear(&mut mapper, tick, 0.0, 0.0, Some(0.7));
+    }
+    let hazards = |mapper: &Mapper| {
+        let cells = mapper.state().cells().iter();
+        cells
+            .filter(|&&cell| CellState::from_byte(cell).is_hazard())
+            .count()
+    };
+    let before = hazards(&mapper);
+    // Turned by the arc's half: its edge meets the thing, its middle meets nothing new.
+    hear(&mut mapper, 4, 0.0, 0.25, Some(0.7));
+    assert_eq!(hazards(&mapper), before);
+}
+
+#[test]
+fn an_echo_beyond_reach_is_not_mapped() {
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 0.0, 0.0, Some(1.4));
+    assert_eq!(mapper.state().safety_events(), 0);
+    assert_eq!(state(&mapper, 1.0, 0.0), CellState::Swept);
+}
+
+#[test]
+fn swept_ground_grows_stale_as_the_wheels_roll() {
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 0.0, 0.0, None);
+    assert_eq!(state(&mapper, 0.9, 0.0), CellState::Swept);
+    // Six turns on the spot: 4.9 m of each wheel; the beam looks the other way at the end.
+    let heading = 13.0 * std::f64::consts::PI;
+    hear(&mut mapper, 1, 0.0, heading, None);
+    assert_eq!(state(&mapper, 0.9, 0.0), CellState::Free);
+    assert_eq!(state(&mapper, -0.9, 0.0), CellState::Swept);
+}
+
+#[test]
+fn a_mapper_that_was_killed_goes_on_to_the_bit() {
+    let mut first = mapper("");
+    for tick in 0..5 {
+        hear(&mut first, tick, 0.0, 0.1 * tick as f64, Some(0.6));
+    }
+    let mut successor = mapper("");
+    successor.restore(first.state().clone()).unwrap();
+    for tick in 5..9 {
+        let echo = (tick % 2 == 0).then_some(0.5);
+        for mapper in [&mut first, &mut successor] {
+            hear(mapper, tick, 0.02, -0.1 * tick as f64, echo);
+        }
+    }
+    assert_eq!(first.state(), successor.state());
+}
+
+#[test]
+fn a_belief_of_the_other_method_is_refused() {
+    let saved = mapper("method = 'paper'").state().clone();
+    assert_eq!(mapper("").restore(saved), Err(ForeignState));
+}
+
+#[test]
+fn what_is_forgotten_first_is_what_is_not_near_and_then_all_of_it() {
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 0.0, 0.0, Some(0.9));
+    hear(&mut mapper, 1, 0.0, 2.0, Some(0.3));
+    assert!(mapper.reset(1) && !mapper.reset(1));
+    assert!(!state(&mapper, 1.1, 0.0).is_hazard());
+    let near = DVec2::from_angle(2.0) * 0.5;
+    assert!(state(&mapper, near.x, near.y).is_hazard());
+    assert!(mapper.reset(2));
+    assert!(!state(&mapper, near.x, near.y).is_hazard());
+}
+
+#[test]
+fn the_targets_cell_is_never_hazard() {
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 1.3, 0.0, Some(0.5));
+    assert!(state(&mapper, 1.9, 0.0).is_hazard());
+    assert!(!state(&mapper, 2.0, 0.0).is_hazard());
+}

@@ -1,0 +1,95 @@
+//! A belief that was broken on purpose.
+
+use super::*;
+
+fn mapper(method: &str) -> Mapper {
+    let text = format!(
+        "target = [1.5, 0]\nmethod = '{method}'\nperimeter = {{ width_m = 5, cells = 50 }}"
+    );
+    Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+}
+
+fn stand(mapper: &mut Mapper, tick: u64, x_m: f64) {
+    let stamp = Stamp {
+        tick,
+        ..Stamp::default()
+    };
+    mapper.hear(
+        &PoseSample {
+            stamp,
+            x_m,
+            ..PoseSample::default()
+        },
+        None,
+    );
+}
+
+fn is_hazard(mapper: &Mapper, x: f64, y: f64) -> bool {
+    let cell = mapper.frame().cell_at(DVec2::new(x, y)).unwrap();
+    CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)]).is_hazard()
+}
+
+/// Whether the free cells lead from the origin to the target's.
+fn is_connected(mapper: &Mapper) -> bool {
+    let frame = mapper.frame();
+    let free =
+        |cell: Cell| !CellState::from_byte(mapper.state().cells()[frame.index(cell)]).is_hazard();
+    let mut seen = vec![false; frame.area()];
+    let mut next = vec![frame.cell_at(DVec2::ZERO).unwrap()];
+    while let Some(Cell { col, row }) = next.pop() {
+        let beside = [
+            (col - 1, row),
+            (col + 1, row),
+            (col, row - 1),
+            (col, row + 1),
+        ];
+        for (col, row) in beside {
+            let cell = Cell { col, row };
+            if free(cell) && !std::mem::replace(&mut seen[frame.index(cell)], true) {
+                next.push(cell);
+            }
+        }
+    }
+    seen[frame.index(frame.cell_at(DVec2::new(1.5, 0.0)).unwrap())]
+}
+
+#[test]
+fn a_robot_inside_a_false_hazard_takes_it_along_until_the_belief_is_forgotten() {
+    for method in ["paper", "evidential"] {
+        let mut mapper = mapper(method);
+        mapper.step(Input::Fault(FaultKind::BuryRobot), MissionTime(0));
+        stand(&mut mapper, 0, 0.0);
+        assert!(is_hazard(&mapper, 0.0, 0.0) && !is_hazard(&mapper, 0.7, 0.0));
+        stand(&mut mapper, 1, 0.3);
+        assert!(is_hazard(&mapper, 0.7, 0.0));
+        assert!(mapper.reset(1));
+        assert!(!is_hazard(&mapper, 0.3, 0.0) && !is_hazard(&mapper, 0.7, 0.0));
+        stand(&mut mapper, 2, 0.3);
+        assert!(!is_hazard(&mapper, 0.3, 0.0), "{method}");
+    }
+}
+
+#[test]
+fn a_target_that_is_cut_off_stays_so_whatever_is_forgotten() {
+    for method in ["paper", "evidential"] {
+        let mut mapper = mapper(method);
+        assert!(is_connected(&mapper));
+        mapper.step(Input::Fault(FaultKind::CutOff), MissionTime(0));
+        stand(&mut mapper, 0, 0.0);
+        assert!(!is_connected(&mapper));
+        assert!(mapper.reset(1));
+        assert!(!is_connected(&mapper), "{method}");
+    }
+}
+
+#[test]
+fn a_version_differs_from_the_one_before_in_one_window_broken_or_not() {
+    let mut mapper = mapper("evidential");
+    mapper.step(Input::Fault(FaultKind::BuryRobot), MissionTime(0));
+    for tick in 0..4 {
+        let before = (mapper.state().version(), mapper.state().cells().to_vec());
+        stand(&mut mapper, tick, 0.1 * tick as f64);
+        assert_eq!(mapper.state().version(), before.0 + 1);
+        assert_ne!(mapper.state().cells(), before.1);
+    }
+}
