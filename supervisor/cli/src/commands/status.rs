@@ -65,7 +65,7 @@ struct LinkStatus {
     losses: u64,
     reboots: u64,
     unsent: u64,
-    strangers: u64,
+    foreign_datagrams: u64,
 }
 
 /// The robot's batteries.
@@ -174,7 +174,7 @@ fn link_status(link: &LinkSample) -> LinkStatus {
         losses: link.losses,
         reboots: link.reboots,
         unsent: link.unsent,
-        strangers: link.foreign_datagrams,
+        foreign_datagrams: link.foreign_datagrams,
     }
 }
 

@@ -57,7 +57,7 @@ fn is_connected(mapper: &Mapper) -> bool {
 fn a_robot_inside_a_false_hazard_takes_it_along_until_the_belief_is_forgotten() {
     for method in ["paper", "evidential"] {
         let mut mapper = mapper(method);
-        mapper.step(Input::Fault(FaultKind::BuryRobot), MissionTime(0));
+        mapper.step(Input::Fault(FaultKind::HazardAroundRobot), MissionTime(0));
         stand(&mut mapper, 0, 0.0);
         assert!(is_hazard(&mapper, 0.0, 0.0) && !is_hazard(&mapper, 0.7, 0.0));
         stand(&mut mapper, 1, 0.3);
@@ -85,7 +85,7 @@ fn a_target_that_is_cut_off_stays_so_whatever_is_forgotten() {
 #[test]
 fn a_version_differs_from_the_one_before_in_one_window_broken_or_not() {
     let mut mapper = mapper("evidential");
-    mapper.step(Input::Fault(FaultKind::BuryRobot), MissionTime(0));
+    mapper.step(Input::Fault(FaultKind::HazardAroundRobot), MissionTime(0));
     for tick in 0..4 {
         let before = (mapper.state().version(), mapper.state().cells().to_vec());
         stand(&mut mapper, tick, 0.1 * tick as f64);
