@@ -280,7 +280,7 @@ fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
     }
     let ground_truth = robot.ground_truth();
     assert_eq!(ground_truth.contacts, 1);
-    assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{truth:?}");
+    assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{ground_truth:?}");
     assert_eq!(ground_truth.v, 0.0, "the wall holds it");
 }
 
@@ -358,7 +358,7 @@ fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
         robot.advance_to_next_tick();
     }
     let ground_truth = robot.ground_truth();
-    assert!((ground_truth.x + 0.49).abs() < 0.01, "{truth:?}");
+    assert!((ground_truth.x + 0.49).abs() < 0.01, "{ground_truth:?}");
     assert_eq!(ground_truth.contacts, 1);
     // Pushed straight back, its wheels roll.
     let back = 0.49 / (std::f64::consts::TAU * 0.085 / 1200.0);
