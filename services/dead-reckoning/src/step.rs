@@ -192,7 +192,7 @@ impl DeadReckoning {
 }
 
 /// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only
-/// what happened between two generations of it has to be told from the counts themselves.
+/// what happened between two generations of it must be read off the counts themselves.
 fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
     if last.generation == wheels.stamp.generation {
         return last.restarts != wheels.restarts;

@@ -1,6 +1,6 @@
 //! The occupancy evidence grid: what was heard for and against every cell, the evidential method's memory under the map.
 //!
-//! Its cells are a lattice of their own, as fine as the sonar can tell and no finer, whatever the grid of the map:
+//! Its cells are a lattice of their own, as fine as the sonar resolves and no finer, whatever the grid of the map:
 //! what the robot believes of the place must not depend on how finely the field is solved. Every cell
 //! holds the weight of the evidence that something stands in it, the beam that heard it, and whether the
 //! sonar ever looked there.
@@ -38,7 +38,7 @@ pub(crate) struct Beam {
     pub(crate) axis: DVec2,
     /// The echo's range, metres; none where nothing answered within reach.
     pub(crate) echo: Option<f64>,
-    /// How far it speaks at all, metres.
+    /// How far it is evidence at all, metres.
     pub(crate) reach: f64,
 }
 
@@ -171,7 +171,7 @@ impl EvidenceGrid {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
             let (across, along) = (beam.axis.perp_dot(offset), beam.axis.dot(offset));
-            // Most cells around lie outside anything asked below, which is told without an angle.
+            // Most cells around lie outside anything asked below, which is known without an angle.
             if range > far || range > near && across.abs() > along * outside {
                 continue;
             }

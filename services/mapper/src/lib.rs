@@ -3,7 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`step`] | the mapper itself, pure: poses with ranges in, the window of the grid that changed out |
-//! | `sonar_model` | THE numbers that say what an echo, and its absence, tell of the cells around |
+//! | `sonar_model` | THE numbers of what an echo, and its absence, mean for the cells around |
 //! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
 //! | `inflation` | occupied cells grown by the robot's body |
 //! | `evidential` | evidence and inflation together: the evidential method's state of a cell |

@@ -1,20 +1,20 @@
-//! The sonar model: what an echo, and its absence, tell of the cells around.
+//! The sonar model: what an echo, and its absence, mean for the cells around.
 //!
 //! The X80's front sonar is one ultrasonic ranger: one byte of centimetres a frame, "nothing" included, from a cone of
 //! about 15 degrees to either side. Every number that the evidential method makes of that stands here.
 //!
 //! Angles are radians off the sonar's axis, to one side. Weights are integers in quarters of the echo that is heard in
-//! the middle of its arc; positive speaks for something that stands there, negative for free ground.
+//! the middle of its arc; positive is evidence for something that stands there, negative for free ground.
 
 use std::f64::consts::TAU;
 
 const DEGREE: f64 = TAU / 360.0;
 
-/// The inverse sensor model of the evidence grid, and how evidence is kept. [`SonarModel::default`] is the X80's.
+/// The inverse sensor model of the evidence grid, and how evidence is bounded and forgotten. [`SonarModel::default`] is the X80's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SonarModel {
     /// Side of a cell of the evidence grid, metres. A third of the cone's width where a hit starts to matter: as fine as
-    /// the sonar can tell, and no finer.
+    /// the sonar resolves, and no finer.
     pub(crate) resolution_m: f64,
 
     /// Half the angle over which an echo is spread, and the widest angle of the model. The cone's 15 degrees, rounded up.
@@ -34,12 +34,12 @@ pub(crate) struct SonarModel {
     pub(crate) pass: i8,
     /// The same at the beam's edge, where it may have missed.
     pub(crate) pass_at_edge: i8,
-    /// Half the angle in which a beam speaks against an echo heard before; farther out it may have missed.
+    /// Half the angle in which a beam is evidence against an echo heard before; farther out it may have missed.
     pub(crate) against: f64,
     /// Half the angle in which it does so at all.
     pub(crate) against_at_edge: f64,
-    /// Widest angle between two beams of which one speaks against an echo of the other. A smooth wall that is hit at a
-    /// slant gives no echo, which says nothing of what was heard square to it.
+    /// Widest angle between two beams of which one is evidence against an echo of the other. A smooth wall that is hit at a
+    /// slant gives no echo, which is no evidence against what was heard square to it.
     pub(crate) same_side: f64,
 
     /// Weights are bounded below and above: a world that changes is believed after a few readings.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use common::samples::{Action, Cause, HoldReason, Order};
 
-/// A supervisor that has been silent for so long watches nobody: ten times what it says its word again after,
+/// A supervisor that has published nothing for so long watches nobody: ten times the interval of its directives,
 /// so that a loaded machine does not stop the robot, and a second before systemd's watchdog would kill it.
 pub const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
 
@@ -18,7 +18,7 @@ pub const SLOW_SHARE: f64 = 0.5;
 /// What the link knows when it decides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flags {
-    /// The supervisor's last word; none before it spoke.
+    /// The supervisor's last directive; none before the first.
     pub directive: Option<Directive>,
     /// Whether the robot answers.
     pub connected: bool,
@@ -28,14 +28,14 @@ pub struct Flags {
     pub battery: Charge,
 }
 
-/// What the supervisor said last.
+/// What the supervisor ordered last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Directive {
     /// What it wants.
     pub order: Order,
     /// Why it does not want the robot to drive.
     pub reason: HoldReason,
-    /// How long ago it said so, by the machine's clock.
+    /// How long ago, by the machine's clock.
     pub age: Duration,
 }
 
@@ -102,7 +102,7 @@ pub struct Rule {
     applies: fn(&Flags, Duration) -> bool,
 }
 
-/// Every rule, the worst action first; of those with the same action the first that applies is told.
+/// Every rule, the worst action first; of those with the same action the first that applies is reported.
 pub static TABLE: &[Rule] = &[
     Rule {
         cause: Cause::MissionOver,

@@ -7,7 +7,9 @@
 //! | `stream` | what a connection and a serial line have in common: opened for ever anew, never half a frame |
 //! | `tcp` | a connection |
 //! | `serial` | a serial line |
+//! | `counts` | what each of them counts |
 
+mod counts;
 mod serial;
 mod stream;
 mod tcp;
@@ -21,9 +23,10 @@ use std::{
 use common::address::Address;
 use thiserror::Error;
 
+pub use self::counts::{Attempts, Tally};
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
-/// The wire cannot be had or kept: this process is short of something, the robot has no part in it.
+/// The wire cannot be opened or stays unusable: this process is short of something, the robot has no part in it.
 #[derive(Debug, Error)]
 #[error(
     "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
@@ -35,31 +38,13 @@ pub struct TransportError {
     pub source: io::Error,
 }
 
-/// What a wire counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// Datagrams from another address than the robot's, dropped.
-    pub foreign_datagrams: u64,
-    /// Messages to the robot that the wire did not take, lost.
-    pub unsent: u64,
-}
-
-/// Attempts to open a wire that is down.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Attempts {
-    /// So many since the robot was last heard on it.
-    pub made: u64,
-    /// Nanoseconds until the next one; 0 when one is under way.
-    pub next_ns: u64,
-}
-
 /// A wire to one robot.
 #[derive(Debug)]
 pub struct Transport {
     address: Address,
     wire: Wire,
-    /// Whether the wire was open when that was last told.
-    told: Option<bool>,
+    /// Whether the wire was open when that was last reported.
+    reported: Option<bool>,
     buffer: Box<[u8]>,
 }
 
@@ -87,21 +72,21 @@ impl Transport {
                 source,
             })?,
             address: address.clone(),
-            told: None,
+            reported: None,
             // The largest datagram.
             buffer: vec![0; 65_536].into_boxed_slice(),
         })
     }
 
     /// Open what is down when that is due, send what is left of a message; at `now_ns` of the monotonic
-    /// clock. Says whether the wire is open, when that was not said yet. No opening hides a closing: both
-    /// are told, in turn.
+    /// clock. Says whether the wire is open, when that was not reported yet. No opening hides a closing: both
+    /// are reported, in turn.
     ///
     /// # Errors
     /// When the system refuses to watch a descriptor.
     pub fn tend(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
-        let closed_untold = self.told == Some(true) && !self.is_open();
-        if !closed_untold {
+        let closed_unreported = self.reported == Some(true) && !self.is_open();
+        if !closed_unreported {
             let tended = match &mut self.wire {
                 Wire::Udp(_) => Ok(()),
                 Wire::Tcp(stream) => stream.tend(now_ns),
@@ -110,10 +95,10 @@ impl Transport {
             tended.map_err(|source| self.broken(source))?;
         }
         let open = Some(self.is_open());
-        if self.told == open {
+        if self.reported == open {
             return Ok(None);
         }
-        self.told = open;
+        self.reported = open;
         Ok(open)
     }
 
@@ -184,7 +169,7 @@ impl Transport {
     }
 }
 
-/// Readable when there is something to do; the same descriptor for as long as the transport lives.
+/// Readable when there is something to do; the same descriptor for as long as the transport exists.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
         match &self.wire {

@@ -36,6 +36,7 @@
 //! ```
 
 pub mod body;
+mod error;
 pub mod infrared;
 pub mod motor;
 pub mod noise;
@@ -49,4 +50,6 @@ mod streams;
 mod transport;
 pub mod world;
 
-pub use shell::{SimError, SimOptions, Transport, run};
+pub use error::SimError;
+pub use shell::{SimOptions, run};
+pub use transport::Transport;

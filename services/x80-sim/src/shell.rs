@@ -12,34 +12,22 @@ use std::{
 };
 
 use common::{
-    checkpoint::{Checkpoint, CheckpointError},
+    checkpoint::Checkpoint,
     clock::{Pace, monotonic_ns},
     mission::Mission,
     poll,
 };
-use thiserror::Error;
 
 use self::session::Session;
 use crate::{
+    error::SimError,
     robot::Robot,
     saved_state::{self, SavedState},
-    transport::Way,
+    transport::{Transport, Way},
 };
 
 /// Datagrams taken in one go before time and the stop are looked at again.
 const MOST_AT_ONCE: usize = 64;
-
-/// How bytes reach the robot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Transport {
-    /// Datagrams.
-    #[default]
-    Udp,
-    /// A connection, one host at a time.
-    Tcp,
-    /// A pseudo-terminal, opened by its path like a serial port.
-    Pty,
-}
 
 /// What a simulated robot is started with.
 pub struct SimOptions {
@@ -65,46 +53,6 @@ pub struct SimOptions {
     /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
     /// without.
     pub ground_truth: Option<Box<dyn Write + Send>>,
-}
-
-/// Why a simulated robot could not start or go on.
-#[derive(Debug, Error)]
-pub enum SimError {
-    /// The address cannot be listened on.
-    #[error(
-        "the simulated robot cannot listen on {address}: {source}; stop what listens there, or give port 0 to take a free one"
-    )]
-    Bind {
-        /// The address.
-        address: SocketAddr,
-        /// The system's word.
-        source: io::Error,
-    },
-    /// No pseudo-terminal is to be had.
-    #[error("the simulated robot gets no pseudo-terminal: {0}; mount /dev/pts, or use UDP or TCP")]
-    Line(#[source] io::Error),
-    /// The transport failed later.
-    #[error("the simulated robot can no longer listen on {address}: {source}; start it again")]
-    Lost {
-        /// Where it listened.
-        address: String,
-        /// The system's word.
-        source: io::Error,
-    },
-    /// How it stands cannot be saved.
-    #[error(transparent)]
-    Keep(#[from] CheckpointError),
-    /// The file that keeps how it stands cannot be had.
-    #[error("the simulated robot cannot have {file} to itself: {source}; give another file")]
-    Lock {
-        /// The file.
-        file: PathBuf,
-        /// The system's word.
-        source: io::Error,
-    },
-    /// The system would not let it wait.
-    #[error("the simulated robot cannot wait for its socket: {0}; start it again")]
-    Wait(#[source] io::Error),
 }
 
 /// Run a simulated robot until `stop` becomes readable (or its other end is closed).

@@ -1,22 +1,25 @@
 //! How bytes reach the robot: datagrams, a connection or a serial line.
 
 mod pty;
+mod source;
 mod tcp;
 mod udp;
 
 use std::{io, net::SocketAddr, os::fd::BorrowedFd};
 
-use crate::shell::{SimError, Transport};
+pub(crate) use self::source::Source;
+use crate::error::SimError;
 
-/// Who bytes came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Source {
-    /// A peer that sends datagrams.
-    Peer(SocketAddr),
-    /// The connection with this number.
-    Connection(u64),
-    /// Whoever is at the other end of the line.
-    Line,
+/// How bytes reach the robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Transport {
+    /// Datagrams.
+    #[default]
+    Udp,
+    /// A connection, one host at a time.
+    Tcp,
+    /// A pseudo-terminal, opened by its path like a serial port.
+    Pty,
 }
 
 /// An open way to the robot. What cannot be sent on it is lost, as on a radio.

@@ -122,7 +122,7 @@ fn every_cause_has_one_row_and_a_case_that_is_decided_otherwise_without_it() {
         let rows = TABLE.iter().filter(|rule| rule.cause == cause).count();
         assert_eq!(rows, 1, "{cause:?}");
         let cases = cases();
-        let mut own = cases.iter().filter(|(_, _, told)| *told == cause);
+        let mut own = cases.iter().filter(|(_, _, reported)| *reported == cause);
         let (flags, action, _) = own.next().unwrap();
         let others = TABLE.iter().filter(|rule| rule.cause != cause);
         let without = worst(others, flags, LIMIT);
@@ -186,8 +186,11 @@ fn whatever_is_wrong_at_once_nothing_milder_is_done_than_the_worst_of_it_asks_fo
         let mut applying = TABLE.iter().filter(|rule| (rule.applies)(&flags, LIMIT));
         let worst = applying.clone().map(|rule| rule.action).max();
         assert_eq!(decision.action, worst.unwrap_or(Action::Go), "{flags:?}");
-        let told = applying.find(|rule| Some(rule.action) == worst);
-        assert_eq!(decision.cause, told.map_or(Cause::None, |rule| rule.cause));
+        let reported = applying.find(|rule| Some(rule.action) == worst);
+        assert_eq!(
+            decision.cause,
+            reported.map_or(Cause::None, |rule| rule.cause)
+        );
         went += u32::from(decision == Decision::GO);
     }
     // Drive, said for any of five reasons and not too long ago; three ages, none too old.

@@ -289,12 +289,12 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
     let custom = CustomSensors::default();
     Report::Custom(custom).encode(Addressing::default(), &mut bytes);
     let effects = link.at(Event::Datagram(&bytes), 0);
-    for told in [
+    for reported in [
         |effect: &Effect| matches!(effect, Effect::Infrared(_)),
         |effect: &Effect| matches!(effect, Effect::Power(_)),
         |effect: &Effect| matches!(effect, Effect::Surroundings(_)),
     ] {
-        assert_eq!(effects.iter().filter(|effect| told(effect)).count(), 1);
+        assert_eq!(effects.iter().filter(|effect| reported(effect)).count(), 1);
     }
     assert!(ticks(&effects).is_empty());
 }

@@ -1,4 +1,4 @@
-//! What the robot says, and whether it is there.
+//! What the robot sends, and whether it is there.
 
 use common::wire::{Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal};
 
@@ -67,8 +67,8 @@ impl Link {
         }
     }
 
-    /// Whether the counts began anew. On a clock of ticks the robot is a simulated one that lives as long as
-    /// its mission, and no time passes that could tell.
+    /// Whether the counts began anew. On a clock of ticks the robot is a simulated one that runs as long as
+    /// its mission, and no time passes by which to notice.
     pub(super) fn notice_restart(&mut self, sensors: &MotorSensors) -> bool {
         let counts = sensors.encoders.map(|encoder| encoder.position);
         !self.in_ticks() && self.restart.step(counts, self.now)

@@ -55,7 +55,7 @@ impl Dial for Serial {
             return Err(Errno::NOTTY.into());
         }
         // For this process alone. TIOCEXCL would do the same, but it outlives a killed link for as long as
-        // anyone has the line open, and then keeps its successor out; this lock dies with its holder.
+        // anyone has the line open, and then keeps its successor out; this lock ends with its holder.
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();

@@ -18,7 +18,7 @@ use rustix::{
     io::{Errno, read, write},
 };
 
-use super::{Attempts, Tally};
+use super::counts::{Attempts, Tally};
 use crate::backoff::Backoff;
 
 /// Between the first two attempts: a robot that restarts its network is back as soon as it can be.
@@ -30,7 +30,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 
 /// What a stream is opened over.
 pub(super) trait Dial: fmt::Display {
-    /// After how much silence an open stream is taken for dead; none where the system tells.
+    /// After how much silence an open stream is taken for closed; none where the system reports that.
     const SILENCE: Option<Duration>;
 
     /// Begin to open it, without waiting.
@@ -60,8 +60,8 @@ pub(super) struct Stream<D> {
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
-    /// What was last said to be wrong: the same again is no news.
-    told: Option<Errno>,
+    /// What was last logged to be wrong: the same again is no news.
+    logged: Option<Errno>,
 }
 
 impl<D: Dial> Stream<D> {
@@ -73,7 +73,7 @@ impl<D: Dial> Stream<D> {
             tail: Vec::new(),
             backoff: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
             unsent: 0,
-            told: None,
+            logged: None,
         })
     }
 
@@ -116,7 +116,7 @@ impl<D: Dial> Stream<D> {
                         since_ns: now_ns,
                     };
                 }
-                Err(error) => self.tell(&error),
+                Err(error) => self.log(&error),
             }
         }
         match &self.state {
@@ -161,7 +161,7 @@ impl<D: Dial> Stream<D> {
                 *heard_ns = now_ns;
                 // Only now: a peer that hangs up at once must not be called ten times a second.
                 self.backoff.reset();
-                self.told = None;
+                self.logged = None;
                 return Some(length);
             }
             Err(Errno::AGAIN | Errno::INTR) => {}
@@ -240,7 +240,7 @@ impl<D: Dial> Stream<D> {
 
     /// Down it is. The descriptor takes itself off the epoll when it is closed.
     fn close(&mut self, error: &io::Error) {
-        self.tell(error);
+        self.log(error);
         if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
             std::mem::replace(&mut self.state, State::Closed)
         {
@@ -249,10 +249,10 @@ impl<D: Dial> Stream<D> {
         self.tail.clear();
     }
 
-    fn tell(&mut self, error: &io::Error) {
+    fn log(&mut self, error: &io::Error) {
         // A stream that ends has no number of its own.
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
-        if self.told.replace(errno) != Some(errno) {
+        if self.logged.replace(errno) != Some(errno) {
             let remedy = remedy(errno);
             tracing::warn!(robot = %self.dial, %error, "the wire is down: {remedy}; it is tried for ever");
         }

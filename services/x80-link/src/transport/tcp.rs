@@ -12,7 +12,7 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// A connection whose other end was switched off is never told so. The slowest robot a mission allows
+/// A connection is not notified when its other end was switched off. The slowest robot a mission allows
 /// speaks every 2 s, and pings are answered at once.
 const SILENCE: Duration = Duration::from_secs(5);
 

@@ -8,7 +8,7 @@ use std::{
 
 use rustix::io::Errno;
 
-use super::Tally;
+use super::counts::Tally;
 
 /// A socket that speaks to one robot.
 #[derive(Debug)]

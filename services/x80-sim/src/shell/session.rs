@@ -11,8 +11,8 @@ use common::{
 };
 use serde::Serialize;
 
-use super::SimError;
 use crate::{
+    error::SimError,
     radio::Radio,
     robot::{Heard, Robot},
     transport::{Source, Way},
@@ -181,7 +181,7 @@ impl Session {
         Ok(())
     }
 
-    /// The frames of the next tick, its ground truth told and saved.
+    /// The frames of the next tick, its ground truth written and its state saved.
     fn measured(&mut self) -> Result<Vec<u8>, SimError> {
         self.robot.advance_to_next_tick();
         self.write_tick();

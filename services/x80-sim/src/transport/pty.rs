@@ -12,7 +12,7 @@ use rustix::{
     termios::{OptionalActions, tcgetattr, tcsetattr},
 };
 
-use super::Source;
+use super::source::Source;
 
 #[derive(Debug)]
 pub(crate) struct Pty {

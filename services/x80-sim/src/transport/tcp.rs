@@ -6,7 +6,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use super::Source;
+use super::source::Source;
 
 #[derive(Debug)]
 pub(crate) struct Tcp {

@@ -70,8 +70,8 @@ fn on_a_clock_of_ticks_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_
     let effects = link.at(Event::Command(&command(1, PERIOD_NS, TURN, TURN)), frozen);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
     assert_eq!(sent(&effects), [], "each command would be a tick");
-    let word = Event::Order(Order::Drive, HoldReason::None);
-    assert_eq!(sent(&link.at(word, frozen + MS)), []);
+    let directive = Event::Order(Order::Drive, HoldReason::None);
+    assert_eq!(sent(&link.at(directive, frozen + MS)), []);
     let effects = link.at(Event::Quiet, frozen + 100 * MS);
     assert_eq!(ticks(&effects)[0].0, 1, "the same tick again");
     let answer = command(1, PERIOD_NS, TURN, TURN);
@@ -145,8 +145,8 @@ fn on_an_empty_battery_the_robot_stands_for_good() {
         let mut ended = None;
         for number in 0..20 {
             let now = number * period;
-            let word = Event::Order(Order::Drive, HoldReason::None);
-            link.at(word, now);
+            let directive = Event::Order(Order::Drive, HoldReason::None);
+            link.at(directive, now);
             let command = command(number, now, TURN, TURN);
             let effects = tick_by(&mut link, now, &powered(5.9), &command);
             if decided(&effects).contains(&(Action::End, Cause::BatteryEmpty)) {

@@ -1,0 +1,19 @@
+//! What a wire counts.
+
+/// What a wire counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Datagrams from another address than the robot's, dropped.
+    pub foreign_datagrams: u64,
+    /// Messages to the robot that the wire did not take, lost.
+    pub unsent: u64,
+}
+
+/// Attempts to open a wire that is down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Attempts {
+    /// So many since the robot was last heard on it.
+    pub made: u64,
+    /// Nanoseconds until the next one; 0 when one is under way.
+    pub next_ns: u64,
+}
