@@ -5,19 +5,14 @@
 //! otherwise, its x-axis is the robot's own.
 
 mod check;
+mod error;
 mod robot;
 mod simulation;
-
-use std::{
-    fs::File,
-    io::{self, Read as _},
-    path::{Path, PathBuf},
-};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-pub use check::MissionError;
+pub use error::MissionError;
 pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig};
 pub use simulation::{
     BatteryPhysics, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
@@ -236,26 +231,6 @@ impl Default for Controller {
 }
 
 impl Mission {
-    /// Parse and validate `text`; `origin` names it in errors.
-    ///
-    /// # Errors
-    /// A [`MissionError`] that says line, key, what is wrong and the remedy.
-    pub fn parse(text: &str, origin: &Path) -> Result<Self, MissionError> {
-        check::parse(text, origin)
-    }
-
-    /// [`Mission::parse`] on a file.
-    ///
-    /// # Errors
-    /// Also when the file cannot be read.
-    pub fn load(path: &Path) -> Result<Self, MissionError> {
-        let text = read_bounded(path).map_err(|source| MissionError::Unreadable {
-            file: PathBuf::from(path),
-            source,
-        })?;
-        Self::parse(&text, path)
-    }
-
     /// Delta = D / N and where the cells lie.
     #[must_use]
     pub fn grid_frame(&self) -> GridFrame {
@@ -304,20 +279,6 @@ impl Mission {
     pub fn body(&self) -> Body {
         self.robot.body()
     }
-}
-
-/// A mission is a page or two; a file without end is no mission.
-const MAX_BYTES: u64 = 8 << 20;
-
-fn read_bounded(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    let read = File::open(path)?
-        .take(MAX_BYTES)
-        .read_to_string(&mut text)?;
-    if read as u64 == MAX_BYTES {
-        return Err(io::Error::other(format!("it is {MAX_BYTES} bytes or more")));
-    }
-    Ok(text)
 }
 
 #[cfg(test)]

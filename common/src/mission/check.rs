@@ -2,56 +2,34 @@
 
 mod simulation;
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::{self, Read as _},
+    path::{Path, PathBuf},
+};
 
 use glam::DVec2;
-use thiserror::Error;
 use toml::de::{DeTable, DeValue};
 
-use super::Mission;
+use super::{Mission, error::MissionError};
 use crate::{
     address::{Address, AddressError, FORMS},
     grid::MAX_CELLS,
     wire::MOTOR_SCALE_V,
 };
 
-/// Why a mission was refused.
-#[derive(Debug, Error)]
-pub enum MissionError {
-    /// The file cannot be read.
-    #[error(
-        "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
-    )]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// The system's word.
-        source: std::io::Error,
-    },
-    /// It is not the TOML a mission is written in: syntax, an unknown key, a wrong type.
-    #[error("{file}:{line}: {problem}")]
-    Syntax {
-        /// The file.
-        file: PathBuf,
-        /// 1-based line.
-        line: usize,
-        /// The parser's word.
-        problem: String,
-    },
-    /// A value cannot be.
-    #[error("{file}:{line}: {key}: {problem}; {remedy}")]
-    Value {
-        /// The file.
-        file: PathBuf,
-        /// 1-based line of the key, or of the table that should hold it.
-        line: usize,
-        /// The key, dotted.
-        key: String,
-        /// What is wrong with it.
-        problem: String,
-        /// What to do.
-        remedy: String,
-    },
+/// A mission is a page or two; a file without end is no mission.
+const MAX_BYTES: u64 = 8 << 20;
+
+fn read_bounded(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let read = File::open(path)?
+        .take(MAX_BYTES)
+        .read_to_string(&mut text)?;
+    if read as u64 == MAX_BYTES {
+        return Err(io::Error::other(format!("it is {MAX_BYTES} bytes or more")));
+    }
+    Ok(text)
 }
 
 /// Fewer cells than this leave no room between the perimeter's two sides.
@@ -61,7 +39,29 @@ const MAX_TIMEOUT_S: f64 = 86_400.0;
 /// More shapes than this in a file are a mistake.
 const MAX_POINTS: usize = 100_000;
 
-pub(super) fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
+impl Mission {
+    /// Parse and validate `text`; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// A [`MissionError`] that says line, key, what is wrong and the remedy.
+    pub fn parse(text: &str, origin: &Path) -> Result<Self, MissionError> {
+        parse(text, origin)
+    }
+
+    /// [`Mission::parse`] on a file.
+    ///
+    /// # Errors
+    /// Also when the file cannot be read.
+    pub fn load(path: &Path) -> Result<Self, MissionError> {
+        let text = read_bounded(path).map_err(|source| MissionError::Unreadable {
+            file: PathBuf::from(path),
+            source,
+        })?;
+        Self::parse(&text, path)
+    }
+}
+
+fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     let syntax = |error: &toml::de::Error| MissionError::Syntax {
         file: origin.to_path_buf(),
         line: error.span().map_or(1, |span| line_of(text, span.start)),

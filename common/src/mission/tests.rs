@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use super::*;
 
 fn with_cells(cells: u32) -> Mission {

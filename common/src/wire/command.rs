@@ -4,7 +4,7 @@ mod parse;
 
 use super::{
     did,
-    frame::{Addressing, Frame, MessageError, SystemSignal},
+    frame::{Addressing, Frame, SystemSignal},
 };
 
 /// Channels of the motor board. The wheels are on two of them.
@@ -221,14 +221,6 @@ impl Command {
             data: &data,
         }
         .encode(out);
-    }
-
-    /// What a frame asks of the robot.
-    ///
-    /// # Errors
-    /// When the frame has a right CRC but is no command: unknown DID, odd length, a byte that means nothing.
-    pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
-        parse::command(frame)
     }
 }
 

@@ -19,9 +19,7 @@ use harmonic::{
 };
 
 use crate::active_sensing::{ActiveSensing, Advice, View};
-use crate::{
-    fault::lead_astray,
-};
+use crate::fault::lead_astray;
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 

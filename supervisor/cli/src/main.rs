@@ -15,7 +15,7 @@ mod summary;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 #[cfg(feature = "simulator")]
 use commands::sim;
@@ -119,7 +119,7 @@ fn main() -> ExitCode {
         Command::Stages(arguments) => tables::stages(&arguments),
         Command::Failsafe(arguments) => tables::failsafe(&arguments),
         Command::Faults(arguments) => tables::faults(&arguments),
-        Command::Help(arguments) => help::main(&arguments),
+        Command::Help(arguments) => help::main(&arguments, Arguments::command()),
     };
     match result {
         Ok(code) => code,

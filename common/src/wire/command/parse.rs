@@ -9,7 +9,17 @@ use crate::wire::{
     frame::{Frame, MessageError, SystemSignal, length},
 };
 
-pub(super) fn command(frame: &Frame<'_>) -> Result<Command, MessageError> {
+impl Command {
+    /// What a frame asks of the robot.
+    ///
+    /// # Errors
+    /// When the frame has a right CRC but is no command: unknown DID, odd length, a byte that means nothing.
+    pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
+        command(frame)
+    }
+}
+
+fn command(frame: &Frame<'_>) -> Result<Command, MessageError> {
     let data = frame.data;
     match frame.did {
         did::POSITION => one(frame, Quantity::Position),

@@ -280,7 +280,10 @@ fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
     }
     let ground_truth = robot.ground_truth();
     assert_eq!(ground_truth.contacts, 1);
-    assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{ground_truth:?}");
+    assert!(
+        (0.0..1e-6).contains(&ground_truth.clearance_m),
+        "{ground_truth:?}"
+    );
     assert_eq!(ground_truth.v, 0.0, "the wall holds it");
 }
 

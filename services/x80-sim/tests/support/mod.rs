@@ -67,7 +67,8 @@ impl Sim {
                 }
             }
         });
-        let header: GroundTruthHeader = serde_json::from_str(&ground_truth.recv().unwrap()).unwrap();
+        let header: GroundTruthHeader =
+            serde_json::from_str(&ground_truth.recv().unwrap()).unwrap();
         Self {
             listening: header.listening,
             ground_truth,

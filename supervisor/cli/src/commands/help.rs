@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, process::ExitCode};
 
-use clap::{Args, CommandFactory as _, error::ErrorKind};
+use clap::{Args, Command, error::ErrorKind};
 
 use super::{Failure, print_text};
 
@@ -77,8 +77,8 @@ pub(crate) fn topics() -> String {
     list
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let mut whole = crate::Arguments::command();
+/// `whole` is the command line of the executable.
+pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<ExitCode, Failure> {
     // Usage lines name the whole command only once it is built.
     whole.build();
     let text = match arguments.topic.as_deref() {

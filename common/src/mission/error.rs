@@ -1,0 +1,44 @@
+//! Why a mission is refused.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a mission was refused.
+#[derive(Debug, Error)]
+pub enum MissionError {
+    /// The file cannot be read.
+    #[error(
+        "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
+    )]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// The system's word.
+        source: std::io::Error,
+    },
+    /// It is not the TOML a mission is written in: syntax, an unknown key, a wrong type.
+    #[error("{file}:{line}: {problem}")]
+    Syntax {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: usize,
+        /// The parser's word.
+        problem: String,
+    },
+    /// A value cannot be.
+    #[error("{file}:{line}: {key}: {problem}; {remedy}")]
+    Value {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line of the key, or of the table that should hold it.
+        line: usize,
+        /// The key, dotted.
+        key: String,
+        /// What is wrong with it.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+}
