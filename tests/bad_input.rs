@@ -1,12 +1,9 @@
 //! One clear sentence with cause and remedy, a non-zero exit, nothing left running.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::net::UdpSocket;
 
+use crate::support::{Run, assert_nothing_left, firsthand, output};
 use rustix::process::Signal;
-use support::{Run, assert_nothing_left, firsthand, output};
 
 /// The sentence on standard error of a command that must fail.
 fn refusal(arguments: &[&str]) -> String {
@@ -89,15 +86,15 @@ fn an_unknown_stage_is_answered_with_those_there_are() {
 
 #[test]
 fn a_second_supervisor_of_a_robot_is_refused_and_the_first_goes_on() {
-    let mut first = Run::start("twice", "obstacle-course", &["--pace", "1"]);
+    let mut first = Run::start("second", "obstacle-course", &["--pace", "1"]);
     first.wait_until_under_way(0.3);
-    let text = refusal(&["run", "--robot", "twice"]);
+    let text = refusal(&["run", "--robot", "second"]);
     let pid = first.pid().to_string();
     assert!(text.contains(&pid) && text.contains("--robot"), "{text}");
     assert!(first.status().is_some());
     first.signal(Signal::TERM);
     first.finish();
-    assert_nothing_left("twice");
+    assert_nothing_left("second");
 }
 
 #[test]

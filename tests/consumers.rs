@@ -1,12 +1,8 @@
 //! A consumer that comes late gets everything, and going away changes nothing.
-//!
-//! One test alone: a process speaks to one robot.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::time::Instant;
 
+use crate::support::{self, Run, assert_nothing_left, in_own_process};
 use common::{
     bus::Bus,
     domain::Domain,
@@ -15,7 +11,6 @@ use common::{
     topics,
     waiter::Waiter,
 };
-use support::{Run, assert_nothing_left};
 
 /// What a consumer has heard, put together.
 #[derive(Default)]
@@ -63,55 +58,57 @@ fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
 
 #[test]
 fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothing() {
-    let mut run = Run::start("consumed", "obstacle-course", &["--pace", "4"]);
-    run.wait_until_under_way(6.0);
-    let heard = listen("consumed", |heard| {
-        heard.poses.len() >= 40 && heard.grid_changes >= 3 && heard.field_changes >= 3
-    });
-    let ticks: Vec<u64> = heard.poses.iter().map(|(tick, _)| *tick).collect();
-    let in_order = ticks.windows(2).all(|pair| pair[1] == pair[0] + 1);
-    assert!(in_order, "ticks missing: {ticks:?}");
+    in_own_process(|| {
+        let mut run = Run::start("consumed", "obstacle-course", &["--pace", "4"]);
+        run.wait_until_under_way(6.0);
+        let heard = listen("consumed", |heard| {
+            heard.poses.len() >= 40 && heard.grid_changes >= 3 && heard.field_changes >= 3
+        });
+        let ticks: Vec<u64> = heard.poses.iter().map(|(tick, _)| *tick).collect();
+        let in_order = ticks.windows(2).all(|pair| pair[1] == pair[0] + 1);
+        assert!(in_order, "ticks missing: {ticks:?}");
 
-    let frame = heard.grid.frame().expect("a keyframe came");
-    assert_eq!(heard.grid.cells().len(), frame.area());
-    let count = |state: CellState| {
-        heard
-            .grid
+        let frame = heard.grid.frame().expect("a keyframe came");
+        assert_eq!(heard.grid.cells().len(), frame.area());
+        let count = |state: CellState| {
+            heard
+                .grid
+                .cells()
+                .iter()
+                .filter(|&&cell| cell == state as u8)
+                .count()
+        };
+        assert_eq!(
+            count(CellState::Perimeter),
+            4 * (frame.cells as usize - 1),
+            "the whole rim"
+        );
+        assert!(
+            count(CellState::Sensed) > 0,
+            "what was sensed before the consumer came"
+        );
+
+        assert_eq!(heard.field.frame(), Some(frame));
+        let directed = heard
+            .field
             .cells()
             .iter()
-            .filter(|&&cell| cell == state as u8)
-            .count()
-    };
-    assert_eq!(
-        count(CellState::Perimeter),
-        4 * (frame.cells as usize - 1),
-        "the whole rim"
-    );
-    assert!(
-        count(CellState::Sensed) > 0,
-        "what was sensed before the consumer came"
-    );
+            .filter(|cell| cell.ex != 0.0 || cell.ey != 0.0)
+            .count();
+        assert!(
+            directed > frame.area() / 2,
+            "{directed} of {} cells have a direction",
+            frame.area()
+        );
 
-    assert_eq!(heard.field.frame(), Some(frame));
-    let directed = heard
-        .field
-        .cells()
-        .iter()
-        .filter(|cell| cell.ex != 0.0 || cell.ey != 0.0)
-        .count();
-    assert!(
-        directed > frame.area() / 2,
-        "{directed} of {} cells have a direction",
-        frame.area()
-    );
-
-    let (code, summary) = run.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    let restarts = summary["restarts"].as_object().unwrap();
-    assert!(restarts.values().all(|times| times == 0), "{summary}");
-    assert_nothing_left("consumed");
+        let (code, summary) = run.finish();
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(0), &"reached".into()),
+            "{summary}"
+        );
+        let restarts = summary["restarts"].as_object().unwrap();
+        assert!(restarts.values().all(|times| times == 0), "{summary}");
+        assert_nothing_left("consumed");
+    });
 }

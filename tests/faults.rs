@@ -1,11 +1,9 @@
 //! Robots that do not get on, each pinned by a fault put into a running stage: every recovery frees one, and the last
 //! says that it could not.
-#![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
-use std::path::Path;
-
+use crate::support::{
+    self, Run, STAGES, assert_nothing_left, find, in_own_process, operate, output, records,
+};
 use common::{
     bus::Bus,
     clock::MissionTime,
@@ -15,7 +13,6 @@ use common::{
     waiter::Waiter,
 };
 use serde_json::Value;
-use support::{Run, assert_nothing_left, find, output};
 
 /// At this speed the mission has thousands of ticks: seconds to be broken in, on a clock of ticks, which does not
 /// care how loaded the machine is.
@@ -24,8 +21,7 @@ const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
 
 /// `firsthand fault`, which must succeed.
 fn inject(robot: &str, stage: &str, fault: &str) {
-    let output = output(&["fault", stage, fault, "--robot", robot]);
-    assert!(output.status.success(), "{fault}: {output:?}");
+    operate(robot, &["fault", stage, fault]);
 }
 
 /// What `firsthand` says when it refuses.
@@ -33,13 +29,6 @@ fn refusal(arguments: &[&str]) -> String {
     let output = output(arguments);
     assert!(!output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stderr).unwrap()
-}
-
-/// The run's list of stalls.
-fn stalls(directory: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(directory.join("stalls.jsonl")).unwrap_or_default();
-    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
-    lines.collect()
 }
 
 /// How many of them were met by `recovery`.
@@ -65,7 +54,7 @@ fn broken(
     let (_, summary, kept) = run.finish_in();
     let directory = kept.path().join("run");
     let log = std::fs::read_to_string(directory.join("supervisor.log")).unwrap();
-    let stalls = stalls(&directory);
+    let stalls = records(&directory.join("stalls.jsonl"));
     assert_eq!(summary["replans"], count(&stalls, "replan"), "{stalls:?}");
     assert_eq!(summary["resets"], count(&stalls, "forget"), "{stalls:?}");
     assert_eq!(
@@ -100,11 +89,11 @@ fn a_robot_pinned_by_a_corrupted_field_comes_free_by_a_fresh_planner_by_either_m
 
 #[test]
 fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_forgotten_belief_by_either_method() {
-    for (robot, method) in [("buried", &[][..]), ("buried-p", &PAPER[..])] {
+    for (robot, method) in [("inside", &[][..]), ("inside-p", &PAPER[..])] {
         let (summary, stalls, _) = broken(robot, "mapper", "hazard-around-robot", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
         let first = stalls.iter().find(|stall| stall["recovery"] == "forget");
-        assert_eq!(first.unwrap()["cause"], "buried", "{stalls:?}");
+        assert_eq!(first.unwrap()["cause"], "inside_hazard", "{stalls:?}");
     }
 }
 
@@ -120,7 +109,7 @@ fn a_robot_cut_off_for_good_ends_unreachable_with_a_picture_that_says_so() {
         "{summary}"
     );
     let directory = kept.path().join("run");
-    let stalls = stalls(&directory);
+    let stalls = records(&directory.join("stalls.jsonl"));
     let recoveries: Vec<_> = stalls.iter().map(|stall| &stall["recovery"]).collect();
     assert_eq!(
         recoveries,
@@ -156,8 +145,7 @@ fn a_stage_that_spins_is_aborted_as_hung() {
         find(status, "controller")["generation"] == 2
             && find(status, "controller")["state"] == "running"
     });
-    let text = std::fs::read_to_string(run.directory().join("deaths.jsonl")).unwrap();
-    let death: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+    let death = run.records("deaths.jsonl").remove(0);
     assert_eq!(
         (&death["stage"], &death["hung"]),
         (&"controller".into(), &true.into())
@@ -165,6 +153,51 @@ fn a_stage_that_spins_is_aborted_as_hung() {
     let (_, summary) = run.finish();
     assert_eq!(summary["outcome"], "reached", "{summary}");
     assert_nothing_left("spins");
+}
+
+#[test]
+fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
+    let slow = [
+        "--pace",
+        "4",
+        "--set",
+        "controller.speed_m_s=0.02",
+        "--timeout",
+        "2000",
+    ];
+    let mut run = Run::start("mutes", "open-room", &slow);
+    run.wait_until_under_way(1.0);
+    // The link has no input from a stage that it owes an answer for.
+    for stage in STAGES.into_iter().skip(1) {
+        let status = run.wait_until("all run and it drives", |status| {
+            let mut stages = STAGES.iter().map(|stage| find(status, stage));
+            status["order"] == "driving" && stages.all(|stage| stage["state"] == "running")
+        });
+        let generation =
+            |status: &Value, stage: &str| find(status, stage)["generation"].as_u64().unwrap();
+        inject("mutes", stage, "mute");
+        let after = run.wait_until("it is replaced", |after| {
+            generation(after, stage) > generation(&status, stage)
+        });
+        for other in STAGES {
+            let more = u64::from(other == stage);
+            assert_eq!(
+                generation(&after, other),
+                generation(&status, other) + more,
+                "{stage}: {other}"
+            );
+        }
+        let death = run.records("deaths.jsonl").pop().unwrap();
+        assert_eq!(
+            (&death["stage"], &death["hung"]),
+            (&stage.into(), &true.into())
+        );
+        // It beat until its end.
+        assert!(death["beat_age_s"].as_f64().unwrap() < 0.5, "{death}");
+    }
+    run.signal(rustix::process::Signal::TERM);
+    run.finish();
+    assert_nothing_left("mutes");
 }
 
 /// Ask the planner for a fault past the command line; what it answered.
@@ -199,22 +232,24 @@ fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
 
 #[test]
 fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor_by_the_stage() {
-    // An address makes it real. Nobody answers there: it never moves.
-    let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
-    let mut run = Run::start("metal", "open-room", &address);
-    run.wait_until("its stages run", |status| {
-        find(status, "planner")["state"] == "running"
+    in_own_process(|| {
+        // An address makes it real. Nobody answers there: it never moves.
+        let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
+        let mut run = Run::start("metal", "open-room", &address);
+        run.wait_until("its stages run", |status| {
+            find(status, "planner")["state"] == "running"
+        });
+        let fault = ["fault", "planner", "saddle", "--robot", "metal"];
+        let said = refusal(&fault);
+        assert!(said.contains("--break-a-real-robot"), "{said}");
+        assert_eq!(ask_planner("metal", false), FaultAnswer::Refused);
+        assert_eq!(ask_planner("metal", true), FaultAnswer::Taken);
+        let meant = output(&[&fault[..], &["--break-a-real-robot"]].concat());
+        assert!(meant.status.success(), "{meant:?}");
+        run.signal(rustix::process::Signal::INT);
+        run.finish();
+        assert_nothing_left("metal");
     });
-    let fault = ["fault", "planner", "saddle", "--robot", "metal"];
-    let said = refusal(&fault);
-    assert!(said.contains("--break-a-real-robot"), "{said}");
-    assert_eq!(ask_planner("metal", false), FaultAnswer::Refused);
-    assert_eq!(ask_planner("metal", true), FaultAnswer::Taken);
-    let meant = output(&[&fault[..], &["--break-a-real-robot"]].concat());
-    assert!(meant.status.success(), "{meant:?}");
-    run.signal(rustix::process::Signal::INT);
-    run.finish();
-    assert_nothing_left("metal");
 }
 
 #[test]

@@ -1,12 +1,9 @@
 //! `firsthand field`: what comes out of a map, and what is said of one that is none.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::path::{Path, PathBuf};
 
+use crate::support::output;
 use serde_json::Value;
-use support::output;
 
 /// A room of 24 x 16 cells in its rim, a wall across it with one doorway, and a closet nobody can leave.
 fn rooms() -> Vec<String> {

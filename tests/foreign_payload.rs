@@ -1,10 +1,6 @@
-//! A consumer built against other payload types is told so, and does no harm.
-//!
-//! One test alone: a process speaks to one robot.
-#![allow(clippy::unwrap_used, clippy::panic)]
+//! A consumer built against other payload types is refused with the reason, and does no harm.
 
-mod support;
-
+use crate::support::{Run, in_own_process};
 use common::{
     bus::{Bus, BusError, Topic},
     domain::Domain,
@@ -12,23 +8,24 @@ use common::{
     topics::{self, AnyTopic as _},
 };
 use rustix::process::Signal;
-use support::Run;
 
 #[test]
-fn a_consumer_built_against_another_payload_is_told_so() {
-    let mut run = Run::start("foreign", "obstacle-course", &["--pace", "1"]);
-    run.wait_until_under_way(0.3);
-    let bus = Bus::join(&Domain::of("foreign".parse().unwrap()), "foreigner").unwrap();
-    let pose_as_wheels = Topic::<WheelSample>::new(topics::POSE.spec());
-    let error = bus.reader(&pose_as_wheels).unwrap_err();
-    assert!(
-        matches!(error, BusError::Incompatible { topic: "pose" }),
-        "{error}"
-    );
-    assert!(error.to_string().contains("build it against"), "{error}");
-    drop(bus);
-    run.wait_until_under_way(1.0);
-    run.signal(Signal::TERM);
-    let (_, summary) = run.finish();
-    assert_eq!(summary["restarts"]["dead-reckoning"], 0, "{summary}");
+fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
+    in_own_process(|| {
+        let mut run = Run::start("foreign", "obstacle-course", &["--pace", "1"]);
+        run.wait_until_under_way(0.3);
+        let bus = Bus::join(&Domain::of("foreign".parse().unwrap()), "foreigner").unwrap();
+        let pose_as_wheels = Topic::<WheelSample>::new(topics::POSE.spec());
+        let error = bus.reader(&pose_as_wheels).unwrap_err();
+        assert!(
+            matches!(error, BusError::Incompatible { topic: "pose" }),
+            "{error}"
+        );
+        assert!(error.to_string().contains("build it against"), "{error}");
+        drop(bus);
+        run.wait_until_under_way(1.0);
+        run.signal(Signal::TERM);
+        let (_, summary) = run.finish();
+        assert_eq!(summary["restarts"]["dead-reckoning"], 0, "{summary}");
+    });
 }

@@ -4,8 +4,7 @@
 mod support;
 
 use rustix::process::Signal;
-use serde_json::Value;
-use support::{Run, STAGES, assert_nothing_left, find, signal_process};
+use support::{Run, STAGES, assert_nothing_left, find};
 
 /// How late a deadline may be noticed.
 const SLACK: f64 = 0.020;
@@ -30,27 +29,16 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
                     .iter()
                     .all(|stage| find(status, stage)["state"] == "running")
             });
-            let generation = find(&status, stage)["generation"].as_u64();
-            signal_process(
-                find(&status, stage)["pid"].as_u64().unwrap() as u32,
-                Signal::STOP,
-            );
-            run.wait_until("it is replaced", |status| {
-                find(status, stage)["generation"].as_u64() > generation
-            });
+            run.kill_and_await(stage, Signal::STOP, &status);
         }
     }
-    let text = std::fs::read_to_string(run.directory().join("deaths.jsonl")).unwrap();
+    let deaths = run.records("deaths.jsonl");
     run.signal(Signal::INT);
     let (code, summary) = run.finish();
     assert_eq!(code, Some(0), "{summary}");
     assert_nothing_left(robot);
-    let deaths: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
     // On a machine that stands still for a moment others may be late too.
-    assert!(deaths.len() >= times * STAGES.len(), "{text}");
+    assert!(deaths.len() >= times * STAGES.len(), "{deaths:?}");
     let mut late: Vec<f64> = deaths
         .iter()
         .map(|death| {

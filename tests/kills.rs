@@ -1,39 +1,46 @@
 //! Stages killed, frozen and stopped in the middle of missions.
-#![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
+use crate::support::{self, Run, STAGES, assert_nothing_left, processes_of, run};
 use rustix::process::Signal;
-use support::{Run, STAGES, assert_nothing_left, processes_of, run};
 
 /// Mission time runs so many times as fast as the wall's: a mission takes ten seconds.
 const PACE: &str = "4";
 
 #[test]
-fn each_stage_killed_once_the_robot_arrives_and_knows_where_it_is() {
-    let (_, undisturbed) = run("calm", "obstacle-course", &["--pace", PACE]);
-    let mut killed = Run::start("kills", "obstacle-course", &["--pace", PACE]);
-    killed.wait_until_under_way(2.0);
-    for stage in STAGES {
-        killed.kill_and_await_successor(stage, Signal::KILL);
+fn each_stage_killed_or_frozen_once_the_robot_arrives_and_knows_where_it_is() {
+    let start = |robot| Run::start(robot, "obstacle-course", &["--pace", PACE]);
+    let (calm, killed, frozen) = (start("calm"), start("kills"), start("frozen"));
+    let disturbed = [(killed, Signal::KILL), (frozen, Signal::STOP)].map(|(mut run, signal)| {
+        std::thread::spawn(move || {
+            run.wait_until_under_way(2.0);
+            for stage in STAGES {
+                run.kill_and_await_successor(stage, signal);
+            }
+            run.finish()
+        })
+    });
+    let (_, undisturbed) = calm.finish();
+    for run in disturbed {
+        let (code, summary) = run.join().unwrap();
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(0), &"reached".into()),
+            "{summary}"
+        );
+        assert_eq!(summary["collisions"], 0, "{summary}");
+        for stage in STAGES {
+            assert_eq!(summary["restarts"][stage], 1, "{summary}");
+        }
+        // A count of the encoders is half a millimetre; a lost pose is metres.
+        let error = |summary: &serde_json::Value| summary["pose_error_m"].as_f64().unwrap();
+        assert!(
+            error(&summary) <= error(&undisturbed) + 0.005,
+            "{summary} against {undisturbed}"
+        );
     }
-    let (code, summary) = killed.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_eq!(summary["collisions"], 0, "{summary}");
-    for stage in STAGES {
-        assert_eq!(summary["restarts"][stage], 1, "{summary}");
+    for robot in ["calm", "kills", "frozen"] {
+        assert_nothing_left(robot);
     }
-    // A count of the encoders is half a millimetre; a lost pose is metres.
-    let error = |summary: &serde_json::Value| summary["pose_error_m"].as_f64().unwrap();
-    assert!(
-        error(&summary) <= error(&undisturbed) + 0.005,
-        "{summary} against {undisturbed}"
-    );
-    assert_nothing_left("kills");
 }
 
 #[test]
@@ -63,8 +70,8 @@ fn node_files(robot: &str) -> Vec<String> {
 }
 
 #[test]
-fn what_a_stage_killed_in_its_start_left_on_the_bus_is_cleared_away() {
-    let mut run = Run::start("dregs", "obstacle-course", &["--pace", "1"]);
+fn what_a_stage_killed_in_its_start_left_on_the_bus_is_removed() {
+    let mut run = Run::start("leftovers", "obstacle-course", &["--pace", "1"]);
     let status = run.wait_until_under_way(0.5);
     let pid = support::find(&status, "mapper")["pid"].as_u64().unwrap();
     // The process is the third of the four words of a node's id.
@@ -72,38 +79,23 @@ fn what_a_stage_killed_in_its_start_left_on_the_bus_is_cleared_away() {
         let id = name.parse::<u128>().ok()?;
         ((id >> 64) as u32 == pid as u32).then_some(id)
     };
-    let id = node_files("dregs").iter().find_map(own).unwrap();
-    // A life that was killed between making its node's directory and saying that the node lives.
+    let id = node_files("leftovers").iter().find_map(own).unwrap();
+    // A generation that was killed between making its node's directory and registering the node.
     let cut_off = (id + (1 << 96)).to_string();
     let user = rustix::process::geteuid().as_raw();
-    let directory = format!("/dev/shm/fh{user}_dregs_bus/nodes/{cut_off}");
+    let directory = format!("/dev/shm/fh{user}_leftovers_bus/nodes/{cut_off}");
     std::fs::create_dir(&directory).unwrap();
-    std::fs::write(format!("{directory}/fh{user}_dregs_node.details"), "").unwrap();
+    std::fs::write(format!("{directory}/fh{user}_leftovers_node.details"), "").unwrap();
     run.kill_and_await_successor("mapper", Signal::KILL);
-    run.wait_until("the dead node is cleared away", |_| {
-        let left = node_files("dregs");
+    run.wait_until("the node is removed", |_| {
+        let left = node_files("leftovers");
         !left
             .iter()
             .any(|name| name.contains(&id.to_string()) || *name == cut_off)
     });
     run.signal(Signal::INT);
     run.finish();
-    assert_nothing_left("dregs");
-}
-
-#[test]
-fn a_frozen_stage_is_noticed_and_replaced() {
-    let mut frozen = Run::start("frozen", "obstacle-course", &["--pace", PACE]);
-    frozen.wait_until_under_way(2.0);
-    frozen.kill_and_await_successor("mapper", Signal::STOP);
-    let (code, summary) = frozen.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_eq!(summary["restarts"]["mapper"], 1);
-    assert_nothing_left("frozen");
+    assert_nothing_left("leftovers");
 }
 
 #[test]
@@ -157,19 +149,19 @@ fn stages_die_with_their_supervisor_and_the_link_stops_the_robot_first() {
     let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
     assert!(log.contains("robot told to stand"), "{log}");
     drop(orphaned);
-    // What the dead supervisor left does not stand in the way of the next, and goes with it.
+    // What the killed supervisor left does not hinder the next, and is removed with it.
     let (code, summary) = run("orphans", "open-room", &[]);
     assert_eq!(code, Some(0), "{summary}");
     assert_nothing_left("orphans");
 }
 
 #[test]
-fn a_frozen_stage_that_outlives_its_supervisor_is_not_in_the_way_of_the_next() {
+fn a_frozen_stage_that_outlives_its_supervisor_does_not_hinder_the_next() {
     // One that the supervisor started is woken by the kernel when its parent dies; another's stays frozen.
     let watching = ["--pace", "1", "--watch-only"];
-    let mut watching = Run::start("ice-orphan", "obstacle-course", &watching);
+    let mut watching = Run::start("frozen-orphan", "obstacle-course", &watching);
     watching.wait_until("there is a bus", |_| true);
-    let mapper = ["stage", "mapper", "--robot", "ice-orphan"];
+    let mapper = ["stage", "mapper", "--robot", "frozen-orphan"];
     let mut mapper = support::firsthand(&mapper).spawn().unwrap();
     watching.wait_until("the mapper runs", |status| {
         support::find(status, "mapper")["state"] == "running"
@@ -177,16 +169,16 @@ fn a_frozen_stage_that_outlives_its_supervisor_is_not_in_the_way_of_the_next() {
     support::signal_process(mapper.id(), Signal::STOP);
     watching.signal(Signal::KILL);
     watching.reap();
-    let directory = support::directory_of("ice-orphan");
+    let directory = support::directory_of("frozen-orphan");
     let out = directory.path().join("run");
-    let next = ["run", "open-room", "--robot", "ice-orphan", "--out"];
+    let next = ["run", "open-room", "--robot", "frozen-orphan", "--out"];
     let next = support::firsthand(&next).arg(out).output().unwrap();
     let gone = mapper.try_wait().unwrap();
     mapper.kill().unwrap();
     mapper.wait().unwrap();
     assert!(next.status.success(), "{next:?}");
     assert!(gone.is_some(), "the frozen stage is still there");
-    assert_nothing_left("ice-orphan");
+    assert_nothing_left("frozen-orphan");
 }
 
 #[test]

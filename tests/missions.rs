@@ -1,9 +1,6 @@
 //! Whole missions through real processes.
-#![allow(clippy::unwrap_used, clippy::panic)]
 
-mod support;
-
-use support::{assert_nothing_left, run};
+use crate::support::{self, assert_nothing_left, run};
 
 /// Reached, and nothing touched.
 fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) {
@@ -113,25 +110,6 @@ fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
         time(&knowing) < time(&sensing),
         "{knowing} against {sensing}"
     );
-}
-
-#[test]
-fn the_same_seed_gives_the_same_run_to_the_bit() {
-    let numbers = |robot: &str| {
-        let run = support::Run::start(robot, "obstacle-course", &["--seed", "7"]);
-        let (_, mut summary, kept) = run.finish_in();
-        // Wall-clock is the one thing that differs.
-        for wall_clock in ["tick_latency_us", "full_solve_us", "local_update_us"] {
-            summary.as_object_mut().unwrap().remove(wall_clock);
-        }
-        let checkpoint = |stage: &str| {
-            let file = kept.path().join("run").join(format!("{stage}.checkpoint"));
-            assert!(file.exists(), "{}", file.display());
-        };
-        checkpoint("mapper");
-        summary
-    };
-    assert_eq!(numbers("once"), numbers("twice"));
 }
 
 #[test]

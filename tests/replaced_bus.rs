@@ -1,17 +1,14 @@
-//! A consumer that joined before the bus was made anew is told, joins again, and is in nobody's way when it leaves.
-//!
-//! One test alone: a process speaks to one robot.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
+//! A consumer that joined before the bus was recreated can tell, joins again, and does no harm when it leaves.
 
 use std::time::{Duration, Instant};
 
+use crate::support::{
+    PATIENCE, Run, assert_nothing_left, find, half_make, in_own_process, pid, signal_process,
+};
 use common::{bus::Bus, domain::Domain, samples::PoseSample, topics, waiter::Waiter};
 use rustix::process::Signal;
-use support::{PATIENCE, Run, assert_nothing_left, find, half_make, pid, signal_process};
 
-const ROBOT: &str = "anew";
+const ROBOT: &str = "recreated";
 
 /// The next pose heard on `bus`; as the README's consumer listens.
 fn next_pose(bus: &Bus) -> PoseSample {
@@ -30,44 +27,46 @@ fn next_pose(bus: &Bus) -> PoseSample {
 
 #[test]
 fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_without_harm() {
-    let mut run = Run::start(ROBOT, "obstacle-course", &["--pace", "4"]);
-    let status = run.wait_until_under_way(1.0);
-    let domain = Domain::of(ROBOT.parse().unwrap());
-    let old = Bus::join(&domain, "logger").unwrap();
-    let old_poses = old.reader(&topics::POSE).unwrap();
-    let heard = next_pose(&old);
-    assert!(!old.is_replaced());
+    in_own_process(|| {
+        let mut run = Run::start(ROBOT, "obstacle-course", &["--pace", "4"]);
+        let status = run.wait_until_under_way(1.0);
+        let domain = Domain::of(ROBOT.parse().unwrap());
+        let old = Bus::join(&domain, "logger").unwrap();
+        let old_poses = old.reader(&topics::POSE).unwrap();
+        let heard = next_pose(&old);
+        assert!(!old.is_replaced());
 
-    let services = domain.middleware_root().join("services");
-    for service in std::fs::read_dir(services).unwrap() {
-        half_make(&service.unwrap().path());
-    }
-    // Not one that speaks of poses: the dead count as users of their topics.
-    signal_process(pid(&status, "x80-link"), Signal::KILL);
-    let began = Instant::now();
-    while !old.is_replaced() {
-        assert!(began.elapsed() < PATIENCE, "the bus is never made anew");
-        run.status();
-    }
-    let new = Bus::join(&domain, "logger").unwrap();
-    assert!(!new.is_replaced());
-    assert!(next_pose(&new).stamp.tick > heard.stamp.tick);
+        let services = domain.middleware_root().join("services");
+        for service in std::fs::read_dir(services).unwrap() {
+            half_make(&service.unwrap().path());
+        }
+        // Not one that has to do with poses: killed processes count as users of their topics.
+        signal_process(pid(&status, "x80-link"), Signal::KILL);
+        let began = Instant::now();
+        while !old.is_replaced() {
+            assert!(began.elapsed() < PATIENCE, "the bus is never recreated");
+            run.status();
+        }
+        let new = Bus::join(&domain, "logger").unwrap();
+        assert!(!new.is_replaced());
+        assert!(next_pose(&new).stamp.tick > heard.stamp.tick);
 
-    // The last to leave it: everybody else has gone over.
-    drop((old_poses, old));
-    let before = run.wait_until("all work", |status| status["order"] == "driving");
-    let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
-    // One life, not two that were refused and a bus made anew once more.
-    let lives = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
-    for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
-        assert_eq!(
-            lives(&after, stage),
-            lives(&before, stage) + more,
-            "{stage}"
-        );
-    }
-    drop(new);
-    let (code, summary) = run.finish();
-    assert_eq!(code, Some(0), "{summary}");
-    assert_nothing_left(ROBOT);
+        // The last to leave it: all others use the new one.
+        drop((old_poses, old));
+        let before = run.wait_until("all work", |status| status["order"] == "driving");
+        let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
+        // One start, not two that were refused and a bus recreated once more.
+        let generation = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
+        for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
+            assert_eq!(
+                generation(&after, stage),
+                generation(&before, stage) + more,
+                "{stage}"
+            );
+        }
+        drop(new);
+        let (code, summary) = run.finish();
+        assert_eq!(code, Some(0), "{summary}");
+        assert_nothing_left(ROBOT);
+    });
 }

@@ -1,16 +1,13 @@
 //! A run whose supervisor was killed, and everything else with it, goes on.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{path::Path, process::Stdio, time::Instant};
 
+use crate::support::{self, Run, assert_nothing_left, firsthand, pids_of, run, signal_process};
 use rustix::process::Signal;
 use serde_json::Value;
-use support::{Run, assert_nothing_left, firsthand, pids_of, run, signal_process};
 
-/// Wait until nobody works for `robot` any more.
-fn wait_until_alone(robot: &str) {
+/// Wait until no process works for `robot` any more.
+fn wait_until_all_ended(robot: &str) {
     let began = Instant::now();
     while !pids_of(robot).is_empty() {
         assert!(began.elapsed() < support::PATIENCE, "{:?}", pids_of(robot));
@@ -33,7 +30,7 @@ fn pose_error(summary: &Value) -> f64 {
 }
 
 #[test]
-fn a_run_whose_supervisor_was_killed_again_and_again_is_gone_on_with_and_loses_no_pose() {
+fn a_run_whose_supervisor_was_killed_again_and_again_is_resumed_and_loses_no_pose() {
     const PACE: [&str; 2] = ["--pace", "4"];
     let (_, undisturbed) = run("res-calm", "obstacle-course", &PACE);
     let mut first = Run::start("res-again", "obstacle-course", &PACE);
@@ -74,7 +71,7 @@ fn a_run_goes_on_after_everything_was_killed_at_once() {
         signal_process(pid, Signal::KILL);
     }
     all.reap();
-    wait_until_alone("res-all");
+    wait_until_all_ended("res-all");
     let (code, summary) = resume(&all.directory());
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()));
     assert_eq!(
@@ -111,7 +108,7 @@ fn a_robot_that_was_told_to_stand_still_stands_when_its_run_goes_on() {
 }
 
 #[test]
-fn a_run_that_came_to_its_end_is_not_gone_on_with() {
+fn a_run_that_came_to_its_end_is_not_resumed() {
     let (_, _, kept) = Run::start("res-end", "open-room", &[]).finish_in();
     let output = firsthand(&["run", "--resume"])
         .arg(kept.path().join("run"))

@@ -1,7 +1,4 @@
 //! Runs under a service manager: this test in the place of systemd.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{
     os::{
@@ -18,14 +15,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::{self, PATIENCE, Run, assert_nothing_left, find, firsthand, signal_process};
 use rustix::process::Signal;
-use support::{PATIENCE, Run, assert_nothing_left, find, firsthand, signal_process};
 use tempfile::TempDir;
 
 /// What a unit would give as WatchdogSec.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
-/// A place where a service says how it goes.
+/// The socket where a service reports its state.
 struct Manager {
     socket: UnixDatagram,
     directory: TempDir,
@@ -176,7 +173,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
         said.all(|line| line.starts_with("mission ")),
         "only the mission's title has no priority: {text}"
     );
-    // The same is in the run directory, and stages, whose words go to files, put no priorities there.
+    // The same is in the run directory, and stages, which log to files, put no priorities there.
     let log =
         |name: &str| std::fs::read_to_string(directory.path().join("run").join(name)).unwrap();
     assert!(log("supervisor.log").contains("stage died"));
@@ -187,7 +184,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
 struct Units {
     keepers: Vec<(&'static str, JoinHandle<Option<i32>>)>,
     over: Arc<AtomicBool>,
-    // Their words go to files there.
+    // They log to files there.
     directory: TempDir,
 }
 
@@ -221,7 +218,7 @@ impl Units {
     }
 }
 
-/// One life of a stage after another, until one leaves in order or all is over. Returns how the last one ended.
+/// One process of a stage after another, until one ends in order or all is over. Returns how the last one ended.
 fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
     loop {
         let mut append = std::fs::File::options();
@@ -249,7 +246,7 @@ fn watching(robot: &'static str) -> (Run, Units) {
 }
 
 #[test]
-fn stages_that_another_starts_drive_and_survive_kills_under_a_supervisor_that_only_watches() {
+fn external_stages_drive_and_survive_kills_under_a_supervisor_that_only_watches() {
     let (mut run, mut units) = watching("units");
     run.wait_until_under_way(2.0);
     for stage in support::STAGES {
@@ -270,7 +267,7 @@ fn stages_that_another_starts_drive_and_survive_kills_under_a_supervisor_that_on
 }
 
 #[test]
-fn a_frozen_stage_of_another_is_ended_by_the_supervisor_that_only_watches() {
+fn a_frozen_external_stage_is_ended_by_the_supervisor_that_only_watches() {
     let (mut run, mut units) = watching("unit-hang");
     run.wait_until_under_way(1.0);
     run.kill_and_await_successor("mapper", Signal::STOP);
@@ -281,7 +278,7 @@ fn a_frozen_stage_of_another_is_ended_by_the_supervisor_that_only_watches() {
 }
 
 #[test]
-fn stages_that_another_starts_stop_the_robot_and_end_when_the_supervisor_is_killed() {
+fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
     let robot = "unit-orphan";
     let (mut run, mut units) = watching(robot);
     run.wait_until_under_way(1.0);

@@ -1,7 +1,4 @@
 //! Missions over every wire, by robots that are not the run's own children: they come and go by themselves.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod support;
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -10,8 +7,8 @@ use std::{
     sync::mpsc::{Receiver, channel},
 };
 
+use crate::support::{self, Run, assert_nothing_left, firsthand};
 use serde_json::Value;
-use support::{Run, assert_nothing_left, firsthand};
 use tempfile::TempDir;
 
 /// A few seconds straight ahead.
@@ -137,7 +134,7 @@ fn a_mission_arrives_over_a_serial_line() {
 }
 
 /// The robot is killed halfway and comes back where it listened before, as one that was switched off and
-/// on: its counts begin anew, and so does the place it takes for its start.
+/// on: its counts begin at zero, and so does the place it takes for its start.
 fn goes_away_and_comes_back(transport: &str) {
     let (_directory, mission) = mission();
     let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");

@@ -1,5 +1,4 @@
-//! What must hold for any bytes whatever. Shared by the fuzz target and by the plain test that runs the
-//! kept corpus.
+//! What must hold for any bytes whatever. Shared by the fuzz target and by the plain test that runs the corpus.
 
 use common::wire::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report};
 
@@ -16,7 +15,7 @@ pub(crate) fn check(input: &[u8]) {
         decoder.push(piece);
         drain(&mut decoder);
     }
-    // Whatever has come, it is deaf to nothing that follows.
+    // Whatever has come, it decodes what follows.
     decoder.push(&[0; MAX_FRAME_BYTES]);
     drain(&mut decoder);
     let before = decoder.tally();

@@ -4,22 +4,17 @@
 //! A supervisor that only watches links its run directory into the robot's domain, and publishes in the roster which
 //! stages have no process. A stage takes its place when the roster shows it free.
 
-use std::{
-    fs,
-    os::fd::OwnedFd,
-    time::{Duration, Instant},
-};
+use std::{fs, os::fd::OwnedFd, time::Duration};
 
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
 
 use crate::{
     bus::Bus,
     domain::{Domain, RobotName},
+    roster::Roster,
     run::{self, Run},
     samples::{Order, name_str},
     start::{Generation, Joined, StageError, enter, name_process},
-    topics,
-    waiter::Waiter,
 };
 
 /// The roster is published five times a second, and the place of a process that has ended is free in the next.
@@ -69,34 +64,29 @@ struct Place {
 }
 
 fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
-    let mut roster = bus.slice_reader(&topics::ROSTER)?;
-    let mut waiter = Waiter::default();
-    waiter.on(bus.wakeup(&topics::ROSTER)?);
-    let began = Instant::now();
     let mut holder = None;
-    while began.elapsed() < PATIENCE {
-        while let Some(entries) = roster.take()? {
-            let header = entries.header();
-            if Order::from_byte(header.order) == Order::Stop {
-                return Err(StageError::Other("the robot is being stopped".to_owned()));
-            }
-            holder = entries
-                .iter()
-                .find(|entry| name_str(&entry.stage) == stage)
-                .map(|entry| entry.pid);
-            if holder == Some(0) {
-                return Ok(Place {
-                    first_tick: header.stamp.tick + 1,
-                    supervisor: watch(header.supervisor_pid)?,
-                });
-            }
+    let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
+        if Order::from_byte(header.order) == Order::Stop {
+            let error = StageError::Other("the robot is being stopped".to_owned());
+            return Some(Err(error));
         }
-        waiter.wait(PATIENCE)?;
-    }
-    Err(StageError::Other(match holder {
-        Some(pid) => format!("{stage} runs already, as process {pid}; end that one first"),
-        None => "no supervisor publishes on the robot's bus; is it frozen?".to_owned(),
-    }))
+        let mut entries = entries.iter();
+        holder = entries
+            .find(|entry| name_str(&entry.stage) == stage)
+            .map(|entry| entry.pid);
+        (holder == Some(0)).then(|| {
+            Ok(Place {
+                first_tick: header.stamp.tick + 1,
+                supervisor: watch(header.supervisor_pid)?,
+            })
+        })
+    })?;
+    place.unwrap_or_else(|| {
+        Err(StageError::Other(match holder {
+            Some(pid) => format!("{stage} runs already, as process {pid}; end that one first"),
+            None => "no supervisor publishes on the robot's bus; is it frozen?".to_owned(),
+        }))
+    })
 }
 
 /// A descriptor that becomes readable when the supervisor ends. It published a moment ago: the number is still its own.

@@ -25,13 +25,20 @@ pub struct Fault {
 }
 
 /// Every fault, in the order of the pipeline.
-pub static TABLE: [Fault; 5] = [
+pub static TABLE: [Fault; 6] = [
     Fault {
         kind: FaultKind::Spin,
         name: "spin",
         stage: None,
         meaning: "a turn of the work loop that does not end: no output, no beat",
         ends: "the stage is aborted as hung, and started again",
+    },
+    Fault {
+        kind: FaultKind::Mute,
+        name: "mute",
+        stage: None,
+        meaning: "a work loop that only beats: no input is read, no output written",
+        ends: "a stage whose inputs go on is aborted, and started again",
     },
     Fault {
         kind: FaultKind::HazardAroundRobot,

@@ -4,6 +4,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::samples::PoseSample;
+
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
@@ -66,4 +68,16 @@ impl GroundTruthTick {
     pub const AT_REST_M_S: f64 = 0.01;
     /// Clearance where nothing stands, metres: JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
+
+    /// Whether it is of the tick of `pose`: wheel counts are what both know.
+    #[must_use]
+    pub const fn is_of(&self, pose: &PoseSample) -> bool {
+        self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
+    }
+
+    /// How far `pose` is from the true position, metres.
+    #[must_use]
+    pub fn pose_error_m(&self, pose: &PoseSample) -> f64 {
+        (pose.x_m - self.x).hypot(pose.y_m - self.y)
+    }
 }

@@ -42,6 +42,8 @@ pub mod kinematics;
 pub mod latency;
 pub mod mission;
 pub mod poll;
+pub mod process_status;
+pub mod roster;
 pub mod run;
 pub mod samples;
 pub mod shell;

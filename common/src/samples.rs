@@ -8,7 +8,7 @@
 //! Any bit pattern may arrive from another process: states travel as bytes and are read through
 //! `from_byte`, never as Rust enums.
 //!
-//! [`robot`], [`navigation`] and [`supervision`] hold them; here is what they have in common.
+//! `robot`, `navigation` and `supervision` hold them; here is what they have in common.
 #![allow(unsafe_code)]
 
 pub use crate::bus::{Stamp, Stamped};

@@ -198,6 +198,10 @@ fn work(
                 while fault == Ok(FaultKind::Spin) && !stop.came() {
                     std::hint::spin_loop();
                 }
+                while fault == Ok(FaultKind::Mute) && !stop.came() {
+                    std::thread::park_timeout(heartbeat.period);
+                    heartbeat.beat(HealthState::Ready, progress)?;
+                }
             }
         }
     }
@@ -211,8 +215,9 @@ fn inject(
 ) -> Result<FaultAnswer, StageError> {
     Ok(match request {
         Err(answer) => answer,
-        // The one that every stage has is done in the work loop.
-        Ok(fault) if fault == FaultKind::Spin || process.inject(fault)? => FaultAnswer::Taken,
+        // Those that every stage has are done in the work loop.
+        Ok(FaultKind::Spin | FaultKind::Mute) => FaultAnswer::Taken,
+        Ok(fault) if process.inject(fault)? => FaultAnswer::Taken,
         Ok(_) => FaultAnswer::Impossible,
     })
 }

@@ -12,6 +12,8 @@ use std::{
 
 pub use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
+use crate::process_status;
+
 /// Signals caught by this process.
 #[derive(Debug)]
 pub struct Signals {
@@ -44,11 +46,8 @@ impl Signals {
 
 /// Whether whoever started this process had it ignore `signal`.
 fn is_ignored(signal: c_int) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status
-        .lines()
-        .find_map(|line| line.strip_prefix("SigIgn:"))
-        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    let mask = process_status::field("self", "SigIgn")
+        .and_then(|mask| u64::from_str_radix(&mask, 16).ok());
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 

@@ -11,7 +11,7 @@ use crate::{
     run::{Run, RunError},
 };
 
-/// Which process of a stage's in a run this is: each start of a stage is a generation.
+/// Which of a stage's processes in a run this is: each start of a stage is a generation.
 #[derive(Clone, Debug)]
 pub struct Generation {
     /// The stage's name in the table.
@@ -65,7 +65,7 @@ pub enum StageError {
     /// The stage's checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// What only this stage does.
+    /// An error of this stage alone, in words.
     #[error("{0}")]
     Other(String),
     /// Signals or process attributes.

@@ -89,7 +89,7 @@ topics! {
     HEALTH: Topic<HealthSample> {
         name: "health", writer: EVERY_STAGE, rate: on_change(BEAT), limits: Limits::SMALL,
     }
-    /// The wire to the robot: connection, counts, tick latency.
+    /// The connection to the robot: its state, counts, tick latency.
     LINK: Topic<LinkSample> {
         name: "link", writer: "x80-link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL,
     }
@@ -97,7 +97,7 @@ topics! {
     INFRARED: Topic<InfraredSample> {
         name: "infrared", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
     }
-    /// Battery volts and whether they are low, motor currents, heat of the drivers.
+    /// Battery volts and whether they are low, motor currents, temperatures of the drivers.
     POWER: Topic<PowerSample> {
         name: "power", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
     }
@@ -109,15 +109,15 @@ topics! {
     DIRECTIVE: Topic<DirectiveSample> {
         name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
     }
-    /// What runs, as the supervisor sees it.
+    /// The stages' processes, as the supervisor sees them.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {
         name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::MAP,
     }
-    /// A stage died: cause, ages, last words, what follows.
+    /// A stage's process ended: cause, ages, the end of its log, what follows.
     DEATHS: Topic<DeathSample> {
         name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
-    /// The robot should get on and does not: how, and what is tried.
+    /// The robot should make progress and does not: how, and what is tried.
     STALLS: Topic<StallSample> {
         name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
@@ -125,7 +125,7 @@ topics! {
     REQUESTS: Topic<RequestSample> {
         name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }
-    /// What an operator breaks in a stage on purpose; every stage listens.
+    /// What an operator breaks in a stage on purpose; every stage reads it.
     FAULTS: Topic<FaultSample> {
         name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
     }

@@ -1,4 +1,4 @@
-//! What the system tests share: the real executable, robots of their own, words to wait for.
+//! What the system tests share: the real executable, robots of their own, states to wait for.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -19,6 +19,30 @@ use std::{
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
+
+/// Run `test` in a process of its own, where it may join the bus of its robot: a process speaks to one robot.
+pub fn in_own_process<T: FnOnce()>(test: T) {
+    // The closure's name is the test's, in its crate: CRATE::MODULE::TEST::{{closure}}.
+    let (_, name) = std::any::type_name::<T>().split_once("::").unwrap();
+    let name = name.strip_suffix("::{{closure}}").unwrap();
+    if std::env::var_os(OWN_PROCESS).is_some_and(|chosen| chosen == name) {
+        return test();
+    }
+    let output = Command::new(std::env::current_exe().unwrap())
+        .args([name, "--exact", "--nocapture"])
+        .env(OWN_PROCESS, name)
+        .output()
+        .unwrap();
+    let (said, failed) = (
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr),
+    );
+    let passed = output.status.success() && said.contains("1 passed");
+    assert!(passed, "{said}\n{failed}");
+}
+
+/// Names the one test that a process is for.
+const OWN_PROCESS: &str = "FIRSTHAND_TEST";
 
 /// Every stage, in the order of the pipeline.
 pub const STAGES: [&str; 5] = [
@@ -42,6 +66,13 @@ pub fn firsthand(arguments: &[&str]) -> Command {
 /// Run it to its end.
 pub fn output(arguments: &[&str]) -> Output {
     firsthand(arguments).output().unwrap()
+}
+
+/// `firsthand` with these arguments for `robot`, which must succeed.
+pub fn operate(robot: &str, arguments: &[&str]) {
+    let arguments = [arguments, &["--robot", robot]].concat();
+    let output = output(&arguments);
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
 }
 
 /// A run of a mission by a robot of its own.
@@ -75,6 +106,16 @@ impl Run {
         self.directory.path().join("run")
     }
 
+    /// The lines of a file of records in the run directory.
+    pub fn records(&self, file: &str) -> Vec<Value> {
+        records(&self.directory().join(file))
+    }
+
+    pub fn is_running(&mut self) -> bool {
+        let child = self.child.as_mut().unwrap();
+        child.try_wait().unwrap().is_none()
+    }
+
     pub fn pid(&self) -> u32 {
         self.child.as_ref().unwrap().id()
     }
@@ -84,7 +125,7 @@ impl Run {
         status_of(&self.robot)
     }
 
-    /// Ask for the status until `is_so` of it: each answer waits for the supervisor's next word.
+    /// Ask for the status until `is_so` of it: each answer waits for what the supervisor publishes next.
     pub fn wait_until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
         let began = Instant::now();
         loop {
@@ -119,7 +160,7 @@ impl Run {
         signal_process(self.pid(), signal);
     }
 
-    /// Kill a stage and wait until its successor runs; the status then.
+    /// Kill a stage, or freeze it (`Signal::STOP`), and wait until its successor runs; the status then.
     pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
         let status = self.wait_until("the stage runs", |status| {
             find(status, stage)["state"] == "running"
@@ -127,7 +168,7 @@ impl Run {
         self.kill_and_await(stage, signal, &status)
     }
 
-    /// The same of a stage that runs in `status`, where nobody can ask any more.
+    /// The same of a stage that runs in `status`, when no further status can be had.
     pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
         let generation = find(status, stage)["generation"].as_u64().unwrap();
         signal_process(pid(status, stage), signal);
@@ -151,7 +192,7 @@ impl Run {
         (output.status.code(), summary)
     }
 
-    /// Wait for the end and keep the run directory.
+    /// Wait for the end; the run directory with it.
     pub fn finish_in(mut self) -> (Option<i32>, Value, TempDir) {
         let kept = std::mem::replace(&mut self.directory, tempfile::tempdir().unwrap());
         let (code, summary) = self.finish();
@@ -159,7 +200,7 @@ impl Run {
     }
 }
 
-/// A test that fails leaves nobody behind: the stages go with their supervisor.
+/// A test that fails leaves no process behind: the stages go with their supervisor.
 impl Drop for Run {
     fn drop(&mut self) {
         if let Some(child) = &mut self.child {
@@ -167,6 +208,13 @@ impl Drop for Run {
             let _ = child.wait();
         }
     }
+}
+
+/// The lines of a file of records: a JSON value each, none before the first.
+pub fn records(file: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    lines.collect()
 }
 
 /// A whole run.
@@ -241,7 +289,7 @@ pub fn assert_nothing_left(robot: &str) {
 
 /// In the name of every directory that a run of `robot` in these tests uses.
 fn mark(robot: &str) -> String {
-    format!("firsthand-test-{robot}-")
+    format!("firsthand-test-{robot}_")
 }
 
 /// Command lines of the processes that work for `robot`: supervisor, stages, simulator.

@@ -1,6 +1,6 @@
-//! Who lives, who orders, who asks, who died.
+//! The payloads of supervision: health, roster, orders, requests, deaths, stalls, faults.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
 use crate::bus::{Stamp, ZeroCopySend};
 
@@ -11,7 +11,7 @@ wire_enum! {
         Starting = 0,
         /// Working, or ready to.
         Ready = 1,
-        /// Told to stop, or stopping for a reason of its own.
+        /// Stopping, on request or for a reason of its own.
         Stopping = 2,
     }
 }
@@ -29,14 +29,14 @@ pub fn name(text: &str) -> Name {
     name
 }
 
-/// What a [`Name`] says; what is not UTF-8 is left out.
+/// The text of a [`Name`]; what is not UTF-8 is left out.
 #[must_use]
 pub fn name_str(name: &Name) -> &str {
     let text = name.split(|&byte| byte == 0).next().unwrap_or_default();
     std::str::from_utf8(text).unwrap_or_default()
 }
 
-/// Topic `health`: the heartbeat of every stage, beaten from inside its work loop.
+/// Topic `health`: the heartbeat of every stage, published from inside its work loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Health")]
 #[repr(C)]
@@ -49,11 +49,11 @@ pub struct HealthSample {
     pub pid: u32,
     /// A [`HealthState`].
     pub state: u8,
-    /// Times round the work loop.
+    /// Iterations of the work loop.
     pub turns: u64,
-    /// The fault that this life was asked for last; 0 for none.
+    /// The fault that this generation was asked for last; 0 for none.
     pub last_fault: u64,
-    /// What it made of it: a [`FaultAnswer`].
+    /// How it answered: a [`FaultAnswer`].
     pub fault_answer: u8,
 }
 
@@ -69,7 +69,7 @@ wire_enum! {
     }
 }
 
-/// Topic `directive`: the supervisor's word to all stages.
+/// Topic `directive`: the supervisor's order to all stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Directive")]
 #[repr(C)]
@@ -85,7 +85,7 @@ pub struct DirectiveSample {
 }
 
 wire_enum! {
-    /// Where the supervisor has a stage.
+    /// The state of a stage, as the supervisor sees it.
     StageState, unknown = Down {
         /// No process; one will be started.
         Down = 0,
@@ -95,9 +95,9 @@ wire_enum! {
         Running = 2,
         /// Died too often; waits before the next start.
         BackingOff = 3,
-        /// Told to stop.
+        /// Asked to stop, or aborted because it hung.
         Stopping = 4,
-        /// Died far too often: only an operator's word starts it again.
+        /// Died far too often: only an operator starts it again.
         Held = 5,
     }
 }
@@ -146,13 +146,13 @@ pub struct RosterEntry {
     pub stage: Name,
     /// Its process; 0 for none.
     pub pid: u32,
-    /// Which life.
+    /// Its generation.
     pub generation: u32,
     /// A [`StageState`].
     pub state: u8,
     /// Times it was started again.
     pub restarts: u32,
-    /// Age of this life, nanoseconds.
+    /// Age of its process, nanoseconds.
     pub uptime_ns: u64,
     /// Age of its last heartbeat, nanoseconds; u64::MAX for none yet.
     pub beat_age_ns: u64,
@@ -169,7 +169,7 @@ wire_enum! {
         Signalled = 1,
         /// By a signal, and it left a core; `code` is its number.
         SignalledWithCore = 2,
-        /// It was not the supervisor's child: who started it knows.
+        /// It was not the supervisor's child: the process that started it knows.
         Unknown = 3,
     }
 }
@@ -183,7 +183,7 @@ wire_enum! {
         StartNow = 1,
         /// A successor is started after `next_after_ns`.
         StartLater = 2,
-        /// It died too often: an operator's word starts it.
+        /// It died too often: only an operator starts it again.
         Hold = 3,
     }
 }
@@ -219,7 +219,7 @@ pub fn words(text: &str) -> Words {
 }
 
 impl Words {
-    /// What they say; a character that was cut is replaced.
+    /// The text; a character that was cut is replaced.
     #[must_use]
     pub fn text(&self) -> std::borrow::Cow<'_, str> {
         let text = self.bytes.split(|&byte| byte == 0).next();
@@ -238,11 +238,11 @@ pub struct DeathSample {
     pub stage: Name,
     /// Its process.
     pub pid: u32,
-    /// Which life.
+    /// Its generation.
     pub generation: u32,
     /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
     pub beat_age_ns: u64,
-    /// Length of its life, nanoseconds.
+    /// Age of its process, nanoseconds.
     pub uptime_ns: u64,
     /// Pause before its successor, nanoseconds.
     pub next_after_ns: u64,
@@ -261,11 +261,11 @@ pub struct DeathSample {
 }
 
 wire_enum! {
-    /// What a robot that stalls is tried to be freed by.
+    /// What is done about a stall.
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     RecoveryStep, unknown = GiveUp {
-        /// A fresh planner, which solves the full field.
+        /// A new generation of the planner, which solves the full field.
         Replan = 0,
         /// What was sensed is forgotten.
         Forget = 1,
@@ -275,7 +275,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// How a robot that should get on does not.
+    /// Why a robot that should get on does not.
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     StallCause, unknown = Still {
@@ -284,13 +284,13 @@ wire_enum! {
         /// It moves, and stays where it is.
         Pinned = 1,
         /// It stands in hazard, u = 0, and drives without coming out.
-        Buried = 2,
+        InsideHazard = 2,
         /// It stands where the belief has no way to the target, u = 0.
         CutOff = 3,
     }
 }
 
-/// Topic `stalls`: the robot should get on and does not.
+/// Topic `stalls`: the robot should get on and does not. Serialized it is a line of `stalls.jsonl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Stall")]
 #[repr(C)]
@@ -303,7 +303,7 @@ pub struct StallSample {
     pub y_m: f64,
     /// The belief's epoch from now on.
     pub epoch: u64,
-    /// Fresh planners tried so far in this mission, this one among them.
+    /// Generations of the planner started for a stall so far in this mission, this one among them.
     pub replans: u32,
     /// Beliefs forgotten so far in this mission, this one among them.
     pub resets: u64,
@@ -313,28 +313,58 @@ pub struct StallSample {
     pub recovery: u8,
 }
 
+impl StallSample {
+    /// Why the robot does not get on.
+    #[must_use]
+    pub const fn cause(&self) -> StallCause {
+        StallCause::from_byte(self.cause)
+    }
+
+    /// What is done about it.
+    #[must_use]
+    pub const fn recovery(&self) -> RecoveryStep {
+        RecoveryStep::from_byte(self.recovery)
+    }
+}
+
+impl Serialize for StallSample {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let mut line = to.serialize_struct("Stall", 9)?;
+        line.serialize_field("tick", &self.stamp.tick)?;
+        line.serialize_field("time_s", &self.stamp.time().seconds())?;
+        line.serialize_field("x_m", &self.x_m)?;
+        line.serialize_field("y_m", &self.y_m)?;
+        line.serialize_field("cause", &self.cause())?;
+        line.serialize_field("recovery", &self.recovery())?;
+        line.serialize_field("epoch", &self.epoch)?;
+        line.serialize_field("replans", &self.replans)?;
+        line.serialize_field("resets", &self.resets)?;
+        line.end()
+    }
+}
+
 wire_enum! {
     /// What an operator asks of the supervisor.
     RequestKind, unknown = Nothing {
         /// Nothing.
         Nothing = 0,
-        /// A fresh life of a stage; one that is held is released.
+        /// A new generation of a stage; one that is held is released.
         Restart = 1,
-        /// Let the robot stand.
+        /// The robot is to stand.
         Stop = 2,
-        /// Let it go on.
+        /// The robot is to go on.
         Resume = 3,
     }
 }
 
-/// Topic `requests`: an operator's word to the supervisor.
+/// Topic `requests`: what an operator asks of the supervisor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Request")]
 #[repr(C)]
 pub struct RequestSample {
     /// Which sample.
     pub stamp: Stamp,
-    /// Names the request: the roster's `last_request` says that it was taken. Never 0.
+    /// Identifies the request: the roster's `last_request` says that it was taken. Never 0.
     pub id: u64,
     /// The stage it is about; empty for none.
     pub stage: Name,
@@ -348,9 +378,9 @@ wire_enum! {
     FaultKind, unknown = Nothing {
         /// Nothing.
         Nothing = 0,
-        /// A turn of the work loop that does not end.
+        /// An iteration of the work loop that does not end.
         Spin = 1,
-        /// A live field whose ways all lead to where the robot is.
+        /// A current field whose ways all lead to where the robot is.
         CorruptField = 2,
         /// No direction, as where the gradient is zero.
         Saddle = 3,
@@ -358,17 +388,19 @@ wire_enum! {
         HazardAroundRobot = 4,
         /// A closed wall believed around the target, whatever is forgotten.
         CutOff = 5,
+        /// Beats, and no output.
+        Mute = 6,
     }
 }
 
 wire_enum! {
-    /// What a stage made of a fault it was asked for.
+    /// How a stage answered a fault it was asked for.
     FaultAnswer, unknown = Refused {
         /// Asked for none.
         None = 0,
         /// It is broken now.
         Taken = 1,
-        /// Not done: the robot is a real one, and the request does not say that it is meant all the same.
+        /// Not done: the robot is a real one, and the request does not say `although_real`.
         Refused = 2,
         /// Not done: the stage has no such fault, or nothing yet to break.
         Impossible = 3,
@@ -382,12 +414,12 @@ wire_enum! {
 pub struct FaultSample {
     /// Which sample.
     pub stamp: Stamp,
-    /// Names the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
+    /// Identifies the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
     pub id: u64,
     /// The stage it is for.
     pub stage: Name,
     /// A [`FaultKind`].
     pub kind: u8,
-    /// 1: meant although the robot is a real one.
+    /// 1: to be done although the robot is a real one.
     pub although_real: u8,
 }

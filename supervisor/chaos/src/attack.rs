@@ -1,4 +1,4 @@
-//! The attacker: hears who lives, and hits.
+//! The attacker of one mission: sends signals, and waits for the successors to work.
 
 use std::time::{Duration, Instant};
 
@@ -9,14 +9,6 @@ use common::{
 };
 use rustix::process::{Pid, kill_process};
 
-use super::{
-    ChaosError, Options,
-    mission::PATIENCE,
-    report::{Possessions, Report},
-    schedule::{Chance, Kind},
-    subscriptions::Subscriptions,
-    system,
-};
 use supervisor::{
     policy::{HOLD_AFTER, HOLD_WINDOW},
     process::Process,
@@ -24,14 +16,20 @@ use supervisor::{
     stages,
 };
 
-/// What a supervisor says is always of its newest life: it has the bus made anew.
-const NEWEST: u32 = u32::MAX;
-/// A stage that dies too often is held until an operator releases it, and here there is none: so often none is hit.
-/// A hit may bring another in the start-up, and one of each may die of an earlier one.
-const MOST_HITS: usize = HOLD_AFTER - 4;
-/// How often the child is looked at while the bus is silent.
-pub(super) const LOOK: Duration = Duration::from_millis(50);
+use crate::{
+    error::{ChaosError, system},
+    options::Options,
+    report::Report,
+    resources::Resources,
+    schedule::{Kind, Schedule},
+    subscriptions::{POLL, Subscriptions},
+};
 
+/// The generation of whatever a supervisor publishes: its successor has a bus of its own.
+const NEWEST: u32 = u32::MAX;
+/// Signals to one stage within the window of the hold rule. One that dies more often is held until an operator releases
+/// it, and here there is none. A signal may be followed by one in the start-up, and each may be counted late.
+const MOST_HITS: usize = HOLD_AFTER - 4;
 /// A stage that was hit, until its successor works.
 struct PendingRecovery {
     stage: &'static str,
@@ -39,31 +37,31 @@ struct PendingRecovery {
     generation: u32,
     at: Instant,
     ready: bool,
-    again: Again,
+    startup_hit: StartupHit,
 }
 
 impl PendingRecovery {
-    /// Dealt now to that life of `stage`.
-    fn new(stage: &'static str, kind: Kind, generation: u32, again: Again) -> Self {
+    /// Of that generation of `stage`, hit now.
+    fn new(stage: &'static str, kind: Kind, generation: u32, startup_hit: StartupHit) -> Self {
         Self {
             stage,
             kind,
             generation,
             at: Instant::now(),
             ready: false,
-            again,
+            startup_hit,
         }
     }
 }
 
 /// Whether the successor is to be hit in its first milliseconds.
 #[derive(Clone, Copy)]
-enum Again {
-    /// It may live.
-    No,
+enum StartupHit {
+    /// No.
+    None,
     /// So long after its start.
     After(Duration),
-    /// It has started: then.
+    /// It has started, and is hit then.
     At {
         when: Instant,
         process: u32,
@@ -73,110 +71,110 @@ enum Again {
 
 /// What the attacker knows of a mission.
 #[derive(Default)]
-pub(super) struct Attack {
+pub(crate) struct Attack {
     entries: Vec<RosterEntry>,
     supervisor: u32,
-    /// It was hit: what it said before, and its stages until they follow it, is no sign of its successor.
+    /// It was hit: what it and its stages still publish is no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     pending: Vec<PendingRecovery>,
-    /// Who was hit lately.
+    /// Stages that were hit lately, and when.
     hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
-    /// Of the supervisor that lives: when its robot began to drive, and when it was last looked at.
-    held: Option<[Possessions; 2]>,
+    /// What the supervisor held when its robot began to drive, and when it was last looked at.
+    resources: Option<[Resources; 2]>,
 }
 
 impl Attack {
-    pub(super) fn until_the_end(
+    /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
+    pub(crate) fn run(
         &mut self,
         options: &Options,
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
-        chance: &mut Chance,
+        schedule: &mut Schedule,
         report: &mut Report,
+        patience: Duration,
     ) -> Result<(), ChaosError> {
         let began = Instant::now();
         self.supervisor_hit = false;
         self.driving = false;
         self.entries.clear();
-        self.held = None;
+        self.resources = None;
         // The stages of a supervisor that was hit go with it.
         self.pending.retain(|recovery| recovery.stage == SUPERVISOR);
         let mut subscriptions = loop {
-            if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= PATIENCE {
+            if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
                 return Ok(());
             }
             match Subscriptions::join(options, child.id()) {
                 Ok(Some(subscriptions)) => break subscriptions,
                 // Not up yet.
-                Ok(None) | Err(_) => std::thread::park_timeout(LOOK),
+                Ok(None) | Err(_) => std::thread::park_timeout(POLL),
             }
         };
-        let mut next = Instant::now() + chance.pause();
-        while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < PATIENCE {
-            // A hit that is overdue waits for the robot to drive, which is heard.
+        let mut next = Instant::now() + schedule.pause();
+        while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
+            // A hit that is overdue waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
-            let patience = due.unwrap_or(LOOK).min(self.time_to_successor());
-            subscriptions.waiter.wait(patience.min(LOOK))?;
+            let timeout = due.unwrap_or(POLL).min(self.time_to_startup_hit());
+            subscriptions.roster.waiter.wait(timeout.min(POLL))?;
             if let Some(robot) = &mut robot {
-                robot.tend()?;
+                robot.poll()?;
             }
-            self.listen(&mut subscriptions, report)?;
-            self.await_successors();
-            self.hit_successors(report);
+            self.read(&mut subscriptions, report)?;
+            self.schedule_startup_hits();
+            self.hit_starting(report);
             let enough = report.kills() >= options.kills;
             if Instant::now() >= next && self.driving && !enough {
-                next = Instant::now() + chance.pause();
-                self.hit(options, chance, report);
+                next = Instant::now() + schedule.pause();
+                self.hit(options, schedule, report);
             }
         }
-        if let Some([first, last]) = self.held {
-            report.held(first, last);
+        if let Some([first, last]) = self.resources {
+            report.add_growth(first, last);
         }
         Ok(())
     }
 
     /// Whether the supervisor was hit, and no successor works yet.
-    pub(super) fn supervisor_is_down(&self) -> bool {
+    pub(crate) fn supervisor_is_down(&self) -> bool {
         self.pending
             .iter()
             .any(|recovery| recovery.stage == SUPERVISOR)
     }
 
-    /// How far the last pose heard of was from the truth of its tick, metres. Wheel counts are what both know.
-    pub(super) fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
+    /// How far the last published pose was from the ground truth of its tick, metres; none without both.
+    pub(crate) fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
-        let counts = (pose.left_counts, pose.right_counts);
-        let same = |tick: &&GroundTruthTick| (tick.left_counts, tick.right_counts) == counts;
-        let tick = truth.iter().rev().find(same)?;
-        Some((pose.x_m - tick.x).hypot(pose.y_m - tick.y))
+        let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
+        Some(tick.pose_error_m(&pose))
     }
 
-    /// Take what came: who runs, who beats, who speaks.
-    fn listen(
+    /// Read what came: which stages run, beat and publish.
+    fn read(
         &mut self,
         subscriptions: &mut Subscriptions,
         report: &mut Report,
     ) -> Result<(), ChaosError> {
-        while let Some(entries) = subscriptions.roster.take()? {
+        while let Some(entries) = subscriptions.roster.samples.take()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
             if self.driving {
-                self.supervisor_recovered(true, report);
-                // What the dead held is given back once their successors work.
+                self.on_supervisor_sign(true, report);
+                // What ended processes held is freed once their successors work.
                 if self.pending.is_empty()
-                    && let Some(held) = Possessions::of(self.supervisor)
+                    && let Some(resources) = Resources::of(self.supervisor)
                 {
-                    let [first, _] = self.held.unwrap_or([held; 2]);
-                    self.held = Some([first, held]);
+                    let [first, _] = self.resources.unwrap_or([resources; 2]);
+                    self.resources = Some([first, resources]);
                 }
             }
         }
         while let Some(health) = subscriptions.health.take()? {
             if HealthState::from_byte(health.state) == HealthState::Ready {
-                self.recovered(
+                self.on_sign(
                     name_str(&health.stage),
                     health.stamp.generation,
                     true,
@@ -186,50 +184,50 @@ impl Attack {
         }
         while let Some(sample) = subscriptions.wheels.take()? {
             let writer = topics::WHEELS.spec().writer;
-            self.recovered(writer, sample.stamp.generation, false, report);
+            self.on_sign(writer, sample.stamp.generation, false, report);
         }
         while let Some(sample) = subscriptions.pose.take()? {
             let writer = topics::POSE.spec().writer;
-            self.recovered(writer, sample.stamp.generation, false, report);
+            self.on_sign(writer, sample.stamp.generation, false, report);
             self.pose = Some(sample);
         }
         while let Some(sample) = subscriptions.grid.take()? {
             let writer = topics::GRID.spec().writer;
             let generation = sample.header().stamp.generation;
-            self.recovered(writer, generation, false, report);
+            self.on_sign(writer, generation, false, report);
         }
         while let Some(sample) = subscriptions.guidance.take()? {
             let writer = topics::GUIDANCE.spec().writer;
-            self.recovered(writer, sample.stamp.generation, false, report);
+            self.on_sign(writer, sample.stamp.generation, false, report);
         }
         while let Some(sample) = subscriptions.command.take()? {
             let writer = topics::COMMAND.spec().writer;
-            self.recovered(writer, sample.stamp.generation, false, report);
-            self.supervisor_recovered(false, report);
+            self.on_sign(writer, sample.stamp.generation, false, report);
+            self.on_supervisor_sign(false, report);
         }
         Ok(())
     }
 
-    fn supervisor_recovered(&mut self, beat: bool, report: &mut Report) {
+    fn on_supervisor_sign(&mut self, beat: bool, report: &mut Report) {
         if !self.supervisor_hit {
-            self.recovered(SUPERVISOR, NEWEST, beat, report);
+            self.on_sign(SUPERVISOR, NEWEST, beat, report);
         }
     }
 
-    /// A sign of a life of `stage`: a beat that says ready, or a sample of a tick.
-    fn recovered(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
-        let is_it = |recovery: &PendingRecovery| {
+    /// A sign of a generation of `stage`: a beat as ready, or a sample of a tick.
+    fn on_sign(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
+        let awaited = |recovery: &PendingRecovery| {
             recovery.stage == stage && generation > recovery.generation
         };
-        let Some(at) = self.pending.iter().position(is_it) else {
+        let Some(at) = self.pending.iter().position(awaited) else {
             return;
         };
-        let hit = &mut self.pending[at];
-        let took = hit.at.elapsed().as_nanos() as u64;
-        let recovery = report.recovery(hit.stage);
-        let frozen = hit.kind == Kind::Freeze;
-        if !hit.ready {
-            hit.ready = true;
+        let pending = &mut self.pending[at];
+        let took = pending.at.elapsed().as_nanos() as u64;
+        let recovery = report.recovery(pending.stage);
+        let frozen = pending.kind == Kind::Freeze;
+        if !pending.ready {
+            pending.ready = true;
             if frozen {
                 recovery.after_freeze.record(took);
             } else {
@@ -244,23 +242,23 @@ impl Attack {
         }
     }
 
-    /// Hit a stage that runs and has no open recovery, or the supervisor.
-    fn hit(&mut self, options: &Options, chance: &mut Chance, report: &mut Report) {
-        if options.supervisor && chance.supervisor() {
-            let kind = chance.supervisor_kind();
+    /// Hit a stage that runs and has no pending recovery, or the supervisor.
+    fn hit(&mut self, options: &Options, schedule: &mut Schedule, report: &mut Report) {
+        if options.supervisor && schedule.supervisor() {
+            let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind) {
                 report.hit(SUPERVISOR, kind);
                 self.pending
-                    .push(PendingRecovery::new(SUPERVISOR, kind, 0, Again::No));
+                    .push(PendingRecovery::new(SUPERVISOR, kind, 0, StartupHit::None));
                 self.supervisor_hit = true;
                 self.driving = false;
             }
             return;
         }
-        let Some(stage) = stages::find(chance.stage()).map(|stage| stage.name) else {
+        let Some(stage) = stages::find(schedule.stage()).map(|stage| stage.name) else {
             return;
         };
-        let (kind, again) = (chance.kind(), chance.again());
+        let (kind, startup_hit) = (schedule.kind(), schedule.startup_hit());
         let running = |entry: &&RosterEntry| {
             name_str(&entry.stage) == stage
                 && StageState::from_byte(entry.state) == StageState::Running
@@ -268,33 +266,37 @@ impl Attack {
         let Some(entry) = self.entries.iter().find(running) else {
             return;
         };
-        let hurt = self.pending.iter().any(|recovery| recovery.stage == stage);
+        let recovering = self.pending.iter().any(|recovery| recovery.stage == stage);
         self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
         let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
-        if hurt || lately >= MOST_HITS || !send(entry.pid, kind) {
+        if recovering || lately >= MOST_HITS || !send(entry.pid, kind) {
             return;
         }
         report.hit(stage, kind);
         self.hits.push((stage, Instant::now()));
-        let again = match again {
-            Some(after) if options.startup && kind != Kind::Freeze => Again::After(after),
-            _ => Again::No,
+        let startup_hit = match startup_hit {
+            Some(after) if options.startup && kind != Kind::Freeze => StartupHit::After(after),
+            _ => StartupHit::None,
         };
-        self.pending
-            .push(PendingRecovery::new(stage, kind, entry.generation, again));
+        self.pending.push(PendingRecovery::new(
+            stage,
+            kind,
+            entry.generation,
+            startup_hit,
+        ));
     }
 
-    /// Find the successors that are to be hit, once they have started.
-    fn await_successors(&mut self) {
+    /// Find the successors that have started and are to be hit in their start-up.
+    fn schedule_startup_hits(&mut self) {
         for recovery in &mut self.pending {
             let successor = self.entries.iter().find(|entry| {
                 name_str(&entry.stage) == recovery.stage
                     && entry.generation > recovery.generation
                     && entry.pid != 0
             });
-            if let (Again::After(after), Some(entry)) = (recovery.again, successor) {
+            if let (StartupHit::After(after), Some(entry)) = (recovery.startup_hit, successor) {
                 let age = Duration::from_nanos(entry.uptime_ns);
-                recovery.again = Again::At {
+                recovery.startup_hit = StartupHit::At {
                     when: Instant::now() + after.saturating_sub(age),
                     process: entry.pid,
                     generation: entry.generation,
@@ -303,38 +305,42 @@ impl Attack {
         }
     }
 
-    /// Until one of them is to be hit.
-    fn time_to_successor(&self) -> Duration {
+    /// Time until one of them is to be hit.
+    fn time_to_startup_hit(&self) -> Duration {
         let times = self
             .pending
             .iter()
-            .filter_map(|recovery| match recovery.again {
-                Again::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
-                Again::No | Again::After(_) => None,
+            .filter_map(|recovery| match recovery.startup_hit {
+                StartupHit::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
+                StartupHit::None | StartupHit::After(_) => None,
             });
         times.min().unwrap_or(Duration::MAX)
     }
 
     /// Hit those whose time has come.
-    fn hit_successors(&mut self, report: &mut Report) {
+    fn hit_starting(&mut self, report: &mut Report) {
         for recovery in &mut self.pending {
-            let Again::At {
+            let StartupHit::At {
                 when,
                 process,
                 generation,
-            } = recovery.again
+            } = recovery.startup_hit
             else {
                 continue;
             };
             if Instant::now() < when {
                 continue;
             }
-            recovery.again = Again::No;
+            recovery.startup_hit = StartupHit::None;
             if send(process, Kind::KillAtStart) {
                 report.hit(recovery.stage, Kind::KillAtStart);
                 self.hits.push((recovery.stage, Instant::now()));
-                *recovery =
-                    PendingRecovery::new(recovery.stage, Kind::KillAtStart, generation, Again::No);
+                *recovery = PendingRecovery::new(
+                    recovery.stage,
+                    Kind::KillAtStart,
+                    generation,
+                    StartupHit::None,
+                );
             }
         }
     }

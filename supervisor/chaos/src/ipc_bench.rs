@@ -1,7 +1,7 @@
-//! Five hops between processes with no work in them: what the bus alone costs.
+//! The latency of five hops between processes that do no work: what the bus alone costs.
 //!
-//! The same topics, payloads, wakeups and waits as a tick's, each passed on at once: wheels, pose, grid,
-//! guidance, command. What a tick takes beyond that is the stages' own.
+//! The same topics, payloads, wakeups and waits as a tick's, each forwarded at once: wheels, pose, grid, guidance,
+//! command. What a tick takes beyond that is the stages' work.
 
 use std::time::{Duration, Instant};
 
@@ -19,19 +19,20 @@ use common::{
 use thiserror::Error;
 
 use supervisor::{
-    domain::{DomainError, DomainLock},
+    DomainError,
+    domain::DomainLock,
     process::{Process, firsthand},
 };
 
 /// Cells of the smallest map, which no forwarder looks at.
 const CELLS: usize = 64;
-/// The forwarders, by the stage in whose place they stand.
+/// The forwarders, by the stage that each stands for.
 pub const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
-/// A trip takes microseconds, the forwarders' start some milliseconds; one that takes so long never ends.
+/// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
 const LOST: Duration = Duration::from_secs(5);
-/// Between asking forwarders that may not be up yet.
-const ASK_AGAIN: Duration = Duration::from_millis(20);
-/// Trips before those that count: every page is touched, every map made.
+/// Between samples sent to forwarders that may not be up yet.
+const SEND_AGAIN: Duration = Duration::from_millis(20);
+/// Trips before those that count: all memory is mapped by then.
 const WARM_UP: u64 = 200;
 
 /// Why the hops could not be measured.
@@ -53,7 +54,7 @@ pub enum IpcBenchError {
     #[error("no sample came back within {LOST:?}; is the machine overloaded?")]
     Lost,
     /// No such forwarder.
-    #[error("no forwarder stands in the place of {0:?}")]
+    #[error("no forwarder stands for {0:?}")]
     Place(String),
 }
 
@@ -63,8 +64,8 @@ pub fn measure(
     trips: u64,
     period: Option<Duration>,
 ) -> Result<Histogram, IpcBenchError> {
-    let held = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
-    let bus = held.bus().ok_or(IpcBenchError::Lost)?;
+    let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
+    let bus = lock.bus().ok_or(IpcBenchError::Lost)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
     let mut end = bus.reader(&topics::COMMAND)?;
     let mut waiter = Waiter::default();
@@ -91,7 +92,7 @@ pub fn measure(
                 sent_ns = monotonic_ns();
                 start.publish(trip, MissionTime::default(), WheelSample::default())?;
             }
-            waiter.wait(if trip < WARM_UP { ASK_AGAIN } else { LOST })?;
+            waiter.wait(if trip < WARM_UP { SEND_AGAIN } else { LOST })?;
             while let Some(command) = end.take()? {
                 arrived |= command.stamp.tick == trip;
             }
@@ -109,8 +110,8 @@ pub fn measure(
     Ok(latencies)
 }
 
-/// Be the forwarder that stands in the place of the stage `place`.
-pub fn live(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), IpcBenchError> {
+/// Be the forwarder that stands for the stage `place`.
+pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), IpcBenchError> {
     let mut terminated = Signals::catch(&[SIGTERM]).map_err(|source| StageError::System {
         action: "catch SIGTERM",
         source,
@@ -121,18 +122,18 @@ pub fn live(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), IpcBe
     let bus = Bus::join(&domain, place)?;
     let mut waiter = Waiter::default();
     waiter.on_readable(&terminated)?;
-    let mut pass = forwarder(&bus, place, &mut waiter)?;
+    let mut forward = forwarder(&bus, place, &mut waiter)?;
     while !terminated.came() {
-        pass()?;
+        forward()?;
         waiter.wait(LOST)?;
     }
     Ok(())
 }
 
-/// What passes on all that came.
-type Pass = Box<dyn FnMut() -> Result<(), BusError>>;
+/// Forwards all that came.
+type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
-fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Pass, IpcBenchError> {
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, IpcBenchError> {
     let now = MissionTime::default();
     Ok(match PLACES.iter().position(|name| *name == place) {
         Some(0) => {

@@ -1,4 +1,4 @@
-//! One mission under attack.
+//! One mission, undisturbed and under attack.
 
 use std::{
     fs::{self, File},
@@ -10,20 +10,20 @@ use std::{
 use common::mission::Mission;
 use serde_json::Value;
 
-use super::{
-    ChaosError, Options,
+use crate::{
     attack::Attack,
+    error::{ChaosError, system},
+    options::Options,
     report::{End, Report},
-    schedule::Chance,
-    system,
+    schedule::Schedule,
 };
 use supervisor::{
     process::{Process, firsthand},
     simulator::Simulator,
 };
 
-/// Nothing that is waited for takes longer; a mission at a wall-clock pace takes half a minute.
-pub(super) const PATIENCE: Duration = Duration::from_secs(600);
+/// A mission that takes longer is stopped; at a wall-clock pace it takes half a minute.
+const PATIENCE: Duration = Duration::from_secs(600);
 
 fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
@@ -33,24 +33,24 @@ fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Result<Comma
     for setting in &options.set {
         command.args(["--set", setting]);
     }
-    ours(command, out)
+    child(command, out)
 }
 
-/// The run whose supervisor was hit, once more.
+/// Go on with the run whose supervisor was hit.
 fn resume(directory: &Path) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
-    ours(command, directory)
+    child(command, directory)
 }
 
-/// A run that ends with us, and tells us alone; what it says on the way, and at last should it fall over, beside its
+/// As a child that ends with this process; standard output is piped, standard error goes to a file beside the run's
 /// directory.
-fn ours(mut command: Command, directory: &Path) -> Result<Command, ChaosError> {
-    let said = directory.with_extension("stderr");
-    let said = File::options().create(true).append(true).open(said);
-    let said = said.map_err(system("keep what a mission says"))?;
+fn child(mut command: Command, directory: &Path) -> Result<Command, ChaosError> {
+    let stderr = directory.with_extension("stderr");
+    let stderr = File::options().create(true).append(true).open(stderr);
+    let stderr = stderr.map_err(system("write a mission's standard error"))?;
     command.args(["--parent", &std::process::id().to_string()]);
-    command.stdout(Stdio::piped()).stderr(said);
+    command.stdout(Stdio::piped()).stderr(stderr);
     Ok(command)
 }
 
@@ -59,9 +59,9 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
     serde_json::from_str(text.trim()).map_err(|_| ChaosError::NoSummary(text.into_owned()))
 }
 
-/// The same mission left alone: what there is to compare with.
-pub(super) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
-    let directory = options.directory.join("calm");
+/// The summary of the mission without an attack, to compare with.
+pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
+    let directory = options.directory.join("undisturbed");
     let output = command(options, seed, "max", &directory)?
         .output()
         .map_err(system("start a mission"))?;
@@ -69,21 +69,21 @@ pub(super) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosEr
     parse(&output.stdout)
 }
 
-/// The same mission under attack; what happened goes into `report`. What the mission wrote is kept if it went wrong.
-pub(super) fn attack(
+/// Attack the mission, and report. Its files stay if it went wrong.
+pub(crate) fn attack(
     options: &Options,
     seed: u64,
-    chance: &mut Chance,
+    schedule: &mut Schedule,
     report: &mut Report,
-    calm: &Value,
+    undisturbed: &Value,
 ) -> Result<(), ChaosError> {
     let before = report.kills();
-    let place = options.directory.join(format!("seed-{seed}"));
-    fs::create_dir(&place).map_err(system("make a directory"))?;
-    let directory = place.join("run");
+    let files = options.directory.join(format!("seed-{seed}"));
+    fs::create_dir(&files).map_err(system("make a directory"))?;
+    let directory = files.join("run");
     let mut robot = options
         .supervisor
-        .then(|| robot(options, seed, &place.join("robot")))
+        .then(|| robot(options, seed, &files.join("robot")))
         .transpose()?;
     let mut start = command(options, seed, &options.pace.to_string(), &directory)?;
     if let Some(robot) = &robot {
@@ -93,8 +93,15 @@ pub(super) fn attack(
     let mut attack = Attack::default();
     let began = Instant::now();
     let summary = loop {
-        let summary = one_supervisor(options, start, robot.as_mut(), &mut attack, chance, report)?;
-        // A supervisor that was hit leaves no summary, one that was spared by a hair does.
+        let summary = one_supervisor(
+            options,
+            start,
+            robot.as_mut(),
+            &mut attack,
+            schedule,
+            report,
+        )?;
+        // A supervisor that was hit leaves no summary, unless it had just ended the run.
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
@@ -107,9 +114,9 @@ pub(super) fn attack(
         outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
         reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
         collisions: summary["collisions"].as_u64().unwrap_or_default(),
-        pose_excess_m: number(&summary, "pose_error_m") - number(calm, "pose_error_m"),
-        unattended_s: number(&summary, "unattended_s"),
-        // What a count that was lost may cost, for each of them.
+        pose_excess_m: number(&summary, "pose_error_m") - number(undisturbed, "pose_error_m"),
+        stopping_time_s: number(&summary, "stopping_time_s"),
+        // Each signal may cost one wheel count.
         pose_allowance_m: f64::from(kills) * options.loaded.body().metres_per_count(),
         kills,
     };
@@ -118,17 +125,17 @@ pub(super) fn attack(
         let truth = robot.truth();
         let last = truth.last();
         end.collisions = last.map_or(0, |tick| tick.contacts);
-        end.unattended_s = last.map_or(0.0, |tick| tick.stopping_time_s);
+        end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
-        end.pose_excess_m = error - number(calm, "pose_error_m");
+        end.pose_excess_m = error - number(undisturbed, "pose_error_m");
     }
-    if report.ended(&end) {
-        fs::remove_dir_all(&place).map_err(system("remove its directory"))?;
+    if report.add_mission(&end) {
+        fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
     }
     Ok(())
 }
 
-/// A robot that does not die with its supervisor.
+/// A robot that does not end with its supervisor.
 fn robot(options: &Options, seed: u64, directory: &Path) -> Result<Simulator, ChaosError> {
     fs::create_dir(directory).map_err(system("make a directory"))?;
     let mission = Mission {
@@ -138,18 +145,18 @@ fn robot(options: &Options, seed: u64, directory: &Path) -> Result<Simulator, Ch
     Ok(Simulator::start(directory, &mission, options.pace)?)
 }
 
-/// One life of a supervisor under attack; what it says at its end.
+/// One generation of a supervisor under attack. Returns its standard output.
 fn one_supervisor(
     options: &Options,
     start: Command,
     robot: Option<&mut Simulator>,
     attack: &mut Attack,
-    chance: &mut Chance,
+    schedule: &mut Schedule,
     report: &mut Report,
 ) -> Result<Vec<u8>, ChaosError> {
     let mut child = Process::spawn(start).map_err(system("start a mission"))?;
     let stdout = child.take_stdout();
-    // Read beside, or a long summary could block it.
+    // Read by a thread: a long summary would fill the pipe.
     let summary = std::thread::spawn(move || {
         let mut text = Vec::new();
         if let Some(mut stdout) = stdout {
@@ -157,7 +164,7 @@ fn one_supervisor(
         }
         text
     });
-    let attacked = attack.until_the_end(options, &mut child, robot, chance, report);
+    let attacked = attack.run(options, &mut child, robot, schedule, report, PATIENCE);
     child.end(Duration::from_secs(2));
     let summary = summary.join().unwrap_or_default();
     attacked.map(|()| summary)

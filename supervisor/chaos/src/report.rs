@@ -1,24 +1,24 @@
-//! The sum of all missions under attack.
+//! The result of all missions under attack.
 
 use std::{
     collections::BTreeMap,
-    fmt, fs,
+    fmt,
     time::{Duration, Instant},
 };
 
 use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
-use super::schedule::Kind;
+use crate::{resources::Resources, schedule::Kind};
 use supervisor::stages::TABLE;
 
-/// What became of everything. Times in milliseconds.
+/// The result of all missions under attack. Times in milliseconds.
 #[derive(Debug, Serialize)]
 pub struct Report {
     missions: u64,
     reached: u64,
     collisions: u64,
-    /// Missions that were not reached untouched, or lost pose: their seeds and what was wrong.
+    /// Missions that did not reach the target, touched something or lost the pose: their seeds and what was wrong.
     wrong: Vec<String>,
     /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
@@ -28,48 +28,22 @@ pub struct Report {
     /// signals sent.
     worst_pose_excess_m: f64,
     worst_pose_kills: u32,
-    /// The longest that a wheel turned after the last command the robot had heard, mission seconds.
-    longest_unattended_s: f64,
+    /// The longest that a wheel turned after the last command the robot had received, mission seconds.
+    longest_stopping_time_s: f64,
     /// Files, shared memory, processes that outlived a mission.
     pub leftovers: usize,
-    /// The most that a supervisor held more at the end of its life than when its robot began to drive.
-    most_won: Possessions,
+    /// The most that a supervisor held more at its end than when its robot began to drive.
+    supervisor_growth: Resources,
     took_s: f64,
     #[serde(skip)]
     began: Instant,
-}
-
-/// What a process holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Possessions {
-    /// Open descriptors.
-    pub descriptors: i64,
-    /// Memory that is its own, KiB.
-    pub memory_kib: i64,
-}
-
-impl Possessions {
-    /// Of process `pid`; none when it is gone.
-    pub fn of(pid: u32) -> Option<Self> {
-        let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as i64;
-        let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-        // Pages of shared memory come with the samples that were looked at: they are the bus's.
-        let line = status
-            .lines()
-            .find_map(|line| line.strip_prefix("RssAnon:"))?;
-        let memory_kib = line.trim().trim_end_matches(" kB").parse().ok()?;
-        Some(Self {
-            descriptors,
-            memory_kib,
-        })
-    }
 }
 
 /// From the signal to the successor.
 #[derive(Debug, Default)]
 pub(crate) struct Recovery {
     /// To its first beat that says ready, after which it works; of those that were not frozen, which are noticed
-    /// by their silence.
+    /// because they do not beat.
     pub ready: Histogram,
     /// The same of those that were frozen.
     pub after_freeze: Histogram,
@@ -77,7 +51,7 @@ pub(crate) struct Recovery {
     pub output: Histogram,
 }
 
-/// One mission's end.
+/// The end of one mission.
 #[derive(Debug)]
 pub struct End {
     pub seed: u64,
@@ -85,9 +59,9 @@ pub struct End {
     pub reason: String,
     pub collisions: u64,
     pub pose_excess_m: f64,
-    /// The most that may be.
+    /// The most that is allowed.
     pub pose_allowance_m: f64,
-    pub unattended_s: f64,
+    pub stopping_time_s: f64,
     pub kills: u32,
 }
 
@@ -102,9 +76,9 @@ impl Report {
             recovery_ms: BTreeMap::new(),
             worst_pose_excess_m: 0.0,
             worst_pose_kills: 0,
-            longest_unattended_s: 0.0,
+            longest_stopping_time_s: 0.0,
             leftovers: 0,
-            most_won: Possessions::default(),
+            supervisor_growth: Resources::default(),
             took_s: 0.0,
             began: Instant::now(),
         }
@@ -133,11 +107,11 @@ impl Report {
         self.recovery_ms.entry(stage).or_default()
     }
 
-    /// Says whether the mission arrived untouched, and knew where it was.
-    pub fn ended(&mut self, end: &End) -> bool {
+    /// Count a mission. Says whether it reached the target without a touch, and knew its pose.
+    pub fn add_mission(&mut self, end: &End) -> bool {
         self.missions += 1;
         self.collisions += end.collisions;
-        self.longest_unattended_s = self.longest_unattended_s.max(end.unattended_s);
+        self.longest_stopping_time_s = self.longest_stopping_time_s.max(end.stopping_time_s);
         if end.pose_excess_m > self.worst_pose_excess_m {
             self.worst_pose_excess_m = end.pose_excess_m;
             self.worst_pose_kills = end.kills;
@@ -164,9 +138,9 @@ impl Report {
         self.wrong.len() == before
     }
 
-    /// A supervisor held `first` when its robot began to drive, and `last` when it was last looked at.
-    pub fn held(&mut self, first: Possessions, last: Possessions) {
-        let most = &mut self.most_won;
+    /// A supervisor held `first` when its robot began to drive, and `last` at its end.
+    pub fn add_growth(&mut self, first: Resources, last: Resources) {
+        let most = &mut self.supervisor_growth;
         most.descriptors = most.descriptors.max(last.descriptors - first.descriptors);
         most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
     }
@@ -175,12 +149,12 @@ impl Report {
         self.took_s = self.began.elapsed().as_secs_f64();
     }
 
-    /// Whether every mission arrived untouched and knew where it was. What one wrote that did not is kept.
+    /// Whether every mission reached the target without a touch and knew its pose. The files of one that did not stay.
     pub fn is_right(&self) -> bool {
         self.wrong.is_empty()
     }
 
-    /// Whether every mission did, and left nothing.
+    /// Whether every mission did, and left nothing behind.
     pub fn is_clean(&self) -> bool {
         self.is_right() && self.leftovers == 0
     }
@@ -276,15 +250,15 @@ impl fmt::Display for Report {
         writeln!(
             to,
             "a wheel turned at most {:.2} s of mission time after the last command",
-            self.longest_unattended_s
+            self.longest_stopping_time_s
         )?;
-        let Possessions {
+        let Resources {
             descriptors,
             memory_kib,
-        } = self.most_won;
+        } = self.supervisor_growth;
         writeln!(
             to,
-            "a supervisor won at most {descriptors} descriptors and {memory_kib} KiB on its way"
+            "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"
         )
     }
 }

@@ -1,4 +1,4 @@
-//! Who, how and when.
+//! Which stage gets which signal when: seeded, so that a schedule can be repeated.
 
 use std::time::Duration;
 
@@ -8,12 +8,12 @@ use serde::Serialize;
 
 use supervisor::stages::TABLE;
 
-/// Between two signals on average: each stage gets one every two to three seconds, and has lived before.
+/// Between two signals on average: each stage gets one every two to three seconds, and was stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
-/// A successor that is hit in its start-up is hit within this of its start: the middleware's fragile time.
+/// A successor that is hit in its start-up is hit within this of its start: the time it joins the bus.
 const STARTUP: Duration = Duration::from_millis(12);
-/// Share of the signals that are meant for a successor in its start-up, where that is asked for: a fifth of them, and
-/// half as many that come to nothing because the first left no successor, or one that was ready too soon.
+/// Share of the signals scheduled for a successor in its start-up, where that is asked for. A fifth of all signals are
+/// sent to one; the rest is not sent, because there was no successor, or it was ready too soon.
 const STARTUP_SHARE: f64 = 0.3;
 
 /// Share of the signals that hit the supervisor, where that is asked for: a hundred in two thousand.
@@ -25,7 +25,7 @@ const SUPERVISOR_SHARE: f64 = 0.05;
 pub(crate) enum Kind {
     /// SIGKILL.
     Kill,
-    /// SIGKILL in the first milliseconds of a life.
+    /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
     /// SIGABRT, as a panic of a program that cannot unwind. Not SIGSEGV: Rust's runtime takes the first for an
     /// overflow of the stack, finds none, and goes on.
@@ -37,7 +37,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// What is sent.
+    /// The signal.
     pub(crate) const fn signal(self) -> Signal {
         match self {
             Self::Kill | Self::KillAtStart => Signal::KILL,
@@ -47,7 +47,7 @@ impl Kind {
         }
     }
 
-    /// For people.
+    /// In words.
     pub(crate) const fn as_str(self) -> &'static str {
         match self {
             Self::Kill => "killed",
@@ -59,11 +59,11 @@ impl Kind {
     }
 }
 
-/// Seeded chance.
+/// A seeded sequence of decisions.
 #[derive(Debug)]
-pub(crate) struct Chance(Pcg64);
+pub(crate) struct Schedule(Pcg64);
 
-impl Chance {
+impl Schedule {
     pub(crate) fn new(seed: u64) -> Self {
         Self(Pcg64::new(u128::from(seed), 7))
     }
@@ -89,7 +89,7 @@ impl Chance {
         self.uniform() < SUPERVISOR_SHARE
     }
 
-    /// How to hit the supervisor: told to end it would, and one that is frozen is systemd's to notice.
+    /// How to hit the supervisor. Not by SIGTERM, which ends the run; one that is frozen only systemd notices.
     pub(crate) fn supervisor_kind(&mut self) -> Kind {
         match self.uniform() {
             ..0.8 => Kind::Kill,
@@ -108,9 +108,9 @@ impl Chance {
     }
 
     /// Whether to hit the successor too, and how long after its start.
-    pub(crate) fn again(&mut self) -> Option<Duration> {
-        // Of those that follow a first one.
-        let second = self.uniform() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
-        second.then(|| STARTUP.mul_f64(self.uniform()))
+    pub(crate) fn startup_hit(&mut self) -> Option<Duration> {
+        // Their share of all signals, as a share of those that can be followed by one.
+        let hit = self.uniform() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
+        hit.then(|| STARTUP.mul_f64(self.uniform()))
     }
 }

@@ -1,59 +1,57 @@
-//! The attacker's place on the bus.
+//! What the attacker reads from the bus.
 
-use std::time::Instant;
+use std::time::Duration;
 
 use common::{
     bus::{Bus, Reader, SliceReader},
     domain::Domain,
+    roster::Roster,
     samples::{
         CommandSample, GridHeader, GuidanceSample, HealthSample, PoseSample, RosterEntry,
         RosterHeader, WheelSample,
     },
     topics,
-    waiter::Waiter,
 };
 
-use super::{ChaosError, Options, attack::LOOK};
+use crate::{error::ChaosError, options::Options};
 
-/// The attacker's place on the bus, for one life of the supervisor.
-pub(super) struct Subscriptions {
-    pub(super) roster: SliceReader<RosterHeader, RosterEntry>,
-    pub(super) health: Reader<HealthSample>,
-    pub(super) wheels: Reader<WheelSample>,
-    pub(super) pose: Reader<PoseSample>,
-    pub(super) grid: SliceReader<GridHeader, u8>,
-    pub(super) guidance: Reader<GuidanceSample>,
-    pub(super) command: Reader<CommandSample>,
-    pub(super) waiter: Waiter,
+/// How long to wait for the bus before the processes are looked at again.
+pub(crate) const POLL: Duration = Duration::from_millis(50);
+
+/// What the attacker reads from the bus of one generation of the supervisor.
+pub(crate) struct Subscriptions {
+    pub(crate) roster: Roster,
+    pub(crate) health: Reader<HealthSample>,
+    pub(crate) wheels: Reader<WheelSample>,
+    pub(crate) pose: Reader<PoseSample>,
+    pub(crate) grid: SliceReader<GridHeader, u8>,
+    pub(crate) guidance: Reader<GuidanceSample>,
+    pub(crate) command: Reader<CommandSample>,
 }
 
 impl Subscriptions {
-    /// None on the bus of another than `supervisor`: one that died leaves its bus to its successor to remove.
-    pub(super) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, ChaosError> {
+    /// Join the bus. None if it is the bus of another than `supervisor`: one that was killed leaves its bus, and its
+    /// successor removes it.
+    pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, ChaosError> {
         let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
-        let mut waiter = Waiter::default();
-        waiter.on(bus.wakeup(&topics::ROSTER)?);
-        waiter.on(bus.wakeup(&topics::HEALTH)?);
-        waiter.on(bus.wakeup(&topics::COMMAND)?);
+        let mut roster = Roster::open(&bus)?;
+        roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
+        roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
         let mut subscriptions = Self {
-            roster: bus.slice_reader(&topics::ROSTER)?,
+            roster,
             health: bus.reader(&topics::HEALTH)?,
             wheels: bus.reader(&topics::WHEELS)?,
             pose: bus.reader(&topics::POSE)?,
             grid: bus.slice_reader(&topics::GRID)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
             command: bus.reader(&topics::COMMAND)?,
-            waiter,
         };
-        let began = Instant::now();
-        while began.elapsed() < 2 * topics::RESTATE {
-            while let Some(entries) = subscriptions.roster.take()? {
-                if entries.header().supervisor_pid == supervisor {
-                    return Ok(Some(subscriptions));
-                }
-            }
-            subscriptions.waiter.wait(LOOK)?;
-        }
-        Ok(None)
+        let of_supervisor = |header: &RosterHeader, _: &[RosterEntry]| {
+            (header.supervisor_pid == supervisor).then_some(())
+        };
+        let found = subscriptions
+            .roster
+            .find(2 * topics::RESTATE, of_supervisor)?;
+        Ok(found.map(|()| subscriptions))
     }
 }

@@ -1,7 +1,7 @@
 //! Where this process logs: to standard error, to a file, and, under systemd, to the journal.
 //!
 //! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
-//! keeps the time itself. That needs no library, and a line looks the same to whoever reads it.
+//! records the time itself. That needs no library, and a line is the same wherever it is read.
 
 use std::{
     fs::File,
@@ -22,7 +22,7 @@ use tracing_subscriber::{
 type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
 
 /// Whether standard error goes to the journal. `JOURNAL_STREAM` says which file the journal reads, and children
-/// inherit it: one whose standard error was sent elsewhere must not take it for its own.
+/// inherit it even if their standard error is redirected, so the file is compared.
 pub(crate) fn to_journal() -> bool {
     let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
         return false;

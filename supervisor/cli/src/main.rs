@@ -4,8 +4,8 @@
 //! |---|---|
 //! | [`commands`] | one file a subcommand |
 //! | [`summary`] | how a run ended, as numbers |
-//! | [`run_picture`] | the picture a run ends with |
-//! | [`logging`] | logs where they are looked for |
+//! | [`run_picture`] | the picture of a run |
+//! | [`logging`] | logs to standard error, to a file, to the journal |
 
 mod commands;
 mod logging;
@@ -23,7 +23,7 @@ use commands::sim;
 use commands::{chaos, field, latency};
 use commands::{check, fault, help, install, missions, operate, run, stage, status, tables};
 
-/// Time-critical mobility for ground robots: a target, a perimeter, one sonar, and off it goes.
+/// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
 ///
 /// Without a subcommand: `firsthand run obstacle-course`.
 #[derive(Debug, Parser)]

@@ -41,7 +41,7 @@ pub(crate) fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> 
     })
 }
 
-/// Poses of the truth, for the picture.
+/// Poses of the ground truth, for the picture.
 fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
     truth
         .iter()

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, fmt};
 
 use common::{
     clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
+    samples::PoseSample,
 };
 use serde::Serialize;
 
@@ -27,8 +28,8 @@ impl From<&Histogram> for Quantiles {
     }
 }
 
-/// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the
-/// truth about a real robot.
+/// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the ground truth of a
+/// real robot.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Summary {
     pub(crate) outcome: Outcome,
@@ -39,18 +40,18 @@ pub(crate) struct Summary {
     pub(crate) min_clearance_m: Option<f64>,
     pub(crate) collisions: Option<u64>,
     pub(crate) pose_error_m: Option<f64>,
-    /// The longest that a wheel turned after the last command the robot had heard: command limit and speed loop
-    /// together, in an outage or when a stage dies.
-    pub(crate) unattended_s: Option<f64>,
+    /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
+    /// together, in an outage or when a stage is down.
+    pub(crate) stopping_time_s: Option<f64>,
     pub(crate) safety_events: u64,
     pub(crate) full_solves: u64,
     pub(crate) local_updates: u64,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
-    /// Supervisors that went on with the run. Path and clearance from the truth, solves and latencies are those of
-    /// the last one; the path is then the believed one, which is whole.
+    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last one's
+    /// part; the path is the believed one, which is complete.
     pub(crate) resumes: u32,
-    /// Fresh planners that a stalled robot was given.
+    /// Generations of the planner started because the robot stalled.
     pub(crate) replans: u32,
     /// Times its sensed belief was forgotten.
     pub(crate) resets: u64,
@@ -61,9 +62,8 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    /// Of a run that ended like this. What came after the arrival does not count: it depends on how
-    /// fast the stop was.
-    pub(crate) fn of(mission: &Mission, finished: &Finished) -> Self {
+    /// Of a finished run. What came after the arrival does not count: it depends on how fast the stop was.
+    pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
         let Finished {
             ending,
             record,
@@ -79,17 +79,13 @@ impl Summary {
         };
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
-        let truth = truth_until(
-            &finished.truth,
-            pose.map(|pose| (pose.left_counts, pose.right_counts)),
-            arrival.is_some(),
-        );
+        let truth = truth_until(&finished.truth, pose, arrival.is_some());
         let (full_solves, local_updates) = record.solves(guidance);
         let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
         let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
         let collisions = truth.last().map(|tick| tick.contacts);
-        // The truth comes through a pipe of its own: a touch on the way may be seen after the arrival.
+        // The ground truth comes through a pipe of its own: a touch on the way may be read after the arrival.
         let touched = ending.outcome == Outcome::Reached && collisions.is_some_and(|n| n > 0);
         let (outcome, reason) = if touched {
             let reason = "touched something on the way to the target".to_owned();
@@ -111,8 +107,8 @@ impl Summary {
             collisions,
             pose_error_m: pose
                 .zip(truth.last())
-                .map(|(pose, truth)| (pose.x_m - truth.x).hypot(pose.y_m - truth.y)),
-            unattended_s: truth.last().map(|tick| tick.stopping_time_s),
+                .map(|(pose, truth)| truth.pose_error_m(pose)),
+            stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves,
             local_updates,
@@ -134,7 +130,7 @@ impl Summary {
         };
         let stalls = (self.replans > 0 || self.resets > 0).then(|| {
             format!(
-                "The robot stalled: fresh planners {}, beliefs forgotten {}",
+                "The robot stalled: replans {}, beliefs forgotten {}",
                 self.replans, self.resets
             )
         });
@@ -151,9 +147,10 @@ impl Summary {
                 self.tick_latency_us,
                 self.ticks,
                 self.restarted(),
-                self.unattended_s.map_or(String::new(), |seconds| format!(
-                    " · at rest {seconds:.2} s after a last command at the latest"
-                )),
+                self.stopping_time_s
+                    .map_or(String::new(), |seconds| format!(
+                        " · at rest at most {seconds:.2} s after a last command"
+                    )),
             ),
         ];
         stalls.into_iter().chain(numbers).collect()
@@ -206,17 +203,16 @@ impl fmt::Display for Summary {
     }
 }
 
-/// The truth up to the tick whose frames showed `counts`: wheel counts are what belief and truth have in
-/// common. All of it when the run did not end by arriving.
-fn truth_until(
-    truth: &[GroundTruthTick],
-    counts: Option<(u16, u16)>,
+/// The ground truth up to the tick of `pose`. All of it when the run did not end by arriving.
+fn truth_until<'a>(
+    truth: &'a [GroundTruthTick],
+    pose: Option<&PoseSample>,
     arrived: bool,
-) -> &[GroundTruthTick] {
+) -> &'a [GroundTruthTick] {
     if !arrived {
         return truth;
     }
-    let shows = |tick: &GroundTruthTick| counts == Some((tick.left_counts, tick.right_counts));
+    let shows = |tick: &GroundTruthTick| pose.is_some_and(|pose| tick.is_of(pose));
     let end = truth.iter().rposition(shows).map_or(truth.len(), |last| {
         // A robot at rest shows the same counts for many ticks: the first of them is the arrival.
         truth[..=last]

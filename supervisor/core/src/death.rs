@@ -1,22 +1,19 @@
-//! The record of a death: what is known of it, told once, in one form for the bus, the log and the run directory.
+//! The record of a stage's death. [`Death`] is a line of `deaths.jsonl` as it is; the sample on the bus and the line in
+//! the log are derived from it.
 
 use std::{
     fs::File,
     io::{self, Read as _, Seek as _, SeekFrom},
-    os::unix::process::ExitStatusExt as _,
     path::Path,
     time::Duration,
 };
 
-use common::samples::{DeathCause, DeathSample, NextStep, Words, name, words};
-use rustix::process::Signal;
+use common::samples::{DeathCause, DeathSample, NextStep, name, words};
 use serde::Serialize;
 
-use crate::{json_lines::append_line, process::Ended, stages::REFUSED};
+use crate::{process::ExitCause, stages::REFUSED};
 
-/// The file of a run's deaths, a JSON object a line.
-pub(crate) const FILE_NAME: &str = "deaths.jsonl";
-/// Bytes of a dead stage's log that are kept as its last words: a handful of lines.
+/// Bytes of its log that are recorded as a stage's last words: a few lines.
 const LAST_WORDS: u64 = 400;
 
 /// One death of a stage.
@@ -26,17 +23,17 @@ pub struct Death {
     pub stage: &'static str,
     /// Its process.
     pub pid: u32,
-    /// Which life.
+    /// Which generation of the stage.
     pub generation: u32,
     /// What ended it.
-    pub cause: Cause,
+    pub cause: ExitCause,
     /// Whether it hung, or was never ready, and was ended by the supervisor for that.
     pub hung: bool,
-    /// Age of its last beat when that was seen.
+    /// Age of its last beat when that was noticed.
     pub noticed_after_s: Option<f64>,
     /// Age of its last beat; none if it never beat.
     pub beat_age_s: Option<f64>,
-    /// Length of its life.
+    /// Age of the process.
     pub uptime_s: f64,
     /// Deaths of this stage within the policy's window, this one among them.
     pub deaths_in_window: u32,
@@ -46,24 +43,7 @@ pub struct Death {
     pub last_words: String,
 }
 
-/// How a process ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cause {
-    /// It ended by itself, with this code.
-    Exited(i32),
-    /// A signal ended it.
-    Signalled {
-        /// Its number.
-        signal: i32,
-        /// Whether it left a core.
-        core: bool,
-    },
-    /// It was another's child; its parent knows.
-    Unknown,
-}
-
-/// What the supervisor does about it.
+/// What the supervisor does next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Next {
@@ -74,51 +54,19 @@ pub enum Next {
         /// How long.
         after_s: f64,
     },
-    /// It died too often: an operator's word starts it.
+    /// It died too often: only an operator starts it again.
     Hold,
-    /// None is wanted any more.
+    /// No successor is wanted.
     Nothing,
 }
 
-impl Cause {
-    /// As the kernel tells it.
-    pub fn of(ended: Ended) -> Self {
-        let Ended::Child(status) = ended else {
-            return Self::Unknown;
-        };
-        match (status.code(), status.signal()) {
-            (Some(code), _) => Self::Exited(code),
-            (None, signal) => Self::Signalled {
-                signal: signal.unwrap_or_default(),
-                core: status.core_dumped(),
-            },
-        }
-    }
-}
-
-impl std::fmt::Display for Cause {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match *self {
-            Self::Exited(code) => write!(to, "exit code {code}"),
-            Self::Unknown => Ended::External.fmt(to),
-            Self::Signalled { signal, core } => {
-                match Signal::from_named_raw(signal) {
-                    Some(named) => write!(to, "{named:?}")?,
-                    None => write!(to, "signal {signal}")?,
-                }
-                to.write_str(if core { ", core dumped" } else { "" })
-            }
-        }
-    }
-}
-
 impl Death {
-    /// Whether the bus would not have it.
+    /// Whether it ended because the bus refused it.
     pub fn was_refused(&self) -> bool {
-        self.cause == Cause::Exited(REFUSED.into())
+        self.cause == ExitCause::Exited(REFUSED.into())
     }
 
-    /// For the log: one line that says all but the last words.
+    /// Log it.
     pub fn log(&self) {
         let Self {
             stage,
@@ -136,16 +84,16 @@ impl Death {
         tracing::warn!(stage, pid, generation, %cause, hung, ?beat_age_s, uptime_s, deaths_in_window, ?next, last_words, "stage died");
     }
 
-    /// For the bus.
+    /// The sample for the bus.
     pub fn sample(&self) -> DeathSample {
         let (cause, code) = match self.cause {
-            Cause::Exited(code) => (DeathCause::Exited, code),
-            Cause::Signalled {
+            ExitCause::Exited(code) => (DeathCause::Exited, code),
+            ExitCause::Signalled {
                 signal,
                 core: false,
             } => (DeathCause::Signalled, signal),
-            Cause::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
-            Cause::Unknown => (DeathCause::Unknown, 0),
+            ExitCause::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
+            ExitCause::Unknown => (DeathCause::Unknown, 0),
         };
         let (next, after) = match self.next {
             Next::StartNow => (NextStep::StartNow, 0.0),
@@ -153,7 +101,6 @@ impl Death {
             Next::Hold => (NextStep::Hold, 0.0),
             Next::Nothing => (NextStep::Nothing, 0.0),
         };
-        let last_words: Words = words(&self.last_words);
         DeathSample {
             stage: name(self.stage),
             pid: self.pid,
@@ -166,14 +113,9 @@ impl Death {
             cause: cause.into(),
             next: next.into(),
             hung: self.hung.into(),
-            last_words,
+            last_words: words(&self.last_words),
             ..DeathSample::default()
         }
-    }
-
-    /// Append it to the run's list.
-    pub fn append_to(&self, directory: &Path) -> io::Result<()> {
-        append_line(&directory.join(FILE_NAME), self)
     }
 }
 
@@ -206,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn last_words_are_whole_lines_of_this_life_alone() {
+    fn last_words_are_whole_lines_of_this_generation_alone() {
         let directory = tempfile::tempdir().unwrap();
         let log = directory.path().join("stage.log");
         let lines: String = (0..100).map(|line| format!("line {line}\n")).collect();
@@ -227,7 +169,7 @@ mod tests {
             stage: "mapper",
             pid: 77,
             generation: 3,
-            cause: Cause::Signalled {
+            cause: ExitCause::Signalled {
                 signal: 9,
                 core: false,
             },
@@ -243,12 +185,7 @@ mod tests {
         assert_eq!((sample.code, sample.deaths_in_window), (9, 2));
         assert_eq!(sample.uptime_ns, 12_500_000_000);
         assert_eq!(NextStep::from_byte(sample.next), NextStep::StartLater);
-        let directory = tempfile::tempdir().unwrap();
-        death.append_to(directory.path()).unwrap();
-        death.append_to(directory.path()).unwrap();
-        let text = std::fs::read_to_string(directory.path().join(FILE_NAME)).unwrap();
-        assert_eq!(text.lines().count(), 2);
-        let read: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+        let read = serde_json::to_value(&death).unwrap();
         assert_eq!(read["cause"]["signalled"]["signal"], 9);
         assert_eq!(read["next"]["start_later"]["after_s"], 0.05);
     }

@@ -1,73 +1,23 @@
-//! The supervisor's hold on a robot's domain: locked, wiped, its services created and held open.
+//! The domain of a robot, its directory and shared memory: locked by one supervisor, wiped, its bus made and held open.
 
 use std::{
     fs::{self, DirBuilder, File, OpenOptions},
     io,
     os::unix::fs::{DirBuilderExt, MetadataExt},
-    path::{Path, PathBuf},
+    path::Path,
     rc::Rc,
 };
 
 use common::{
-    bus::{Bus, BusError, Services},
+    bus::{Bus, Services},
     domain::{Domain, SHARED_MEMORY},
     topics,
 };
-use thiserror::Error;
 
-use crate::orphans;
-
-/// Why a robot's domain cannot be had.
-#[derive(Debug, Error)]
-pub enum DomainError {
-    /// Somebody else supervises it.
-    #[error(
-        "robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot"
-    )]
-    Supervised {
-        /// The robot.
-        robot: String,
-        /// What the lock file says.
-        holder: String,
-    },
-    /// Stages of a dead supervisor live on, killed as they are.
-    #[error(
-        "robot {robot:?} is held by processes that do not even end when killed: {holders}; give this one another name with --robot, or restart the machine"
-    )]
-    Orphans {
-        /// The robot.
-        robot: String,
-        /// Their numbers.
-        holders: String,
-    },
-    /// Shared memory is missing or full.
-    #[error("{SHARED_MEMORY} {problem}; {remedy}")]
-    SharedMemory {
-        /// What is wrong.
-        problem: String,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// The directory is not ours.
-    #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
-    Foreign {
-        /// The directory.
-        path: PathBuf,
-    },
-    /// The file system refused.
-    #[error("cannot {action} {path}: {source}; is it writable and not full?", path = path.display())]
-    File {
-        /// What was tried.
-        action: &'static str,
-        /// Where.
-        path: PathBuf,
-        /// The system's word.
-        source: io::Error,
-    },
-    /// The middleware refused.
-    #[error(transparent)]
-    Bus(#[from] BusError),
-}
+use crate::{
+    domain_error::{DomainError, failed},
+    orphans,
+};
 
 /// Shared memory that the topics of small structs take, measured, and as much again.
 const SMALL_TOPICS_BYTES: u64 = 16 << 20;
@@ -80,8 +30,8 @@ pub struct DomainLock {
     domain: Domain,
     // Dropped before the files are removed.
     bus: Option<(Services, Rc<Bus>)>,
-    // Held while the bus is made and removed: stages wait before the door.
-    shut: Option<File>,
+    // Locked while the bus is made and removed: no stage can join meanwhile.
+    stages_lock: Option<File>,
     cells: usize,
     _lock: File,
 }
@@ -91,18 +41,18 @@ impl DomainLock {
     /// `cells`.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         let lock = lock(&domain)?;
-        let mut held = Self {
+        let mut acquired = Self {
             domain,
             bus: None,
-            shut: None,
+            stages_lock: None,
             cells,
             _lock: lock,
         };
-        held.recreate_bus()?;
-        Ok(held)
+        acquired.recreate_bus()?;
+        Ok(acquired)
     }
 
-    /// Make the bus, anew if there is one: what was had through the old one must be gone.
+    /// Make the bus, in place of an old one if there is one, whose endpoints must be closed.
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
         check_shared_memory(
@@ -112,16 +62,16 @@ impl DomainLock {
         make_own_directory(&self.domain.middleware_root())?;
         let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));
-        self.shut = None;
+        self.stages_lock = None;
         Ok(())
     }
 
-    /// Remove the bus. Nobody enters until there is one again.
+    /// Remove the bus. No stage can join until there is one again.
     fn clear(&mut self) -> Result<(), DomainError> {
         self.bus = None;
-        if self.shut.is_none() {
-            // Stages that another started may still be leaving, or just coming.
-            self.shut = Some(orphans::wait_for(&self.domain)?);
+        if self.stages_lock.is_none() {
+            // External stages may still be stopping, or just starting.
+            self.stages_lock = Some(orphans::wait_for(&self.domain)?);
         }
         wipe(&self.domain)
     }
@@ -134,21 +84,12 @@ impl DomainLock {
 
 impl Drop for DomainLock {
     fn drop(&mut self) {
-        // The lock goes last, with its directory: who waits for it finds nothing and makes its own.
+        // The lock goes last, with its directory: a process that waits for it finds nothing and makes its own.
         let _ = self.clear();
         for file in [self.domain.stages_lock_file(), self.domain.lock_file()] {
             let _ = fs::remove_file(file);
         }
         let _ = fs::remove_dir(self.domain.directory());
-    }
-}
-
-pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
-    let path = path.to_path_buf();
-    move |source| DomainError::File {
-        action,
-        path,
-        source,
     }
 }
 
@@ -159,7 +100,7 @@ fn make_directory(domain: &Domain) -> Result<(), DomainError> {
     both.try_for_each(make_own_directory)
 }
 
-/// A directory for its owner only, in a place where anyone may have made it before us.
+/// A directory for its owner only, in a place where another user may have made it before.
 fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     match DirBuilder::new().mode(0o700).create(path) {
         Ok(()) => {}
@@ -175,7 +116,7 @@ fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// Lock the domain; the file names the holder for whoever comes too late.
+/// Lock the domain; the file names the holder, for the error message of another supervisor.
 fn lock(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.lock_file();
     loop {
@@ -203,7 +144,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
             }
             Err(fs::TryLockError::Error(error)) => return Err(failed("lock", &path)(error)),
         }
-        // Its last holder may have removed it between our opening and our locking.
+        // Its last holder may have removed it after it was opened here and before it was locked.
         let (ours, there) = (file.metadata(), fs::metadata(&path));
         if let (Ok(ours), Ok(there)) = (ours, there)
             && ours.ino() == there.ino()
@@ -217,14 +158,14 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
 
 /// Remove every trace of the middleware in this domain.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
-    // Without a configuration nobody joins.
+    // Without a configuration no process can join.
     let files = [
         domain.middleware_config(),
         domain.middleware_config_unfinished(),
         domain.run_link(),
     ];
     files.iter().try_for_each(|file| remove_file(file))?;
-    // Out of the way first: a consumer that is joining would fill it while it is emptied.
+    // Renamed first: a consumer that is joining would fill it while it is emptied.
     let (root, aside) = (domain.middleware_root(), domain.middleware_root_aside());
     remove_directory(&aside)?;
     match fs::rename(&root, &aside) {
@@ -255,7 +196,7 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// If it is there: a consumer of the old bus that leaves it just now removes what is its own.
+/// Remove a file, if it is there: a consumer that leaves the old bus at the same time removes its own.
 fn remove_file(path: &Path) -> Result<(), DomainError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
@@ -263,7 +204,7 @@ fn remove_file(path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// With all that is in it, if it is there.
+/// Remove a directory with all that is in it, if it is there.
 fn remove_directory(path: &Path) -> Result<(), DomainError> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
@@ -271,7 +212,7 @@ fn remove_directory(path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// A segment made in a full file system is a SIGBUS later: look before.
+/// A segment made in a full file system leads to SIGBUS when it is used: check before.
 fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
     let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
         problem: format!("cannot be examined: {error}"),
@@ -296,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_domain_that_could_not_be_had_keeps_no_lock() {
+    fn a_domain_that_could_not_be_acquired_keeps_no_lock() {
         let domain = Domain::of("no-lock".parse().unwrap());
         make_directory(&domain).unwrap();
         // A directory cannot be removed as the file that should be there.
@@ -309,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_or_no_shared_memory_is_said_with_the_remedy() {
+    fn too_little_or_no_shared_memory_is_an_error_with_the_remedy() {
         let full = check_shared_memory(SHARED_MEMORY, u64::MAX).unwrap_err();
         assert!(full.to_string().contains("--shm-size"), "{full}");
         let missing = check_shared_memory("/no/such/mount", 1).unwrap_err();

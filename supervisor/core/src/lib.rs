@@ -1,37 +1,83 @@
-//! A robot's supervisor: starts its stages, lets it drive, watches, restarts, stops.
+//! A robot's supervisor: starts its stages, lets the robot drive, watches, restarts, stops.
+//!
+//! Each stage is a process of its own. The supervisor owns the robot's directory and shared memory, starts the stages
+//! in the order of their inputs, and reads their heartbeats and outputs from the bus. A stage that ends, stops beating
+//! or leaves its inputs unanswered is replaced by a new generation, which goes on from its checkpoint; the link stops
+//! the robot meanwhile. The supervisor orders the robot to drive or to stand, looks for stalls, and judges when the
+//! mission is over. Whatever only reports (logs, records, published deaths) may fail; it never ends a mission.
+//!
+//! # The loop
+//!
+//! ```text
+//! loop {                                    // Supervisor::drive
+//!     read heartbeats, outputs, requests    // observer, bus_endpoints
+//!     reap stages, start successors         // stage_processes: policy decides
+//!     abort stages that do not answer       // output_watchdog decides
+//!     may the robot drive?                  // order decides
+//!     publish order and roster if changed
+//!     is the mission over?                  // judge decides
+//!     does the robot stall?                 // stall decides
+//!     clean the bus if due                  // cleanup
+//!     wait for bus, child, signal, deadline
+//! }
+//! ```
+//!
+//! # The files, in reading order
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`stages`] | THE table of stages |
+//! | [`stages`] | THE table of stages: inputs, outputs, deadlines |
 //! | [`policy`] | what to do with one stage, pure |
-//! | [`output_watchdog`] | whether each stage answers what it reads, pure |
-//! | [`stall`] | what to do when the robot does not get on, pure, and the record of it |
-//! | [`process`], [`stage_processes`] | child processes; those of the stages, each under its policy |
-//! | [`domain`], [`orphans`] | the robot's directory and shared memory, locked and wiped; stages that outlive their supervisor |
-//! | [`simulator`] | the simulated robot as a child |
-//! | [`observer`] | what is heard on the bus |
+//! | `output_watchdog` | whether each stage answers what it reads, pure |
+//! | `order` | whether the robot may drive, pure |
+//! | `judge` | whether the mission is over, pure; [`outcome`] is its result |
+//! | `stall` | whether the robot stalls, and the next recovery step, pure |
+//! | `supervisor` | the loop, which asks these |
+//! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
+//! | [`process`] | a process that is watched, signalled, reaped |
+//! | `stage_process`, `stage_processes` | one stage with its policy and process; all of them |
+//! | `bus_endpoints`, [`observer`] | what the supervisor reads from and writes to the bus |
+//! | `cleanup` | when the bus is cleaned of what ended processes held |
+//! | `run_clock` | mission time of a run, and its first tick that is not made yet |
+//! | `death`, `records` | the record of a death; files of records in the run directory |
 //! | [`recovery`] | what another supervisor needs to go on with a run |
-//! | [`death`], [`json_lines`] | the record of a death; files of such records |
-//! | [`outcome`] | how a run ended |
-//! | [`supervisor`] | the loop |
-//! | [`service_manager`] | systemd told how it goes |
+//! | [`domain`], `orphans` | the robot's directory and shared memory, locked and wiped; stages that outlive their supervisor |
+//! | [`simulator`] | the simulated robot as a child process |
+//! | `service_manager` | notifications to systemd |
+//! | `progress` | how far a run has come, as shown to its user |
+//! | `error`, `domain_error` | why a run could not be carried out |
 
+mod bus_endpoints;
+mod cleanup;
 mod death;
 pub mod domain;
-mod json_lines;
+mod domain_error;
+mod error;
+mod judge;
 pub mod observer;
+mod order;
 mod orphans;
 pub mod outcome;
 mod output_watchdog;
 pub mod policy;
 pub mod process;
+mod progress;
+mod records;
 pub mod recovery;
+mod run;
+mod run_clock;
 mod service_manager;
+mod shutdown;
 pub mod simulator;
+mod stage_process;
 mod stage_processes;
 pub mod stages;
 mod stall;
 mod supervisor;
 
+pub use domain_error::DomainError;
+pub use error::SupervisorError;
+pub use progress::Progress;
+pub use run::{Finished, run};
 pub use stage_processes::Starter;
-pub use supervisor::{Finished, Options, Progress, SupervisorError, run};
+pub use supervisor::Options;

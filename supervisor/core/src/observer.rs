@@ -1,4 +1,4 @@
-//! What the supervisor hears on the bus: the record a run is judged, drawn and summed up by.
+//! What the supervisor reads from the bus: the record that a run is judged, summarised and drawn from.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -16,10 +16,10 @@ use common::{
 
 use crate::stage_processes::StageProcesses;
 
-/// Guidance samples kept, so that the one of the arrival tick is still there when the command is seen.
-const GUIDANCE_KEPT: usize = 1024;
-/// Poses kept: three hours at 7 Hz. A longer run is drawn ever coarser.
-const POSES_KEPT: usize = 80_000;
+/// Guidance samples recorded: the one of the arrival tick must still be there when the command is seen.
+const MOST_GUIDANCE: usize = 1024;
+/// Poses recorded: three hours at 7 Hz. Of a longer run every second pose is dropped, again and again.
+const MOST_POSES: usize = 80_000;
 
 /// Readers of every topic the record is made of.
 pub struct Observer {
@@ -30,11 +30,11 @@ pub struct Observer {
     guidance: Reader<GuidanceSample>,
     field: SliceReader<FieldHeader, FieldCell>,
     command: Reader<CommandSample>,
-    /// What was heard.
+    /// What was read so far.
     pub record: Record,
 }
 
-/// What was heard so far.
+/// What was read so far.
 #[derive(Default)]
 pub struct Record {
     /// Where the robot believed it was, tick by tick.
@@ -47,11 +47,11 @@ pub struct Record {
     pub command: Option<CommandSample>,
     /// The first command that said arrived.
     pub arrival: Option<CommandSample>,
-    /// The newest state of the wire.
+    /// The newest state of the link.
     pub link: Option<LinkSample>,
-    /// Latencies by life of the link.
+    /// Latencies by generation of the link.
     latencies: BTreeMap<u32, LinkSample>,
-    /// The newest counts of each life of the planner: full solves, local updates.
+    /// The newest counts of each generation of the planner: full solves, local updates.
     planners: BTreeMap<u32, (u64, u64)>,
     /// How long full solves took.
     pub full_solves: Histogram,
@@ -64,8 +64,8 @@ pub struct Record {
 }
 
 impl Observer {
-    /// Listen to everything on `bus`; `waiter` wakes for heartbeats and for the end of each tick.
-    pub fn new(bus: &Bus, waiter: &mut Waiter) -> Result<Self, BusError> {
+    /// Read everything on `bus`, to complete `record`; `waiter` wakes for heartbeats and for the end of each tick.
+    pub fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::COMMAND)?);
         Ok(Self {
@@ -76,23 +76,15 @@ impl Observer {
             guidance: bus.reader(&topics::GUIDANCE)?,
             field: bus.slice_reader(&topics::FIELD)?,
             command: bus.reader(&topics::COMMAND)?,
-            record: Record::default(),
+            record,
         })
     }
 
-    /// Listen no more; what was heard stays, but of the wire to the robot, which is opened anew.
-    pub fn close(self) -> Record {
-        Record {
-            link: None,
-            ..self.record
-        }
-    }
-
-    /// Take all that came. Says whether a stage became ready.
+    /// Read all that came. Says whether the roster changed by it.
     pub fn take(&mut self, stages: &mut StageProcesses) -> Result<bool, BusError> {
-        let mut became_ready = false;
+        let mut roster_changed = false;
         while let Some(health) = self.health.take()? {
-            became_ready |= stages.on_health(&health);
+            roster_changed |= stages.on_health(&health);
         }
         let record = &mut self.record;
         while let Some(link) = self.link.take()? {
@@ -100,8 +92,8 @@ impl Observer {
             record.latencies.insert(link.stamp.generation, link);
             record.link = Some(link);
         }
-        // The command of a tick is looked at before what it was computed from, so that whatever led to
-        // it is in the record when it is.
+        // The command of a tick is read before the samples it was computed from, so that these are in the record when
+        // the command is.
         while let Some(command) = self.command.take()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
@@ -123,8 +115,7 @@ impl Observer {
         while let Some(pose) = self.pose.take()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
             record.pose = Some(pose);
-            if record.poses.len() == POSES_KEPT {
-                // Half as fine from here on; the ends of the way stay.
+            if record.poses.len() == MOST_POSES {
                 let mut nth = 0;
                 record.poses.retain(|_| {
                     nth += 1;
@@ -133,7 +124,7 @@ impl Observer {
             }
             record.poses.push(pose);
         }
-        Ok(became_ready)
+        Ok(roster_changed)
     }
 }
 
@@ -142,14 +133,14 @@ impl Record {
         let counts = (guidance.full_solves, guidance.local_updates);
         let before = self.planners.insert(guidance.stamp.generation, counts);
         let (full, local) = before.unwrap_or_default();
-        // Several in one tick are counted as the last of them.
+        // Several solves in one sample are counted as the last of them.
         if counts.0 > full {
             self.full_solves.record(guidance.full_solve_ns);
         }
         if counts.1 > local {
             self.local_updates.record(guidance.local_update_ns);
         }
-        if self.guidance.len() == GUIDANCE_KEPT {
+        if self.guidance.len() == MOST_GUIDANCE {
             self.guidance.pop_front();
         }
         self.guidance.push_back(guidance);
@@ -173,7 +164,7 @@ impl Record {
         self.poses.iter().rev().find(|pose| pose.stamp.tick <= tick)
     }
 
-    /// The newest tick that anyone spoke of.
+    /// The newest tick of any sample.
     pub fn newest_tick(&self) -> Option<u64> {
         let ticks = [
             self.pose.map(|pose| pose.stamp.tick),
@@ -183,7 +174,7 @@ impl Record {
         ticks.into_iter().flatten().max()
     }
 
-    /// Full solves and local updates of every life of the planner, the last one's as of `last`.
+    /// Full solves and local updates of every generation of the planner, the last one's as of `last`.
     pub fn solves(&self, last: Option<&GuidanceSample>) -> (u64, u64) {
         let mut sum = (0, 0);
         for (&generation, &counts) in &self.planners {
@@ -198,7 +189,7 @@ impl Record {
         sum
     }
 
-    /// Tick latencies of every life of the link.
+    /// Tick latencies of every generation of the link.
     pub fn latency(&self) -> Histogram {
         let mut all = Histogram::default();
         for link in self.latencies.values() {

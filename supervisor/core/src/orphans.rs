@@ -1,8 +1,8 @@
-//! Who lives in a robot's domain: waited for, and ended where they outlive their supervisor.
+//! Stages that still run in a robot's domain when a supervisor has locked it: waited for, and killed if they stay.
 //!
-//! Each stage holds a shared lock on the domain's `occupants` file as long as it lives, and leaves when its supervisor
-//! dies. One that is frozen cannot. Whoever holds the supervisor's lock owns what is left of the domain, and nobody
-//! else can want such a process: it is killed.
+//! Each stage holds a shared lock on one file of the domain as long as it runs, and stops when its supervisor ends. One
+//! that is frozen cannot. Only the process that holds the supervisor's lock can need the stages of the domain, so such
+//! an orphan is killed.
 
 use std::{
     fs::{self, File},
@@ -14,31 +14,31 @@ use std::{
 use common::domain::Domain;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 
-use crate::domain::{DomainError, failed};
+use crate::domain_error::{DomainError, failed};
 
-/// Stages get SIGTERM when their supervisor dies and are gone within this.
-const LEAVE: Duration = Duration::from_secs(2);
-/// What is killed is gone within this, unless it hangs in the kernel.
+/// Stages get SIGTERM when their supervisor ends, and end within this.
+const STOP_GRACE: Duration = Duration::from_secs(2);
+/// A killed process ends within this, unless it hangs in the kernel.
 const KILLED: Duration = Duration::from_secs(1);
-/// How often it is looked whether they have gone: a file lock has no descriptor to wait on.
-const LOOK: Duration = Duration::from_millis(10);
+/// How often the lock is tried: a file lock has no descriptor to wait on.
+const RETRY: Duration = Duration::from_millis(10);
 
-/// Wait until no stage lives in the domain: what they use is wiped next. None enters while the result is held.
+/// Wait until no stage runs in the domain: what they use is wiped next. None can join while the result is held.
 pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.stages_lock_file();
-    let occupants = File::create(&path).map_err(failed("make", &path))?;
+    let lock = File::create(&path).map_err(failed("make", &path))?;
     let system = |source| failed("lock", &path)(source);
-    if locked_within(&occupants, LEAVE).map_err(system)? {
-        return Ok(occupants);
+    if locked_within(&lock, STOP_GRACE).map_err(system)? {
+        return Ok(lock);
     }
-    let holders = holders(&occupants).map_err(failed("look for who locks", &path))?;
+    let holders = holders(&lock).map_err(failed("look for who locks", &path))?;
     for &pid in &holders {
         tracing::warn!(pid, "a stage outlives its supervisor: killed");
-        // One that has just gone by itself needs no signal.
-        let _ = kill(pid, &occupants);
+        // One that has just ended by itself needs no signal.
+        let _ = kill(pid, &lock);
     }
-    if locked_within(&occupants, KILLED).map_err(system)? {
-        return Ok(occupants);
+    if locked_within(&lock, KILLED).map_err(system)? {
+        return Ok(lock);
     }
     let holders: Vec<_> = holders.iter().map(u32::to_string).collect();
     Err(DomainError::Orphans {
@@ -47,14 +47,14 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     })
 }
 
-/// Whether the exclusive lock on `file` was had in time.
+/// Whether the exclusive lock on `file` was acquired in time.
 fn locked_within(file: &File, patience: Duration) -> io::Result<bool> {
     let began = Instant::now();
     loop {
         match file.try_lock() {
             Ok(()) => return Ok(true),
             Err(fs::TryLockError::WouldBlock) if began.elapsed() < patience => {
-                std::thread::park_timeout(LOOK);
+                std::thread::park_timeout(RETRY);
             }
             Err(fs::TryLockError::WouldBlock) => return Ok(false),
             Err(fs::TryLockError::Error(error)) => return Err(error),
@@ -68,8 +68,8 @@ fn holders(file: &File) -> io::Result<Vec<u32>> {
     Ok(lockers(&fs::read_to_string("/proc/locks")?, inode))
 }
 
-/// The processes that hold a file lock on this inode, as `/proc/locks` tells it: number, kind, mode, access, process,
-/// device and inode. Who only waits for one has an arrow before the kind.
+/// The processes that hold a file lock on this inode, as `/proc/locks` lists it: number, kind, mode, access, process,
+/// device and inode. A process that only waits for one has an arrow before the kind.
 fn lockers(locks: &str, inode: u64) -> Vec<u32> {
     let holder = |line: &str| {
         let mut words = line.split_ascii_whitespace().skip(1);
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn holders_of_a_lock_are_told_from_those_who_wait_and_from_other_files() {
+    fn holders_of_a_lock_are_distinguished_from_waiting_processes_and_other_files() {
         let locks = "\
 1: FLOCK  ADVISORY  READ 11 fe:00:77 0 EOF
 2: POSIX  ADVISORY  WRITE 12 fe:00:77 0 EOF

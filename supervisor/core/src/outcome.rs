@@ -6,20 +6,20 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// The target, within the tolerance.
+    /// The robot is within the tolerance of the target.
     Reached,
-    /// No way to the target, whatever was forgotten and planned anew.
+    /// The robot stalls, and no recovery step is left.
     Unreachable,
     /// Mission time ran out.
     Timeout,
     /// The simulated robot touched something.
     Collision,
-    /// Told to stop, or something failed.
+    /// Stopped by hand, or something failed.
     Aborted,
 }
 
 impl Outcome {
-    /// The word for it.
+    /// Its name.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Reached => "reached",
@@ -32,12 +32,31 @@ impl Outcome {
 }
 
 /// How a run ended, and why.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ending {
     /// How.
     pub outcome: Outcome,
     /// Why, in a few words.
     pub reason: String,
-    /// Whether it is what its user asked for: the target reached, or a stop by hand.
+    /// Whether it is what the user asked for: the target reached, or a stop by hand.
     pub asked_for: bool,
+}
+
+impl Ending {
+    /// An end that nobody asked for.
+    pub(crate) fn failed(outcome: Outcome, reason: impl Into<String>) -> Self {
+        Self {
+            outcome,
+            reason: reason.into(),
+            asked_for: false,
+        }
+    }
+
+    /// What the user asked for.
+    pub(crate) fn asked_for(outcome: Outcome, reason: impl Into<String>) -> Self {
+        Self {
+            asked_for: true,
+            ..Self::failed(outcome, reason)
+        }
+    }
 }

@@ -1,7 +1,9 @@
-//! Whether each stage answers what it reads: one may beat and yet say nothing. Pure.
+//! Whether each stage answers what it reads: one may beat and yet publish nothing. Pure.
 //!
-//! A stage unanswered_since an output for each tick that all its inputs have reached. So a stage without input unanswered_since nothing, and of
-//! a pipeline that stands still only the stage where it stands is blamed: those behind it have no input.
+//! A stage must publish an output of each tick that all its inputs have reached. So a stage without input is never late,
+//! and of a pipeline that stands still only the stage where it stands is blamed: those behind it have no input.
+
+use std::time::Duration;
 
 use common::topics::Rate;
 
@@ -10,28 +12,28 @@ use crate::{
     stages::{Stage, TABLE, find},
 };
 
-/// How far every stage has come.
-pub(crate) struct OutputWatchdog(Vec<Progress>);
+/// The outputs of every stage.
+pub(crate) struct OutputWatchdog(Vec<StageOutput>);
 
-/// What one stage has said, and unanswered_since.
-struct Progress {
+/// What one stage has published, and since when it has left something unanswered.
+struct StageOutput {
     stage: &'static Stage,
-    /// How long it may owe an answer.
-    patience: Now,
+    /// How long it may leave its input unanswered.
+    patience: Duration,
     /// The stages whose output of a tick it answers.
     reads: Vec<&'static str>,
-    /// The newest tick it has spoken of.
-    said: Option<u64>,
-    /// Ticks up to this one were a former life's to answer.
+    /// The newest tick it has published.
+    published: Option<u64>,
+    /// Ticks up to this one were an earlier generation's to answer.
     excused: Option<u64>,
-    /// Since when it has owed an answer without giving any.
+    /// Since when its input has been unanswered.
     unanswered_since: Option<Now>,
 }
 
 impl OutputWatchdog {
-    /// Nothing said yet; on a map of so many `cells`.
+    /// Nothing published yet; on a map of so many `cells`.
     pub(crate) fn new(cells: usize) -> Self {
-        let progress = |stage: &'static Stage| Progress {
+        let output = |stage: &'static Stage| StageOutput {
             stage,
             patience: stage.deadlines_on(cells).answers,
             reads: stage
@@ -41,75 +43,74 @@ impl OutputWatchdog {
                 .map(|input| input.spec().writer)
                 .filter(|writer| find(writer).is_some())
                 .collect(),
-            said: None,
+            published: None,
             excused: None,
             unanswered_since: None,
         };
-        Self(TABLE.iter().map(progress).collect())
+        Self(TABLE.iter().map(output).collect())
     }
 
     /// `stage` has published something of `tick`.
     pub(crate) fn on_output(&mut self, stage: &str, tick: u64) {
-        if let Some(progress) = self.find(stage)
-            && progress.said < Some(tick)
+        if let Some(output) = self.find(stage)
+            && output.published < Some(tick)
         {
-            (progress.said, progress.unanswered_since) = (Some(tick), None);
+            (output.published, output.unanswered_since) = (Some(tick), None);
         }
     }
 
-    /// A life of `stage` begins: ticks that were under way by then are another life's.
+    /// A generation of `stage` starts: ticks that were under way by then are an earlier one's.
     pub(crate) fn on_start(&mut self, stage: &str) {
-        let newest = self.0.iter().filter_map(|progress| progress.said).max();
-        if let Some(progress) = self.find(stage) {
-            (progress.excused, progress.unanswered_since) = (newest, None);
+        let newest = self.0.iter().filter_map(|output| output.published).max();
+        if let Some(output) = self.find(stage) {
+            (output.excused, output.unanswered_since) = (newest, None);
         }
     }
 
-    /// Nobody unanswered_since anything: the robot stands, and ticks may end on their way.
-    pub(crate) fn forgive(&mut self) {
-        for progress in &mut self.0 {
-            progress.unanswered_since = None;
+    /// Nothing counts as unanswered: the robot stands, and ticks may end on their way.
+    pub(crate) fn clear_unanswered(&mut self) {
+        for output in &mut self.0 {
+            output.unanswered_since = None;
         }
     }
 
-    /// The first stage, in the order of the pipeline, that has been silent for longer than it may although it had input.
+    /// The first stage, in the order of the pipeline, that has left its input unanswered for longer than it may.
     pub(crate) fn stale(&mut self, now: Now) -> Option<&'static str> {
-        let said: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.said)).collect();
-        let said = |writer: &str| said.iter().find(|(name, _)| *name == writer)?.1;
-        for progress in &mut self.0 {
-            let input = progress.reads.iter().map(|writer| said(writer)).min();
-            if input.flatten() <= progress.said.max(progress.excused) {
-                progress.unanswered_since = None;
+        let published: Vec<_> = self
+            .0
+            .iter()
+            .map(|it| (it.stage.name, it.published))
+            .collect();
+        let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
+        for output in &mut self.0 {
+            let input = output.reads.iter().map(|writer| published(writer)).min();
+            if input.flatten() <= output.published.max(output.excused) {
+                output.unanswered_since = None;
             } else {
-                progress.unanswered_since.get_or_insert(now);
+                output.unanswered_since.get_or_insert(now);
             }
         }
-        let stale = |progress: &&Progress| {
-            let waited = progress
+        let stale = |output: &&StageOutput| {
+            let waited = output
                 .unanswered_since
                 .map(|since| now.saturating_sub(since));
-            waited.is_some_and(|waited| waited >= progress.patience)
+            waited.is_some_and(|waited| waited >= output.patience)
         };
-        self.0
-            .iter()
-            .find(stale)
-            .map(|progress| progress.stage.name)
+        self.0.iter().find(stale).map(|output| output.stage.name)
     }
 
-    fn find(&mut self, stage: &str) -> Option<&mut Progress> {
+    fn find(&mut self, stage: &str) -> Option<&mut StageOutput> {
         self.0.iter_mut().find(|it| it.stage.name == stage)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     const MINUTE: Duration = Duration::from_secs(60);
 
-    fn said(outputs: &[(&str, u64)]) -> OutputWatchdog {
+    fn published(outputs: &[(&str, u64)]) -> OutputWatchdog {
         let mut watchdog = OutputWatchdog::new(0);
         for &(stage, tick) in outputs {
             watchdog.on_output(stage, tick);
@@ -117,7 +118,7 @@ mod tests {
         watchdog
     }
 
-    /// Who is blamed when nothing further is said for a minute.
+    /// Who is blamed when nothing further is published for a minute.
     fn blamed(watchdog: &mut OutputWatchdog) -> Option<&'static str> {
         watchdog
             .stale(Duration::ZERO)
@@ -139,23 +140,23 @@ mod tests {
                 .enumerate()
                 .map(|(index, &(stage, tick))| (stage, tick - u64::from(index >= until)))
                 .collect();
-            assert_eq!(blamed(&mut said(&outputs)), Some(tick[until].0));
+            assert_eq!(blamed(&mut published(&outputs)), Some(tick[until].0));
         }
-        assert_eq!(blamed(&mut said(&tick)), None);
+        assert_eq!(blamed(&mut published(&tick)), None);
     }
 
     #[test]
     fn a_stage_without_input_is_never_blamed() {
-        assert_eq!(blamed(&mut said(&[])), None);
+        assert_eq!(blamed(&mut published(&[])), None);
         // The map has not reached the planner, whatever the pose did.
-        let mut watchdog = said(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
+        let mut watchdog = published(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
         assert_eq!(blamed(&mut watchdog), None);
     }
 
     #[test]
     fn a_stage_is_blamed_when_its_time_is_over_and_not_before() {
         for stage in TABLE.iter().filter(|stage| stage.name != "x80-link") {
-            let mut watchdog = said(&[("x80-link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
+            let mut watchdog = published(&[("x80-link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
             watchdog.on_output("planner", 1);
             watchdog.on_output("controller", 1);
             for reads in OutputWatchdog::new(0)
@@ -192,8 +193,8 @@ mod tests {
     }
 
     #[test]
-    fn a_new_life_owes_nothing_from_before_it() {
-        let mut watchdog = said(&TABLE.each_ref().map(|stage| (stage.name, 6)));
+    fn a_new_generation_need_not_answer_ticks_from_before_it() {
+        let mut watchdog = published(&TABLE.each_ref().map(|stage| (stage.name, 6)));
         watchdog.on_output("x80-link", 7);
         watchdog.stale(Duration::ZERO);
         watchdog.on_start("dead-reckoning");
@@ -203,10 +204,10 @@ mod tests {
     }
 
     #[test]
-    fn time_before_the_robot_drove_is_forgiven() {
-        let mut watchdog = said(&[("x80-link", 7)]);
+    fn time_before_the_robot_drove_is_clear_unansweredn() {
+        let mut watchdog = published(&[("x80-link", 7)]);
         watchdog.stale(Duration::ZERO);
-        watchdog.forgive();
+        watchdog.clear_unanswered();
         assert_eq!(watchdog.stale(MINUTE), None);
     }
 }

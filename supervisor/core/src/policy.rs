@@ -3,39 +3,39 @@
 //! ```text
 //!          start            beat            exit
 //!   Down ---------> Starting ----> Running ------> BackingOff --> Starting
-//!                      |  too late    |  silent, or   (not at all the first time)
+//!                      |  too late    |  no beat, or  (not at all the first time)
 //!                      |              |  no output         ^   |
-//!                      +------------->+--> Late ------exit-+   | too many deaths
+//!                      +------------->+--> Aborted ---exit-+   | too many deaths
 //!                      |              |   (abort, then kill)   v
 //!                      +--replace---->+--> Replaced       Held -- released --> Starting
 //!                      |              |        +-------exit-------------------> Starting
 //!                      +--stop------->+--> Stopping --exit--> Down
 //! ```
-//! Its siblings are not touched: a stage that cannot live holds itself, and the robot stands meanwhile. The one
-//! exception is a bus that lets no life of it begin: that is made anew under all of them.
+//! Other stages are not touched: a stage that cannot run is held, and the robot stands meanwhile. The one exception is a
+//! bus on which it cannot start: that is recreated under all of them.
 
 use std::{collections::VecDeque, time::Duration};
 
 use crate::stages::Deadlines;
 
-/// A stage that was ready for so long was well: its next death is a first one.
-const WELL_AFTER: Duration = Duration::from_millis(500);
+/// A stage that was ready for so long was stable: its next death is a first one.
+const STABLE_AFTER: Duration = Duration::from_millis(500);
 /// Wait before the second start in a row; doubles with each further one. Less than a start takes: one that is killed in
-/// it was mostly unlucky.
+/// its start-up was mostly unlucky.
 const FIRST_BACKOFF: Duration = Duration::from_millis(2);
-/// The most to wait between starts: a person who mends the cause should not wait longer.
+/// The most to wait between starts: a person who repairs the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
-/// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been well, is held: one that
-/// cannot live at all gets here in two seconds, and no person or test kills the same stage that fast.
+/// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been stable, is held: one that
+/// cannot run at all gets here in two seconds, and no person or test kills the same stage that fast.
 pub const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
 pub const HOLD_WINDOW: Duration = Duration::from_secs(10);
-/// Starts in a row that the bus may be to blame for, before it is made anew: one may have met what the life before
+/// Starts in a row that the bus may have blocked, before it is recreated: one may have met what the generation before
 /// left half made, which is removed when it ends.
 const BLOCKED_STARTS: u32 = 2;
-/// Time an aborted stage has to write its last words.
+/// Time an aborted stage has to write the end of its log.
 const ABORT_GRACE: Duration = Duration::from_millis(100);
-/// Time a terminated stage has to say goodbye. The link sends three datagrams in it.
+/// Time a terminated stage has to stop in order. The link sends three datagrams in it.
 const STOP_GRACE: Duration = Duration::from_millis(300);
 
 /// A reading of the supervisor's clock: time since it started.
@@ -56,9 +56,9 @@ pub enum Event {
     OutputStale,
     /// Its process is gone and reaped.
     Exited,
-    /// As exited, and it said that the bus would not have it.
+    /// As exited, with the exit code for a bus that refused it.
     Refused,
-    /// It should be replaced by a fresh life; if it is held, that life is its release.
+    /// It should be replaced by a new generation; one that is held is released by it.
     Replace,
     /// It should stop for good.
     Stop,
@@ -77,7 +77,7 @@ pub enum Action {
     Abort,
     /// SIGKILL.
     Kill,
-    /// Stop all stages, make the bus anew, start them again.
+    /// Stop all stages, recreate the bus, start them again.
     RecreateBus,
 }
 
@@ -91,7 +91,7 @@ pub enum Phase {
         /// When.
         until: Now,
     },
-    /// No process; it died too often, and only an operator's word starts it.
+    /// No process; it died too often, and only an operator starts it again.
     Held,
     /// A process that has not beaten as ready.
     Starting {
@@ -105,43 +105,43 @@ pub enum Phase {
         /// Its last beat.
         beat: Now,
     },
-    /// A process that was not ready, silent or without output for too long: it was aborted.
-    Late {
-        /// How it had lived.
-        lived: Lived,
+    /// A process that was not ready, without beat or without output for too long: it was aborted.
+    Aborted {
+        /// For how long it was ready.
+        stability: Stability,
         /// When it is killed.
         kill: Now,
     },
-    /// A process that was told to make room for its successor; that is no death.
+    /// A process that was asked to stop for its successor; that is no death.
     Replaced {
         /// When it is killed.
         kill: Now,
     },
-    /// A process that was told to go, and no successor is wanted.
+    /// A process that was asked to stop, and no successor is wanted.
     Stopping {
         /// When it is killed.
         kill: Now,
     },
 }
 
-/// How well a life went before its end.
+/// For how long a generation was ready before its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Lived {
+pub enum Stability {
     /// It never became ready.
-    Never,
-    /// It was ready.
-    Briefly,
-    /// It was ready for [`WELL_AFTER`].
-    Well,
+    NeverReady,
+    /// It was ready for less than [`STABLE_AFTER`].
+    Brief,
+    /// It was ready for [`STABLE_AFTER`].
+    Stable,
 }
 
-impl Lived {
-    /// From ready to last known well.
-    fn ready(since: Now, until: Now) -> Self {
-        if until.saturating_sub(since) >= WELL_AFTER {
-            Self::Well
+impl Stability {
+    /// Of one that was ready from `since` to its last sign, at `until`.
+    fn of(since: Now, until: Now) -> Self {
+        if until.saturating_sub(since) >= STABLE_AFTER {
+            Self::Stable
         } else {
-            Self::Briefly
+            Self::Brief
         }
     }
 }
@@ -151,16 +151,16 @@ impl Lived {
 pub struct Policy {
     deadlines: Deadlines,
     phase: Phase,
-    /// Deaths in a row, none of a life long enough to be well.
+    /// Deaths in a row, none of a generation that was stable.
     deaths: usize,
-    /// When it died, within the window; at most [`HOLD_AFTER`].
+    /// The deaths within the window; at most [`HOLD_AFTER`].
     recent: VecDeque<Now>,
-    /// Starts in a row that the bus may be to blame for.
+    /// Starts in a row that the bus may have blocked.
     blocked_starts: u32,
 }
 
 impl Policy {
-    /// For a stage that has never run and may be silent for so long.
+    /// For a stage that has never run and has these deadlines.
     pub fn new(deadlines: Deadlines) -> Self {
         Self {
             deadlines,
@@ -181,20 +181,20 @@ impl Policy {
         self.phase
     }
 
-    /// When [`Event::Time`] is next worth telling; none when only events move it.
+    /// When [`Event::Time`] is next due; none when only other events matter.
     pub fn deadline(&self) -> Option<Now> {
         match self.phase {
             Phase::Down | Phase::Held => None,
             Phase::BackingOff { until } => Some(until),
             Phase::Starting { since } => Some(since + self.deadlines.startup),
             Phase::Running { beat, .. } => Some(beat + self.deadlines.heartbeat),
-            Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } => {
+            Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } => {
                 Some(kill)
             }
         }
     }
 
-    /// What to do now.
+    /// What to do about `event`.
     pub fn step(&mut self, event: Event, now: Now) -> Option<Action> {
         let due = self.deadline().is_some_and(|deadline| now >= deadline);
         match (self.phase, event) {
@@ -210,7 +210,7 @@ impl Policy {
             (Phase::Starting { .. }, Event::StartFailed) => {
                 // Whatever is used up: not at once again.
                 self.deaths = self.deaths.max(1);
-                self.bury(Lived::Never, now)
+                self.record_death(Stability::NeverReady, now)
             }
 
             (Phase::Starting { .. }, Event::BeatReady) => {
@@ -224,26 +224,26 @@ impl Policy {
                 None
             }
 
-            (Phase::Starting { .. }, Event::Time) if due => self.abort(Lived::Never, now),
+            (Phase::Starting { .. }, Event::Time) if due => self.abort(Stability::NeverReady, now),
             (Phase::Running { since, beat }, Event::Time) if due => {
-                self.abort(Lived::ready(since, beat), now)
+                self.abort(Stability::of(since, beat), now)
             }
             (Phase::Running { since, .. }, Event::OutputStale) => {
-                self.abort(Lived::ready(since, now), now)
+                self.abort(Stability::of(since, now), now)
             }
             (Phase::Starting { .. } | Phase::Running { .. }, Event::Replace) => {
                 let kill = now + STOP_GRACE;
                 self.phase = Phase::Replaced { kill };
                 Some(Action::Terminate)
             }
-            (Phase::Late { kill, .. }, Event::Replace) => {
+            (Phase::Aborted { kill, .. }, Event::Replace) => {
                 self.phase = Phase::Replaced { kill };
                 None
             }
             (
                 Phase::Starting { .. }
                 | Phase::Running { .. }
-                | Phase::Late { .. }
+                | Phase::Aborted { .. }
                 | Phase::Replaced { .. },
                 Event::Stop,
             ) => {
@@ -252,26 +252,30 @@ impl Policy {
                 Some(Action::Terminate)
             }
             (
-                Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill },
+                Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill },
                 Event::Time,
             ) if now >= kill => {
-                self.ask_again(now);
+                self.delay_kill(now);
                 Some(Action::Kill)
             }
 
             (Phase::Starting { .. }, Event::Refused)
             | (
-                Phase::Late {
-                    lived: Lived::Never,
+                Phase::Aborted {
+                    stability: Stability::NeverReady,
                     ..
                 },
                 Event::Exited | Event::Refused,
-            ) => self.bury_jammed(now),
-            (Phase::Starting { .. }, Event::Exited) => self.bury(Lived::Never, now),
-            (Phase::Running { since, .. }, Event::Exited | Event::Refused) => {
-                self.bury(Lived::ready(since, now), now)
+            ) => self.record_blocked_start(now),
+            (Phase::Starting { .. }, Event::Exited) => {
+                self.record_death(Stability::NeverReady, now)
             }
-            (Phase::Late { lived, .. }, Event::Exited | Event::Refused) => self.bury(lived, now),
+            (Phase::Running { since, .. }, Event::Exited | Event::Refused) => {
+                self.record_death(Stability::of(since, now), now)
+            }
+            (Phase::Aborted { stability, .. }, Event::Exited | Event::Refused) => {
+                self.record_death(stability, now)
+            }
             (Phase::Replaced { .. }, Event::Exited | Event::Refused) => Some(self.start(now)),
             (Phase::Stopping { .. }, Event::Exited | Event::Refused)
             | (Phase::BackingOff { .. } | Phase::Held, Event::Stop) => {
@@ -287,40 +291,41 @@ impl Policy {
         Action::Start
     }
 
-    fn abort(&mut self, lived: Lived, now: Now) -> Option<Action> {
+    fn abort(&mut self, stability: Stability, now: Now) -> Option<Action> {
         let kill = now + ABORT_GRACE;
-        self.phase = Phase::Late { lived, kill };
+        self.phase = Phase::Aborted { stability, kill };
         Some(Action::Abort)
     }
 
-    /// SIGKILL cannot be refused, only delayed by the kernel: ask again later.
-    fn ask_again(&mut self, now: Now) {
-        if let Phase::Late { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } =
+    /// SIGKILL cannot be refused, only delayed by the kernel: it is repeated.
+    fn delay_kill(&mut self, now: Now) {
+        if let Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } =
             &mut self.phase
         {
             *kill = now + ABORT_GRACE;
         }
     }
 
-    /// A life has ended that the bus did not let begin. Made anew once, it is not blamed again before a life begins.
-    fn bury_jammed(&mut self, now: Now) -> Option<Action> {
+    /// A generation has ended that may not have got past the bus. Once recreated, the bus is not blamed again before a
+    /// generation was ready.
+    fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
         self.blocked_starts = self.blocked_starts.saturating_add(1);
-        let next = self.bury(Lived::Never, now);
+        let next = self.record_death(Stability::NeverReady, now);
         if self.blocked_starts == BLOCKED_STARTS && self.phase != Phase::Held {
             return Some(Action::RecreateBus);
         }
         next
     }
 
-    fn bury(&mut self, lived: Lived, now: Now) -> Option<Action> {
-        if lived == Lived::Well {
+    fn record_death(&mut self, stability: Stability, now: Now) -> Option<Action> {
+        if stability == Stability::Stable {
             self.deaths = 0;
         }
         self.deaths += 1;
         self.recent
             .retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
         self.recent.push_back(now);
-        // One that is held, stopped and started anew: no more are counted than make the difference.
+        // One that is held, stopped and started again: no more are counted than make a difference.
         if self.recent.len() > HOLD_AFTER {
             self.recent.pop_front();
         }

@@ -1,11 +1,11 @@
-//! A process: a child started from this very executable, or a guest that somebody else started; watched through
-//! a pidfd, signalled, and reaped if it is ours.
+//! A process: a child started from this very executable, or an external one that somebody else started; watched
+//! through a pidfd, signalled, and reaped if it is a child.
 
 use std::{
     fmt, fs, io,
     os::{
         fd::{AsFd, BorrowedFd, OwnedFd},
-        unix::process::CommandExt,
+        unix::process::{CommandExt, ExitStatusExt as _},
     },
     process::{Child, ChildStdout, Command, ExitStatus, Stdio},
     time::{Duration, Instant},
@@ -13,6 +13,7 @@ use std::{
 
 use common::poll;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use serde::Serialize;
 
 /// The kernel ends a killed process within this, unless it hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
@@ -27,7 +28,7 @@ pub fn firsthand(arguments: &[&str]) -> Command {
         .arg0("firsthand")
         .args(arguments)
         .process_group(0)
-        // What systemd says to the supervisor is not meant for its children.
+        // The supervisor's connection to systemd is not its children's.
         .env_remove("NOTIFY_SOCKET")
         .env_remove("WATCHDOG_USEC")
         .env_remove("WATCHDOG_PID")
@@ -38,26 +39,53 @@ pub fn firsthand(arguments: &[&str]) -> Command {
 /// A process and the descriptor that becomes readable when it ends.
 #[derive(Debug)]
 pub struct Process {
-    /// None of a guest: its parent reaps it.
+    /// None of an external process: its parent reaps it.
     child: Option<Child>,
     id: u32,
     pidfd: OwnedFd,
 }
 
-/// How a process ended.
-#[derive(Clone, Copy, Debug)]
-pub enum Ended {
-    /// A child, so.
-    Child(ExitStatus),
-    /// A guest; how, its parent knows.
-    External,
+/// What ended a process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ExitCause {
+    /// It ended by itself, with this code.
+    Exited(i32),
+    /// A signal ended it.
+    Signalled {
+        /// Its number.
+        signal: i32,
+        /// Whether it left a core.
+        core: bool,
+    },
+    /// It was the child of another process, which knows.
+    Unknown,
 }
 
-impl fmt::Display for Ended {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Child(status) => status.fmt(f),
-            Self::External => f.write_str("not our child; systemctl status says how"),
+impl From<ExitStatus> for ExitCause {
+    fn from(status: ExitStatus) -> Self {
+        match (status.code(), status.signal()) {
+            (Some(code), _) => Self::Exited(code),
+            (None, signal) => Self::Signalled {
+                signal: signal.unwrap_or_default(),
+                core: status.core_dumped(),
+            },
+        }
+    }
+}
+
+impl fmt::Display for ExitCause {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Exited(code) => write!(to, "exit code {code}"),
+            Self::Unknown => to.write_str("not our child; systemctl status says how"),
+            Self::Signalled { signal, core } => {
+                match Signal::from_named_raw(signal) {
+                    Some(named) => write!(to, "{named:?}")?,
+                    None => write!(to, "signal {signal}")?,
+                }
+                to.write_str(if core { ", core dumped" } else { "" })
+            }
         }
     }
 }
@@ -73,7 +101,7 @@ impl Process {
                 pidfd,
             }),
             Err(error) => {
-                // Unwatched it must not live.
+                // Unwatched it must not run.
                 let _ = child.kill();
                 let _ = child.wait();
                 Err(error.into())
@@ -81,12 +109,12 @@ impl Process {
         }
     }
 
-    /// Watch process `id`, which calls itself `name` and spoke a moment ago, and which another started.
+    /// Watch process `id`, called `name`, which somebody else started and which published a moment ago.
     pub fn adopt(id: u32, name: &str) -> io::Result<Self> {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
         let pid = pid.ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
-        // Should it have died meanwhile and its number be another's, that one must not be signalled for it.
+        // It may have ended meanwhile, and its number be another process's, which must not be signalled.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());
@@ -108,28 +136,26 @@ impl Process {
         self.child.as_mut()?.stdout.take()
     }
 
-    /// Send it a signal; one that is gone gets none.
+    /// Send it a signal, if it still runs.
     pub fn signal(&self, signal: Signal) {
         let _ = pidfd_send_signal(&self.pidfd, signal);
     }
 
     /// Reap it, if it has ended.
-    pub fn try_reap(&mut self) -> io::Result<Option<Ended>> {
+    pub fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
         let Some(child) = &mut self.child else {
             let gone = self.wait(Duration::ZERO)?;
-            return Ok(gone.then_some(Ended::External));
+            return Ok(gone.then_some(ExitCause::Unknown));
         };
-        Ok(child.try_wait()?.map(Ended::Child))
+        Ok(child.try_wait()?.map(ExitCause::from))
     }
 
     /// Wait until it has ended; says whether it has.
     fn wait(&self, patience: Duration) -> io::Result<bool> {
         poll::is_readable(&self.pidfd, patience)
     }
-}
 
-impl Process {
-    /// SIGTERM, and SIGKILL for one that is not gone after `grace`.
+    /// SIGTERM, and SIGKILL if it has not ended after `grace`.
     pub fn end(&mut self, grace: Duration) {
         self.signal(Signal::TERM);
         let began = Instant::now();
@@ -138,7 +164,7 @@ impl Process {
             if left.is_zero() {
                 self.signal(Signal::KILL);
             }
-            // RecoveredRun or not, it is looked at again.
+            // Whether it ended is asked above.
             let _ = self.wait(left.max(KILLED_WITHIN));
         }
     }
@@ -151,7 +177,7 @@ impl AsFd for Process {
 }
 
 impl Drop for Process {
-    /// Nothing of ours is left running, whatever went wrong.
+    /// No child is left running, whatever went wrong.
     fn drop(&mut self) {
         if let Some(child) = &mut self.child
             && !matches!(child.try_wait(), Ok(Some(_)))

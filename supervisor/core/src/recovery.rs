@@ -1,7 +1,7 @@
-//! What of a supervisor outlives it: enough for another to go on with its run.
+//! What another supervisor needs to go on with a run whose supervisor ended.
 //!
-//! Pose, belief and robot keep themselves; here is what only the supervisor knew. On a wall clock mission time
-//! stands still while nobody supervises: the robot stands too.
+//! The stages and the simulated robot have checkpoints of their own; here is the supervisor's. On a wall clock mission
+//! time stands still without a supervisor: the robot stands too.
 
 use std::{fs, path::Path};
 
@@ -18,29 +18,29 @@ use thiserror::Error;
 const CAPACITY: usize = 256;
 /// The kernel's name for the time since the machine was started.
 const BOOT_ID: &str = "/proc/sys/kernel/random/boot_id";
-/// In a run directory whose run was summed up.
+/// The summary of a run that ended, in its run directory.
 pub const SUMMARY: &str = "summary.json";
-/// Whose checkpoint a simulated robot's is.
+/// The name of the simulated robot's checkpoint.
 const SIMULATOR: &str = "x80-sim";
 
-/// What a supervisor keeps.
+/// The state of a supervisor that survives it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SupervisorState {
     /// An operator said stop, and has not said resume.
     pub operator_stop: bool,
-    /// Supervisors that went on with this run.
+    /// Times another supervisor went on with this run.
     pub resumes: u32,
-    /// The start of the machine that it lived in.
+    /// The boot of the machine it ran in.
     boot: String,
-    /// When it was last alive, [`monotonic_ns`].
-    alive_ns: u64,
+    /// When it last saved this, [`monotonic_ns`].
+    saved_ns: u64,
 }
 
-/// Keeps it in the run directory.
+/// Its checkpoint in the run directory.
 #[derive(Debug)]
 pub struct StateFile {
     checkpoint: Checkpoint,
-    /// What is state.
+    /// What is saved next.
     pub state: SupervisorState,
 }
 
@@ -54,52 +54,50 @@ impl StateFile {
         Ok(Self { checkpoint, state })
     }
 
-    /// Keep what is so now.
-    pub fn keep(&mut self) -> Result<(), CheckpointError> {
-        self.state.alive_ns = monotonic_ns();
+    /// Save the state.
+    pub fn save(&mut self) -> Result<(), CheckpointError> {
+        self.state.saved_ns = monotonic_ns();
         self.checkpoint.save(&self.state)
     }
 }
 
-/// The start of the machine that this is; empty where the kernel does not say.
+/// The current boot of the machine; empty where the kernel does not say.
 fn boot() -> String {
     let id = fs::read_to_string(BOOT_ID).unwrap_or_default();
     id.trim().to_owned()
 }
 
-/// Seconds since the supervisor of `directory` was last alive; none if the machine was started since, or nothing
-/// was state.
+/// Seconds since the supervisor of `directory` last saved its state; none if the machine was booted since, or there is
+/// no state.
 pub fn age_s(directory: &Path) -> Option<f64> {
     let file = run::checkpoint_file(directory, "supervisor");
     let (_, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY).ok()?;
     let state = state.filter(|state| state.boot == boot())?;
-    Some(monotonic_ns().saturating_sub(state.alive_ns) as f64 * 1e-9)
+    Some(monotonic_ns().saturating_sub(state.saved_ns) as f64 * 1e-9)
 }
 
-/// A run to go on with.
+/// A run whose supervisor ended, to go on with.
 #[derive(Clone, Debug)]
 pub struct RecoveredRun {
-    /// What it was; its clock goes on.
+    /// Its run file; its clock goes on.
     pub run: Run,
-    /// The first tick that nobody has made.
+    /// The first tick that was not made yet.
     pub first_tick: u64,
     /// Mission time by then.
     pub time: MissionTime,
 }
 
-/// Why there is nothing to go on with.
+/// Why a run cannot be gone on with.
 #[derive(Debug, Error)]
 pub enum ResumeError {
-    /// It ended.
+    /// It came to its end.
     #[error("the run in {directory} came to its end, see {SUMMARY} there; start a new one")]
     Ended {
         /// Its directory.
         directory: String,
     },
-    /// The simulated robot left nothing.
-    #[error(
-        "the simulated robot of the run in {directory} did not keep where it stood; start a new run"
-    )]
+    /// The simulated robot left no checkpoint.
+    #[error("the simulated robot of the run in {directory} left no checkpoint; start a new run")]
     NoRobot {
         /// Its directory.
         directory: String,
@@ -113,7 +111,7 @@ pub enum ResumeError {
 }
 
 impl RecoveredRun {
-    /// The run whose supervisor died.
+    /// The run in `directory`, whose supervisor ended.
     pub fn load(directory: &Path) -> Result<Self, ResumeError> {
         let run = Run::load(directory)?;
         let named = || directory.display().to_string();

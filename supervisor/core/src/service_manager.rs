@@ -1,4 +1,4 @@
-//! What systemd is told, if it started this process: ready, how it goes, alive, stopping.
+//! Notifications to systemd, if it started this process: ready, status, watchdog, stopping.
 //!
 //! Everything here does nothing where there is no `NOTIFY_SOCKET`.
 
@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 
 use sd_notify::NotifyState;
 
-/// How often the line that `systemctl status` shows is said anew.
+/// How often the line that `systemctl status` shows is renewed.
 const STATUS_EVERY: Duration = Duration::from_secs(1);
 
-/// The service manager, as far as one can tell it something.
+/// The service manager, as a receiver of notifications.
 pub(crate) struct ServiceManager {
-    /// It kills a process that says nothing for so long.
+    /// It kills a process that does not notify it for so long.
     watchdog: Option<Duration>,
     fed: Option<Instant>,
-    stated: Option<Instant>,
+    shown: Option<Instant>,
     ready: bool,
 }
 
@@ -24,41 +24,41 @@ impl ServiceManager {
         Self {
             watchdog: sd_notify::watchdog_enabled(),
             fed: None,
-            stated: None,
+            shown: None,
             ready: false,
         }
     }
 
-    /// The service is up. Said once.
+    /// The service is up. Notified once.
     pub(crate) fn ready(&mut self) {
         if !self.ready {
             self.ready = true;
-            tell(&[NotifyState::Ready]);
+            notify(&[NotifyState::Ready]);
         }
     }
 
     /// The service is going down.
     pub(crate) fn stopping(&self) {
-        tell(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
+        notify(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
     }
 
-    /// Show how it goes, unless that was done a moment ago.
+    /// Show a status line, unless that was done a moment ago.
     pub(crate) fn show(&mut self, status: impl FnOnce() -> String) {
         let due = self
-            .stated
-            .is_none_or(|stated| stated.elapsed() >= STATUS_EVERY);
+            .shown
+            .is_none_or(|shown| shown.elapsed() >= STATUS_EVERY);
         if due {
-            self.stated = Some(Instant::now());
-            tell(&[NotifyState::Status(&status())]);
+            self.shown = Some(Instant::now());
+            notify(&[NotifyState::Status(&status())]);
         }
     }
 
-    /// Say that the loop goes round, when that is due. To be called from within the loop and nowhere else: a
-    /// thread that fed the watchdog would feed it while the loop hangs.
+    /// Feed the watchdog, when that is due. To be called from within the loop and nowhere else: a thread would feed it
+    /// while the loop hangs.
     pub(crate) fn feed(&mut self) {
         if self.time_to_feed().is_some_and(|left| left.is_zero()) {
             self.fed = Some(Instant::now());
-            tell(&[NotifyState::Watchdog]);
+            notify(&[NotifyState::Watchdog]);
         }
     }
 
@@ -71,7 +71,7 @@ impl ServiceManager {
 }
 
 /// A service manager that does not listen is no reason to stop the robot.
-fn tell(states: &[NotifyState<'_>]) {
+fn notify(states: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
         tracing::debug!(%error, "systemd does not listen");
     }

@@ -1,4 +1,4 @@
-//! The simulated robot as a child process, and the truth it tells through its standard output.
+//! The simulated robot as a child process, and the ground truth that it writes to its standard output.
 
 use std::{
     fs::{self, File},
@@ -21,14 +21,14 @@ use thiserror::Error;
 
 use crate::process::{Process, firsthand};
 
-/// A simulator that has not said where it listens by then never will.
+/// A simulator that has not written its address by then never will.
 const STARTUP: Duration = Duration::from_secs(5);
-/// Time it has to end when told to.
+/// Time it has to stop in order.
 const STOP_GRACE: Duration = Duration::from_millis(300);
-/// A line of truth is under 300 bytes; more without an end is no truth.
+/// A line of ground truth is under 300 bytes; a longer one is an error.
 const LONGEST_LINE: usize = 64 * 1024;
 
-/// The simulated robot is not to be had.
+/// Why there is no simulated robot.
 #[derive(Debug, Error)]
 pub enum SimulatorError {
     /// The system refused.
@@ -36,7 +36,7 @@ pub enum SimulatorError {
     System {
         /// What was tried.
         action: &'static str,
-        /// The system's word.
+        /// The system's error.
         source: io::Error,
     },
     /// It did not come up.
@@ -51,21 +51,22 @@ fn system(action: &'static str) -> impl FnOnce(io::Error) -> SimulatorError {
 /// The running simulator.
 pub struct Simulator {
     process: Process,
-    truth: Truth,
+    truth: GroundTruth,
     address: SocketAddr,
 }
 
-/// Everything it told so far.
-struct Truth {
+/// All that it has written so far.
+struct GroundTruth {
     pipe: ChildStdout,
-    pending: Vec<u8>,
+    /// The beginning of a line.
+    unfinished: Vec<u8>,
     listening: Option<SocketAddr>,
     ticks: Vec<GroundTruthTick>,
 }
 
 impl Simulator {
-    /// Start one on this very `mission`, overrides included, and wait until it says where it listens. Its files are
-    /// in `directory`; it goes on where an earlier one of that directory stands.
+    /// Start one in the world of `mission`, overrides included, and wait until it listens. Its files are in `directory`;
+    /// it goes on from the checkpoint of an earlier one there.
     pub fn start(directory: &Path, mission: &Mission, pace: Pace) -> Result<Self, SimulatorError> {
         let text = toml::to_string(mission)
             .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
@@ -74,7 +75,7 @@ impl Simulator {
         let log_path = directory.join("x80-sim.log");
         let log = File::options().create(true).append(true).open(&log_path);
         let log = log.map_err(system("log"))?;
-        let keep = run::checkpoint_file(directory, "x80-sim");
+        let checkpoint = run::checkpoint_file(directory, "x80-sim");
         let mission = file.to_str().ok_or_else(|| {
             SimulatorError::Startup("the run directory's name is not UTF-8".into())
         })?;
@@ -87,7 +88,7 @@ impl Simulator {
             "--supervisor",
             &std::process::id().to_string(),
         ]);
-        command.arg("--keep").arg(keep);
+        command.arg("--keep").arg(checkpoint);
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command).map_err(system("start"))?;
         let pipe = process
@@ -96,9 +97,9 @@ impl Simulator {
         let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
         fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
             .map_err(|errno| system("listen to")(errno.into()))?;
-        let mut truth = Truth {
+        let mut truth = GroundTruth {
             pipe,
-            pending: Vec::new(),
+            unfinished: Vec::new(),
             listening: None,
             ticks: Vec::new(),
         };
@@ -116,7 +117,8 @@ impl Simulator {
                 let words = fs::read_to_string(&log_path).unwrap_or_default();
                 return Err(SimulatorError::Startup(words.trim().to_owned()));
             }
-            wait(&[truth.pipe.as_fd(), process.as_fd()], STARTUP)?;
+            let descriptors = [truth.pipe.as_fd(), process.as_fd()];
+            poll::readable(&descriptors, Some(STARTUP)).map_err(system("wait for"))?;
         }
     }
 
@@ -125,42 +127,36 @@ impl Simulator {
         self.address
     }
 
-    /// Readable when there is more truth, or the process ended.
+    /// Readable when there is more ground truth, or the process ended.
     pub fn descriptors(&self) -> [BorrowedFd<'_>; 2] {
         [self.truth.pipe.as_fd(), self.process.as_fd()]
     }
 
-    /// Take what it told since. Says whether it still runs.
-    pub fn tend(&mut self) -> Result<bool, SimulatorError> {
+    /// Read what it has written. Says whether it still runs.
+    pub fn poll(&mut self) -> Result<bool, SimulatorError> {
         self.truth.take()?;
         Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
     }
 
-    /// What it told, tick by tick.
+    /// The ground truth, tick by tick.
     pub fn truth(&self) -> &[GroundTruthTick] {
         &self.truth.ticks
     }
 
-    /// End it; what it told stays.
+    /// End it; the ground truth stays.
     pub fn stop(&mut self) -> Result<(), SimulatorError> {
         self.process.end(STOP_GRACE);
         self.truth.take()
     }
 }
 
-fn wait(descriptors: &[BorrowedFd<'_>], timeout: Duration) -> Result<(), SimulatorError> {
-    poll::readable(descriptors, Some(timeout))
-        .map(drop)
-        .map_err(system("wait for"))
-}
-
-impl Truth {
+impl GroundTruth {
     fn take(&mut self) -> Result<(), SimulatorError> {
         let mut bytes = [0; 16 * 1024];
         loop {
             match self.pipe.read(&mut bytes) {
                 Ok(0) => return Ok(()),
-                Ok(length) => self.pending.extend_from_slice(&bytes[..length]),
+                Ok(length) => self.unfinished.extend_from_slice(&bytes[..length]),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(system("listen to")(error)),
@@ -170,16 +166,16 @@ impl Truth {
     }
 
     fn take_lines(&mut self) -> Result<(), SimulatorError> {
-        let Some(end) = self.pending.iter().rposition(|&byte| byte == b'\n') else {
-            if self.pending.len() > LONGEST_LINE {
+        let Some(end) = self.unfinished.iter().rposition(|&byte| byte == b'\n') else {
+            if self.unfinished.len() > LONGEST_LINE {
                 return Err(SimulatorError::Startup(
-                    "it tells a line without end".into(),
+                    "it writes a line without end".into(),
                 ));
             }
             return Ok(());
         };
-        let rest = self.pending.split_off(end + 1);
-        for line in self.pending.split(|&byte| byte == b'\n') {
+        let rest = self.unfinished.split_off(end + 1);
+        for line in self.unfinished.split(|&byte| byte == b'\n') {
             if self.listening.is_none() {
                 let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();
                 self.listening = header.and_then(|header| header.listening.parse().ok());
@@ -187,7 +183,7 @@ impl Truth {
                 self.ticks.push(tick);
             }
         }
-        self.pending = rest;
+        self.unfinished = rest;
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
-//! THE table of stages: what runs for a robot, what each reads and writes, and how long it may be silent.
+//! THE table of stages: what runs for a robot, what each reads and writes, and its deadlines.
 //!
-//! Start order, deadlines, `firsthand stage`, `firsthand stages` and the README's table come from it.
+//! Start order, deadlines, `firsthand stage`, `firsthand stages` and the tables of the documentation come from it.
 
 use std::time::Duration;
 
@@ -23,17 +23,17 @@ pub struct Stage {
     pub feedback: &'static [&'static dyn AnyTopic],
     /// Topics it alone writes.
     pub outputs: &'static [&'static dyn AnyTopic],
-    /// How long it may be silent, whatever the map.
+    /// Its deadlines on a map without cells.
     pub deadlines: Deadlines,
     /// What each deadline grows by for a million cells of the map.
-    pub million_cells: Duration,
+    pub per_million_cells: Duration,
     /// What the robot does while the stage is down.
     pub while_down: &'static str,
-    /// Its process.
-    pub live: fn(&Start) -> Result<(), StageError>,
+    /// What its process does.
+    pub run: fn(&Start) -> Result<(), StageError>,
 }
 
-/// How long a stage may be silent.
+/// How long a stage may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
     /// From its start to its first beat as ready.
@@ -47,7 +47,7 @@ pub struct Deadlines {
 impl Stage {
     /// Its deadlines on a map of so many `cells`.
     pub fn deadlines_on(&self, cells: usize) -> Deadlines {
-        let more = self.million_cells.mul_f64(cells as f64 * 1e-6);
+        let more = self.per_million_cells.mul_f64(cells as f64 * 1e-6);
         Deadlines {
             startup: self.deadlines.startup + more,
             heartbeat: self.deadlines.heartbeat + more,
@@ -64,25 +64,26 @@ const STARTUP: Duration = Duration::from_secs(3);
 const HEARTBEAT: Duration = Duration::from_millis(500);
 /// An answer takes a hundredth of that where it takes long.
 const ANSWERS: Duration = Duration::from_secs(1);
-/// What most stages keep to.
+/// The deadlines of most stages.
 const DEADLINES: Deadlines = Deadlines {
     startup: STARTUP,
     heartbeat: HEARTBEAT,
     answers: ANSWERS,
 };
-/// The planner beats between solves, and may owe some answers while it solves: it is rather seen to hang.
+/// The planner beats between solves, and leaves ticks unanswered while it solves.
 const PLANNER_DEADLINES: Deadlines = Deadlines {
     startup: STARTUP,
     heartbeat: Duration::from_secs(2),
     answers: Duration::from_secs(4),
 };
-/// The mapper reads its map back, and tells it whole, in one turn. Ample: at 16.8 million cells none was late without it.
+/// The mapper restores its map, and publishes all of it, in one iteration. Ample: at 16.8 million cells none was late
+/// without it.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
-/// At 16.8 million cells the planner was silent for more than 2 s forty times in a mission, and with this allowance never
-/// for too long in a run of 97 s: a full solve, the field told whole and what came meanwhile fall into one turn.
+/// At 16.8 million cells the planner did not beat for more than 2 s forty times in a mission, and with this allowance was
+/// never late in a run of 97 s: a full solve, a keyframe of the field and the backlog fall into one iteration.
 const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
-/// What a stage's process ends with when the bus would not have it.
+/// The exit code of a stage that the bus refused.
 pub const REFUSED: u8 = 8;
 
 /// Every stage, in the order of the pipeline.
@@ -93,9 +94,9 @@ pub static TABLE: [Stage; 5] = [
         feedback: &[&COMMAND],
         outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
         deadlines: DEADLINES,
-        million_cells: Duration::ZERO,
+        per_million_cells: Duration::ZERO,
         while_down: "stands when its timed command ends",
-        live: run_stage::<x80_link::shell::Shell>,
+        run: run_stage::<x80_link::shell::Shell>,
     },
     Stage {
         name: "dead-reckoning",
@@ -103,9 +104,9 @@ pub static TABLE: [Stage; 5] = [
         feedback: &[],
         outputs: &[&POSE],
         deadlines: DEADLINES,
-        million_cells: Duration::ZERO,
+        per_million_cells: Duration::ZERO,
         while_down: "stopped by the link when the command is stale",
-        live: run_stage::<dead_reckoning::shell::Shell>,
+        run: run_stage::<dead_reckoning::shell::Shell>,
     },
     Stage {
         name: "mapper",
@@ -113,9 +114,9 @@ pub static TABLE: [Stage; 5] = [
         feedback: &[],
         outputs: &[&GRID],
         deadlines: DEADLINES,
-        million_cells: MAPPER_MILLION_CELLS,
+        per_million_cells: MAPPER_MILLION_CELLS,
         while_down: "stopped by the link when the command is stale",
-        live: run_stage::<mapper::shell::Shell>,
+        run: run_stage::<mapper::shell::Shell>,
     },
     Stage {
         name: "planner",
@@ -123,9 +124,9 @@ pub static TABLE: [Stage; 5] = [
         feedback: &[],
         outputs: &[&GUIDANCE, &FIELD],
         deadlines: PLANNER_DEADLINES,
-        million_cells: PLANNER_MILLION_CELLS,
+        per_million_cells: PLANNER_MILLION_CELLS,
         while_down: "stopped by the link when the command is stale",
-        live: run_stage::<planner::shell::Shell>,
+        run: run_stage::<planner::shell::Shell>,
     },
     Stage {
         name: "controller",
@@ -133,9 +134,9 @@ pub static TABLE: [Stage; 5] = [
         feedback: &[],
         outputs: &[&COMMAND],
         deadlines: DEADLINES,
-        million_cells: Duration::ZERO,
+        per_million_cells: Duration::ZERO,
         while_down: "stopped by the link when the command is stale",
-        live: run_stage::<controller::shell::Shell>,
+        run: run_stage::<controller::shell::Shell>,
     },
 ];
 
@@ -144,7 +145,7 @@ pub fn find(name: &str) -> Option<&'static Stage> {
     TABLE.iter().find(|stage| stage.name == name)
 }
 
-/// What to say of a name that no stage has.
+/// The error message for a name that no stage has.
 pub fn unknown(name: &str) -> String {
     let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
     let names = names.join(", ");

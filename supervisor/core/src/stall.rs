@@ -1,12 +1,13 @@
-//! The paper's rule: a robot that should move and does not has a planner to blame. Pure.
+//! Whether the robot stalls, and which recovery step comes next. Pure.
 //!
-//! Rungs, in order: plan anew from the same belief; forget what was sensed and plan anew; give up.
+//! The paper's rule: a robot that should move and does not has a planner to blame. Recovery steps, in order: replan from
+//! the same belief; forget what was sensed and replan; give up.
 //!
 //! | cause | seen as | first step |
 //! |---|---|---|
-//! | still | it neither drives nor turns | plan anew |
-//! | pinned | it drives or turns, and stays where it is | plan anew |
-//! | buried | it stands in hazard, and has driven far without coming out | forget |
+//! | still | it neither drives nor turns | replan |
+//! | pinned | it drives or turns, and stays where it is | replan |
+//! | inside hazard | it stands in hazard, and has driven far without coming out | forget |
 //! | cut off | it stands where no way leads to the target, and has looked around | forget |
 
 use std::{f64::consts::TAU, time::Duration};
@@ -14,18 +15,17 @@ use std::{f64::consts::TAU, time::Duration};
 use common::{
     clock::MissionTime,
     mission::{Method, Mission},
-    samples::{GuidanceSample, GuidanceStatus, PoseSample, StallCause},
+    samples::{GuidanceSample, GuidanceStatus, PoseSample, RecoveryStep, StallCause, StallSample},
 };
 use glam::DVec2;
-
-pub(crate) mod record;
 
 /// Mission time without motion that is a stall: longer than the slowest turn on the spot takes to begin.
 const STALLED_AFTER: Duration = Duration::from_secs(3);
 /// Mission time without a way to the target that is no passing false echo.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// A careful robot that is cut off turns so often on the spot first, at half the speed it is told to.
-const LOOKS_AROUND: f64 = 1.2;
+/// With the evidential method a robot that is cut off first turns so often on the spot, at half the speed it is
+/// ordered.
+const SCAN_TURNS: f64 = 1.2;
 /// A robot that gets on turns no more often than so at one place, at the slower of its two rates.
 const TURNS_AT_A_PLACE: f64 = 2.0;
 /// Farther than this is another place, metres; likewise less for a robot that is to drive slower than that.
@@ -40,32 +40,44 @@ const TURNED_RAD: f64 = 0.1;
 const SHARE: f64 = 0.05;
 /// A way so long leads out of any margin: several of them on top of each other, metres.
 const WAY_OUT_M: f64 = 1.0;
-/// Fresh planners tried before the belief is blamed.
+/// Replans tried before the belief is blamed.
 const MOST_REPLANS: u32 = 2;
 /// Beliefs forgotten before the target is called unreachable.
 const MOST_RESETS: u64 = 3;
 
-/// A robot that does not get on: how, and what to do about it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Stall {
-    /// How it was seen.
-    pub cause: StallCause,
-    /// What to do.
-    pub recovery: Recovery,
+/// The cause of a stall in words.
+pub(crate) const fn words(cause: StallCause) -> &'static str {
+    match cause {
+        StallCause::Still => "the robot neither drives nor turns, whatever is planned",
+        StallCause::Pinned => "the robot moves and does not get away, whatever is planned",
+        StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
+        StallCause::CutOff => "the belief isolates the robot from the target, again and again",
+    }
 }
 
-/// What to do about a stall.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Recovery {
-    /// Restart the planner: a full solve of the same belief.
-    Replan,
-    /// Forget what was sensed: this is the epoch to begin.
-    Forget {
-        /// The new epoch.
-        epoch: u64,
-    },
-    /// End the mission: the target is unreachable.
-    GiveUp,
+/// Log it.
+pub(crate) fn log(stall: &StallSample) {
+    let (cause, recovery) = (stall.cause(), stall.recovery());
+    let StallSample {
+        stamp,
+        x_m,
+        y_m,
+        epoch,
+        replans,
+        resets,
+        ..
+    } = stall;
+    tracing::warn!(
+        tick = stamp.tick,
+        x_m,
+        y_m,
+        ?cause,
+        ?recovery,
+        epoch,
+        replans,
+        resets,
+        "the robot stalls"
+    );
 }
 
 /// Watches one mission.
@@ -80,11 +92,13 @@ pub(crate) struct StallWatch {
     place: Option<Place>,
     cut_off_since: Option<MissionTime>,
     /// What it had travelled when it was first seen in hazard, metres.
-    buried_since: Option<f64>,
-    /// Fresh planners at this place, with this belief.
+    inside_hazard_since: Option<f64>,
+    /// Replans at this place, with this belief.
     replans_here: u32,
     replans: u32,
     epoch: u64,
+    /// The tick that was looked at last.
+    tick: Option<u64>,
 }
 
 /// Where the robot last was seen to move.
@@ -122,7 +136,7 @@ impl StallWatch {
             pinned_after: STALLED_AFTER + Duration::from_secs_f64(at_a_place),
             cut_off_after: match mission.method {
                 Method::Evidential => {
-                    let turn = LOOKS_AROUND * TAU / controller.look_rad_s;
+                    let turn = SCAN_TURNS * TAU / controller.look_rad_s;
                     CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
                 }
                 Method::Paper => CUT_OFF_AFTER,
@@ -130,10 +144,11 @@ impl StallWatch {
             anchor: None,
             place: None,
             cut_off_since: None,
-            buried_since: None,
+            inside_hazard_since: None,
             replans_here: 0,
             replans: 0,
             epoch: 0,
+            tick: None,
         }
     }
 
@@ -142,7 +157,7 @@ impl StallWatch {
         self.epoch
     }
 
-    /// Fresh planners so far in this mission.
+    /// Replans so far in this mission.
     pub(crate) const fn replans(&self) -> u32 {
         self.replans
     }
@@ -152,14 +167,17 @@ impl StallWatch {
         self.epoch
     }
 
-    /// Look at a tick of a robot that is ordered to drive. `held` says that something else holds it: the
-    /// link's failsafe, a stage that is down.
+    /// Look at the newest tick of a robot that is ordered to drive; each is looked at once. `held` says that something
+    /// else holds the robot: the link's failsafe, a stage that is down.
     pub(crate) fn step(
         &mut self,
         pose: &PoseSample,
         guidance: &GuidanceSample,
         held: bool,
-    ) -> Option<Stall> {
+    ) -> Option<StallSample> {
+        if self.tick.replace(pose.stamp.tick) == Some(pose.stamp.tick) {
+            return None;
+        }
         // The belief outlives its supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
         if held {
@@ -167,32 +185,42 @@ impl StallWatch {
             return None;
         }
         let cause = self
-            .without_ground(pose, guidance)
+            .without_policy(pose, guidance)
             .or_else(|| self.without_motion(pose, guidance))?;
         let recovery = match cause {
             StallCause::Still | StallCause::Pinned if self.replans_here < MOST_REPLANS => {
                 self.replans_here += 1;
                 self.replans += 1;
-                Recovery::Replan
+                RecoveryStep::Replan
             }
             _ if self.epoch < MOST_RESETS => {
                 self.epoch += 1;
                 self.replans_here = 0;
-                Recovery::Forget { epoch: self.epoch }
+                RecoveryStep::Forget
             }
-            _ => Recovery::GiveUp,
+            _ => RecoveryStep::GiveUp,
         };
-        // What is tried gets the time that the robot had.
+        // What is tried gets as much time as the robot had.
         let now = pose.stamp.time();
         if let (Some(anchor), Some(place)) = (&mut self.anchor, &mut self.place) {
             (anchor.time, place.since) = (now, now);
         }
-        (self.cut_off_since, self.buried_since) = (None, None);
-        Some(Stall { cause, recovery })
+        (self.cut_off_since, self.inside_hazard_since) = (None, None);
+        Some(StallSample {
+            stamp: pose.stamp,
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            epoch: self.epoch,
+            replans: self.replans,
+            resets: self.epoch,
+            cause: cause.into(),
+            recovery: recovery.into(),
+        })
     }
 
-    /// Whether u = 0 where the robot stands, by this very belief, for longer than a robot needs to get away.
-    fn without_ground(
+    /// Whether u = 0 where the robot stands, in the field of the current belief, for longer than a robot needs to get
+    /// away.
+    fn without_policy(
         &mut self,
         pose: &PoseSample,
         guidance: &GuidanceSample,
@@ -206,14 +234,14 @@ impl StallWatch {
             return Some(StallCause::CutOff);
         }
         if !is(GuidanceStatus::WayOut) {
-            self.buried_since = None;
-        } else if travelled - *self.buried_since.get_or_insert(travelled) >= WAY_OUT_M {
-            return Some(StallCause::Buried);
+            self.inside_hazard_since = None;
+        } else if travelled - *self.inside_hazard_since.get_or_insert(travelled) >= WAY_OUT_M {
+            return Some(StallCause::InsideHazard);
         }
         None
     }
 
-    /// Whether the robot has neither moved nor turned for long, or both for longer and to no avail.
+    /// Whether the robot has neither moved nor turned for long, or moves or turns for longer and stays where it is.
     fn without_motion(
         &mut self,
         pose: &PoseSample,

@@ -1,63 +1,41 @@
-//! One robot's supervisor: brings its stages up, lets it drive, watches, brings all down again.
-//!
-//! Here is its loop; beside it whether the robot may drive ([`order`]), whether the mission has ended ([`judge`]), and
-//! how things end ([`end`]).
+//! The loop of one robot's supervisor: gathers what happened, lets the pure functions decide, carries it out.
 
-mod end;
-mod error;
-mod judge;
-mod order;
-mod progress;
+use std::{os::unix::fs::symlink, path::PathBuf, time::Instant};
 
-use std::{
-    io,
-    os::unix::fs::symlink,
-    path::PathBuf,
-    rc::Rc,
-    time::{Duration, Instant},
-};
-
-pub use self::{end::Finished, error::SupervisorError, progress::Progress};
-use self::{error::system, judge::fault};
-use crate::{
-    death::{self, Death},
-    domain::DomainLock,
-    observer::Observer,
-    outcome::{Ending, Outcome},
-    recovery::{RecoveredRun, StateFile},
-    service_manager::ServiceManager,
-    simulator::Simulator,
-    stage_processes::{StageProcesses, Starter},
-    stages,
-    stall::StallWatch,
-};
 use common::{
     address::Address,
-    bus::{Bus, Reader, SliceWriter, Writer},
-    clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    clock::Pace,
     domain::{Domain, RobotName},
     mission::Mission,
     run::Run,
-    samples::{
-        DeathSample, DirectiveSample, HoldReason, Order, RequestSample, RosterEntry, RosterHeader,
-        StallSample,
-    },
-    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    samples::{DirectiveSample, Order, RecoveryStep, RequestKind, RosterHeader, name_str},
+    signals::Signals,
     topics,
-    waiter::Waiter,
 };
 
-/// How often the bus is cleared at least: of consumers that died.
-const CLEAR_UP: Duration = Duration::from_secs(1);
-
-/// A death is often followed by another within this: its successor's, or a sibling's.
-const CLEANUP_DELAY: Duration = Duration::from_millis(50);
+use crate::{
+    bus_endpoints::BusEndpoints,
+    cleanup::Cleanup,
+    domain::DomainLock,
+    error::{SupervisorError, system},
+    judge::{self, TickProgress},
+    order::{self, Decision},
+    outcome::{Ending, Outcome},
+    progress::Progress,
+    records,
+    recovery::{RecoveredRun, StateFile},
+    run_clock::RunClock,
+    service_manager::ServiceManager,
+    simulator::Simulator,
+    stage_processes::{StageProcesses, Starter},
+    stall::{self, StallWatch},
+};
 
 /// What a run is made from.
 pub struct Options {
     /// What to do.
     pub mission: Mission,
-    /// For whom.
+    /// The robot that does it.
     pub robot: RobotName,
     /// How mission time passes; a real robot only knows wall-clock.
     pub pace: Pace,
@@ -69,308 +47,335 @@ pub struct Options {
     pub recovered: Option<RecoveredRun>,
 }
 
-/// Carry out a run. `watch` is called a few times a second.
-pub fn run(
-    options: &Options,
-    watch: &mut dyn FnMut(&Progress<'_>),
-) -> Result<Finished, SupervisorError> {
-    let mut signals =
-        Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
-    let mut lock = DomainLock::acquire(
-        Domain::of(options.robot.clone()),
-        options.mission.grid_frame().area(),
-    )?;
-    let mut supervisor = Supervisor::start(options, bus_of(&lock)?)?;
-    let ending = loop {
-        match supervisor.drive(&mut signals, watch) {
-            Ok(Some(ending)) => break Ok(ending),
-            Ok(None) => supervisor = supervisor.recreate_bus(&mut lock)?,
-            Err(error) => break Err(error),
-        }
-    };
-    // Whatever went wrong, the robot is stopped first and the stages go in order.
-    let stopped = supervisor.stop();
-    let ending = ending?;
-    stopped?;
-    Ok(supervisor.finish(ending))
-}
-
-fn bus_of(lock: &DomainLock) -> Result<Rc<Bus>, SupervisorError> {
-    let bus = lock.bus();
-    bus.ok_or_else(|| system("keep the bus")(io::ErrorKind::NotConnected.into()))
-}
-
-struct Supervisor<'a> {
-    options: &'a Options,
-    // Dropped in this order: the stages go before the robot they speak to.
-    stages: StageProcesses,
-    simulator: Option<Simulator>,
-    observer: Observer,
-    waiter: Waiter,
-    ends: Ends,
-    last_request: u64,
-    state_file: StateFile,
-    /// The first tick that is not made yet, and mission time by then, as long as none was heard of.
-    beginning: (u64, MissionTime),
-    order: Order,
-    /// Why it is not [`Order::Drive`].
-    reason: HoldReason,
-    /// All was ready once: from then on only what is said here holds the robot.
-    ready: bool,
-    stall: StallWatch,
-    judged_tick: Option<u64>,
-    restated: Option<Instant>,
-    progressed: (Option<u64>, Instant),
-    cleared_up: Instant,
-    /// Stages that died since, and when the last one did.
-    died: (usize, Instant),
-    /// Processes whose remains are not cleared up yet.
-    pending_cleanup: Vec<u32>,
-    clock: MissionClock,
+/// The robot that is driven.
+pub(crate) struct Robot {
+    /// Its process, if it is a simulated one.
+    pub simulator: Option<Simulator>,
     address: Address,
-    service: ServiceManager,
 }
 
-/// The supervisor's own ends on the bus.
-struct Ends {
-    bus: Rc<Bus>,
-    directive: Writer<DirectiveSample>,
-    roster: SliceWriter<RosterHeader, RosterEntry>,
-    deaths: Writer<DeathSample>,
-    stalls: Writer<StallSample>,
-    requests: Reader<RequestSample>,
-}
-
-impl Ends {
-    /// All of them; `waiter` wakes for requests.
-    fn open(bus: Rc<Bus>, waiter: &mut Waiter) -> Result<Self, SupervisorError> {
-        waiter.on(bus.wakeup(&topics::REQUESTS)?);
+impl Robot {
+    /// The robot of a mission; a simulated one is started.
+    fn start(options: &Options) -> Result<Self, SupervisorError> {
+        if let Some(address) = &options.mission.robot.address {
+            let address = address.parse::<Address<String>>()?.resolve()?;
+            return Ok(Self {
+                simulator: None,
+                address,
+            });
+        }
+        let simulator = Simulator::start(&options.directory, &options.mission, options.pace)?;
         Ok(Self {
-            directive: bus.writer(&topics::DIRECTIVE, 1)?,
-            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
-            deaths: bus.writer(&topics::DEATHS, 1)?,
-            stalls: bus.writer(&topics::STALLS, 1)?,
-            requests: bus.reader(&topics::REQUESTS)?,
-            bus,
+            address: Address::Udp(simulator.address()),
+            simulator: Some(simulator),
         })
+    }
+
+    /// Read the ground truth. Says whether a simulated robot's process still runs.
+    pub(crate) fn poll(&mut self) -> Result<bool, SupervisorError> {
+        match &mut self.simulator {
+            Some(simulator) => Ok(simulator.poll()?),
+            None => Ok(true),
+        }
     }
 }
 
+/// The supervisor of one run.
+pub(crate) struct Supervisor<'a> {
+    options: &'a Options,
+    // Dropped in this order: the stages end before the robot.
+    pub stages: StageProcesses,
+    pub robot: Robot,
+    pub bus: BusEndpoints,
+    pub state_file: StateFile,
+    clock: RunClock,
+    pub decision: Decision,
+    pub tick_progress: TickProgress,
+    pub stall_watch: StallWatch,
+    cleanup: Cleanup,
+    pub service: ServiceManager,
+}
+
 impl<'a> Supervisor<'a> {
-    /// The robot, the run file, the stages.
-    fn start(options: &'a Options, bus: Rc<Bus>) -> Result<Self, SupervisorError> {
+    /// Start the robot, write the run file, start the stages.
+    pub(crate) fn start(options: &'a Options, lock: &DomainLock) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
         let mission = &options.mission;
         let mut state_file = StateFile::open(directory)?;
-        let (simulator, address) = match &mission.robot.address {
-            Some(address) => (None, address.parse::<Address<String>>()?.resolve()?),
-            None => {
-                let simulator = Simulator::start(directory, mission, options.pace)?;
-                let address = Address::Udp(simulator.address());
-                (Some(simulator), address)
-            }
-        };
-        let (clock, beginning) = match (&options.recovered, options.pace) {
-            (Some(recovered), _) => {
+        let robot = Robot::start(options)?;
+        let clock = match &options.recovered {
+            Some(run) => {
                 state_file.state.resumes += 1;
-                let (tick, time) = (recovered.first_tick, recovered.time);
-                tracing::warn!(tick, seconds = time.seconds(), "the run goes on");
-                (recovered.clock(), (tick, time))
+                let (tick, seconds) = (run.first_tick, run.time.seconds());
+                tracing::warn!(tick, seconds, "the run goes on");
+                RunClock::recovered(run)
             }
-            (None, Pace::Max) if simulator.is_some() => {
-                let period_ns = (1e9 / mission.robot.rate_hz) as u64;
-                (
-                    MissionClock::Ticks { period_ns },
-                    (0, MissionTime::default()),
-                )
-            }
-            // A real robot's time passes as it does.
-            (None, pace) => {
-                let rate = match pace {
-                    Pace::Rate(rate) if simulator.is_some() => rate,
-                    _ => 1.0,
-                };
-                let epoch_ns = monotonic_ns();
-                (
-                    MissionClock::Wall { epoch_ns, rate },
-                    (0, MissionTime::default()),
-                )
-            }
+            None => RunClock::begin(
+                options.pace,
+                mission.robot.rate_hz,
+                robot.simulator.is_some(),
+            ),
         };
         let run = Run {
             robot: options.robot.clone(),
-            address: address.clone(),
-            clock,
+            address: robot.address.clone(),
+            clock: clock.clock,
             mission: mission.clone(),
         };
         run.save(directory)?;
-        let mut waiter = Waiter::default();
-        let observer = Observer::new(&bus, &mut waiter)?;
-        let ends = Ends::open(bus, &mut waiter)?;
+        let cells = mission.grid_frame().area();
         let mut supervisor = Self {
             options,
-            stages: StageProcesses::new(
-                directory.clone(),
-                options.starter,
-                mission.grid_frame().area(),
-            ),
-            simulator,
-            observer,
-            waiter,
-            ends,
-            last_request: 0,
+            stages: StageProcesses::new(directory.clone(), options.starter, cells),
+            robot,
+            bus: BusEndpoints::open(lock)?,
             state_file,
-            beginning,
-            order: Order::Hold,
-            reason: HoldReason::Starting,
-            ready: false,
-            stall: StallWatch::new(mission),
-            judged_tick: None,
-            restated: None,
-            progressed: (None, Instant::now()),
-            cleared_up: Instant::now(),
-            died: (0, Instant::now()),
-            pending_cleanup: Vec::new(),
             clock,
-            address,
+            decision: Decision::STARTING,
+            tick_progress: TickProgress::new(Instant::now()),
+            stall_watch: StallWatch::new(mission),
+            cleanup: Cleanup::new(),
             service: ServiceManager::of_environment(),
         };
-        supervisor.restate()?;
-        supervisor.stages.start_all(beginning.0)?;
-        if options.starter == Starter::Another {
+        supervisor.publish_state()?;
+        supervisor.stages.start_all(supervisor.first_tick());
+        if options.starter == Starter::External {
             let link = Domain::of(options.robot.clone()).run_link();
             symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
-            // The stages come after this.
+            // Systemd starts the stages after this.
             supervisor.service.ready();
         }
         Ok(supervisor)
     }
 
-    /// Until the mission ends, one way or another; or, without an ending, until the bus must be made anew.
-    fn drive(
+    /// The same with a new bus; no stage may use the old one.
+    pub(crate) fn with_new_bus(self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+        let bus = self.bus.recreate(lock)?;
+        Ok(Self { bus, ..self })
+    }
+
+    /// Iterate until the mission ends; or, without an ending, until the bus must be recreated.
+    pub(crate) fn drive(
         &mut self,
         signals: &mut Signals,
-        watch: &mut dyn FnMut(&Progress<'_>),
+        show: &mut dyn FnMut(&Progress<'_>),
     ) -> Result<Option<Ending>, SupervisorError> {
-        self.waiter.on_readable(&*signals)?;
+        self.bus.waiter.on_readable(&*signals)?;
         loop {
             if signals.came() {
-                return Ok(Some(Ending {
-                    outcome: Outcome::Aborted,
-                    reason: "told to stop".to_owned(),
-                    asked_for: true,
-                }));
+                return Ok(Some(Ending::asked_for(
+                    Outcome::Aborted,
+                    "stopped by a signal",
+                )));
             }
-            if let Some(ending) = self.turn()? {
+            if let Some(ending) = self.iterate()? {
                 return Ok(Some(ending));
             }
             if self.stages.is_start_blocked() {
                 return Ok(None);
             }
-            if self.restate_if_due()? {
-                let progress = Progress {
-                    record: &self.observer.record,
-                    alive: self.stages.alive(),
-                    driving: self.order == Order::Drive,
-                    straight_m: self.options.mission.target.length(),
-                };
-                watch(&progress);
-                self.service.show(|| progress.to_string());
+            if self.bus.is_due(topics::RESTATE) {
+                self.publish_state()?;
+                self.show_progress(show);
             }
-            self.clear_up_if_due();
+            let any_starting = self.stages.any_starting();
+            self.cleanup.run_if_due(self.bus.bus(), any_starting);
             self.service.feed();
             self.wait()?;
         }
     }
 
-    /// Wait for the bus, a child, a signal, a deadline.
-    fn wait(&self) -> Result<(), SupervisorError> {
+    /// One iteration: read, restart, decide, judge.
+    fn iterate(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let roster_changed = self.bus.observer.take(&mut self.stages)?;
+        let first_tick = self.first_tick();
+        let asked = self.take_requests(first_tick)?;
+        let died = self.poll_processes(first_tick)?;
+        let driving = self.decision.order() == Order::Drive;
+        self.stages.check_outputs(driving, first_tick);
+        let simulator_ended = !self.robot.poll()?;
+        if self.decide_order() || roster_changed || died || asked {
+            self.publish_state()?;
+        }
+        match self.judge(simulator_ended) {
+            None => self.watch_for_stalls(),
+            ending => Ok(ending),
+        }
+    }
+
+    /// Do what operators ask. Says whether anything was asked.
+    fn take_requests(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+        let mut asked = false;
+        while let Some(request) = self.bus.take_request()? {
+            asked = true;
+            let stage = name_str(&request.stage);
+            match RequestKind::from_byte(request.kind) {
+                RequestKind::Nothing => {}
+                RequestKind::Restart => {
+                    tracing::warn!(stage, "an operator asks for a new generation");
+                    self.stages.replace(stage, first_tick);
+                }
+                RequestKind::Stop => {
+                    tracing::warn!("an operator says stop");
+                    self.state_file.state.operator_stop = true;
+                }
+                RequestKind::Resume => {
+                    tracing::warn!("an operator says resume");
+                    self.state_file.state.operator_stop = false;
+                }
+            }
+        }
+        Ok(asked)
+    }
+
+    /// Reap and restart stages; log, publish and record each death once. Says whether there was one.
+    pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
+        let deaths = self.stages.poll(self.bus.bus(), first_tick)?;
+        for death in &deaths {
+            death.log();
+            self.bus.publish_death(death.sample());
+            records::append(&self.options.directory, records::DEATHS, death);
+        }
+        self.cleanup.on_deaths(&deaths, self.bus.bus());
+        Ok(!deaths.is_empty())
+    }
+
+    /// Decide whether the robot may drive. Says whether that changed.
+    fn decide_order(&mut self) -> bool {
+        let record = &self.bus.observer.record;
+        let decision = order::decide(&order::Snapshot {
+            was_ready: self.decision.ready,
+            all_running: self.stages.all_running(),
+            robot_answers: record.link.is_some_and(|link| link.connected == 1),
+            field_known: record.field.frame().is_some(),
+            operator_stop: self.state_file.state.operator_stop,
+            stage_held: !self.stages.held().is_empty(),
+        });
+        if decision.ready && !self.decision.ready {
+            tracing::info!("all stages ready");
+            self.service.ready();
+        }
+        let changed = decision.reason != self.decision.reason;
+        if changed {
+            tracing::info!(reason = ?decision.reason, "order");
+            self.tick_progress = TickProgress::new(Instant::now());
+        }
+        self.decision = decision;
+        changed
+    }
+
+    /// Judge whether the mission is over.
+    fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
+        let now = Instant::now();
+        let record = &self.bus.observer.record;
+        let simulator = self.robot.simulator.as_ref();
+        let truth = simulator.and_then(|simulator| simulator.truth().last());
+        let collision = truth.filter(|truth| truth.contacts > 0);
+        judge::judge(
+            &judge::Snapshot {
+                arrived_m: record.arrival.map(|command| command.distance_m),
+                link: record.link.as_ref(),
+                simulated: simulator.is_some(),
+                simulator_ended,
+                collision_m: collision.map(|truth| [truth.x, truth.y]),
+                time: self.clock.now(record.pose.as_ref()),
+                timeout_s: self.options.mission.timeout_s,
+                in_ticks: self.clock.in_ticks(),
+                progress: self.tick_progress.update(record.newest_tick(), now),
+                was_ready: self.decision.ready,
+                reason: self.decision.reason,
+                held: self.stages.held(),
+                not_started: self.stages.not_started(),
+                robot: &self.options.robot,
+                address: &self.robot.address,
+            },
+            now,
+        )
+    }
+
+    /// Look for a stall, and take the next recovery step. The last one ends the mission.
+    fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let record = &self.bus.observer.record;
+        let (Some(pose), Some(guidance)) = (record.pose, record.newest_guidance()) else {
+            return Ok(None);
+        };
+        if self.decision.order() != Order::Drive {
+            return Ok(None);
+        }
+        let stopped = record.link.is_none_or(|link| link.stopped());
+        let held = stopped || !self.stages.all_running();
+        let Some(stall) = self.stall_watch.step(&pose, guidance, held) else {
+            return Ok(None);
+        };
+        stall::log(&stall);
+        self.bus.publish_stall(&pose, stall);
+        records::append(&self.options.directory, records::STALLS, &stall);
+        match stall.recovery() {
+            RecoveryStep::Replan => self.stages.replace("planner", self.first_tick()),
+            // The new epoch is in the directive.
+            RecoveryStep::Forget => self.publish_state()?,
+            RecoveryStep::GiveUp => {
+                let reason = format!("target unreachable: {}", stall::words(stall.cause()));
+                return Ok(Some(Ending::failed(Outcome::Unreachable, reason)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The tick that a new generation of a stage starts from.
+    pub(crate) fn first_tick(&self) -> u64 {
+        self.clock
+            .first_tick(self.bus.observer.record.newest_tick())
+    }
+
+    /// Save the state, then publish the order and the roster: what an operator asked is confirmed by the roster.
+    pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
+        self.state_file.save()?;
+        // An external stage takes its first tick from here: it must not be one that was made.
+        let tick = self.first_tick().saturating_sub(1);
+        let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
+        let (order, reason) = (self.decision.order(), self.decision.reason);
+        let directive = DirectiveSample {
+            order: order.into(),
+            reason: reason.into(),
+            epoch: self.stall_watch.epoch(),
+            ..DirectiveSample::default()
+        };
+        let header = RosterHeader {
+            supervisor_pid: std::process::id(),
+            order: order.into(),
+            reason: reason.into(),
+            simulated: self.robot.simulator.is_some().into(),
+            ..RosterHeader::default()
+        };
+        let entries = self.stages.roster();
+        self.bus
+            .publish_state(tick, time, directive, header, entries)?;
+        Ok(())
+    }
+
+    /// Show how far the run has come.
+    fn show_progress(&mut self, show: &mut dyn FnMut(&Progress<'_>)) {
+        let progress = Progress {
+            record: &self.bus.observer.record,
+            running: self.stages.running(),
+            driving: self.decision.order() == Order::Drive,
+            straight_m: self.options.mission.target.length(),
+        };
+        show(&progress);
+        self.service.show(|| progress.to_string());
+    }
+
+    /// Wait for the bus, a child, a signal or a deadline.
+    pub(crate) fn wait(&self) -> Result<(), SupervisorError> {
         let mut descriptors = self.stages.descriptors();
-        if let Some(simulator) = &self.simulator {
+        if let Some(simulator) = &self.robot.simulator {
             descriptors.extend(simulator.descriptors());
         }
         let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed()];
         let soonest = deadlines.into_iter().flatten().min();
-        let patience = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
-        self.waiter.wait_also_for(&descriptors, patience)?;
+        let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
+        self.bus.waiter.wait_also_for(&descriptors, timeout)?;
         Ok(())
-    }
-
-    /// Take what came, tend the stages, judge.
-    fn turn(&mut self) -> Result<Option<Ending>, SupervisorError> {
-        let became_ready = self.observer.take(&mut self.stages)?;
-        let first_tick = self.first_tick();
-        let asked = self.take_requests(first_tick)?;
-        let died = self.tend(first_tick)?;
-        let driven = self.order == Order::Drive;
-        self.stages.judge_outputs(driven, first_tick)?;
-        if let Some(simulator) = &mut self.simulator
-            && !simulator.tend()?
-        {
-            return Ok(Some(fault("the simulated robot ended; see x80-sim.log")));
-        }
-        if self.decide_order() || became_ready || died || asked {
-            self.restate()?;
-        }
-        self.judge()
-    }
-
-    /// What a new life of a stage begins with: the first tick that nobody has made.
-    fn first_tick(&self) -> u64 {
-        let newest = self.observer.record.newest_tick();
-        // The link speaks of tick 0 before its first.
-        newest.map_or(0, |tick| tick + 1).max(self.beginning.0)
-    }
-
-    /// Reap and restart; tell each death once, on the bus, in the log and in the run directory. Says whether one was.
-    fn tend(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
-        let deaths = self.stages.tend(&self.ends.bus, first_tick)?;
-        let pose = self.observer.record.pose.unwrap_or_default();
-        for death in &deaths {
-            death.log();
-            self.ends
-                .deaths
-                .publish(pose.stamp.tick, pose.stamp.time(), death.sample())?;
-            let file = self.options.directory.join(death::FILE_NAME);
-            death
-                .append_to(&self.options.directory)
-                .map_err(system(format!("write {}", file.display())))?;
-        }
-        self.pending_cleanup
-            .extend(deaths.iter().map(|death| death.pid));
-        if !deaths.is_empty() {
-            self.died = (self.died.0 + deaths.len(), Instant::now());
-        }
-        if deaths.iter().any(Death::was_refused) {
-            // Its place may be one that the dead still hold.
-            self.clear_up();
-        }
-        Ok(!deaths.is_empty())
-    }
-
-    /// Free what the dead held once their successors work and nobody dies any more: a start takes about as long, and
-    /// would wait for it. But sooner when so many are dead that places on the bus may run out. And free what consumers
-    /// held that died, of which nobody tells us.
-    fn clear_up_if_due(&mut self) {
-        let (died, last) = self.died;
-        let quiet = died > 0 && last.elapsed() >= CLEANUP_DELAY && !self.stages.any_starting();
-        let many = died >= stages::TABLE.len();
-        if quiet || many || self.cleared_up.elapsed() >= CLEAR_UP {
-            self.clear_up();
-        }
-    }
-
-    /// What cannot be freed makes the bus slower, not wrong.
-    fn clear_up(&mut self) {
-        self.cleared_up = Instant::now();
-        self.died.0 = 0;
-        match self.ends.bus.clear_up(&self.pending_cleanup) {
-            Ok(true) => self.pending_cleanup.clear(),
-            Ok(false) => {}
-            Err(error) => {
-                let dead = std::mem::take(&mut self.pending_cleanup);
-                tracing::warn!(%error, ?dead, "cannot remove what the dead left on the bus");
-            }
-        }
     }
 }

@@ -8,7 +8,11 @@ use std::{
 use ::image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 use harmonic::MAX_SIDE;
 
-use super::{Map, MapError, check_size, open};
+use crate::{
+    error::MapError,
+    file::{check_size, open},
+    map::Map,
+};
 
 /// The largest map in 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
 const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);

@@ -6,7 +6,11 @@ use std::path::Path;
 
 use harmonic::MAX_SIDE;
 
-use super::{Map, MapError, check_size, read};
+use crate::{
+    error::MapError,
+    file::{check_size, read},
+    map::Map,
+};
 
 /// The largest map with two characters at the end of every line, and its header.
 const LONGEST: u64 = MAX_SIDE as u64 * (MAX_SIDE as u64 + 2) + 4096;

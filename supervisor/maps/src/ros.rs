@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::{
-    Map, MapError,
+use crate::{
+    error::MapError,
+    file::read,
     image::{self, Lightness},
-    read,
+    map::Map,
 };
 
 /// A map file says a dozen short things.

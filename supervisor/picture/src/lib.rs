@@ -1,21 +1,22 @@
-//! The picture a run ends with: one SVG file that needs nothing but itself. And the picture of a field on a map.
+//! The picture of a run: one SVG file without references to others. And the picture of a field on a map.
 //!
 //! From the bottom of the page to its top, everything in the mission frame (metres, y up):
 //!
 //! | module | draws |
 //! |---|---|
-//! | [`bands`] | log2 u of the final belief, in bands between level sets |
-//! | [`streamlines`] | lines of the guidance field E |
-//! | [`cells`] | what was believed hazardous |
-//! | [`world`] | what is really there |
-//! | [`motion`] | trajectories, the robot at regular times, start, target |
-//! | [`margin`] | title, axes, legend, captions |
-//! | [`page`], [`lattice`] | the sheet all of them draw on, and how cells lie on it |
+//! | `bands` | log2 u of the final belief, in bands between level sets |
+//! | `streamlines` | lines of the guidance field E |
+//! | `cells` | what was believed hazardous |
+//! | `world` | what is really there |
+//! | `motion` | trajectories, the robot at regular times, start, target |
+//! | `margin` | title, axes, legend, captions |
+//! | `page`, `lattice` | the page that all draw on, and where cells are on it |
+//! | [`Scene`] | what is drawn |
 //!
-//! [`map`] draws the field of a bare map with the same bands and lines, [`raster`] makes it a PNG.
+//! `map` draws the field of a bare map with the same bands and lines, `raster` makes it a PNG.
 //!
-//! A picture is made of what came in until the end, however the end came: every layer but the frame
-//! may be missing, and no input makes a file that cannot be read.
+//! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
+//! every input gives a valid file.
 
 mod bands;
 mod cells;
@@ -25,6 +26,7 @@ mod margin;
 mod motion;
 mod page;
 mod raster;
+mod scene;
 mod streamlines;
 #[cfg(test)]
 mod tests;
@@ -32,14 +34,13 @@ mod world;
 
 use common::{
     grid::{CellState, GridFrame},
-    kinematics::Pose2,
-    mission::Mission,
     samples::FieldCell,
 };
 
 pub use self::{
     map::{FieldOnMap, map_svg},
     raster::png,
+    scene::{Facts, Scene},
 };
 
 use self::{
@@ -50,43 +51,6 @@ use self::{
     motion::Motion,
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
-
-/// What there is to draw.
-pub struct Scene<'a> {
-    /// The mission: target, world, body, perimeter.
-    pub mission: &'a Mission,
-    /// The final belief: one [`common::grid::CellState`] byte a cell, row-major.
-    pub grid: Option<(GridFrame, &'a [u8])>,
-    /// The field of that belief, row-major.
-    pub field: Option<(GridFrame, &'a [FieldCell])>,
-    /// Where dead reckoning put the robot, at equal steps of mission time from its beginning.
-    pub believed: &'a [Pose2],
-    /// Where the robot really was, likewise; empty with a real robot.
-    pub truth: &'a [Pose2],
-    /// How the run went.
-    pub facts: Facts<'a>,
-    /// Lines below the picture; each is cut where the page ends.
-    pub captions: &'a [String],
-}
-
-/// The numbers of the title line.
-#[derive(Clone, Copy, Debug)]
-pub struct Facts<'a> {
-    /// In a word: reached, unreachable, timeout, ...
-    pub outcome: &'a str,
-    /// Whether that is what was wanted.
-    pub reached: bool,
-    /// Mission time, seconds.
-    pub mission_time_s: f64,
-    /// Length of the way driven, metres.
-    pub path_length_m: f64,
-    /// From start to target as the crow flies, metres.
-    pub straight_m: f64,
-    /// Range samples that put a hazard on the map.
-    pub safety_events: u64,
-    /// Seed of the simulation; none with a real robot.
-    pub seed: Option<u64>,
-}
 
 /// Whether any cell believed free cannot reach the target.
 fn has_isolated_cells(

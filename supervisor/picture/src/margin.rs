@@ -3,11 +3,11 @@
 use glam::DVec2;
 
 use super::{
-    Scene,
     bands::Levels,
     cells::BelievedHazard,
     motion::{self, Motion},
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up},
+    scene::Scene,
     streamlines::arrowhead,
     world,
 };

@@ -4,8 +4,8 @@ use common::{kinematics::Pose2, mission::Mission};
 use glam::DVec2;
 
 use super::{
-    Scene,
     page::{Path, Px, View, ink},
+    scene::Scene,
 };
 
 /// Poses of one trajectory that are drawn at most: a day at 7 Hz still makes a small file.

@@ -1,4 +1,4 @@
-//! `firsthand chaos`: random deaths of random stages, and what became of the missions.
+//! `firsthand chaos`: signals to random stages at random times, and what became of the missions.
 
 use std::process::ExitCode;
 
@@ -8,7 +8,7 @@ use common::{clock::Pace, domain::RobotName};
 use super::{Failure, missions};
 use chaos::Options;
 
-/// Hit random stages with random signals at random times, mission after mission, and report.
+/// Send random signals to random stages at random times, mission after mission, and report.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A shipped mission or a mission file.
@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     /// Signals to send in all; the mission under way is left to end after the last.
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     kills: u32,
-    /// Seed of who, how and when; the missions' own seeds count up from it.
+    /// Seed of the schedule; the missions' own seeds count up from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Hit some successors again within their first 12 ms: about a fifth of all signals.
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Name of the robot, and of its corner of shared memory.
+    /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "chaos")]
     robot: RobotName,
     /// One line of JSON.
@@ -41,12 +41,12 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What it ends with when a mission was lost, touched something, lost its pose, or left something.
+/// The exit code when a mission did not arrive, touched something, lost its pose, or left something behind.
 const NOT_CLEAN: u8 = 8;
 
 #[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    // Faults in it are told at once, and once.
+    // Errors in it are reported before anything is started.
     let loaded = missions::load(&arguments.mission, &arguments.set)?;
     if arguments.include_supervisor && loaded.robot.address.is_some() {
         return Err("chaos brings its own robot; leave robot.address out".into());
@@ -85,8 +85,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if report.is_right() {
         std::fs::remove_dir_all(&directory)?;
     } else {
-        let kept = directory.display();
-        eprintln!("firsthand: what the missions wrote that went wrong is kept in {kept}");
+        let directory = directory.display();
+        eprintln!("firsthand: the files of the missions that went wrong are in {directory}");
     }
     if arguments.json {
         println!("{}", serde_json::to_string(&report)?);

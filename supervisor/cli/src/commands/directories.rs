@@ -8,7 +8,7 @@ use std::{
 use super::Failure;
 use supervisor::recovery::SUMMARY;
 
-/// In a run directory whose run was cut off, once somebody was told.
+/// Marks a run directory whose run was cut off, once that was reported.
 const CUT_OFF: &str = "cut-off";
 
 /// The directory asked for; results of an earlier run are not mixed with this one's.
@@ -50,8 +50,8 @@ pub(crate) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The newest run below `runs` that was begun, never summed up, and not told of yet: its supervisor was killed, or
-/// the machine.
+/// The newest run below `runs` without a summary whose cut was not reported yet: its supervisor was killed, or the
+/// machine was switched off.
 pub(crate) fn cut_off(runs: &Path) -> io::Result<Option<PathBuf>> {
     let entries = match fs::read_dir(runs) {
         Ok(entries) => entries,
@@ -72,7 +72,7 @@ pub(crate) fn cut_off(runs: &Path) -> io::Result<Option<PathBuf>> {
         .transpose()
 }
 
-/// Note that a run was told of as cut off: who then starts anew means it.
+/// Mark that a run was reported as cut off: the next start begins a new one.
 pub(crate) fn mark_cut_off(directory: &Path) -> io::Result<()> {
     fs::write(directory.join(CUT_OFF), "")
 }
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_that_was_cut_off_is_told_once() {
+    fn a_run_that_was_cut_off_is_reported_once() {
         let runs = tempfile::tempdir().unwrap();
         let begun = |name: &str| {
             let directory = runs.path().join(name);
@@ -95,6 +95,6 @@ mod tests {
         let cut = fs::canonicalize(begun("cut")).unwrap();
         assert_eq!(cut_off(runs.path()).unwrap(), Some(cut.clone()));
         mark_cut_off(&cut).unwrap();
-        assert_eq!(cut_off(runs.path()).unwrap(), None, "told again");
+        assert_eq!(cut_off(runs.path()).unwrap(), None, "reported again");
     }
 }

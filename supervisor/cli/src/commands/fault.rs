@@ -1,4 +1,4 @@
-//! `firsthand fault STAGE FAULT`: something broken in a running stage on purpose.
+//! `firsthand fault STAGE FAULT`: break something in a running stage on purpose.
 
 use std::{fmt::Write as _, process::ExitCode, time::Instant};
 
@@ -8,6 +8,7 @@ use common::{
     clock::MissionTime,
     domain::{Domain, RobotName},
     faults,
+    roster::Roster,
     samples::{FaultAnswer, FaultSample, name, name_str},
     topics,
     waiter::Waiter,
@@ -16,7 +17,7 @@ use thiserror::Error;
 
 use super::{
     Failure,
-    operate::{PATIENCE, await_roster, fresh_id, known},
+    operate::{PATIENCE, find, known, new_id},
 };
 
 /// Break something in a running stage on purpose, to see the rest cope.
@@ -68,10 +69,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let robot = &arguments.robot;
     let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
-    let mut roster = bus.slice_reader(&topics::ROSTER)?;
-    let mut waiter = Waiter::default();
-    waiter.on(bus.wakeup(&topics::ROSTER)?);
-    let simulated = await_roster(&mut roster, &waiter, robot, |header, _| {
+    let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| {
         Some(header.simulated == 1)
     })?;
     let refused = || FaultError::RealRobot(robot.clone());
@@ -79,7 +77,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Err(refused().into());
     }
     let request = FaultSample {
-        id: fresh_id(),
+        id: new_id(),
         stage: name(stage),
         kind: fault.kind.into(),
         although_real: arguments.break_a_real_robot.into(),
@@ -93,12 +91,12 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Ask the stage itself; its heartbeat says what it made of it. None if it said nothing for long.
+/// Ask the stage itself; its heartbeat says how it answered. None if it did not.
 fn ask(bus: &Bus, stage: &str, request: FaultSample) -> Result<Option<FaultAnswer>, Failure> {
     let mut health = bus.reader(&topics::HEALTH)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::HEALTH)?);
-    // Kept until the answer is there: with the writer goes what was not read yet.
+    // The writer must stay until the answer is there: samples that were not read yet go with it.
     let mut requests = bus.writer(&topics::FAULTS, 1)?;
     requests.publish(0, MissionTime::default(), request)?;
     let began = Instant::now();

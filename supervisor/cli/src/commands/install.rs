@@ -1,4 +1,4 @@
-//! `firsthand install`: what makes a robot a service of this machine, printed or put in place.
+//! `firsthand install`: the files that make a robot a service of this machine, printed or written.
 //!
 //! The Debian package brings the same files (`[package.metadata.deb]`); this is for everyone else.
 
@@ -38,7 +38,7 @@ struct Part {
     path: &'static str,
     /// What is in it, as packaged.
     text: &'static str,
-    /// Whether it is its user's once it is there.
+    /// Whether a user may have changed it: then it is not overwritten.
     configuration: bool,
 }
 
@@ -83,7 +83,7 @@ then, when /etc/firsthand/mission.toml is the robot's mission:
   systemctl enable --now firsthand          # the supervisor starts the stages, or
   systemctl enable --now firsthand-watch    # systemd does:";
 
-/// A file could not be put in place.
+/// A file could not be written.
 #[derive(Debug, Error)]
 #[error("cannot write {file}: {source}; as root, or with --root?", file = file.display())]
 struct InstallError {
@@ -127,7 +127,7 @@ fn put(file: &Path, text: &str) -> Result<(), InstallError> {
     })
 }
 
-/// The commands, and the units they lead to.
+/// The commands, and the units they concern.
 fn remaining() -> String {
     let units = stages::TABLE
         .iter()
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn configuration_that_is_there_is_not_written_over() {
+    fn configuration_that_is_there_is_not_overwritten() {
         let root = tempfile::tempdir().unwrap();
         let mission = root.path().join("etc/firsthand/mission.toml");
         put(&mission, "target = [1.0, 0.0]").unwrap();

@@ -1,4 +1,4 @@
-//! `firsthand latency`: what a tick takes, beside what the bus alone takes.
+//! `firsthand latency`: what a tick takes, compared with what the bus alone takes.
 
 use std::{
     fs,
@@ -14,7 +14,7 @@ use super::{Failure, missions};
 use chaos::ipc_bench;
 use supervisor::process;
 
-/// Measure a tick, datagram in to datagram out, beside five bare hops between processes.
+/// Measure a tick, datagram in to datagram out, and five bare hops between processes.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The mission whose ticks are measured.
@@ -32,20 +32,20 @@ pub(crate) struct Arguments {
     /// One line of JSON.
     #[arg(long)]
     json: bool,
-    /// Name of the robot, and of its corner of shared memory.
+    /// Name of the robot, which also names its shared memory.
     #[arg(long)]
     robot: Option<RobotName>,
-    /// Be the forwarder in the place of this stage.
+    /// Be the forwarder that stands for this stage.
     #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
     forwarder: Option<String>,
-    /// The process that must live for this one to live.
+    /// The parent process: this one stops when it ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
 }
 
-/// Trips of a round where they follow each other without a pause.
+/// Samples of a round that follow each other without a pause.
 const TRIPS: u64 = 2000;
-/// The same where each has the pause of a tick.
+/// The same with the pause of a tick between them.
 const PACED_TRIPS: u64 = 50;
 
 /// What was measured, microseconds.
@@ -57,7 +57,7 @@ struct Report {
     trips: u64,
     hops_p50_us: f64,
     hops_p99_us: f64,
-    /// Of the medians.
+    /// Ratio of the medians, tick to hops.
     ratio: f64,
 }
 
@@ -75,7 +75,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         None => format!("latency{}", std::process::id()).parse()?,
     };
     if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
-        ipc_bench::live(&robot, place, supervisor)?;
+        ipc_bench::run_forwarder(&robot, place, supervisor)?;
         return Ok(ExitCode::SUCCESS);
     }
     let mission = missions::load(&arguments.mission, &arguments.set)?;
@@ -121,7 +121,7 @@ fn report(hops: &Histogram, trips: u64, ticks: &mut [Ticks]) -> Option<Report> {
     })
 }
 
-/// Run the mission, in processes of its own as always.
+/// Run the mission.
 fn measure_ticks(arguments: &Arguments, robot: &RobotName) -> Result<Ticks, Failure> {
     let directory = std::env::temp_dir().join(format!("firsthand-{robot}"));
     let (robot, pace) = (robot.to_string(), arguments.pace.to_string());
@@ -136,8 +136,8 @@ fn measure_ticks(arguments: &Arguments, robot: &RobotName) -> Result<Ticks, Fail
         .output()?;
     let _ = fs::remove_dir_all(&directory);
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).map_err(|_| {
-        let said = String::from_utf8_lossy(&output.stderr);
-        format!("the mission gave no summary: {}", said.trim())
+        let errors = String::from_utf8_lossy(&output.stderr);
+        format!("the mission gave no summary: {}", errors.trim())
     })?;
     let latency = |share| summary["tick_latency_us"][share].as_f64();
     let (Some(p50_us), Some(p99_us)) = (latency("p50"), latency("p99")) else {

@@ -24,7 +24,7 @@ macro_rules! shipped {
 /// Name and text of every shipped mission.
 pub(crate) static SHIPPED: [(&str, &str); 3] = shipped!("open-room", "obstacle-course", "trap");
 
-/// A mission that cannot be had.
+/// Why a mission cannot be loaded.
 #[derive(Debug, Error)]
 pub(crate) enum LookupError {
     #[error("no shipped mission is called {name:?}; shipped are {}", names())]

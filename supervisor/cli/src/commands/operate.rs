@@ -1,53 +1,55 @@
-//! `firsthand stop`, `resume`, `restart`, `kill`, `freeze`, `thaw`: an operator's hand on a robot that runs.
+//! `firsthand stop`, `resume`, `restart`, `kill`, `freeze`, `thaw`: what an operator does to a robot that runs.
 
-use std::{
-    process::ExitCode,
-    time::{Duration, Instant},
-};
+use std::{process::ExitCode, time::Duration};
 
 use clap::Args;
 use common::{
-    bus::{Bus, SliceReader},
+    bus::Bus,
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
+    roster::Roster,
     samples::{RequestKind, RequestSample, RosterEntry, RosterHeader, name, name_str},
     topics,
-    waiter::Waiter,
 };
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::Failure;
 use supervisor::stages;
 
-/// Whose robot.
+/// Which robot.
 #[derive(Debug, Args)]
-pub(crate) struct Whose {
+pub(crate) struct Robot {
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
-    robot: RobotName,
+    #[arg(
+        id = "robot",
+        long = "robot",
+        value_name = "ROBOT",
+        default_value = "x80"
+    )]
+    name: RobotName,
 }
 
 /// Let the robot stand until `firsthand resume`; the mission goes on then.
 #[derive(Debug, Args)]
 pub(crate) struct Stop {
     #[command(flatten)]
-    whose: Whose,
+    robot: Robot,
 }
 
-/// Let a robot go on that was told to stop.
+/// Let a stopped robot go on.
 #[derive(Debug, Args)]
 pub(crate) struct Resume {
     #[command(flatten)]
-    whose: Whose,
+    robot: Robot,
 }
 
-/// Give a stage a fresh life; one that died too often and is held is released.
+/// Replace a stage by a new generation; one that died too often and is held is released.
 #[derive(Debug, Args)]
 pub(crate) struct Restart {
     /// The stage (`firsthand stages`).
     stage: String,
     #[command(flatten)]
-    whose: Whose,
+    robot: Robot,
 }
 
 /// Send a stage a signal, SIGKILL if no other is named, to see what happens.
@@ -59,16 +61,16 @@ pub(crate) struct Kill {
     #[arg(long, default_value = "KILL", value_parser = signal)]
     signal: Signal,
     #[command(flatten)]
-    whose: Whose,
+    robot: Robot,
 }
 
-/// Stop a stage's process in its tracks: it hangs, as far as the others can tell.
+/// Freeze a stage's process: it hangs, as far as others can see.
 #[derive(Debug, Args)]
 pub(crate) struct Freeze {
     /// The stage (`firsthand stages`), or `supervisor`.
     stage: String,
     #[command(flatten)]
-    whose: Whose,
+    robot: Robot,
 }
 
 /// Let a frozen stage's process go on.
@@ -77,35 +79,35 @@ pub(crate) struct Thaw {
     /// The stage (`firsthand stages`), or `supervisor`.
     stage: String,
     #[command(flatten)]
-    whose: Whose,
+    robot: Robot,
 }
 
-/// The roster comes five times a second; a frozen supervisor says nothing.
+/// The roster comes five times a second; a frozen supervisor publishes none.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(crate) fn stop(arguments: &Stop) -> Result<ExitCode, Failure> {
-    ask(&arguments.whose.robot, RequestKind::Stop, "")
+    ask(&arguments.robot.name, RequestKind::Stop, "")
 }
 
 pub(crate) fn resume(arguments: &Resume) -> Result<ExitCode, Failure> {
-    ask(&arguments.whose.robot, RequestKind::Resume, "")
+    ask(&arguments.robot.name, RequestKind::Resume, "")
 }
 
 pub(crate) fn restart(arguments: &Restart) -> Result<ExitCode, Failure> {
     let stage = known(&arguments.stage)?;
-    ask(&arguments.whose.robot, RequestKind::Restart, stage)
+    ask(&arguments.robot.name, RequestKind::Restart, stage)
 }
 
 pub(crate) fn kill(arguments: &Kill) -> Result<ExitCode, Failure> {
-    send(&arguments.whose.robot, &arguments.stage, arguments.signal)
+    send(&arguments.robot.name, &arguments.stage, arguments.signal)
 }
 
 pub(crate) fn freeze(arguments: &Freeze) -> Result<ExitCode, Failure> {
-    send(&arguments.whose.robot, &arguments.stage, Signal::STOP)
+    send(&arguments.robot.name, &arguments.stage, Signal::STOP)
 }
 
 pub(crate) fn thaw(arguments: &Thaw) -> Result<ExitCode, Failure> {
-    send(&arguments.whose.robot, &arguments.stage, Signal::CONT)
+    send(&arguments.robot.name, &arguments.stage, Signal::CONT)
 }
 
 /// A stage of the table.
@@ -116,14 +118,13 @@ pub(crate) fn known(stage: &str) -> Result<&'static str, Failure> {
     }
 }
 
-/// Say it to the supervisor, and wait until it has heard.
+/// Send a request to the supervisor, and wait until it has taken it.
 fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<ExitCode, Failure> {
     let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
-    let mut roster = bus.slice_reader(&topics::ROSTER)?;
-    let mut waiter = Waiter::default();
-    waiter.on(bus.wakeup(&topics::ROSTER)?);
+    // Opened first: the confirmation must not be missed.
+    let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
-    let id = fresh_id();
+    let id = new_id();
     let request = RequestSample {
         id,
         stage: name(stage),
@@ -131,20 +132,20 @@ fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<ExitCode, Fa
         ..RequestSample::default()
     };
     requests.publish(0, MissionTime::default(), request)?;
-    await_roster(&mut roster, &waiter, robot, |header, _| {
+    find(&mut roster, robot, |header, _| {
         (header.last_request == id).then_some(ExitCode::SUCCESS)
     })
 }
 
-/// A name for a request: no two processes ask in the same nanosecond of one boot under one pid.
-pub(crate) fn fresh_id() -> u64 {
+/// An id for a request: no two processes ask in the same nanosecond of one boot with one pid.
+pub(crate) fn new_id() -> u64 {
     monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1
 }
 
 /// Send a signal to a process of the robot.
 fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<ExitCode, Failure> {
     let domain = Domain::of(robot.clone());
-    // One that is frozen says nothing, so its name is read off the lock it holds.
+    // A frozen supervisor publishes nothing, so its process id is read from its lock file.
     let pid = if stage == "supervisor" {
         std::fs::read_to_string(domain.lock_file())
             .ok()
@@ -162,39 +163,26 @@ fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<ExitCode, Fail
 /// The process that the roster names for `stage`.
 fn pid_of(domain: &Domain, stage: &str) -> Result<Option<i32>, Failure> {
     let bus = Bus::join(domain, "operator")?;
-    let mut roster = bus.slice_reader(&topics::ROSTER)?;
-    let mut waiter = Waiter::default();
-    waiter.on(bus.wakeup(&topics::ROSTER)?);
-    await_roster(&mut roster, &waiter, &domain.robot, |_, entries| {
+    find(&mut Roster::open(&bus)?, &domain.robot, |_, entries| {
         let mut entries = entries.iter();
         let entry = entries.find(|entry| name_str(&entry.stage) == stage)?;
         Some((entry.pid != 0).then_some(entry.pid.cast_signed()))
     })
 }
 
-/// Look at each roster until `is_it` finds what it looks for.
-pub(crate) fn await_roster<T>(
-    roster: &mut SliceReader<RosterHeader, RosterEntry>,
-    waiter: &Waiter,
+/// What `find` finds in a roster first.
+pub(crate) fn find<T>(
+    roster: &mut Roster,
     robot: &RobotName,
-    is_it: impl Fn(&RosterHeader, &[RosterEntry]) -> Option<T>,
+    find: impl Fn(&RosterHeader, &[RosterEntry]) -> Option<T>,
 ) -> Result<T, Failure> {
-    let began = Instant::now();
-    loop {
-        while let Some(entries) = roster.take()? {
-            if let Some(found) = is_it(entries.header(), &entries) {
-                return Ok(found);
-            }
-        }
-        let left = PATIENCE.saturating_sub(began.elapsed());
-        if left.is_zero() {
-            return Err(format!(
-                "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand thaw supervisor`)"
-            )
-            .into());
-        }
-        waiter.wait(left)?;
-    }
+    let found = roster.find(PATIENCE, find)?;
+    found.ok_or_else(|| {
+        format!(
+            "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand thaw supervisor`)"
+        )
+        .into()
+    })
 }
 
 /// A signal by its name.

@@ -21,19 +21,19 @@ use supervisor::{
     recovery::{self, RecoveredRun, SUMMARY},
 };
 
-/// Carry out a mission: bring up a robot's stages, let it drive, sum up.
+/// Carry out a mission: start a robot's stages, let it drive, summarise.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A shipped mission (`firsthand missions`) or a mission file.
     #[arg(default_value = "obstacle-course")]
     mission: String,
-    /// Name of the robot, and of its corner of shared memory.
+    /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
     /// Mission time of a simulated robot: `max`, or R times wall-clock.
     #[arg(long, default_value = "max")]
     pace: Pace,
-    /// Seed of everything random in the simulation, over the mission's.
+    /// Seed of everything random in the simulation, in place of the mission's.
     #[arg(long)]
     seed: Option<u64>,
     /// Where logs, checkpoints, summary and picture go; a new directory below --runs otherwise.
@@ -42,19 +42,18 @@ pub(crate) struct Arguments {
     /// Where the directories of runs are made.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// Go on with the run in DIR, whose supervisor died. The robot stands where it came to rest, and must not have
-    /// been carried since.
+    /// Go on with the run in DIR, whose supervisor was killed. The robot must stand where it came to rest.
     #[arg(
         long,
         value_name = "DIR",
         conflicts_with_all = ["mission", "robot", "pace", "seed", "out", "timeout", "set"]
     )]
     resume: Option<PathBuf>,
-    /// Go on with the newest run below --runs if it was cut off within the last minute; say so instead of starting,
-    /// once, if that was before: the robot is not where its mission starts. For services, which systemd starts again.
+    /// Go on with the newest run below --runs if it was cut off within the last minute. If that was before, report it once
+    /// instead of starting: the robot is not where its mission starts. For services, which systemd starts again.
     #[arg(long, conflicts_with_all = ["resume", "out"])]
     resume_last: bool,
-    /// Mission seconds after which to give up, over the mission's.
+    /// Mission seconds after which to give up, in place of the mission's.
     #[arg(long, value_name = "S")]
     timeout: Option<f64>,
     /// KEY=VALUE over the mission file, as often as needed: `--set start.heading_deg=90`.
@@ -84,7 +83,7 @@ impl Default for Arguments {
     }
 }
 
-/// A run to carry out; none when one was cut off too long ago, and that was said.
+/// A run to carry out; none when one was cut off too long ago, which is reported.
 fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     if let Some(directory) = &arguments.resume {
         return resumed(arguments, fs::canonicalize(directory)?).map(Some);
@@ -98,7 +97,7 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
         directories::mark_cut_off(&cut)?;
         let cut = cut.display();
         eprintln!(
-            "firsthand: {cut} was cut off on its way, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`"
+            "firsthand: {cut} was cut off, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`"
         );
         return Ok(None);
     }
@@ -132,7 +131,7 @@ fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure
 
 fn starter(arguments: &Arguments) -> Starter {
     if arguments.watch_only {
-        Starter::Another
+        Starter::External
     } else {
         Starter::Supervisor
     }
@@ -162,13 +161,13 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::from(CUT_OFF));
     };
     let directory = &options.directory;
-    // The supervisor's own log lies beside its stages'.
+    // The supervisor's log goes where its stages' logs are.
     logging::to_file(&directory.join("supervisor.log"), "info")?;
     let mut console = Console::new(&options);
     let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
         Ok(finished) => finished,
         Err(error) => {
-            // A directory made for a run that never was is litter.
+            // The directory was made for a run that did not begin.
             if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
                 let _ = fs::remove_dir_all(directory);
             }
@@ -176,7 +175,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     };
     console.end();
-    let summary = Summary::of(&options.mission, &finished);
+    let summary = Summary::new(&options.mission, &finished);
     let json = serde_json::to_string(&summary)?;
     fs::write(directory.join(SUMMARY), format!("{json}\n"))?;
     if arguments.json {
@@ -184,24 +183,23 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     } else {
         print!("{summary}");
     }
-    // Drawn last: the result does not depend on it.
+    // Drawn last, and without effect on the result.
     #[cfg(feature = "tools")]
     {
         let picture = directory.join("picture.svg");
-        fs::write(
-            &picture,
-            run_picture::svg(&options.mission, &finished, &summary),
-        )?;
-        if !arguments.json {
-            println!("picture: {}", picture.display());
+        let svg = run_picture::svg(&options.mission, &finished, &summary);
+        match fs::write(&picture, svg) {
+            Ok(()) if arguments.json => {}
+            Ok(()) => println!("picture: {}", picture.display()),
+            Err(error) => tracing::warn!(%error, "cannot write the picture"),
         }
     }
     Ok(exit_code(&summary, &finished.ending))
 }
 
-/// A robot that stands unsupervised for longer may have been carried.
+/// A robot that stands without a supervisor for longer may have been moved.
 const RESUMED_WITHIN_S: f64 = 60.0;
-/// What `--resume-last` ends with instead of starting.
+/// The exit code of `--resume-last` when it does not start.
 const CUT_OFF: u8 = 7;
 
 /// The documented code.
@@ -218,8 +216,8 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
-/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere, none in a
-/// journal: systemd is told it as the service's status.
+/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere, none in a journal, where
+/// it is the service's status.
 struct Console {
     rewrites: bool,
     silent: bool,
@@ -227,7 +225,7 @@ struct Console {
     title: String,
 }
 
-/// Where lines cannot be rewritten they come so seldom.
+/// Time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 impl Console {
@@ -261,24 +259,24 @@ impl Console {
             return;
         }
         if self.shown.replace(Instant::now()).is_none() {
-            say(&format!("{}\n", self.title));
+            write_stderr(&format!("{}\n", self.title));
         }
         if self.rewrites {
-            say(&format!("\r\x1b[K{progress}"));
+            write_stderr(&format!("\r\x1b[K{progress}"));
         } else if !self.silent {
-            say(&format!("{progress}\n"));
+            write_stderr(&format!("{progress}\n"));
         }
     }
 
     fn end(&self) {
         if self.rewrites {
-            say("\n");
+            write_stderr("\n");
         }
     }
 }
 
-/// On standard error; a reader that went away does not end the mission.
-fn say(text: &str) {
+/// Write to standard error; a reader that was closed does not end the mission.
+fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
     let _ = stderr
         .write_all(text.as_bytes())

@@ -1,4 +1,4 @@
-//! `firsthand sim MISSION`: a simulated X80 to drive with anything that speaks its protocol.
+//! `firsthand sim MISSION`: a simulated X80 for any software that speaks its protocol.
 
 use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
@@ -32,10 +32,10 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Keep in this file how the robot stands; if it is there, go on from it.
+    /// Checkpoint of the robot; if the file is there, go on from it.
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
-    /// Write the ground truth, a JSON object a line, on standard output.
+    /// Write the ground truth to standard output, a JSON object a line.
     #[arg(long)]
     ground_truth: bool,
     /// End when this process, the parent, ends.
@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     supervisor: Option<u32>,
 }
 
-/// How the robot is spoken to.
+/// How the robot is reached.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum Transport {
     #[default]

@@ -1,4 +1,4 @@
-//! `firsthand stage NAME`: the process of one stage. The supervisor starts these, or leaves it to systemd.
+//! `firsthand stage NAME`: the process of one stage, started by the supervisor, by systemd or by a person.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -16,19 +16,19 @@ use supervisor::stages;
 pub(crate) struct Arguments {
     /// Its name in the table (`firsthand stages`).
     name: String,
-    /// Whose, where the supervisor only watches; it says the rest.
+    /// Name of the robot, where the supervisor only watches.
     #[arg(long, default_value = "x80", conflicts_with = "supervisor")]
     robot: RobotName,
-    /// The process that must live for this one to live, the parent.
+    /// The parent process: this one stops when it ends.
     #[arg(long, hide = true, requires = "run")]
     supervisor: Option<u32>,
     /// The run directory.
     #[arg(long, hide = true, requires = "supervisor")]
     run: Option<PathBuf>,
-    /// Which life of the stage this is.
+    /// The generation of the stage.
     #[arg(long, hide = true, requires = "supervisor", default_value_t = 1)]
     generation: u32,
-    /// Ticks before this one are another life's.
+    /// Ticks before this one are an earlier generation's.
     #[arg(long, hide = true, requires = "supervisor", default_value_t = 0)]
     first_tick: u64,
 }
@@ -50,7 +50,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             robot: arguments.robot.clone(),
         },
     };
-    match (stage.live)(&start) {
+    match (stage.run)(&start) {
         Ok(()) => Ok(ExitCode::SUCCESS),
         Err(StageError::Bus(error)) => {
             eprintln!("firsthand: {error}");

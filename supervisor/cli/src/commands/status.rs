@@ -1,4 +1,4 @@
-//! `firsthand status`: what runs, and how the robot is.
+//! `firsthand status`: the stages of a robot, its link and its batteries.
 
 use std::{
     fmt,
@@ -10,11 +10,11 @@ use clap::Args;
 use common::{
     bus::Bus,
     domain::{Domain, RobotName},
+    roster::Roster,
     samples::{
         Action, HoldReason, LinkSample, Order, PowerSample, RosterEntry, StageState, name_str,
     },
     topics,
-    waiter::Waiter,
 };
 
 use serde::Serialize;
@@ -22,11 +22,10 @@ use x80_link::failsafe;
 
 use super::Failure;
 
-/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its wire and its
-/// batteries.
+/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its link and its batteries.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Whose.
+    /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
     /// One line of JSON; an age of null is never.
@@ -42,20 +41,20 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// None while no link speaks.
+    /// None while no link publishes.
     link: Option<LinkStatus>,
-    /// None while no robot tells.
+    /// None while the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
 }
 
-/// The wire to the robot.
+/// The link to the robot.
 #[derive(Serialize)]
 struct LinkStatus {
     connected: bool,
     /// Whether the link holds the robot still.
     stopped: bool,
-    /// What its failsafe makes of the robot: goes, stands and the like.
+    /// What the robot does by its failsafe: goes, stands and the like.
     robot: &'static str,
     /// Why; none while it goes.
     cause: Option<&'static str>,
@@ -93,40 +92,38 @@ struct StageStatus<'a> {
 
 /// The roster comes five times a second.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The link speaks ten times a second, and a robot that answers several times.
-const WIRE_PATIENCE: Duration = Duration::from_millis(400);
+/// The link publishes ten times a second, and a robot reports its batteries several times.
+const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
 #[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
-    let mut roster = bus.slice_reader(&topics::ROSTER)?;
+    let mut roster = Roster::open(&bus)?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut powers = bus.reader(&topics::POWER)?;
-    let mut waiter = Waiter::default();
-    waiter.on(bus.wakeup(&topics::ROSTER)?);
-    waiter.on(bus.wakeup(&topics::LINK)?);
-    waiter.on(bus.wakeup(&topics::POWER)?);
+    roster.waiter.on(bus.wakeup(&topics::LINK)?);
+    roster.waiter.on(bus.wakeup(&topics::POWER)?);
     let began = Instant::now();
     let (mut entries, mut link, mut power) = (None, None, None);
     let entries = loop {
-        entries = roster.take()?.or(entries);
+        entries = roster.samples.take()?.or(entries);
         link = links.newest()?.or(link);
         power = powers.newest()?.or(power);
         let lost = link.is_some_and(|link| link.connected == 0);
         let all = link.is_some() && (power.is_some() || lost);
-        if (all || began.elapsed() >= WIRE_PATIENCE)
+        if (all || began.elapsed() >= LINK_PATIENCE)
             && let Some(entries) = entries.take()
         {
             break entries;
         }
         if began.elapsed() >= PATIENCE {
             return Err(format!(
-                "robot {:?} has a bus but no supervisor that speaks; start it anew with `firsthand run`",
+                "robot {:?} has a bus but no supervisor that publishes; start it again with `firsthand run`",
                 arguments.robot.to_string()
             )
             .into());
         }
-        waiter.wait(WIRE_PATIENCE)?;
+        roster.waiter.wait(LINK_PATIENCE)?;
     };
     let header = entries.header();
     let status = Status {
@@ -285,7 +282,7 @@ impl fmt::Display for PowerStatus {
     }
 }
 
-/// u64::MAX nanoseconds are never.
+/// Seconds of so many nanoseconds; u64::MAX stands for never.
 fn seconds(nanoseconds: u64) -> Option<f64> {
     (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
 }

@@ -109,7 +109,7 @@ fn stage_table() -> String {
             stage.deadlines.startup.as_millis(),
             stage.deadlines.heartbeat.as_millis(),
             stage.deadlines.answers.as_millis(),
-            stage.million_cells.as_millis(),
+            stage.per_million_cells.as_millis(),
             stage.while_down
         );
     }

@@ -1,4 +1,4 @@
-//! The rules one by one, then all of them against a plain progress of one process, over every short history and a
+//! The rules one by one, then all of them against a plain model of one process, over every short history and a
 //! great many long ones.
 
 use std::collections::HashSet;
@@ -44,7 +44,7 @@ fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
     assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
 }
 
-/// Dies as soon as it is started, until it is held; the time of that.
+/// It exits as soon as it is started, until it is held. Returns the time of that.
 fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
     for _ in 0..100 {
         policy.step(Event::Exited, now);
@@ -56,11 +56,11 @@ fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
             assert_eq!(policy.step(Event::Time, now), Some(Action::Start));
         }
     }
-    panic!("it dies for ever: {policy:?}");
+    panic!("it is never held: {policy:?}");
 }
 
 #[test]
-fn a_stage_that_cannot_live_is_held_within_ten_seconds() {
+fn a_stage_that_cannot_run_is_held_within_ten_seconds() {
     let mut policy = running();
     let held = crash_until_held(&mut policy, ms(20));
     assert!(held < Duration::from_secs(10), "{held:?}");
@@ -87,7 +87,7 @@ fn a_stage_that_never_becomes_ready_is_held_after_twelve_starts() {
 }
 
 #[test]
-fn a_released_stage_starts_with_a_clean_slate() {
+fn a_released_stage_starts_without_a_history() {
     let mut policy = running();
     let held = crash_until_held(&mut policy, ms(20));
     assert_eq!(
@@ -111,7 +111,7 @@ fn a_stage_killed_once_a_second_is_never_held() {
 }
 
 #[test]
-fn a_stage_killed_again_and_again_is_held_though_it_was_well_in_between() {
+fn a_stage_killed_again_and_again_is_held_though_it_was_stable_in_between() {
     let mut policy = running();
     for death in 1..12 {
         assert_eq!(
@@ -125,7 +125,7 @@ fn a_stage_killed_again_and_again_is_held_though_it_was_well_in_between() {
 }
 
 #[test]
-fn a_life_that_was_well_clears_the_deaths_before_it() {
+fn a_stable_generation_clears_the_deaths_before_it() {
     let mut policy = running();
     policy.step(Event::Exited, ms(20));
     policy.step(Event::BeatReady, ms(30));
@@ -162,7 +162,7 @@ fn a_stage_that_never_becomes_ready_is_aborted() {
 }
 
 #[test]
-fn a_bus_that_lets_no_life_begin_is_made_anew_once() {
+fn a_bus_that_blocks_starts_is_recreated_once() {
     for refused in [false, true] {
         let mut policy = running();
         let mut now = ms(600);
@@ -191,7 +191,7 @@ fn a_bus_that_lets_no_life_begin_is_made_anew_once() {
 }
 
 #[test]
-fn a_life_that_began_speaks_for_the_bus() {
+fn a_generation_that_became_ready_clears_the_bus() {
     let mut policy = running();
     for second in 1..5 {
         policy.step(Event::Exited, ms(second * 1000));
@@ -206,7 +206,7 @@ fn a_life_that_began_speaks_for_the_bus() {
 }
 
 #[test]
-fn a_replaced_stage_is_asked_to_go_and_followed_and_has_not_died() {
+fn a_replaced_stage_is_told_to_stop_and_followed_and_has_not_died() {
     let mut policy = running();
     for turn in 1..100 {
         let now = ms(turn * 50);
@@ -247,7 +247,7 @@ fn a_stopped_stage_is_not_followed_and_killed_if_it_stays() {
 
 /// One process and its policy: what is true of the process, written down without a look at the phases.
 #[derive(Clone, PartialEq, Eq, Hash)]
-struct Progress {
+struct Model {
     policy: Policy,
     now: Now,
     /// The process, if there is one.
@@ -256,7 +256,7 @@ struct Progress {
     wanted: bool,
     /// Held, until somebody starts it.
     held: bool,
-    /// Deaths, when they happened: those in a row, of no generation that was well, and the last wait between them.
+    /// Deaths, when they happened: those in a row, of no generation that was stable, and the last wait between them.
     deaths: Vec<Now>,
     row: usize,
     wait: Duration,
@@ -266,12 +266,12 @@ struct Progress {
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Generation {
     ready: Option<Now>,
-    /// When it was last known well; its start counts.
+    /// Its last sign; its start counts.
     sign: Now,
-    /// Told to go: to make room, or for good. Nobody's word makes that a death.
-    leaves: bool,
+    /// Asked to stop, for a successor or for good: that is no death.
+    stopping: bool,
     /// Aborted.
-    late: bool,
+    aborted: bool,
     /// When it is to be killed.
     kill: Option<Now>,
 }
@@ -289,7 +289,7 @@ const EVENTS: [Event; 10] = [
     Event::Time,
 ];
 
-impl Progress {
+impl Model {
     fn new() -> Self {
         Self {
             policy: Policy::new(TABLE[0].deadlines),
@@ -304,13 +304,13 @@ impl Progress {
         }
     }
 
-    /// Whether the world lets that happen: only what lives can beat or end.
+    /// Whether that can happen: only a process can beat or end.
     fn can(&self, event: Event) -> bool {
         match event {
             Event::Start => self.generation.is_none(),
-            // Told in the moment of the start.
+            // Known in the moment of the start.
             Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
-                generation.sign == self.now && generation.ready.is_none() && !generation.leaves
+                generation.sign == self.now && generation.ready.is_none() && !generation.stopping
             }),
             Event::BeatStarting
             | Event::BeatReady
@@ -321,7 +321,7 @@ impl Progress {
         }
     }
 
-    /// When the clock must be looked at, by the promises alone.
+    /// When the clock must be looked at, by the rules alone.
     fn due(&self) -> Option<Now> {
         match &self.generation {
             Some(generation) => Some(generation.kill.unwrap_or_else(|| match generation.ready {
@@ -335,7 +335,7 @@ impl Progress {
         }
     }
 
-    /// What must be done by the promises alone.
+    /// What must be done by the rules alone.
     fn expect(&mut self, event: Event) -> Option<Action> {
         let now = self.now;
         let due = self.due().is_some_and(|due| now >= due);
@@ -366,30 +366,30 @@ impl Progress {
                 generation.kill = Some(now + ms(100));
                 Some(Action::Kill)
             }
-            Event::Time if due => self.late(),
+            Event::Time if due => self.abort(),
             Event::OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
                 generation.sign = now;
-                self.late()
+                self.abort()
             }
-            Event::Replace if self.wanted && !generation.leaves => {
-                generation.leaves = true;
-                let told = generation.kill.is_none();
+            Event::Replace if self.wanted && !generation.stopping => {
+                generation.stopping = true;
+                let running = generation.kill.is_none();
                 generation.kill.get_or_insert(now + ms(300));
-                told.then_some(Action::Terminate)
+                running.then_some(Action::Terminate)
             }
             Event::Stop if self.wanted => {
-                (generation.leaves, generation.kill) = (true, Some(now + ms(300)));
+                (generation.stopping, generation.kill) = (true, Some(now + ms(300)));
                 self.wanted = false;
                 Some(Action::Terminate)
             }
             Event::StartFailed => self.death(true, false),
             Event::Exited => {
-                let jam = generation.late && generation.ready.is_none();
-                self.death(false, jam)
+                let blocked = generation.aborted && generation.ready.is_none();
+                self.death(false, blocked)
             }
             Event::Refused => {
-                let jam = generation.ready.is_none();
-                self.death(false, jam)
+                let blocked = generation.ready.is_none();
+                self.death(false, blocked)
             }
             _ => None,
         }
@@ -400,26 +400,26 @@ impl Progress {
         self.generation = Some(Generation {
             ready: None,
             sign: self.now,
-            leaves: false,
-            late: false,
+            stopping: false,
+            aborted: false,
             kill: None,
         });
         Action::Start
     }
 
-    fn late(&mut self) -> Option<Action> {
+    fn abort(&mut self) -> Option<Action> {
         let generation = self.generation.as_mut().unwrap();
-        (generation.late, generation.kill) = (true, Some(self.now + ms(100)));
+        (generation.aborted, generation.kill) = (true, Some(self.now + ms(100)));
         Some(Action::Abort)
     }
 
-    fn death(&mut self, unborn: bool, jam: bool) -> Option<Action> {
+    fn death(&mut self, start_failed: bool, blocked: bool) -> Option<Action> {
         let now = self.now;
         let generation = self.generation.take().unwrap();
-        if generation.leaves {
+        if generation.stopping {
             return self.wanted.then(|| self.begin());
         }
-        let until = if generation.late {
+        let until = if generation.aborted {
             generation.sign
         } else {
             now
@@ -431,19 +431,19 @@ impl Progress {
             self.row = 0;
         }
         self.row += 1;
-        if unborn {
+        if start_failed {
             self.row = self.row.max(2);
         }
         self.deaths.retain(|then| now - *then < ms(10_000));
         self.deaths.push(now);
-        self.blocked_starts += u32::from(jam);
+        self.blocked_starts += u32::from(blocked);
         if self.deaths.len() >= 12 || self.row >= 12 {
             self.held = true;
             return None;
         }
         let waits = [0, 0, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1000];
         self.wait = ms(waits[self.row.min(11)]);
-        if jam && self.blocked_starts == 2 {
+        if blocked && self.blocked_starts == 2 {
             return Some(Action::RecreateBus);
         }
         self.wait.is_zero().then(|| self.begin())
@@ -461,9 +461,9 @@ impl Progress {
             phase == Phase::Down,
             self.generation.is_none() && !self.wanted
         );
-        let processless = matches!(phase, Phase::Down | Phase::Held | Phase::BackingOff { .. });
+        let no_process = matches!(phase, Phase::Down | Phase::Held | Phase::BackingOff { .. });
         assert_eq!(
-            processless,
+            no_process,
             self.generation.is_none(),
             "{event:?}: {phase:?}"
         );
@@ -479,7 +479,7 @@ impl Progress {
         pauses
     }
 
-    /// The same with the clock set back: two accounts of equal ages are one.
+    /// The same with the clock set back: two models of equal ages are equal.
     fn at_zero(&self) -> Self {
         // A common origin of all times, so that what lies behind stays behind.
         const ORIGIN: Duration = Duration::from_secs(100);
@@ -493,7 +493,7 @@ impl Progress {
             Phase::Down | Phase::Held => {}
             Phase::BackingOff { until: then }
             | Phase::Starting { since: then }
-            | Phase::Late { kill: then, .. }
+            | Phase::Aborted { kill: then, .. }
             | Phase::Replaced { kill: then }
             | Phase::Stopping { kill: then } => back(then),
             Phase::Running { since, beat } => {
@@ -512,23 +512,23 @@ impl Progress {
 }
 
 #[test]
-fn every_short_history_keeps_every_promise() {
+fn every_short_history_keeps_every_rule() {
     let mut seen = HashSet::new();
-    let mut newest = vec![Progress::new().at_zero()];
+    let mut newest = vec![Model::new().at_zero()];
     let mut cases = 0_u64;
     for _ in 0..6 {
         let mut next = Vec::new();
-        for progress in newest {
-            for pause in progress.moments() {
+        for model in newest {
+            for pause in model.moments() {
                 for event in EVENTS {
-                    let mut progress = progress.clone();
-                    progress.now += pause;
-                    if progress.can(event) {
+                    let mut model = model.clone();
+                    model.now += pause;
+                    if model.can(event) {
                         cases += 1;
-                        progress.step(event);
-                        let progress = progress.at_zero();
-                        if seen.insert(progress.clone()) {
-                            next.push(progress);
+                        model.step(event);
+                        let model = model.at_zero();
+                        if seen.insert(model.clone()) {
+                            next.push(model);
                         }
                     }
                 }
@@ -536,25 +536,25 @@ fn every_short_history_keeps_every_promise() {
         }
         newest = next;
     }
-    println!("{cases} cases, {} accounts", seen.len());
+    println!("{cases} cases, {} models", seen.len());
 }
 
 #[test]
-fn two_million_steps_of_long_histories_keep_every_promise() {
+fn two_million_steps_of_long_histories_keep_every_rule() {
     let mut chance = Pcg64::new(5, 5);
     let mut phases = HashSet::new();
     let mut actions = 0_u64;
     for history in 0..2_000 {
-        let mut progress = Progress::new();
-        // Some worlds are kind, some are not: how likely each event is differs.
+        let mut model = Model::new();
+        // How likely each event is differs from history to history.
         let weights: Vec<u64> = EVENTS.iter().map(|_| chance.next_u64() % 100).collect();
         let sum: u64 = weights.iter().sum::<u64>().max(1);
         for _ in 0..1_000 {
-            let moments = progress.moments();
+            let moments = model.moments();
             let pause = moments[chance.next_u64() as usize % moments.len()];
-            // Mostly the short ones: what is long after anything forgets.
+            // Mostly the short ones: after a long pause earlier events no longer matter.
             if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
-                progress.now += pause;
+                model.now += pause;
             }
             let mut pick = chance.next_u64() % sum;
             let event = EVENTS.iter().zip(&weights).find(|(_, weight)| {
@@ -563,15 +563,15 @@ fn two_million_steps_of_long_histories_keep_every_promise() {
                 found
             });
             let event = *event.map_or(&Event::Time, |(event, _)| event);
-            if progress.can(event) {
-                progress.step(event);
+            if model.can(event) {
+                model.step(event);
                 actions += 1;
-                phases.insert(std::mem::discriminant(&progress.policy.phase()));
+                phases.insert(std::mem::discriminant(&model.policy.phase()));
             }
-            assert!(progress.policy.recent_deaths() <= 12, "history {history}");
+            assert!(model.policy.recent_deaths() <= 12, "history {history}");
         }
     }
-    // The walk has been everywhere.
+    // Every phase was visited.
     assert_eq!(phases.len(), 8);
     assert!(actions > 1_000_000, "{actions}");
 }

@@ -1,0 +1,30 @@
+//! What is attacked, and how.
+
+use std::path::PathBuf;
+
+use common::{clock::Pace, domain::RobotName, mission::Mission};
+
+/// What is attacked, and how.
+pub struct Options {
+    /// The mission, by name or file, as given to `firsthand run`.
+    pub mission: String,
+    /// The same mission, with its overrides.
+    pub loaded: Mission,
+    /// The overrides, `KEY=VALUE`.
+    pub set: Vec<String>,
+    /// The robot that is attacked.
+    pub robot: RobotName,
+    /// The missions' pace, on the wall clock.
+    pub pace: Pace,
+    /// Signals to send in all.
+    pub kills: u32,
+    /// Seed of the schedule; the missions' seeds count up from it.
+    pub seed: u64,
+    /// Whether some signals hit a successor in its first milliseconds.
+    pub startup: bool,
+    /// Whether the supervisor is hit too; its run is resumed then. The robot is a process of its own in that case,
+    /// as a real one is.
+    pub supervisor: bool,
+    /// Where the run directories go; emptied mission by mission.
+    pub directory: PathBuf,
+}

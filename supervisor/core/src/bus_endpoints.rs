@@ -1,0 +1,142 @@
+//! All that the supervisor reads from and writes to one bus. It goes and comes with the bus.
+
+use std::{
+    io,
+    rc::Rc,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, BusError, Reader, SliceWriter, Writer},
+    clock::MissionTime,
+    samples::{
+        DeathSample, DirectiveSample, PoseSample, RequestSample, RosterEntry, RosterHeader,
+        StallSample,
+    },
+    topics,
+    waiter::Waiter,
+};
+
+use crate::{
+    domain::DomainLock,
+    error::{SupervisorError, system},
+    observer::{Observer, Record},
+    stages,
+};
+
+/// The supervisor's endpoints on the bus.
+pub(crate) struct BusEndpoints {
+    /// What the stages publish.
+    pub observer: Observer,
+    /// Wakes for heartbeats, ends of ticks and requests.
+    pub waiter: Waiter,
+    directive: Writer<DirectiveSample>,
+    roster: SliceWriter<RosterHeader, RosterEntry>,
+    deaths: Writer<DeathSample>,
+    stalls: Writer<StallSample>,
+    requests: Reader<RequestSample>,
+    /// The request that was taken last; 0 for none.
+    last_request: u64,
+    published: Option<Instant>,
+    // Dropped last.
+    bus: Rc<Bus>,
+}
+
+impl BusEndpoints {
+    /// Open all on the bus of `lock`.
+    pub(crate) fn open(lock: &DomainLock) -> Result<Self, SupervisorError> {
+        Self::continued(lock, Record::default(), 0)
+    }
+
+    /// Open all, to go on with what was read on an earlier bus.
+    fn continued(
+        lock: &DomainLock,
+        record: Record,
+        last_request: u64,
+    ) -> Result<Self, SupervisorError> {
+        let bus = lock.bus();
+        let bus = bus.ok_or_else(|| system("open the bus")(io::ErrorKind::NotConnected.into()))?;
+        let mut waiter = Waiter::default();
+        let observer = Observer::new(&bus, &mut waiter, record)?;
+        waiter.on(bus.wakeup(&topics::REQUESTS)?);
+        Ok(Self {
+            observer,
+            waiter,
+            directive: bus.writer(&topics::DIRECTIVE, 1)?,
+            roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
+            deaths: bus.writer(&topics::DEATHS, 1)?,
+            stalls: bus.writer(&topics::STALLS, 1)?,
+            requests: bus.reader(&topics::REQUESTS)?,
+            last_request,
+            published: None,
+            bus,
+        })
+    }
+
+    /// Recreate the bus of `lock`, and open all on it.
+    pub(crate) fn recreate(mut self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
+        let mut record = std::mem::take(&mut self.observer.record);
+        // The wire to the robot is opened again by the next link.
+        record.link = None;
+        let last_request = self.last_request;
+        // The old endpoints go before the new bus is made: they would remove its files as their own.
+        drop(self);
+        lock.recreate_bus()?;
+        Self::continued(lock, record, last_request)
+    }
+
+    /// The bus itself.
+    pub(crate) fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    /// The next request of an operator.
+    pub(crate) fn take_request(&mut self) -> Result<Option<RequestSample>, BusError> {
+        let request = self.requests.take()?;
+        if let Some(request) = request {
+            self.last_request = request.id;
+        }
+        Ok(request)
+    }
+
+    /// Whether nothing was published to late joiners for so long.
+    pub(crate) fn is_due(&self, period: Duration) -> bool {
+        self.published.is_none_or(|last| last.elapsed() >= period)
+    }
+
+    /// Publish the order and the roster, as of `tick`.
+    pub(crate) fn publish_state(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        directive: DirectiveSample,
+        header: RosterHeader,
+        entries: Vec<RosterEntry>,
+    ) -> Result<(), BusError> {
+        self.published = Some(Instant::now());
+        self.directive.publish(tick, time, directive)?;
+        let header = RosterHeader {
+            last_request: self.last_request,
+            ..header
+        };
+        self.roster.publish(tick, time, header, entries.into_iter())
+    }
+
+    /// Publish a death. It only reports: a failure is a warning in the log.
+    pub(crate) fn publish_death(&mut self, death: DeathSample) {
+        let stamp = self.observer.record.pose.unwrap_or_default().stamp;
+        warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));
+    }
+
+    /// Publish a stall of the robot at `pose`, likewise.
+    pub(crate) fn publish_stall(&mut self, pose: &PoseSample, stall: StallSample) {
+        let stamp = pose.stamp;
+        warn_if_failed(self.stalls.publish(stamp.tick, stamp.time(), stall));
+    }
+}
+
+fn warn_if_failed(published: Result<(), BusError>) {
+    if let Err(error) = published {
+        tracing::warn!(%error, "cannot publish a record");
+    }
+}

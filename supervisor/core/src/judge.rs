@@ -1,0 +1,151 @@
+//! Whether the mission is over, and how it ended. Pure.
+
+use std::time::{Duration, Instant};
+
+use common::{
+    address::Address,
+    clock::MissionTime,
+    domain::RobotName,
+    samples::{Action, HoldReason, LinkSample},
+};
+use x80_link::failsafe;
+
+use crate::{
+    outcome::{Ending, Outcome},
+    records,
+};
+
+/// A pipeline that makes no tick for so long although nothing holds it is stuck. Wall-clock: a clock of ticks does not
+/// advance meanwhile, so the mission's own timeout would not end it.
+const NO_PROGRESS: Duration = Duration::from_secs(15);
+
+/// What the judgement depends on.
+#[derive(Clone, Debug)]
+pub(crate) struct Snapshot<'a> {
+    /// Distance from the target at which the controller said arrived, metres.
+    pub arrived_m: Option<f64>,
+    /// The newest state of the link.
+    pub link: Option<&'a LinkSample>,
+    /// The robot is a simulated one.
+    pub simulated: bool,
+    /// The process of the simulated robot ended.
+    pub simulator_ended: bool,
+    /// Where a simulated robot is that has touched something, metres.
+    pub collision_m: Option<[f64; 2]>,
+    /// Mission time.
+    pub time: MissionTime,
+    /// Mission time at which the mission is given up, seconds.
+    pub timeout_s: f64,
+    /// Mission time advances with ticks, not with the wall clock.
+    pub in_ticks: bool,
+    /// When the newest tick was first seen, or the order last changed.
+    pub progress: Instant,
+    /// The robot was once ready to drive.
+    pub was_ready: bool,
+    /// Why the robot is not to drive.
+    pub reason: HoldReason,
+    /// Stages that died too often and are held.
+    pub held: Vec<&'static str>,
+    /// Stages that do not run although another should have started them.
+    pub not_started: Vec<&'static str>,
+    /// Name of the robot.
+    pub robot: &'a RobotName,
+    /// Where the robot should answer.
+    pub address: &'a Address,
+}
+
+/// The end of the mission at `now`, if it has come. The first rule that applies decides.
+pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
+    simulator_ended(snapshot)
+        .or_else(|| arrived(snapshot))
+        .or_else(|| ended_by_failsafe(snapshot))
+        .or_else(|| collided(snapshot))
+        .or_else(|| timed_out(snapshot))
+        .or_else(|| stuck(snapshot, now))
+}
+
+fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let reason = "the simulated robot ended; see x80-sim.log";
+    (snapshot.simulator_ended).then(|| Ending::failed(Outcome::Aborted, reason))
+}
+
+fn arrived(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let distance = snapshot.arrived_m?;
+    let reason = format!("{distance:.2} m from the target");
+    Some(Ending::asked_for(Outcome::Reached, reason))
+}
+
+fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let link = snapshot.link.filter(|link| link.action() == Action::End)?;
+    let rule = failsafe::rule(link.cause())?;
+    let reason = format!("{}: {}", rule.name, rule.when);
+    Some(Ending::failed(Outcome::Aborted, reason))
+}
+
+fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let [x, y] = snapshot.collision_m?;
+    let reason = format!("touched something near ({x:.2}, {y:.2})");
+    Some(Ending::failed(Outcome::Collision, reason))
+}
+
+fn timed_out(snapshot: &Snapshot<'_>) -> Option<Ending> {
+    let timeout_s = snapshot.timeout_s;
+    let reason = || format!("not there after {timeout_s} s");
+    (snapshot.time.seconds() >= timeout_s).then(|| Ending::failed(Outcome::Timeout, reason()))
+}
+
+fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
+    let may_wait = match snapshot.reason {
+        // A real robot may be out of reach for as long as it likes.
+        HoldReason::None => !snapshot.simulated,
+        HoldReason::Operator => true,
+        // On the wall clock the mission's timeout ends it.
+        HoldReason::StageHeld => !snapshot.in_ticks,
+        HoldReason::Starting | HoldReason::Ending => false,
+    };
+    if may_wait || now.duration_since(snapshot.progress) < NO_PROGRESS {
+        return None;
+    }
+    let robot_answers = snapshot.link.is_some_and(|link| link.connected == 1);
+    let reason = if !snapshot.not_started.is_empty() {
+        let (robot, stages) = (snapshot.robot, snapshot.not_started.join(", "));
+        format!("not running: {stages}; start each with `firsthand stage NAME --robot {robot}`")
+    } else if !snapshot.held.is_empty() {
+        let (held, file) = (snapshot.held.join(", "), records::DEATHS);
+        format!("{held} died again and again and is held; see {file} in the run directory")
+    } else if !snapshot.was_ready && !robot_answers {
+        let address = snapshot.address;
+        format!("no robot answers at {address}; is it on, is robot.address right?")
+    } else {
+        "the pipeline makes no progress; see the stages' logs".to_owned()
+    };
+    Some(Ending::failed(Outcome::Aborted, reason))
+}
+
+/// When the newest tick was first seen.
+#[derive(Debug)]
+pub(crate) struct TickProgress {
+    tick: Option<u64>,
+    since: Instant,
+}
+
+impl TickProgress {
+    /// No tick is known at `now`.
+    pub(crate) const fn new(now: Instant) -> Self {
+        Self {
+            tick: None,
+            since: now,
+        }
+    }
+
+    /// When the newest `tick`, as of `now`, was first seen.
+    pub(crate) fn update(&mut self, tick: Option<u64>, now: Instant) -> Instant {
+        if tick != self.tick {
+            (self.tick, self.since) = (tick, now);
+        }
+        self.since
+    }
+}
+
+#[cfg(test)]
+mod tests;

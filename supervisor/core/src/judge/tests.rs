@@ -1,0 +1,101 @@
+use super::*;
+use common::samples::Cause;
+
+/// A link that hears the robot.
+fn link(action: Action, cause: Cause) -> LinkSample {
+    LinkSample {
+        connected: 1,
+        action: action.into(),
+        cause: cause.into(),
+        ..LinkSample::default()
+    }
+}
+
+#[test]
+fn every_rule_of_the_judgement_decides_its_row() {
+    let start = Instant::now();
+    let go = link(Action::Go, Cause::None);
+    let stop = link(Action::Stop, Cause::BatteryLow);
+    let end = link(Action::End, Cause::BatteryEmpty);
+    let robot = "x80".parse().unwrap();
+    let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap();
+    let address = address.resolve().unwrap();
+    // A simulated robot that drives; its last tick was made at the start.
+    let driving = || Snapshot {
+        arrived_m: None,
+        link: Some(&go),
+        simulated: true,
+        simulator_ended: false,
+        collision_m: None,
+        time: MissionTime::from_seconds(10.0),
+        timeout_s: 60.0,
+        in_ticks: true,
+        progress: start,
+        was_ready: true,
+        reason: HoldReason::None,
+        held: Vec::new(),
+        not_started: Vec::new(),
+        robot: &robot,
+        address: &address,
+    };
+    let starting = || Snapshot {
+        was_ready: false,
+        reason: HoldReason::Starting,
+        ..driving()
+    };
+    let held = || Snapshot {
+        reason: HoldReason::StageHeld,
+        held: vec!["mapper"],
+        ..driving()
+    };
+    // How long after the last tick.
+    let (early, late) = (NO_PROGRESS - Duration::from_millis(1), NO_PROGRESS);
+    #[rustfmt::skip]
+    let rows = [
+        ("a driving robot goes on", driving(), early, None),
+        ("a simulator that ended", Snapshot { simulator_ended: true, arrived_m: Some(0.1), ..driving() }, early,
+         Some((Outcome::Aborted, "x80-sim.log"))),
+        ("an arrival", Snapshot { arrived_m: Some(0.123), collision_m: Some([1.0, 2.0]), ..driving() }, early,
+         Some((Outcome::Reached, "0.12 m from the target"))),
+        ("an end by the link's failsafe",
+         Snapshot { link: Some(&end), collision_m: Some([1.0, 2.0]), ..driving() },
+         early, Some((Outcome::Aborted, "battery"))),
+        ("a stop by the link's failsafe is no end",
+         Snapshot { link: Some(&stop), ..driving() }, early, None),
+        ("a collision", Snapshot { collision_m: Some([1.0, 2.0]), timeout_s: 5.0, ..driving() }, early,
+         Some((Outcome::Collision, "(1.00, 2.00)"))),
+        ("a timeout", Snapshot { timeout_s: 10.0, ..driving() }, late, Some((Outcome::Timeout, "10 s"))),
+        ("no tick while driving", driving(), late, Some((Outcome::Aborted, "stages' logs"))),
+        ("a real robot may be away", Snapshot { simulated: false, ..driving() }, late, None),
+        ("a real robot that is to start may not be away", Snapshot { simulated: false, link: None, ..starting() }, late,
+         Some((Outcome::Aborted, "no robot answers at udp://10.0.0.1:10001"))),
+        ("a robot that answers and does not start", starting(), late, Some((Outcome::Aborted, "stages' logs"))),
+        ("a robot that once was ready is not looked for", Snapshot { link: None, ..driving() }, late,
+         Some((Outcome::Aborted, "stages' logs"))),
+        ("an operator may wait", Snapshot { reason: HoldReason::Operator, ..driving() }, late, None),
+        ("a held stage in ticks", held(), late, Some((Outcome::Aborted, "mapper died again and again"))),
+        ("a held stage on the wall clock may wait", Snapshot { in_ticks: false, ..held() }, late, None),
+        ("an external stage that is missing", Snapshot { not_started: vec!["planner"], held: vec!["mapper"], ..starting() },
+         late, Some((Outcome::Aborted, "not running: planner; start each with `firsthand stage NAME --robot x80`"))),
+    ];
+    for (rule, snapshot, after, expected) in rows {
+        let ending = judge(&snapshot, start + after);
+        let outcome = ending.as_ref().map(|ending| ending.outcome);
+        assert_eq!(outcome, expected.map(|(outcome, _)| outcome), "{rule}");
+        if let (Some(ending), Some((outcome, words))) = (ending, expected) {
+            assert!(ending.reason.contains(words), "{rule}: {}", ending.reason);
+            assert_eq!(ending.asked_for, outcome == Outcome::Reached, "{rule}");
+        }
+    }
+}
+
+#[test]
+fn progress_is_when_a_tick_was_first_seen() {
+    let start = Instant::now();
+    let at = |seconds| start + Duration::from_secs(seconds);
+    let mut progress = TickProgress::new(start);
+    assert_eq!(progress.update(None, at(1)), start);
+    assert_eq!(progress.update(Some(7), at(2)), at(2));
+    assert_eq!(progress.update(Some(7), at(3)), at(2));
+    assert_eq!(progress.update(Some(8), at(4)), at(4));
+}

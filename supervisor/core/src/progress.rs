@@ -1,0 +1,51 @@
+//! How far a run has come, as shown to its user.
+
+use std::fmt;
+
+use common::samples::{Action, Cause};
+use x80_link::failsafe;
+
+use crate::observer::Record;
+
+/// How far a run has come, as shown to its user.
+pub struct Progress<'a> {
+    /// What was read from the bus so far.
+    pub record: &'a Record,
+    /// Stages that run, of how many.
+    pub running: (usize, usize),
+    /// Whether the robot is ordered to drive.
+    pub driving: bool,
+    /// From the start to the target, metres.
+    pub straight_m: f64,
+}
+
+/// One line.
+impl fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (running, all) = self.running;
+        let record = self.record;
+        let link = record.link.unwrap_or_default();
+        if !self.driving && link.cause() == Cause::NotOrdered {
+            return write!(f, "starting: {running}/{all} stages alive");
+        }
+        let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
+        let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
+        let distance = record
+            .command
+            .map_or(self.straight_m, |command| command.distance_m);
+        let events = record
+            .newest_guidance()
+            .map_or(0, |guidance| guidance.safety_events);
+        write!(
+            f,
+            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  {events:3} safety events  {running}/{all} stages alive"
+        )?;
+        match link.action() {
+            Action::Go => Ok(()),
+            action => {
+                let cause = failsafe::name(link.cause()).to_uppercase();
+                write!(f, ", {cause}: the robot {}", failsafe::effect(action))
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! A run from start to end: the domain locked, the stages started, the mission driven, everything stopped.
+
+use std::collections::BTreeMap;
+
+use common::{
+    domain::Domain,
+    ground_truth::GroundTruthTick,
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+};
+
+use crate::{
+    domain::DomainLock,
+    error::{SupervisorError, system},
+    observer::Record,
+    outcome::Ending,
+    progress::Progress,
+    shutdown,
+    supervisor::{Options, Supervisor},
+};
+
+/// The result of a run.
+pub struct Finished {
+    /// How it ended, and why.
+    pub ending: Ending,
+    /// What was read from the bus.
+    pub record: Record,
+    /// What really happened, of a simulated robot.
+    pub truth: Vec<GroundTruthTick>,
+    /// Times each stage was started again.
+    pub restarts: BTreeMap<&'static str, u32>,
+    /// Times another supervisor went on with the run.
+    pub resumes: u32,
+    /// Generations of the planner started because the robot stalled.
+    pub replans: u32,
+    /// Times its sensed belief was forgotten.
+    pub resets: u64,
+}
+
+/// Carry out a run. `show` is called a few times a second.
+pub fn run(
+    options: &Options,
+    show: &mut dyn FnMut(&Progress<'_>),
+) -> Result<Finished, SupervisorError> {
+    let mut signals =
+        Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
+    let domain = Domain::of(options.robot.clone());
+    let mut lock = DomainLock::acquire(domain, options.mission.grid_frame().area())?;
+    let mut supervisor = Supervisor::start(options, &lock)?;
+    let ending = loop {
+        match supervisor.drive(&mut signals, show) {
+            Ok(Some(ending)) => break Ok(ending),
+            Ok(None) => supervisor = shutdown::recreate_bus(supervisor, &mut lock)?,
+            Err(error) => break Err(error),
+        }
+    };
+    // Also after an error the robot is stopped first, and the stages in order.
+    let stopped = shutdown::stop(&mut supervisor);
+    let ending = ending?;
+    stopped?;
+    let simulator = supervisor.robot.simulator;
+    Ok(Finished {
+        ending,
+        record: supervisor.bus.observer.record,
+        truth: simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec()),
+        restarts: supervisor.stages.restarts().collect(),
+        resumes: supervisor.state_file.state.resumes,
+        replans: supervisor.stall_watch.replans(),
+        resets: supervisor.stall_watch.resets(),
+    })
+}

@@ -1,0 +1,76 @@
+//! Mission time of a run, and its first tick that is not made yet.
+
+use common::{
+    clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    samples::PoseSample,
+};
+
+use crate::recovery::RecoveredRun;
+
+/// The clock of a run, from the start of this supervisor on.
+pub(crate) struct RunClock {
+    /// How mission time passes.
+    pub clock: MissionClock,
+    /// The first tick that no earlier supervisor saw made.
+    first_tick: u64,
+    /// Mission time at the start of this supervisor.
+    start: MissionTime,
+}
+
+impl RunClock {
+    /// Of a run that goes on.
+    pub(crate) fn recovered(run: &RecoveredRun) -> Self {
+        Self {
+            clock: run.clock(),
+            first_tick: run.first_tick,
+            start: run.time,
+        }
+    }
+
+    /// Of a run that begins; only a `simulated` robot's time can pass at a pace of its own.
+    pub(crate) fn begin(pace: Pace, rate_hz: f64, simulated: bool) -> Self {
+        let clock = match pace {
+            Pace::Max if simulated => MissionClock::Ticks {
+                period_ns: (1e9 / rate_hz) as u64,
+            },
+            _ => MissionClock::Wall {
+                epoch_ns: monotonic_ns(),
+                rate: match pace {
+                    Pace::Rate(rate) if simulated => rate,
+                    _ => 1.0,
+                },
+            },
+        };
+        Self {
+            clock,
+            first_tick: 0,
+            start: MissionTime::default(),
+        }
+    }
+
+    /// Whether mission time advances with ticks, not with the wall clock.
+    pub(crate) const fn in_ticks(&self) -> bool {
+        matches!(self.clock, MissionClock::Ticks { .. })
+    }
+
+    /// The tick that a new generation of a stage starts from: the first one that was not made, where `newest` is the
+    /// newest tick of any sample.
+    pub(crate) fn first_tick(&self, newest: Option<u64>) -> u64 {
+        // The link publishes tick 0 before its first.
+        newest.map_or(0, |tick| tick + 1).max(self.first_tick)
+    }
+
+    /// Mission time of the newest pose.
+    pub(crate) fn pose_time(&self, pose: Option<&PoseSample>) -> MissionTime {
+        pose.map_or(self.start, |pose| pose.stamp.time())
+    }
+
+    /// Mission time now.
+    pub(crate) fn now(&self, pose: Option<&PoseSample>) -> MissionTime {
+        match self.clock {
+            MissionClock::Ticks { .. } => pose.map_or(MissionTime::default(), |it| it.stamp.time()),
+            // It passes without a robot or a pose, too.
+            MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! One stage of a run: its policy, and the process that is its current generation.
+
+use std::{
+    fs::File,
+    io,
+    path::{Path, PathBuf},
+    process::Stdio,
+};
+
+use common::{
+    run,
+    samples::{HealthSample, HealthState, RosterEntry, StageState, name},
+};
+use rustix::process::Signal;
+use thiserror::Error;
+
+use crate::{
+    death::{Death, Next, last_words},
+    policy::{Action, Event, Now, Phase, Policy},
+    process::{ExitCause, Process, firsthand},
+    stages::Stage,
+};
+
+/// A stage's process could not be watched.
+#[derive(Debug, Error)]
+#[error("cannot reap stage {stage}: {source}")]
+pub struct StageProcessError {
+    stage: &'static str,
+    source: io::Error,
+}
+
+/// One stage and its current generation. Times are readings of its owner's clock.
+pub(crate) struct StageProcess {
+    pub stage: &'static Stage,
+    policy: Policy,
+    process: Option<Process>,
+    generation: u32,
+    started: Now,
+    beat: Option<Now>,
+    output: Option<Now>,
+    /// Length of its log when this generation was started, bytes.
+    log_start: u64,
+    /// When the supervisor noticed that it hung.
+    hung: Option<Now>,
+}
+
+impl StageProcess {
+    /// Of `stage`, which does not run yet, with a map of so many `cells`.
+    pub(crate) fn new(stage: &'static Stage, cells: usize) -> Self {
+        Self {
+            stage,
+            policy: Policy::new(stage.deadlines_on(cells)),
+            process: None,
+            generation: 0,
+            started: Now::ZERO,
+            beat: None,
+            output: None,
+            log_start: 0,
+            hung: None,
+        }
+    }
+
+    /// Where its policy has it.
+    pub(crate) const fn phase(&self) -> Phase {
+        self.policy.phase()
+    }
+
+    /// Whether it beats as ready.
+    pub(crate) const fn is_running(&self) -> bool {
+        matches!(self.phase(), Phase::Running { .. })
+    }
+
+    /// Its process, if there is one.
+    pub(crate) const fn process(&self) -> Option<&Process> {
+        self.process.as_ref()
+    }
+
+    /// Take the process away, to end it.
+    pub(crate) fn take_process(&mut self) -> Option<Process> {
+        self.process.take()
+    }
+
+    /// Its process's number; 0 for none.
+    fn pid(&self) -> u32 {
+        self.process.as_ref().map_or(0, Process::id)
+    }
+
+    /// Times it was started again.
+    pub(crate) const fn restarts(&self) -> u32 {
+        self.generation.saturating_sub(1)
+    }
+
+    /// When its policy must next look at the clock.
+    pub(crate) fn deadline(&self) -> Option<Now> {
+        self.policy.deadline()
+    }
+
+    /// What its policy does about `event`.
+    pub(crate) fn step(&mut self, event: Event, now: Now) -> Option<Action> {
+        self.policy.step(event, now)
+    }
+
+    /// Watch the external process that published `health`, if it is a successor. Says whether it is.
+    pub(crate) fn adopt(&mut self, health: &HealthSample, now: Now) -> bool {
+        // Beats of a process that ended may still be on their way.
+        if self.process.is_some() || self.generation >= health.stamp.generation {
+            return false;
+        }
+        let Ok(process) = Process::adopt(health.pid, self.stage.name) else {
+            return false;
+        };
+        self.policy.step(Event::Start, now);
+        self.process = Some(process);
+        self.generation = health.stamp.generation;
+        self.started = now;
+        true
+    }
+
+    /// A heartbeat of this stage came. Says whether its process became ready by it.
+    pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
+        if self.process.is_none() || self.pid() != health.pid {
+            return false;
+        }
+        self.beat = Some(now);
+        let was_running = self.is_running();
+        let event = match HealthState::from_byte(health.state) {
+            HealthState::Ready => Event::BeatReady,
+            HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
+        };
+        self.policy.step(event, now);
+        !was_running && event == Event::BeatReady
+    }
+
+    /// It published a sample.
+    pub(crate) fn on_output(&mut self, now: Now) {
+        self.output = Some(now);
+    }
+
+    /// Start its next generation, which logs to the run `directory`; ticks before `first_tick` are not its own.
+    pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
+        let stage = self.stage.name;
+        (self.started, self.hung) = (now, None);
+        self.log_start = self.log(directory).metadata().map_or(0, |log| log.len());
+        let generation = run::next_generation(directory, stage).map_err(io::Error::other);
+        let spawned = generation.and_then(|generation| {
+            self.generation = generation;
+            self.spawn(directory, first_tick)
+        });
+        match spawned {
+            Ok(process) => self.process = Some(process),
+            // Tried again with growing pauses; the other stages go on.
+            Err(error) => {
+                tracing::error!(stage, %error, "cannot be started; are processes, descriptors or disk used up?");
+                self.policy.step(Event::StartFailed, now);
+            }
+        }
+    }
+
+    fn spawn(&self, directory: &Path, first_tick: u64) -> io::Result<Process> {
+        let log = self.log(directory);
+        let log = File::options().create(true).append(true).open(log)?;
+        let directory = directory
+            .to_str()
+            .ok_or_else(|| io::Error::other("the run directory's name is not UTF-8"))?;
+        let mut command = firsthand(&[
+            "stage",
+            self.stage.name,
+            "--run",
+            directory,
+            "--generation",
+            &self.generation.to_string(),
+            "--first-tick",
+            &first_tick.to_string(),
+            "--supervisor",
+            &std::process::id().to_string(),
+        ]);
+        command.stdout(Stdio::null()).stderr(log);
+        Process::spawn(command)
+    }
+
+    /// The log of all its generations in the run `directory`.
+    fn log(&self, directory: &Path) -> PathBuf {
+        directory.join(format!("{}.log", self.stage.name))
+    }
+
+    /// Send its process a signal, if there is one.
+    pub(crate) fn signal(&mut self, signal: Signal, now: Now) {
+        if signal == Signal::ABORT {
+            self.hung = Some(now);
+        }
+        if let Some(process) = &self.process {
+            tracing::debug!(stage = self.stage.name, ?signal, "signalled");
+            process.signal(signal);
+        }
+    }
+
+    /// What ended its process, if it has ended.
+    pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
+        let Some(process) = &mut self.process else {
+            return Ok(None);
+        };
+        process.try_reap().map_err(|source| StageProcessError {
+            stage: self.stage.name,
+            source,
+        })
+    }
+
+    /// Its process is reaped. Returns what is known of it, besides what follows.
+    pub(crate) fn record_death(&mut self, cause: ExitCause, directory: &Path, now: Now) -> Death {
+        let age = |then: Now| now.saturating_sub(then).as_secs_f64();
+        let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();
+        let death = Death {
+            stage: self.stage.name,
+            pid: self.pid(),
+            generation: self.generation,
+            cause,
+            hung: self.hung.is_some(),
+            noticed_after_s: self.hung.zip(self.beat).map(hung_after),
+            beat_age_s: self.beat.map(age),
+            uptime_s: age(self.started),
+            deaths_in_window: 0,
+            next: Next::Nothing,
+            last_words: last_words(&self.log(directory), self.log_start),
+        };
+        (self.process, self.beat) = (None, None);
+        death
+    }
+
+    /// Complete the record of a death by what the policy has decided.
+    pub(crate) fn record_next(&self, death: &mut Death, now: Now) {
+        death.deaths_in_window = self.policy.recent_deaths() as u32;
+        death.next = match self.phase() {
+            Phase::BackingOff { until } => Next::StartLater {
+                after_s: until.saturating_sub(now).as_secs_f64(),
+            },
+            Phase::Held => Next::Hold,
+            Phase::Down | Phase::Stopping { .. } => Next::Nothing,
+            Phase::Starting { .. }
+            | Phase::Running { .. }
+            | Phase::Aborted { .. }
+            | Phase::Replaced { .. } => Next::StartNow,
+        };
+    }
+
+    /// Its row of the `roster` topic.
+    pub(crate) fn roster_entry(&self, now: Now) -> RosterEntry {
+        let age = |then: Option<Now>| {
+            then.map_or(u64::MAX, |then| now.saturating_sub(then).as_nanos() as u64)
+        };
+        RosterEntry {
+            stage: name(self.stage.name),
+            pid: self.pid(),
+            generation: self.generation,
+            state: state(self.phase()).into(),
+            restarts: self.restarts(),
+            uptime_ns: age(self.process.as_ref().map(|_| self.started)),
+            beat_age_ns: age(self.beat),
+            output_age_ns: age(self.output),
+        }
+    }
+}
+
+const fn state(phase: Phase) -> StageState {
+    match phase {
+        Phase::Down => StageState::Down,
+        Phase::BackingOff { .. } => StageState::BackingOff,
+        Phase::Starting { .. } => StageState::Starting,
+        Phase::Running { .. } => StageState::Running,
+        Phase::Aborted { .. } | Phase::Replaced { .. } | Phase::Stopping { .. } => {
+            StageState::Stopping
+        }
+        Phase::Held => StageState::Held,
+    }
+}

@@ -1,0 +1,68 @@
+//! A map of cells.
+
+/// A map of cells, row-major, row 0 at the top.
+#[derive(Debug)]
+pub struct Map {
+    /// Columns.
+    pub cols: usize,
+    /// Rows.
+    pub rows: usize,
+    /// Everything that is not free, and the whole rim.
+    pub blocked: Vec<bool>,
+}
+
+impl Map {
+    /// A map of `free` cells. Its rim counts as blocked, as the perimeter of a mission does.
+    pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
+        let mut blocked: Vec<bool> = free.map(|free| !free).collect();
+        for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {
+            if row == 0 || row + 1 == rows {
+                line.fill(true);
+            }
+            for rim in [0, cols.saturating_sub(1)] {
+                if let Some(cell) = line.get_mut(rim) {
+                    *cell = true;
+                }
+            }
+        }
+        Self {
+            cols,
+            rows,
+            blocked,
+        }
+    }
+
+    /// The free cell nearest to (`col`, `row`), as column and row; none if no cell is free.
+    pub fn nearest_free(&self, col: usize, row: usize) -> Option<(usize, usize)> {
+        let free = self.blocked.iter().enumerate().filter(|cell| !cell.1);
+        free.map(|(at, _)| (at % self.cols, at / self.cols))
+            .min_by_key(|cell| {
+                let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
+                // Far outside the map a distance may not fit.
+                x.saturating_mul(x).saturating_add(y.saturating_mul(y))
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rim_of_a_map_is_blocked_and_nothing_else() {
+        let map = Map::new(4, 3, [true; 12].into_iter());
+        let free: Vec<usize> = (0..12).filter(|&at| !map.blocked[at]).collect();
+        assert_eq!(free, [5, 6]);
+        let map = Map::new(1, 1, [true].into_iter());
+        assert_eq!(map.blocked, [true]);
+    }
+
+    #[test]
+    fn the_nearest_free_cell_is_found_from_outside_too() {
+        let map = Map::new(5, 5, [true; 25].into_iter());
+        assert_eq!(map.nearest_free(0, 2), Some((1, 2)));
+        assert_eq!(map.nearest_free(usize::MAX, 3), Some((1, 1)));
+        let walled = Map::new(2, 2, [true; 4].into_iter());
+        assert_eq!(walled.nearest_free(0, 0), None);
+    }
+}

@@ -1,0 +1,40 @@
+//! What a picture of a run shows.
+
+use common::{grid::GridFrame, kinematics::Pose2, mission::Mission, samples::FieldCell};
+
+/// What there is to draw.
+pub struct Scene<'a> {
+    /// The mission: target, world, body, perimeter.
+    pub mission: &'a Mission,
+    /// The final belief: one [`common::grid::CellState`] byte a cell, row-major.
+    pub grid: Option<(GridFrame, &'a [u8])>,
+    /// The field of that belief, row-major.
+    pub field: Option<(GridFrame, &'a [FieldCell])>,
+    /// Where dead reckoning put the robot, at equal steps of mission time from its beginning.
+    pub believed: &'a [Pose2],
+    /// Where the robot really was, likewise; empty with a real robot.
+    pub truth: &'a [Pose2],
+    /// How the run went.
+    pub facts: Facts<'a>,
+    /// Lines below the picture; each is cut where the page ends.
+    pub captions: &'a [String],
+}
+
+/// The numbers of the title line.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts<'a> {
+    /// In a word: reached, unreachable, timeout, ...
+    pub outcome: &'a str,
+    /// Whether that is what was wanted.
+    pub reached: bool,
+    /// Mission time, seconds.
+    pub mission_time_s: f64,
+    /// Length of the way driven, metres.
+    pub path_length_m: f64,
+    /// From start to target in a straight line, metres.
+    pub straight_m: f64,
+    /// Range samples that put a hazard on the map.
+    pub safety_events: u64,
+    /// Seed of the simulation; none with a real robot.
+    pub seed: Option<u64>,
+}

@@ -1,0 +1,154 @@
+//! A run on a clock of ticks is the same each time, whatever the machine does meanwhile.
+
+use std::{collections::BTreeMap, fmt::Debug, time::Duration};
+
+use common::{bus::Bus, domain::Domain, grid::Replica, samples::Stamped, topics, waiter::Waiter};
+use serde_json::Value;
+
+use crate::support::{self, Run, assert_nothing_left, in_own_process};
+
+/// The summary without what is measured on the wall's clock.
+fn numbers(mut summary: Value) -> Value {
+    for wall_clock in ["tick_latency_us", "full_solve_us", "local_update_us"] {
+        summary.as_object_mut().unwrap().remove(wall_clock);
+    }
+    summary
+}
+
+/// What a consumer receives of a run, and what the run writes.
+#[derive(Debug, PartialEq)]
+struct Recording {
+    /// Each sample, by topic and tick.
+    samples: BTreeMap<(&'static str, u64), String>,
+    /// The cells of each version of the grid that was put together. A reader that was late has missed some.
+    grids: BTreeMap<u64, Vec<u8>>,
+    summary: Value,
+    picture: Vec<u8>,
+}
+
+impl Recording {
+    fn add(&mut self, topic: &'static str, mut sample: impl Stamped + Debug) {
+        let tick = sample.stamp().tick;
+        *sample.stamp_mut() = common::samples::Stamp {
+            tick,
+            stamp_ns: sample.stamp().stamp_ns,
+            ..Default::default()
+        };
+        self.samples.insert((topic, tick), format!("{sample:?}"));
+    }
+
+    /// Whether every sample of every tick was received.
+    fn is_whole(&self, topics: usize) -> bool {
+        let ticks = self.summary["ticks"].as_u64().unwrap();
+        let last = self.samples.keys().map(|(_, tick)| *tick).max();
+        last >= Some(ticks) && self.samples.len() as u64 >= topics as u64 * ticks
+    }
+}
+
+/// Run the default mission, and receive all of it.
+fn record(robot: &str) -> Recording {
+    let domain = Domain::of(robot.parse().unwrap());
+    let mut run = Run::start(robot, "obstacle-course", &["--seed", "7"]);
+    let bus = loop {
+        match Bus::join(&domain, "recorder") {
+            Ok(bus) => break bus,
+            Err(error) => assert!(run.is_running(), "{error}"),
+        }
+    };
+    let mut ranges = bus.reader(&topics::RANGE).unwrap();
+    let mut wheels = bus.reader(&topics::WHEELS).unwrap();
+    let mut poses = bus.reader(&topics::POSE).unwrap();
+    let mut guidances = bus.reader(&topics::GUIDANCE).unwrap();
+    let mut commands = bus.reader(&topics::COMMAND).unwrap();
+    let mut grids = bus.slice_reader(&topics::GRID).unwrap();
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::GRID).unwrap());
+    let mut received = Recording {
+        samples: BTreeMap::new(),
+        grids: BTreeMap::new(),
+        summary: Value::Null,
+        picture: Vec::new(),
+    };
+    let mut grid = Replica::default();
+    loop {
+        // Asked first: what was published until then is received below.
+        let over = !run.is_running();
+        while let Ok(Some(part)) = grids.take() {
+            grid.apply(&part.header().part.revision(), &part);
+            received.grids.insert(grid.version(), grid.cells().to_vec());
+        }
+        while let Ok(Some(sample)) = ranges.take() {
+            received.add("range", sample);
+        }
+        while let Ok(Some(sample)) = wheels.take() {
+            received.add("wheels", sample);
+        }
+        while let Ok(Some(sample)) = poses.take() {
+            received.add("pose", sample);
+        }
+        while let Ok(Some(sample)) = guidances.take() {
+            received.add("guidance", sample);
+        }
+        while let Ok(Some(sample)) = commands.take() {
+            received.add("command", sample);
+        }
+        if over {
+            break;
+        }
+        let _ = waiter.wait(Duration::from_millis(20));
+    }
+    let (_, summary, kept) = run.finish_in();
+    received.summary = numbers(summary);
+    received.picture = std::fs::read(kept.path().join("run/picture.svg")).unwrap();
+    received
+}
+
+#[test]
+fn the_same_seed_gives_the_same_samples_grids_and_picture_to_the_bit() {
+    in_own_process(|| {
+        // A consumer that the machine did not let run in time has lost some.
+        let whole = || {
+            let mut records = (0..20).map(|_| record("recorded"));
+            records
+                .find(|recording| recording.is_whole(5))
+                .expect("a recording without a gap")
+        };
+        let (mut one, mut other) = (whole(), whole());
+        let last = |recording: &Recording| *recording.grids.keys().last().unwrap();
+        assert_eq!(last(&one), last(&other));
+        one.grids
+            .retain(|version, _| other.grids.contains_key(version));
+        other
+            .grids
+            .retain(|version, _| one.grids.contains_key(version));
+        println!("{} samples, {} grids", one.samples.len(), one.grids.len());
+        assert!(one.grids.len() > 10, "{:?}", one.grids.keys());
+        for (key, sample) in &one.samples {
+            assert_eq!(Some(sample), other.samples.get(key), "{key:?}");
+        }
+        assert!(one == other, "{} against {}", one.summary, other.summary);
+        assert_nothing_left("recorded");
+    });
+}
+
+#[test]
+fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_and_picture_to_the_bit() {
+    // At this speed the mission has tens of thousands of ticks: seconds to be stopped in.
+    let slow = ["--set", "controller.speed_m_s=0.002", "--timeout", "20000"];
+    let ended = |run: Run| {
+        let (_, summary, kept) = run.finish_in();
+        let picture = std::fs::read(kept.path().join("run/picture.svg")).unwrap();
+        (numbers(summary), picture)
+    };
+    let undisturbed = ended(Run::start("tick-calm", "open-room", &slow));
+    let mut run = Run::start("tick-held", "open-room", &slow);
+    run.wait_until("the robot drives", |status| status["order"] == "driving");
+    support::operate("tick-held", &["stop"]);
+    run.wait_until("it is stopped", |status| {
+        status["link"]["cause"] == "stopped by an operator"
+    });
+    support::operate("tick-held", &["resume"]);
+    let resumed = ended(run);
+    assert_eq!(resumed.0, undisturbed.0);
+    assert!(resumed.1 == undisturbed.1, "the pictures differ");
+}

@@ -1,0 +1,24 @@
+//! The system tests: whole runs through real processes. Nothing here reaches inside a stage.
+//!
+//! One executable, since each takes long to link; `freezes`, which measures time, is one of its own, which runs alone.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
+
+mod support;
+
+mod bad_input;
+mod blocked_starts;
+mod consumers;
+mod failsafe;
+mod faults;
+mod field;
+mod foreign_payload;
+mod kills;
+mod missions;
+mod operators;
+mod repeatability;
+mod replaced_bus;
+mod resume;
+mod services;
+mod structure;
+mod telemetry;
+mod transports;
