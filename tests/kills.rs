@@ -117,7 +117,7 @@ fn ctrl_c_sigterm_and_a_closed_terminal_end_a_run_in_order_and_leave_nothing() {
             "{summary}"
         );
         let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
-        assert!(log.contains("robot told to stand"), "{log}");
+        assert!(log.contains("stop sent to the robot"), "{log}");
         assert_nothing_left(robot);
         drop(kept);
     }
@@ -147,7 +147,7 @@ fn stages_die_with_their_supervisor_and_the_link_stops_the_robot_first() {
         );
     }
     let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
-    assert!(log.contains("robot told to stand"), "{log}");
+    assert!(log.contains("stop sent to the robot"), "{log}");
     drop(orphaned);
     // What the killed supervisor left does not hinder the next, and is removed with it.
     let (code, summary) = run("orphans", "open-room", &[]);

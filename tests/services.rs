@@ -286,7 +286,7 @@ fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
     run.reap();
     units.assert_all_leave();
     let log = units.log("x80-link");
-    assert!(log.contains("robot told to stand"), "{log}");
+    assert!(log.contains("stop sent to the robot"), "{log}");
     assert_eq!(support::run(robot, "open-room", &[]).0, Some(0));
     assert_nothing_left(robot);
 }
