@@ -116,9 +116,9 @@ fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
 fn a_target_behind_closed_walls_is_called_unreachable() {
     let walls = "world.wall=[{points=[[2.4,-3.4],[2.4,3.4]]},{points=[[-1.9,1.4],[2.6,1.4]]},\
                  {points=[[-1.9,-1.4],[2.6,-1.4]]},{points=[[-1.7,-1.6],[-1.7,1.6]]}]";
-    let careful = ["--set", walls, "--set", "timeout_s=900"];
-    let paper = [&careful[..], &PAPER, &["--set", "mapper.margin_m=0.35"]].concat();
-    for arguments in [&careful[..], &paper] {
+    let evidential = ["--set", walls, "--set", "timeout_s=900"];
+    let paper = [&evidential[..], &PAPER, &["--set", "mapper.margin_m=0.35"]].concat();
+    for arguments in [&evidential[..], &paper] {
         let (code, summary) = run("walled", "open-room", arguments);
         assert_eq!(
             (code, &summary["outcome"]),
