@@ -1,7 +1,7 @@
-//! `cargo bench -p harmonic`: times of the solver, beside those of plain passes over the grid and of other algorithms.
+//! `cargo bench -p harmonic --features bench`: times of the solver, beside those of plain passes over the grid and of other algorithms.
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
-//! is the least of several runs. `cargo bench -p harmonic -- quick` leaves out the large maps, `-- updates` all but the
+//! is the least of several runs. `cargo bench -p harmonic --features bench -- quick` leaves out the large maps, `-- updates` all but the
 //! local updates.
 //! `-- --maps DIR` adds the PGM maps of a directory.
 #![allow(
