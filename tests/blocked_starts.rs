@@ -82,7 +82,7 @@ fn assert_bus_was_recreated(summary: &Value) {
 
 #[test]
 fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
-    let mut run = Run::start("block-own", "obstacle-course", &PACE);
+    let mut run = Run::start("block-own", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
     let domain = domain("block-own");
     let mapper = pid(&status, "mapper");
@@ -103,7 +103,7 @@ fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
 
 #[test]
 fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
-    let mut run = Run::start("block-other", "obstacle-course", &PACE);
+    let mut run = Run::start("block-other", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
     let domain = domain("block-other");
     // Of the killed mapper, by its tags, but with a number that is not its own.
@@ -126,7 +126,7 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
 
 #[test]
 fn a_half_made_service_blocks_starts_until_the_bus_is_recreated() {
-    let mut run = Run::start("block-service", "obstacle-course", &PACE);
+    let mut run = Run::start("block-service", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
     let services = domain("block-service").middleware_root().join("services");
     for service in fs::read_dir(services).unwrap() {
@@ -139,7 +139,7 @@ fn a_half_made_service_blocks_starts_until_the_bus_is_recreated() {
 #[test]
 fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_recreated() {
     in_own_process(|| {
-        let mut run = Run::start("block-places", "obstacle-course", &PACE);
+        let mut run = Run::start("block-places", "open-room", &PACE);
         let status = run.wait_until_under_way(1.0);
         let bus = Bus::join(&domain("block-places"), "greedy").unwrap();
         let mut places = Vec::new();
@@ -180,7 +180,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
 
 #[test]
 fn node_files_of_processes_that_ended_are_removed() {
-    let mut run = Run::start("block-nodes", "obstacle-course", &PACE);
+    let mut run = Run::start("block-nodes", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
     let domain = domain("block-nodes");
     let mapper = pid(&status, "mapper");

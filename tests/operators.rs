@@ -10,7 +10,7 @@ const PACE: [&str; 2] = ["--pace", "4"];
 
 #[test]
 fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
-    let mut run = Run::start("halt", "obstacle-course", &PACE);
+    let mut run = Run::start("halt", "open-room", &PACE);
     run.wait_until_under_way(2.0);
     operate("halt", &["stop"]);
     let stopped = run.wait_until("it is stopped", |status| {
