@@ -16,7 +16,7 @@ impl Cancellation {
     }
 
     /// Asks every solve that holds this token, or a clone of it, to stop soon with
-    /// [`SolveError::Cancelled`](crate::SolveError::Cancelled).
+    /// [`SolveError::Cancelled`].
     pub fn cancel(&self) {
         // Relaxed: the flag carries no other data, and a solve that sees it a little later is only a little late.
         self.0.store(true, Ordering::Relaxed);

@@ -9,7 +9,7 @@ use crate::verification::Verification;
 
 /// The field of one domain: u = 1 at the target, 0 where blocked or cut off, positive wherever the target can be reached.
 ///
-/// Row-major, as [`Domain`](crate::Domain); cells outside the map count as blocked.
+/// Row-major, as [`Domain`]; cells outside the map count as blocked.
 #[derive(Clone, Debug)]
 pub struct Field {
     width: usize,

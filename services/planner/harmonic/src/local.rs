@@ -3,7 +3,7 @@
 //! A change alters u everywhere downstream of it, so a local update cannot be right everywhere. It is right near the
 //! change, steepest ascent still ends at the target from every cell, and it reports when that is not enough:
 //! - [`window`] solves for u in a window, between inflow and outflow at its rim.
-//! - [`estimate`] estimates from the rim how far off directions beyond it are; the window grows until that is small.
+//! - [`mod@estimate`] estimates from the rim how far off directions beyond it are; the window grows until that is small.
 //! - [`paths`] checks that paths of steepest ascent through the window still ascend, where the estimate cannot tell.
 //!
 //! A [`Patch`] keeps u of each window before its update. Across the outflow rim ratios of u stay as they were, and windows
