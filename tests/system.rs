@@ -8,6 +8,7 @@ mod support;
 mod bad_input;
 mod blocked_starts;
 mod consumers;
+mod evaluation;
 mod failsafe;
 mod faults;
 mod field;

@@ -6,6 +6,8 @@ use std::io::{self, Write as _};
 pub(crate) mod chaos;
 pub(crate) mod check;
 mod directories;
+#[cfg(feature = "tools")]
+pub(crate) mod evaluate;
 pub(crate) mod fault;
 #[cfg(feature = "tools")]
 pub(crate) mod field;

@@ -20,7 +20,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 #[cfg(feature = "simulator")]
 use commands::sim;
 #[cfg(feature = "tools")]
-use commands::{chaos, field, latency};
+use commands::{chaos, evaluate, field, latency};
 use commands::{check, fault, help, install, missions, operate, run, stage, status, tables};
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
@@ -50,6 +50,8 @@ enum Command {
     Field(field::Arguments),
     #[cfg(feature = "tools")]
     Latency(latency::Arguments),
+    #[cfg(feature = "tools")]
+    Evaluate(evaluate::Arguments),
     Status(status::Arguments),
     Stop(operate::Stop),
     Resume(operate::Resume),
@@ -104,6 +106,8 @@ fn main() -> ExitCode {
         Command::Field(arguments) => field::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Latency(arguments) => latency::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Evaluate(arguments) => evaluate::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Stop(arguments) => operate::stop(&arguments),
         Command::Resume(arguments) => operate::resume(&arguments),

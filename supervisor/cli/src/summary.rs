@@ -40,12 +40,20 @@ pub(crate) struct Summary {
     pub(crate) min_clearance_m: Option<f64>,
     pub(crate) collisions: Option<u64>,
     pub(crate) pose_error_m: Option<f64>,
+    /// From where the robot ended to the target, by the ground truth.
+    pub(crate) true_distance_m: Option<f64>,
+    /// When the robot had moved 0.1 m, by the ground truth.
+    pub(crate) departed_s: Option<f64>,
     /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
     /// together, in an outage or when a stage is down.
     pub(crate) stopping_time_s: Option<f64>,
     pub(crate) safety_events: u64,
     pub(crate) full_solves: u64,
     pub(crate) local_updates: u64,
+    /// Times the robot stopped to look.
+    pub(crate) looks: u64,
+    /// Mission time that it looked.
+    pub(crate) look_s: f64,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
     /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last one's
@@ -60,6 +68,9 @@ pub(crate) struct Summary {
     pub(crate) full_solve_us: Quantiles,
     pub(crate) local_update_us: Quantiles,
 }
+
+/// A robot that has moved so far has departed, metres.
+const DEPARTED_M: f64 = 0.1;
 
 impl Summary {
     /// Of a finished run. What came after the arrival does not count: it depends on how fast the stop was.
@@ -108,10 +119,19 @@ impl Summary {
             pose_error_m: pose
                 .zip(truth.last())
                 .map(|(pose, truth)| truth.pose_error_m(pose)),
+            true_distance_m: truth
+                .last()
+                .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
+            departed_s: truth
+                .iter()
+                .find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M)
+                .map(|tick| tick.time_s),
             stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves,
             local_updates,
+            looks: record.looks,
+            look_s: record.look_ticks as f64 / mission.robot.rate_hz,
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: finished.restarts.clone(),
             resumes: *resumes,

@@ -8,7 +8,7 @@ use common::{
     latency::Histogram,
     samples::{
         CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        HealthSample, LinkSample, PoseSample,
+        GuidanceStatus, HealthSample, LinkSample, PoseSample,
     },
     topics::{self, AnyTopic as _},
     waiter::Waiter,
@@ -53,6 +53,10 @@ pub struct Record {
     latencies: BTreeMap<u32, LinkSample>,
     /// The newest counts of each generation of the planner: full solves, local updates.
     planners: BTreeMap<u32, (u64, u64)>,
+    /// Times the robot stopped to look.
+    pub looks: u64,
+    /// Ticks it looked.
+    pub look_ticks: u64,
     /// How long full solves took.
     pub full_solves: Histogram,
     /// How long local updates took.
@@ -139,6 +143,15 @@ impl Record {
         }
         if counts.1 > local {
             self.local_updates.record(guidance.local_update_ns);
+        }
+        let is_look = |guidance: &GuidanceSample| {
+            GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look
+        };
+        if is_look(&guidance) {
+            let before = self.guidance.back();
+            self.looks += u64::from(!before.is_some_and(is_look));
+            let is_new_tick = before.is_none_or(|it| it.stamp.tick < guidance.stamp.tick);
+            self.look_ticks += u64::from(is_new_tick);
         }
         if self.guidance.len() == MOST_GUIDANCE {
             self.guidance.pop_front();

@@ -31,13 +31,14 @@ macro_rules! guide {
 }
 
 /// Every page, in the order to read them. None has the name of a subcommand.
-static GUIDE: [Page; 13] = guide! {
+static GUIDE: [Page; 14] = guide! {
     "method",
     "mission-file",
     "attach",
     "deploy",
     "break-it",
     "field-tool",
+    "evaluate-worlds",
     "figures",
     "capabilities",
     "tables",

@@ -1,0 +1,301 @@
+//! `firsthand evaluate`: how often a robot arrives, on many worlds, judged by the ground truth.
+
+use std::{
+    fs,
+    io::{self, IsTerminal as _, Write as _},
+    num::NonZero,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    thread,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use common::mission::{Mission, Model};
+use evaluation::{
+    report::{self, Report},
+    runner::{self, Plan, Progress, Setting},
+    table::Table,
+    trial::BodySize,
+    worlds::{self, Worlds},
+};
+use serde_json::json;
+
+use super::Failure;
+
+/// Run missions on many worlds and count, by the ground truth, how many succeed: with 95 % intervals, every failure
+/// with its picture. Worlds and noise follow from the seed.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// rooms, doors, traps, corridors, straight-corridors; a mission file, a BARN .world or cylinders.csv; a folder of
+    /// such files.
+    #[arg(long, default_value = "rooms")]
+    worlds: Worlds,
+    /// So many worlds; 100 if they are drawn, all if they are read.
+    #[arg(long)]
+    count: Option<usize>,
+    /// Seed of the worlds and of the noise in them.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Missions on each world, each with noise of its own.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    repeats: u64,
+    /// evidential or paper; several, with commas, are compared on the same worlds.
+    #[arg(long, value_delimiter = ',')]
+    method: Vec<String>,
+    /// laboratory or measured.
+    #[arg(long, default_value = "measured")]
+    realism: String,
+    /// The robot's model.
+    #[arg(long, default_value = "x80")]
+    robot: String,
+    /// KEY=VALUE over every mission, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// A further setting to compare with the first on the same worlds: KEY=VALUE over it, several with commas.
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    versus: Vec<String>,
+    /// Missions at once; one for each processor if unsaid.
+    #[arg(long)]
+    jobs: Option<NonZero<usize>>,
+    /// Where rows, worlds, pictures and the page go.
+    #[arg(long, value_name = "DIR", default_value = "evaluation")]
+    out: PathBuf,
+    /// Go on with the evaluation in the directory of --out, which must have been of the same command.
+    #[arg(long)]
+    resume: bool,
+    /// End with one line of JSON on standard output, and nothing else there: of the first setting, the others under
+    /// `versus`.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Free ground that a world leaves the body on both sides of its narrowest way, metres.
+const MARGIN_M: f64 = 0.05;
+/// In the directory of an evaluation: what it is of, its rows, its page.
+const PLAN_FILE: &str = "plan.txt";
+const ROWS_FILE: &str = "rows.csv";
+const PAGE_FILE: &str = "index.html";
+/// A line that cannot be rewritten comes so seldom.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let settings = settings(arguments);
+    let described = described(arguments, &settings);
+    prepare(arguments, &described)?;
+    let found = worlds::find(
+        &arguments.worlds,
+        arguments.count,
+        arguments.seed,
+        &body(&arguments.robot)?,
+    )?;
+    let jobs = arguments.jobs.map_or_else(
+        || thread::available_parallelism().map_or(1, NonZero::get),
+        NonZero::get,
+    );
+    let plan = Plan {
+        trials: found.trials,
+        settings,
+        repeats: arguments.repeats,
+        seed: arguments.seed,
+        jobs,
+        directory: fs::canonicalize(&arguments.out)?,
+    };
+    say(&format!(
+        "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
+        plan.trials.len(),
+        found.unsolvable
+    ));
+    let mut table = Table::open(&plan.directory.join(ROWS_FILE))?;
+    let mut console = Console::default();
+    runner::run(&plan, &mut table, &mut |progress| console.show(progress))?;
+    console.end();
+    table.sort()?;
+    let page = plan.directory.join(PAGE_FILE);
+    fs::write(&page, report::html(&plan, table.rows(), &described))?;
+    let report = Report::new(&plan, table.rows());
+    let mut stdout = io::stdout();
+    if arguments.json {
+        writeln!(stdout, "{}", as_json(&report)?)?;
+    } else {
+        write!(stdout, "{report}")?;
+        writeln!(stdout, "rows and pictures: {}", page.display())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The directory: a new one, or that of the same evaluation.
+fn prepare(arguments: &Arguments, described: &str) -> Result<(), Failure> {
+    let out = &arguments.out;
+    let file = out.join(PLAN_FILE);
+    let earlier = fs::read_to_string(&file).ok();
+    match earlier {
+        Some(earlier) if arguments.resume && earlier.trim() == described => return Ok(()),
+        Some(earlier) if arguments.resume => {
+            let (out, earlier) = (out.display(), earlier.trim());
+            return Err(format!("--resume: the evaluation in {out} was another: {earlier}").into());
+        }
+        Some(_) => {
+            let out = out.display();
+            return Err(format!(
+                "{out} holds an evaluation; go on with it with --resume, or give another --out"
+            )
+            .into());
+        }
+        None => {}
+    }
+    fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
+    fs::write(&file, format!("{described}\n"))
+        .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
+    Ok(())
+}
+
+/// The command that gives these rows.
+fn described(arguments: &Arguments, settings: &[Setting]) -> String {
+    let worlds = match &arguments.worlds {
+        Worlds::Rooms => "rooms".to_owned(),
+        Worlds::Doors => "doors".to_owned(),
+        Worlds::Traps => "traps".to_owned(),
+        Worlds::Corridors => "corridors".to_owned(),
+        Worlds::StraightCorridors => "straight-corridors".to_owned(),
+        Worlds::Path(path) => path.display().to_string(),
+    };
+    let count = arguments
+        .count
+        .map_or(String::new(), |count| format!(" --count {count}"));
+    let settings: Vec<String> = settings
+        .iter()
+        .map(|setting| format!("{}: {}", setting.name, setting.set.join(" ")))
+        .collect();
+    format!(
+        "firsthand evaluate --worlds {worlds}{count} --seed {} --repeats {} --robot {} [{}]",
+        arguments.seed,
+        arguments.repeats,
+        arguments.robot,
+        settings.join("; ")
+    )
+}
+
+/// The settings to compare; the first is what the others are compared with.
+fn settings(arguments: &Arguments) -> Vec<Setting> {
+    let mut set = vec![
+        format!("simulation.realism='{}'", arguments.realism),
+        format!("robot.model='{}'", arguments.robot),
+    ];
+    set.extend(arguments.set.iter().cloned());
+    let methods = match &arguments.method[..] {
+        [] => vec!["evidential".to_owned()],
+        methods => methods.to_vec(),
+    };
+    let mut settings: Vec<Setting> = methods
+        .iter()
+        .map(|method| Setting {
+            name: method.clone(),
+            set: [&set[..], &[format!("method='{method}'")]].concat(),
+        })
+        .collect();
+    for versus in &arguments.versus {
+        let first = settings[0].set.clone();
+        settings.push(Setting {
+            name: versus.clone(),
+            set: first
+                .into_iter()
+                .chain(versus.split(',').map(str::to_owned))
+                .collect(),
+        });
+    }
+    settings
+}
+
+/// The body that every world must let through.
+fn body(robot: &str) -> Result<BodySize, Failure> {
+    let text = format!("target = [1, 0]\nrobot.model = '{robot}'");
+    let mission = Mission::parse(&text, Path::new("--robot"))?;
+    let _: Model = mission.robot.model;
+    Ok(BodySize {
+        radius_m: mission.body().radius_m,
+        margin_m: MARGIN_M,
+    })
+}
+
+/// The object that `--json` ends with.
+fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
+    let mut totals = report.totals.iter();
+    let mut object = match totals.next() {
+        Some(first) => serde_json::to_value(first)?,
+        None => json!({}),
+    };
+    let others: Vec<_> = totals
+        .zip(&report.comparisons)
+        .map(|(totals, comparison)| {
+            let interval = |of: evaluation::statistics::Estimate| [of.value, of.low, of.high];
+            Ok(json!({
+                "totals": serde_json::to_value(totals)?,
+                "pairs": comparison.pairs,
+                "success_change": interval(comparison.success),
+                "collision_change": interval(comparison.collision),
+                "time_ratio": comparison.time_ratio,
+            }))
+        })
+        .collect::<Result<_, serde_json::Error>>()?;
+    if !others.is_empty() {
+        object["versus"] = others.into();
+    }
+    Ok(object)
+}
+
+/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+struct Console {
+    began: Instant,
+    rewrites: bool,
+    shown: Option<Instant>,
+}
+
+impl Default for Console {
+    fn default() -> Self {
+        Self {
+            began: Instant::now(),
+            rewrites: io::stderr().is_terminal(),
+            shown: None,
+        }
+    }
+}
+
+impl Console {
+    fn show(&mut self, progress: &Progress) {
+        let due = self
+            .shown
+            .is_none_or(|shown| self.rewrites || shown.elapsed() >= LINE_EVERY);
+        if !due {
+            return;
+        }
+        self.shown = Some(Instant::now());
+        let Progress {
+            ended,
+            all,
+            ended_now,
+        } = *progress;
+        let each = self.began.elapsed().as_secs_f64() / ended_now.max(1) as f64;
+        let left = each * (all - ended) as f64;
+        let line = format!("{ended} of {all} missions, {left:.0} s left");
+        if self.rewrites {
+            say(&format!("\r\x1b[K{line}"));
+        } else {
+            say(&format!("{line}\n"));
+        }
+    }
+
+    fn end(&self) {
+        if self.rewrites {
+            say("\n");
+        }
+    }
+}
+
+/// On standard error; a reader that went away does not end the evaluation.
+fn say(text: &str) {
+    let mut stderr = io::stderr();
+    let _ = stderr
+        .write_all(text.as_bytes())
+        .and_then(|()| stderr.flush());
+}

@@ -1,0 +1,24 @@
+//! How often does it arrive? Missions on many worlds, each through the real processes, judged by the ground truth.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`worlds`] | where worlds come from: drawn from a seed, or read from files |
+//! | [`shortest_path`] | whether a body gets through a world, and how short its way can be |
+//! | [`trial`] | a mission in a world, and the rules it is judged by |
+//! | [`row`] | one mission's result |
+//! | [`table`] | the rows in a file, as they come and in order |
+//! | [`runner`] | the missions, several at a time |
+//! | [`statistics`], [`totals`] | shares with their intervals; the result of each setting, and paired differences |
+//! | [`report`] | all of it as a page |
+//!
+//! Every setting runs on the same worlds with the same noise, so that two of them differ by what was set alone.
+
+pub mod report;
+pub mod row;
+pub mod runner;
+pub mod shortest_path;
+pub mod statistics;
+pub mod table;
+pub mod totals;
+pub mod trial;
+pub mod worlds;

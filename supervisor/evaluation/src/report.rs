@@ -1,0 +1,152 @@
+//! All of an evaluation as one page: totals, paired differences, every failure with its picture.
+
+use std::fmt::{self, Write as _};
+
+use crate::{
+    row::{Outcome, Row},
+    runner::Plan,
+    totals::{Comparison, Totals},
+};
+
+/// The totals of every setting, and how each differs from the first.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// In the order of the settings.
+    pub totals: Vec<Totals>,
+    /// All but the first against the first.
+    pub comparisons: Vec<Comparison>,
+}
+
+impl Report {
+    /// Of the rows of `plan`.
+    #[must_use]
+    pub fn new(plan: &Plan, rows: &[Row]) -> Self {
+        let names: Vec<&str> = plan.settings.iter().map(|setting| &*setting.name).collect();
+        let comparisons = names.iter().skip(1);
+        Self {
+            totals: names.iter().map(|name| Totals::of(name, rows)).collect(),
+            comparisons: comparisons
+                .map(|name| Comparison::of(names[0], name, rows))
+                .collect(),
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    /// A table in text, with 95 % intervals.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for totals in &self.totals {
+            writeln!(f, "{}: {} missions", totals.setting, totals.count)?;
+            for outcome in Outcome::ALL {
+                if let Some(share) = totals.share(outcome)
+                    && (share.value > 0.0 || outcome == Outcome::Collision)
+                {
+                    writeln!(f, "  {:<12} {share}", outcome.as_str())?;
+                }
+            }
+            for (name, value, digits) in totals.metrics() {
+                writeln!(f, "  {name:<26} {value:.digits$}")?;
+            }
+        }
+        self.comparisons
+            .iter()
+            .try_for_each(|comparison| writeln!(f, "{comparison}"))
+    }
+}
+
+impl Totals {
+    /// Name, value and digits of what is known besides the shares.
+    fn metrics(&self) -> impl Iterator<Item = (&'static str, f64, usize)> {
+        let metrics = [
+            ("median time, s", self.median_time_s, 1),
+            ("median K", self.median_k, 2),
+            ("SPL", self.spl, 3),
+            ("BARN score", self.barn_score, 3),
+            ("median least clearance, m", self.median_clearance_m, 3),
+            ("median share of looking", self.median_look_share, 3),
+        ];
+        let known = |(name, value, digits): (_, Option<f64>, _)| Some((name, value?, digits));
+        metrics.into_iter().filter_map(known)
+    }
+}
+
+/// The page; pictures are beside it, as [`Plan::picture`] says. `command` is how to make it again.
+#[must_use]
+pub fn html(plan: &Plan, rows: &[Row], command: &str) -> String {
+    let report = Report::new(plan, rows);
+    let mut page = String::from(HEAD);
+    let _ = write!(
+        page,
+        "<h1>Evaluation</h1>\n<p><code>{}</code></p>\n<table><tr><th>setting</th><th>missions</th>",
+        escaped(command)
+    );
+    for outcome in Outcome::ALL {
+        let _ = write!(page, "<th>{}</th>", outcome.as_str());
+    }
+    page.push_str("<th>metrics of the successes</th></tr>\n");
+    for totals in &report.totals {
+        let _ = write!(
+            page,
+            "<tr><td>{}</td><td>{}</td>",
+            escaped(&totals.setting),
+            totals.count
+        );
+        for outcome in Outcome::ALL {
+            let share = totals.share(outcome);
+            let share = share.map_or(String::new(), |share| share.to_string());
+            let _ = write!(page, "<td>{share}</td>");
+        }
+        let metrics: Vec<String> = totals
+            .metrics()
+            .map(|(name, value, digits)| format!("{name} {value:.digits$}"))
+            .collect();
+        let _ = writeln!(page, "<td>{}</td></tr>", metrics.join("<br>"));
+    }
+    page.push_str("</table>\n<p>Shares with Wilson's 95 % intervals.</p>\n");
+    for comparison in &report.comparisons {
+        let _ = writeln!(page, "<p>{}</p>", escaped(&comparison.to_string()));
+    }
+    for outcome in Outcome::ALL.into_iter().skip(1) {
+        let failures: Vec<&Row> = rows.iter().filter(|row| row.outcome == outcome).collect();
+        if failures.is_empty() {
+            continue;
+        }
+        let _ = writeln!(page, "<h2>{} ({})</h2>", outcome.as_str(), failures.len());
+        for row in failures {
+            let _ = write!(
+                page,
+                "<figure><figcaption>{}, seed {}, {}: {}</figcaption>",
+                escaped(&row.world),
+                row.seed,
+                escaped(&row.setting),
+                escaped(&row.reason)
+            );
+            let picture = plan.picture(row);
+            if let (true, Some(name)) = (picture.exists(), picture.file_name()) {
+                let name = escaped(&name.to_string_lossy());
+                let _ = write!(
+                    page,
+                    "<img loading=\"lazy\" src=\"failures/{name}\" alt=\"{name}\">"
+                );
+            }
+            page.push_str("</figure>\n");
+        }
+    }
+    page.push_str("</body></html>\n");
+    page
+}
+
+const HEAD: &str = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>Evaluation</title>\n<style>\
+body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\
+table{border-collapse:collapse;display:block;overflow-x:auto}td,th{border:1px solid #cbd2d9;padding:.3em .6em;text-align:left;vertical-align:top}\
+code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);margin:.5em .2em;vertical-align:top}img{width:100%}\
+</style></head>\n<body>\n";
+
+/// `text` where markup is read.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}

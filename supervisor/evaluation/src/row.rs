@@ -1,0 +1,290 @@
+//! One mission's result: a row of the table.
+
+use serde::{Deserialize, Serialize};
+
+use crate::trial::Trial;
+
+/// How a mission ended, by the ground truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// At the target, nothing touched.
+    Success,
+    /// The robot touched something.
+    Collision,
+    /// Mission time ran out.
+    Timeout,
+    /// The robot believed to have arrived, and had not.
+    WrongPlace,
+    /// The robot believed that no way leads to the target; one does.
+    Unreachable,
+    /// Something failed.
+    Aborted,
+}
+
+impl Outcome {
+    /// Every outcome, in the order of the reports.
+    pub const ALL: [Self; 6] = [
+        Self::Success,
+        Self::Collision,
+        Self::Timeout,
+        Self::WrongPlace,
+        Self::Unreachable,
+        Self::Aborted,
+    ];
+
+    /// The word for it.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Success => "success",
+            Self::Collision => "collision",
+            Self::Timeout => "timeout",
+            Self::WrongPlace => "wrong_place",
+            Self::Unreachable => "unreachable",
+            Self::Aborted => "aborted",
+        }
+    }
+}
+
+/// What is read of the last line of `firsthand run --json`.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Summary {
+    outcome: String,
+    reason: String,
+    mission_time_s: f64,
+    path_length_m: f64,
+    min_clearance_m: Option<f64>,
+    pose_error_m: Option<f64>,
+    true_distance_m: Option<f64>,
+    /// Mission time at which the robot had moved 0.1 m in truth.
+    departed_s: Option<f64>,
+    safety_events: u64,
+    looks: u64,
+    look_s: f64,
+    replans: u64,
+    resets: u64,
+    full_solves: u64,
+    local_updates: u64,
+}
+
+/// One mission's result. Metres and mission seconds; without latencies, which no two runs share.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The world.
+    pub world: String,
+    /// Seed of the simulation's noise.
+    pub seed: u64,
+    /// The setting's name.
+    pub setting: String,
+    /// By the ground truth.
+    pub outcome: Outcome,
+    /// What the run said.
+    pub reason: String,
+    /// From when the clock started.
+    pub time_s: f64,
+    /// Driven in truth.
+    pub path_m: f64,
+    /// Start to target.
+    pub straight_m: f64,
+    /// The shortest way of the body.
+    pub shortest_m: f64,
+    /// K of the paper: path over straight distance.
+    pub k: f64,
+    /// Success weighted by path length: shortest / max(path, shortest), 0 without success.
+    pub spl: f64,
+    /// The BARN score; none without an optimal time.
+    pub barn_score: Option<f64>,
+    /// Least true clearance on the way.
+    pub min_clearance_m: Option<f64>,
+    /// Believed against true position at the end.
+    pub pose_error_m: Option<f64>,
+    /// True distance to the target at the end.
+    pub true_distance_m: Option<f64>,
+    /// Echoes that were mapped.
+    pub safety_events: u64,
+    /// Times the robot stopped to look.
+    pub looks: u64,
+    /// Time it looked.
+    pub look_s: f64,
+    /// Fresh planners given to a stalled robot.
+    pub replans: u64,
+    /// Times the sensed belief was reset.
+    pub resets: u64,
+    /// Full solves of the field.
+    pub full_solves: u64,
+    /// Local updates of the field.
+    pub local_updates: u64,
+}
+
+/// A robot at this many optimal times or less gets the best score, at this many or more the worst.
+const BARN_CLIP: [f64; 2] = [2.0, 8.0];
+
+impl Row {
+    /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
+    #[must_use]
+    pub fn new(trial: &Trial, seed: u64, setting: &str, summary: &Summary) -> Self {
+        let rules = &trial.rules;
+        let straight_m = trial.mission.target.length();
+        let outcome = outcome(summary, rules.success_within_m);
+        let success = outcome == Outcome::Success;
+        let started_s = if rules.clock_after_departure {
+            summary.departed_s.unwrap_or_default()
+        } else {
+            0.0
+        };
+        let time_s = (summary.mission_time_s - started_s).max(0.0);
+        let spl = trial.shortest_m / summary.path_length_m.max(trial.shortest_m);
+        let barn_score = rules.optimal_time_s.map(|optimal| {
+            let [least, most] = BARN_CLIP.map(|times| times * optimal);
+            if success {
+                optimal / time_s.clamp(least, most)
+            } else {
+                0.0
+            }
+        });
+        Self {
+            world: trial.world.clone(),
+            seed,
+            setting: setting.to_owned(),
+            outcome,
+            reason: summary.reason.clone(),
+            time_s,
+            path_m: summary.path_length_m,
+            straight_m,
+            shortest_m: trial.shortest_m,
+            k: summary.path_length_m / straight_m,
+            spl: if success { spl } else { 0.0 },
+            barn_score,
+            min_clearance_m: summary.min_clearance_m,
+            pose_error_m: summary.pose_error_m,
+            true_distance_m: summary.true_distance_m,
+            safety_events: summary.safety_events,
+            looks: summary.looks,
+            look_s: summary.look_s,
+            replans: summary.replans,
+            resets: summary.resets,
+            full_solves: summary.full_solves,
+            local_updates: summary.local_updates,
+        }
+    }
+
+    /// A mission that gave no summary.
+    #[must_use]
+    pub fn aborted(trial: &Trial, seed: u64, setting: &str, reason: String) -> Self {
+        let nothing = Summary {
+            outcome: "aborted".to_owned(),
+            reason,
+            mission_time_s: 0.0,
+            path_length_m: 0.0,
+            min_clearance_m: None,
+            pose_error_m: None,
+            true_distance_m: None,
+            departed_s: None,
+            safety_events: 0,
+            looks: 0,
+            look_s: 0.0,
+            replans: 0,
+            resets: 0,
+            full_solves: 0,
+            local_updates: 0,
+        };
+        Self::new(trial, seed, setting, &nothing)
+    }
+
+    /// What makes it the row it is.
+    #[must_use]
+    pub fn key(&self) -> (String, u64, String) {
+        (self.world.clone(), self.seed, self.setting.clone())
+    }
+}
+
+/// What the ground truth says of how a run ended.
+fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
+    let there = summary
+        .true_distance_m
+        .is_some_and(|distance| distance <= success_within_m);
+    match summary.outcome.as_str() {
+        "reached" | "wrong_place" if there => Outcome::Success,
+        "reached" | "wrong_place" => Outcome::WrongPlace,
+        "collision" => Outcome::Collision,
+        "timeout" => Outcome::Timeout,
+        "unreachable" => Outcome::Unreachable,
+        _ => Outcome::Aborted,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{shortest_path::ShortestPath, trial::Rules};
+    use common::mission::Mission;
+    use std::path::Path;
+
+    fn trial(optimal_time_s: Option<f64>) -> Trial {
+        let mission = Mission::parse("target = [4, 0]", Path::new("test.toml")).unwrap();
+        assert!(matches!(
+            crate::shortest_path::shortest_path(
+                &mission.world,
+                glam::DVec2::ZERO,
+                mission.target,
+                0.2
+            ),
+            ShortestPath::Found(_)
+        ));
+        Trial {
+            world: "test".to_owned(),
+            mission,
+            shortest_m: 4.0,
+            rules: Rules {
+                optimal_time_s,
+                clock_after_departure: optimal_time_s.is_some(),
+                ..Rules::default()
+            },
+        }
+    }
+
+    fn summary(outcome: &str, true_distance_m: f64) -> Summary {
+        let text = format!(
+            r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
+            "pose_error_m": 0.1, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3, "looks": 1,
+            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1}}"#
+        );
+        serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn success_is_what_the_ground_truth_says() {
+        let outcome =
+            |said, distance| Row::new(&trial(None), 1, "a", &summary(said, distance)).outcome;
+        assert_eq!(outcome("reached", 0.4), Outcome::Success);
+        assert_eq!(outcome("reached", 0.6), Outcome::WrongPlace);
+        assert_eq!(outcome("collision", 0.1), Outcome::Collision);
+        assert_eq!(outcome("timeout", 0.1), Outcome::Timeout);
+    }
+
+    #[test]
+    fn metrics_are_those_of_their_definitions() {
+        let row = Row::new(&trial(None), 1, "a", &summary("reached", 0.1));
+        assert_eq!((row.k, row.spl, row.barn_score), (1.25, 0.8, None));
+        let lost = Row::new(&trial(None), 1, "a", &summary("timeout", 3.0));
+        assert_eq!(lost.spl, 0.0);
+    }
+
+    #[test]
+    fn the_barn_clock_starts_with_the_motion_and_the_score_is_clipped() {
+        let row = |optimal| Row::new(&trial(Some(optimal)), 1, "a", &summary("reached", 0.1));
+        assert_eq!(row(6.0).time_s, 24.0);
+        assert_eq!(row(6.0).barn_score, Some(0.25));
+        assert_eq!(
+            row(1.0).barn_score,
+            Some(0.125),
+            "eight optimal times and more"
+        );
+        assert_eq!(
+            row(20.0).barn_score,
+            Some(0.5),
+            "two optimal times and less"
+        );
+    }
+}

@@ -1,0 +1,225 @@
+//! The missions of an evaluation: each a `firsthand run` of its own, several at a time.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    process::Stdio,
+    sync::{Mutex, mpsc::channel},
+    thread,
+};
+
+use supervisor::process::firsthand;
+use thiserror::Error;
+
+use crate::{
+    row::{Row, Summary},
+    table::{Table, TableError},
+    trial::Trial,
+};
+
+/// Name of the picture that a run leaves in its directory.
+const PICTURE: &str = "picture.svg";
+
+/// What is set for all missions of a row of totals.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
+    /// Its name.
+    pub name: String,
+    /// KEY=VALUE over the mission.
+    pub set: Vec<String>,
+}
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The worlds.
+    pub trials: Vec<Trial>,
+    /// Every one of them on every world.
+    pub settings: Vec<Setting>,
+    /// Noise seeds on every world, counted on from one world to the next.
+    pub repeats: u64,
+    /// The first noise seed.
+    pub seed: u64,
+    /// Missions at once.
+    pub jobs: usize,
+    /// Where worlds, rows and pictures of failures go; exists.
+    pub directory: PathBuf,
+}
+
+/// Why an evaluation ended early.
+#[derive(Debug, Error)]
+pub enum RunnerError {
+    /// The table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A file or a process.
+    #[error("cannot {action}: {source}")]
+    System {
+        /// What was tried.
+        action: String,
+        /// The system's word.
+        source: io::Error,
+    },
+}
+
+fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> RunnerError {
+    let action = action.into();
+    move |source| RunnerError::System { action, source }
+}
+
+/// How far it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Missions that ended, those of an earlier part among them.
+    pub ended: usize,
+    /// All missions.
+    pub all: usize,
+    /// Missions that this part has ended.
+    pub ended_now: usize,
+}
+
+/// One mission to run.
+struct Job<'a> {
+    trial: &'a Trial,
+    setting: &'a Setting,
+    seed: u64,
+}
+
+impl Plan {
+    /// Where the mission file of a trial lies.
+    fn mission_file(&self, trial: &Trial) -> PathBuf {
+        let name = format!("{}.toml", trial.world);
+        self.directory.join("worlds").join(name)
+    }
+
+    /// Where the picture of a failure lies.
+    #[must_use]
+    pub fn picture(&self, row: &Row) -> PathBuf {
+        picture(&self.directory, row)
+    }
+
+    fn jobs(&self) -> impl Iterator<Item = Job<'_>> {
+        let worlds = (0..).zip(&self.trials);
+        worlds.flat_map(move |(number, trial)| {
+            let first = self.seed + number * self.repeats;
+            (first..first + self.repeats).flat_map(move |seed| {
+                let settings = self.settings.iter();
+                settings.map(move |setting| Job {
+                    trial,
+                    setting,
+                    seed,
+                })
+            })
+        })
+    }
+}
+
+fn picture(directory: &Path, row: &Row) -> PathBuf {
+    let name = format!("{}-{}-{}.svg", row.world, row.seed, row.setting);
+    directory.join("failures").join(name.replace(
+        |c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)),
+        "_",
+    ))
+}
+
+/// Run all missions of `plan` whose rows are not in `table` yet. `watch` is told after each.
+///
+/// # Errors
+/// When a file cannot be written. A mission that fails is a row.
+pub fn run(
+    plan: &Plan,
+    table: &mut Table,
+    watch: &mut dyn FnMut(&Progress),
+) -> Result<(), RunnerError> {
+    for folder in ["worlds", "failures"] {
+        let folder = plan.directory.join(folder);
+        fs::create_dir_all(&folder).map_err(system(format!("make {}", folder.display())))?;
+    }
+    for trial in &plan.trials {
+        let text = toml::to_string(&trial.mission).map_err(io::Error::other);
+        let file = plan.mission_file(trial);
+        text.and_then(|text| fs::write(&file, text))
+            .map_err(system(format!("write {}", file.display())))?;
+    }
+    let done = table.keys();
+    let all = plan.jobs().count();
+    let left = plan.jobs().filter(|job| {
+        let key = (job.trial.world.clone(), job.seed, job.setting.name.clone());
+        !done.contains(&key)
+    });
+    let left: Vec<Job<'_>> = left.collect();
+    let mut progress = Progress {
+        ended: all - left.len(),
+        all,
+        ended_now: 0,
+    };
+    let queue = Mutex::new(left.into_iter());
+    let (give, rows) = channel();
+    thread::scope(|scope| {
+        for worker in 0..plan.jobs.max(1) {
+            let (give, queue) = (give.clone(), &queue);
+            scope.spawn(move || {
+                loop {
+                    let job = queue.lock().ok().and_then(|mut queue| queue.next());
+                    let Some(job) = job else {
+                        return;
+                    };
+                    if give.send(mission(plan, &job, worker)).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(give);
+        for row in rows {
+            table.add(row?)?;
+            progress.ended += 1;
+            progress.ended_now += 1;
+            watch(&progress);
+        }
+        Ok(())
+    })
+}
+
+/// One mission, in processes of its own.
+fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError> {
+    let Job {
+        trial,
+        setting,
+        seed,
+    } = job;
+    let own = std::process::id();
+    let directory = plan.directory.join(format!("run-{worker}"));
+    let mut command = firsthand(&["run", "--json"]);
+    command.arg(plan.mission_file(trial));
+    command.args(["--robot", &format!("evaluate{own}-{worker}")]);
+    command.args(["--seed", &seed.to_string(), "--parent", &own.to_string()]);
+    command.arg("--out").arg(&directory);
+    for assignment in &setting.set {
+        command.args(["--set", assignment]);
+    }
+    let output = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .output()
+        .map_err(system("start a mission"))?;
+    let row = match serde_json::from_slice::<Summary>(&output.stdout) {
+        Ok(summary) => Row::new(trial, *seed, &setting.name, &summary),
+        Err(_) => {
+            let said = String::from_utf8_lossy(&output.stderr);
+            let reason = said
+                .trim()
+                .lines()
+                .last()
+                .unwrap_or("no summary")
+                .to_owned();
+            Row::aborted(trial, *seed, &setting.name, reason)
+        }
+    };
+    if row.outcome != crate::row::Outcome::Success {
+        // A mission that could not start has none.
+        let _ = fs::rename(directory.join(PICTURE), picture(&plan.directory, &row));
+    }
+    let _ = fs::remove_dir_all(&directory);
+    Ok(row)
+}

@@ -1,0 +1,153 @@
+//! One trial: a mission in a world that can be crossed, and the rules it is judged by.
+
+use common::{
+    geometry::Shapes,
+    mission::{Mission, MissionError},
+};
+use glam::DVec2;
+use std::path::Path;
+
+use crate::shortest_path::{ShortestPath, shortest_path};
+
+/// Cells of a trial's grid, metres, where the mission does not say otherwise.
+const CELL_M: f64 = 0.1;
+/// Free ground between what stands in a world and the perimeter around it, metres.
+const RIM_M: f64 = 0.6;
+
+/// How a mission's end is judged by the ground truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// Farther than this from the target, a robot that says it has arrived is in the wrong place, metres.
+    pub success_within_m: f64,
+    /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does; else with the mission.
+    pub clock_after_departure: bool,
+    /// Time of the reference path at 2 m/s, seconds, for the BARN score; none elsewhere.
+    pub optimal_time_s: Option<f64>,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self {
+            success_within_m: 0.5,
+            clock_after_departure: false,
+            optimal_time_s: None,
+        }
+    }
+}
+
+/// A world with a start and a target, in the frame of the world it comes from.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What stands there, metres.
+    pub shapes: Shapes,
+    /// Where the robot starts, metres.
+    pub start: DVec2,
+    /// Its heading there, radians counter-clockwise from x.
+    pub heading: f64,
+    /// Where it is to go, metres.
+    pub target: DVec2,
+}
+
+/// A mission on a world that was checked to be solvable.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// The world's name: its kind and number.
+    pub world: String,
+    /// The mission, its origin at the start of the robot.
+    pub mission: Mission,
+    /// Length of the shortest way of the robot's body, metres.
+    pub shortest_m: f64,
+    /// How it is judged.
+    pub rules: Rules,
+}
+
+impl Trial {
+    /// The trial `world` in `scene`, if a body of `radius_m` can get from start to target with `margin_m` to spare.
+    ///
+    /// # Errors
+    /// When no mission can be made of it, such as a world that is too large.
+    pub fn new(
+        world: String,
+        scene: &Scene,
+        rules: Rules,
+        body: &BodySize,
+    ) -> Result<Option<Self>, MissionError> {
+        let ShortestPath::Found(shortest_m) =
+            shortest_path(&scene.shapes, scene.start, scene.target, body.swept_m())
+        else {
+            return Ok(None);
+        };
+        let mission = mission(&world, scene, shortest_m)?;
+        Ok(Some(Self {
+            world,
+            mission,
+            shortest_m,
+            rules,
+        }))
+    }
+}
+
+/// The body that a world must let through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodySize {
+    /// Radius of the robot, metres.
+    pub radius_m: f64,
+    /// Free ground that must be left on both sides, metres.
+    pub margin_m: f64,
+}
+
+impl BodySize {
+    /// Half the width of the narrowest way, metres.
+    #[must_use]
+    pub fn swept_m(&self) -> f64 {
+        self.radius_m + self.margin_m
+    }
+}
+
+/// Mission seconds for a way of `metres`: four times what a robot at 0.25 m/s needs, and half a minute.
+fn timeout_s(metres: f64) -> f64 {
+    (30.0 + 16.0 * metres).round()
+}
+
+/// The mission of `scene`: origin at the start, x along the x of the scene's own frame.
+fn mission(world: &str, scene: &Scene, shortest_m: f64) -> Result<Mission, MissionError> {
+    let target = scene.target - scene.start;
+    let shapes = moved(&scene.shapes, -scene.start);
+    let (least, greatest) = bounds(&shapes, target);
+    let centre = (least + greatest) / 2.0;
+    let cells = (((greatest - least).max_element() + 2.0 * RIM_M) / CELL_M).ceil();
+    let text = format!(
+        "target = [{:?}, {:?}]\nperimeter = {{ width_m = {:?}, cells = {cells}, centre = [{:?}, {:?}] }}",
+        target.x,
+        target.y,
+        cells * CELL_M,
+        centre.x,
+        centre.y,
+    );
+    let mut mission = Mission::parse(&text, Path::new(world))?;
+    mission.name = world.to_owned();
+    mission.start.heading_deg = scene.heading.to_degrees();
+    mission.world = shapes;
+    mission.timeout_s = timeout_s(shortest_m);
+    Ok(mission)
+}
+
+/// The corners of what holds `shapes`, the origin and the target, metres.
+fn bounds(shapes: &Shapes, target: DVec2) -> (DVec2, DVec2) {
+    let all = shapes.pieces().map(|piece| piece.bounds());
+    let ends = (DVec2::ZERO.min(target), DVec2::ZERO.max(target));
+    all.fold(ends, |(least, greatest), (from, to)| {
+        (least.min(from), greatest.max(to))
+    })
+}
+
+/// `shapes` moved by `by`, metres.
+fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
+    let mut shapes = shapes.clone();
+    shapes.drums.iter_mut().for_each(|drum| drum.at += by);
+    shapes.boxes.iter_mut().for_each(|block| block.at += by);
+    for wall in &mut shapes.walls {
+        wall.points.iter_mut().for_each(|point| *point += by);
+    }
+    shapes
+}

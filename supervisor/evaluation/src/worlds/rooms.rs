@@ -1,0 +1,131 @@
+//! Rooms: four walls, drums, boxes and loose walls at any angle, at three densities; in one of three a partition with
+//! a door of 0.8 to 1.2 m.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use common::geometry::{Box2, Drum, Shapes, Wall};
+use glam::DVec2;
+
+use super::random::Random;
+use crate::trial::Scene;
+
+/// Share of the floor over which things are strewn, things per square metre: sparse, usual, dense.
+const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
+/// Nothing stands nearer than this to start and target, metres.
+const KEPT_FREE_M: f64 = 0.5;
+/// Share of rooms with a partition.
+const DOOR_SHARE: f64 = 1.0 / 3.0;
+
+/// What kinds of room are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Doors {
+    /// One in three has a partition with a door.
+    Some,
+    /// All have.
+    All,
+}
+
+/// Room `number`: the density goes round with the number.
+pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
+    let distance = random.within(4.0, 8.0);
+    let half_width = random.within(1.6, 3.0);
+    let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
+    let (least, greatest) = (
+        DVec2::new(-1.2, -half_width),
+        DVec2::new(distance + 1.2, half_width),
+    );
+    let mut shapes = Shapes {
+        walls: vec![closed(least, greatest)],
+        ..Shapes::default()
+    };
+    if doors == Doors::All || random.share() < DOOR_SHARE {
+        let at = random.within(1.2, distance - 1.2);
+        let gap = random.within(0.8, 1.2);
+        let reach = half_width - gap / 2.0 - 0.1;
+        partition(
+            &mut shapes,
+            at,
+            random.within(-reach, reach),
+            gap,
+            half_width,
+        );
+    }
+    let extent = greatest - least;
+    let things = (extent.x * extent.y * DENSITIES[number % DENSITIES.len()]).round() as usize;
+    for _ in 0..things {
+        let at = random.point((least + greatest) / 2.0, extent / 2.0);
+        add_thing(&mut shapes, random, at, target);
+    }
+    let heading = match random.below(4) {
+        0 => 0.0,
+        1 => FRAC_PI_2,
+        2 => PI,
+        _ => random.within(-PI, PI),
+    };
+    Scene {
+        shapes,
+        start: DVec2::ZERO,
+        heading,
+        target,
+    }
+}
+
+/// A closed rectangle of walls.
+pub(super) fn closed(least: DVec2, greatest: DVec2) -> Wall {
+    let corners = [
+        least,
+        DVec2::new(greatest.x, least.y),
+        greatest,
+        DVec2::new(least.x, greatest.y),
+        least,
+    ];
+    Wall {
+        points: corners.to_vec(),
+    }
+}
+
+/// A wall across the room at x = `at` with a door of `gap` metres around y = `middle`.
+fn partition(shapes: &mut Shapes, at: f64, middle: f64, gap: f64, half_width: f64) {
+    for (from, to) in [
+        (-half_width, middle - gap / 2.0),
+        (middle + gap / 2.0, half_width),
+    ] {
+        shapes.walls.push(Wall {
+            points: vec![DVec2::new(at, from), DVec2::new(at, to)],
+        });
+    }
+}
+
+/// A drum, a box or a loose wall at `at`, unless start or target would not be free.
+fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2) {
+    let is_free =
+        |reach: f64| at.length() > reach + KEPT_FREE_M && at.distance(target) > reach + KEPT_FREE_M;
+    match random.below(10) {
+        0..=4 => {
+            let radius_m = random.within(0.12, 0.35);
+            if is_free(radius_m) {
+                shapes.drums.push(Drum { at, radius_m });
+            }
+        }
+        5..=7 => {
+            let size_m = DVec2::new(random.within(0.24, 0.8), random.within(0.24, 0.8));
+            let angle_deg = random.within(0.0, 180.0);
+            if is_free(size_m.length() / 2.0) {
+                shapes.boxes.push(Box2 {
+                    at,
+                    size_m,
+                    angle_deg,
+                });
+            }
+        }
+        _ => {
+            let half = random.within(0.4, 1.1);
+            let along = DVec2::from_angle(random.within(0.0, TAU)) * half;
+            if is_free(half) {
+                shapes.walls.push(Wall {
+                    points: vec![at - along, at + along],
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! U traps across the straight way: of walls and of drums, of several depths and widths, the robot heading any way.
+
+use common::geometry::{Drum, Shapes, Wall};
+use glam::DVec2;
+
+use super::random::Random;
+use crate::trial::Scene;
+
+/// Where the bottom of the U stands, metres ahead.
+const BOTTOM_M: f64 = 2.4;
+/// From drum to drum, metres: less than a body passes.
+const DRUM_SPACING_M: f64 = 0.36;
+const DRUM_RADIUS_M: f64 = 0.17;
+
+/// What the sides of a trap are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sides {
+    /// Smooth walls.
+    Walls,
+    /// Drums in a row.
+    Drums,
+}
+
+/// Trap `number`: its sides and the robot's heading go round with the number, in steps of 45 degrees.
+pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
+    let sides = [Sides::Walls, Sides::Drums][number % 2];
+    let heading_deg = 45.0 * (number / 2 % 8) as f64;
+    let depth = random.within(0.8, 1.6);
+    let half_width = random.within(0.7, 1.3);
+    let off = random.within(-0.3, 0.3);
+    let corners = [
+        DVec2::new(BOTTOM_M - depth, off - half_width),
+        DVec2::new(BOTTOM_M, off - half_width),
+        DVec2::new(BOTTOM_M, off + half_width),
+        DVec2::new(BOTTOM_M - depth, off + half_width),
+    ];
+    let mut shapes = Shapes::default();
+    match sides {
+        Sides::Walls => shapes.walls.push(Wall {
+            points: corners.to_vec(),
+        }),
+        Sides::Drums => {
+            for pair in corners.windows(2) {
+                let steps = (pair[0].distance(pair[1]) / DRUM_SPACING_M).ceil();
+                shapes.drums.extend((0..=steps as u32).map(|step| Drum {
+                    at: pair[0].lerp(pair[1], f64::from(step) / steps),
+                    radius_m: DRUM_RADIUS_M,
+                }));
+            }
+        }
+    }
+    Scene {
+        shapes,
+        start: DVec2::ZERO,
+        heading: f64::to_radians(heading_deg),
+        target: DVec2::new(4.5, 0.0),
+    }
+}
