@@ -2,20 +2,21 @@
 
 mod barn;
 mod corridors;
+mod error;
 mod random;
 mod rooms;
 mod traps;
 
 use std::{
     convert::Infallible,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
     str::FromStr,
 };
 
-use common::mission::{Mission, MissionError};
-use thiserror::Error;
+use common::mission::Mission;
 
+pub use self::error::WorldError;
 use self::{corridors::Bends, random::Random, rooms::Doors};
 use crate::{
     shortest_path::{ShortestPath, shortest_path},
@@ -54,55 +55,6 @@ impl FromStr for Worlds {
             "straight-corridors" => Self::StraightCorridors,
             path => Self::Path(path.into()),
         })
-    }
-}
-
-/// Worlds that cannot be had.
-#[derive(Debug, Error)]
-pub enum WorldError {
-    /// The file system refused.
-    #[error("cannot read {}: {source}; give rooms, doors, traps, corridors, straight-corridors, a file or a folder", file.display())]
-    Unreadable {
-        /// What was given.
-        file: PathBuf,
-        /// The system's word.
-        source: io::Error,
-    },
-    /// It is not what its name says.
-    #[error("{}: {problem}", file.display())]
-    Malformed {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong, and what to do.
-        problem: String,
-    },
-    /// No mission can be made of it.
-    #[error(transparent)]
-    Mission(#[from] MissionError),
-    /// Nothing there that a body of that size can cross.
-    #[error(
-        "none of the worlds can be crossed by a body of {swept_m:.2} m around its centre; give others, or a smaller robot"
-    )]
-    Unsolvable {
-        /// Half the width of the narrowest way, metres.
-        swept_m: f64,
-    },
-}
-
-impl WorldError {
-    fn unreadable(file: &Path) -> impl Fn(io::Error) -> Self {
-        let file = file.to_path_buf();
-        move |source| Self::Unreadable {
-            file: file.clone(),
-            source,
-        }
-    }
-
-    fn malformed(file: &Path, problem: impl Into<String>) -> Self {
-        Self::Malformed {
-            file: file.to_path_buf(),
-            problem: problem.into(),
-        }
     }
 }
 

@@ -16,7 +16,7 @@ use common::geometry::{Drum, Shapes, Wall};
 use glam::DVec2;
 use serde::Deserialize;
 
-use super::WorldError;
+use super::error::WorldError;
 use crate::trial::{Rules, Scene};
 
 const START: DVec2 = DVec2::new(-2.25, 3.0);
