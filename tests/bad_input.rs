@@ -88,7 +88,9 @@ fn an_unknown_stage_is_answered_with_those_there_are() {
 fn a_second_supervisor_of_a_robot_is_refused_and_the_first_goes_on() {
     let mut first = Run::start("second", "obstacle-course", &["--pace", "1"]);
     first.wait_until_under_way(0.3);
-    let text = refusal(&["run", "--robot", "second"]);
+    let runs = tempfile::tempdir().unwrap();
+    let runs = runs.path().to_str().unwrap();
+    let text = refusal(&["run", "--robot", "second", "--runs", runs]);
     let pid = first.pid().to_string();
     assert!(text.contains(&pid) && text.contains("--robot"), "{text}");
     assert!(first.status().is_some());
@@ -107,10 +109,14 @@ fn a_port_in_use_is_named() {
 
 #[test]
 fn a_robot_address_that_is_none_is_named() {
+    let runs = tempfile::tempdir().unwrap();
+    let runs = runs.path().to_str().unwrap();
     let text = refusal(&[
         "run",
         "--robot",
         "nowhere",
+        "--runs",
+        runs,
         "--set",
         "robot.address='not an address'",
     ]);
