@@ -5,10 +5,12 @@
 //! | [`commands`] | one file a subcommand |
 //! | [`summary`] | how a run ended, as numbers |
 //! | [`run_picture`] | the picture of a run |
+//! | [`progress_line`] | progress on standard error |
 //! | [`logging`] | logs to standard error, to a file, to the journal |
 
 mod commands;
 mod logging;
+mod progress_line;
 #[cfg(feature = "tools")]
 mod run_picture;
 mod summary;

@@ -9,7 +9,7 @@ mod traps;
 
 use std::{
     convert::Infallible,
-    fs,
+    fmt, fs,
     path::{Path, PathBuf},
     str::FromStr,
 };
@@ -43,18 +43,31 @@ pub enum Worlds {
     Path(PathBuf),
 }
 
+/// Kinds that are drawn, by their names.
+const DRAWN: [(&str, Worlds); 5] = [
+    ("rooms", Worlds::Rooms),
+    ("doors", Worlds::Doors),
+    ("traps", Worlds::Traps),
+    ("corridors", Worlds::Corridors),
+    ("straight-corridors", Worlds::StraightCorridors),
+];
+
 impl FromStr for Worlds {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match text {
-            "rooms" => Self::Rooms,
-            "doors" => Self::Doors,
-            "traps" => Self::Traps,
-            "corridors" => Self::Corridors,
-            "straight-corridors" => Self::StraightCorridors,
-            path => Self::Path(path.into()),
-        })
+        let drawn = DRAWN.into_iter().find(|(name, _)| *name == text);
+        Ok(drawn.map_or_else(|| Self::Path(text.into()), |(_, worlds)| worlds))
+    }
+}
+
+/// As [`FromStr`] reads it.
+impl fmt::Display for Worlds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self, DRAWN.iter().find(|(_, worlds)| worlds == self)) {
+            (Self::Path(path), _) => path.display().fmt(f),
+            (_, found) => f.write_str(found.map_or("", |(name, _)| name)),
+        }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::{
     fs,
-    io::{self, IsTerminal as _, Write as _},
     num::NonZero,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -21,7 +20,8 @@ use evaluation::{
 };
 use serde_json::json;
 
-use super::Failure;
+use super::{Failure, print_text};
+use crate::progress_line::{ProgressLine, write_stderr};
 
 /// Run missions on many worlds and count, by the ground truth, how many succeed: with 95 % intervals, every failure
 /// with its picture. Worlds and noise follow from the seed.
@@ -101,26 +101,25 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         jobs,
         directory: fs::canonicalize(&arguments.out)?,
     };
-    say(&format!(
+    write_stderr(&format!(
         "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
         plan.trials.len(),
         found.unsolvable
     ));
     let mut table = Table::open(&plan.directory.join(ROWS_FILE))?;
-    let mut console = Console::default();
+    let mut console = Console::new();
     runner::run(&plan, &mut table, &mut |progress| console.show(progress))?;
-    console.end();
+    console.line.end();
     table.sort()?;
     let page = plan.directory.join(PAGE_FILE);
     fs::write(&page, report::html(&plan, table.rows(), &described))?;
     let report = Report::new(&plan, table.rows());
-    let mut stdout = io::stdout();
-    if arguments.json {
-        writeln!(stdout, "{}", as_json(&report)?)?;
+    let text = if arguments.json {
+        format!("{}\n", as_json(&report)?)
     } else {
-        write!(stdout, "{report}")?;
-        writeln!(stdout, "rows and pictures: {}", page.display())?;
-    }
+        format!("{report}rows and pictures: {}\n", page.display())
+    };
+    print_text(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -152,14 +151,7 @@ fn prepare(arguments: &Arguments, described: &str) -> Result<(), Failure> {
 
 /// The command that gives these rows.
 fn described(arguments: &Arguments, settings: &[Setting]) -> String {
-    let worlds = match &arguments.worlds {
-        Worlds::Rooms => "rooms".to_owned(),
-        Worlds::Doors => "doors".to_owned(),
-        Worlds::Traps => "traps".to_owned(),
-        Worlds::Corridors => "corridors".to_owned(),
-        Worlds::StraightCorridors => "straight-corridors".to_owned(),
-        Worlds::Path(path) => path.display().to_string(),
-    };
+    let worlds = &arguments.worlds;
     let count = arguments
         .count
         .map_or(String::new(), |count| format!(" --count {count}"));
@@ -244,32 +236,25 @@ fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
     Ok(object)
 }
 
-/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+/// Progress on standard error.
 struct Console {
     began: Instant,
-    rewrites: bool,
-    shown: Option<Instant>,
-}
-
-impl Default for Console {
-    fn default() -> Self {
-        Self {
-            began: Instant::now(),
-            rewrites: io::stderr().is_terminal(),
-            shown: None,
-        }
-    }
+    line: ProgressLine,
 }
 
 impl Console {
+    fn new() -> Self {
+        Self {
+            began: Instant::now(),
+            line: ProgressLine::new(LINE_EVERY),
+        }
+    }
+
     fn show(&mut self, progress: &Progress) {
-        let due = self
-            .shown
-            .is_none_or(|shown| self.rewrites || shown.elapsed() >= LINE_EVERY);
-        if !due {
+        if !self.line.is_due() {
             return;
         }
-        self.shown = Some(Instant::now());
+        self.line.begin();
         let Progress {
             ended,
             all,
@@ -278,24 +263,6 @@ impl Console {
         let each = self.began.elapsed().as_secs_f64() / ended_now.max(1) as f64;
         let left = each * (all - ended) as f64;
         let line = format!("{ended} of {all} missions, {left:.0} s left");
-        if self.rewrites {
-            say(&format!("\r\x1b[K{line}"));
-        } else {
-            say(&format!("{line}\n"));
-        }
+        self.line.show(&line, true);
     }
-
-    fn end(&self) {
-        if self.rewrites {
-            say("\n");
-        }
-    }
-}
-
-/// On standard error; a reader that went away does not end the evaluation.
-fn say(text: &str) {
-    let mut stderr = io::stderr();
-    let _ = stderr
-        .write_all(text.as_bytes())
-        .and_then(|()| stderr.flush());
 }

@@ -12,7 +12,7 @@ use std::{
 };
 
 use clap::Args;
-use common::samples::FieldCell;
+use common::{process_status, samples::FieldCell};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use npyz::WriterBuilder as _;
 use serde::Serialize;
@@ -298,11 +298,8 @@ impl fmt::Display for Report {
 
 /// The most memory this process ever held, bytes; none where the kernel does not tell.
 fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    let peak = process_status::field("self", "VmHWM")?;
+    let kibibytes: u64 = peak.strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
 }
 

@@ -1,12 +1,6 @@
 //! `firsthand run MISSION`: a mission from start to summary.
 
-use std::{
-    fs,
-    io::{self, IsTerminal, Write as _},
-    path::PathBuf,
-    process::ExitCode,
-    time::{Duration, Instant},
-};
+use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
@@ -14,7 +8,11 @@ use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_chi
 use super::{Failure, directories, missions};
 #[cfg(feature = "tools")]
 use crate::run_picture;
-use crate::{logging, summary::Summary};
+use crate::{
+    logging,
+    progress_line::{ProgressLine, write_stderr},
+    summary::Summary,
+};
 use supervisor::{
     Options, Progress, Starter,
     outcome::{Ending, Outcome},
@@ -178,7 +176,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             return Err(error.into());
         }
     };
-    console.end();
+    console.line.end();
     let summary = Summary::new(&options.mission, &finished);
     let json = serde_json::to_string(&summary)?;
     fs::write(directory.join(SUMMARY), format!("{json}\n"))?;
@@ -220,12 +218,10 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
-/// Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere, none in a journal, where
-/// it is the service's status.
+/// Progress on standard error; none in a journal, where it is the service's status.
 struct Console {
-    rewrites: bool,
+    line: ProgressLine,
     silent: bool,
-    shown: Option<Instant>,
     title: String,
 }
 
@@ -236,9 +232,8 @@ impl Console {
     fn new(options: &Options) -> Self {
         let mission = &options.mission;
         Self {
-            rewrites: io::stderr().is_terminal(),
+            line: ProgressLine::new(LINE_EVERY),
             silent: logging::to_journal(),
-            shown: None,
             title: format!(
                 "mission {}{}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
                 mission.name,
@@ -256,33 +251,12 @@ impl Console {
     }
 
     fn show(&mut self, progress: &Progress<'_>) {
-        let due = self
-            .shown
-            .is_none_or(|shown| self.rewrites || shown.elapsed() >= LINE_EVERY);
-        if !due {
+        if !self.line.is_due() {
             return;
         }
-        if self.shown.replace(Instant::now()).is_none() {
+        if self.line.begin() {
             write_stderr(&format!("{}\n", self.title));
         }
-        if self.rewrites {
-            write_stderr(&format!("\r\x1b[K{progress}"));
-        } else if !self.silent {
-            write_stderr(&format!("{progress}\n"));
-        }
+        self.line.show(&progress.to_string(), !self.silent);
     }
-
-    fn end(&self) {
-        if self.rewrites {
-            write_stderr("\n");
-        }
-    }
-}
-
-/// Write to standard error; a reader that was closed does not end the mission.
-fn write_stderr(text: &str) {
-    let mut stderr = io::stderr();
-    let _ = stderr
-        .write_all(text.as_bytes())
-        .and_then(|()| stderr.flush());
 }

@@ -1,0 +1,60 @@
+//! Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+
+use std::{
+    io::{self, IsTerminal as _, Write as _},
+    time::{Duration, Instant},
+};
+
+/// The line that is shown now.
+pub(crate) struct ProgressLine {
+    rewrites: bool,
+    /// Time between lines that cannot be rewritten.
+    every: Duration,
+    shown: Option<Instant>,
+}
+
+impl ProgressLine {
+    /// None shown yet; where lines cannot be rewritten, one comes after each `every`.
+    pub(crate) fn new(every: Duration) -> Self {
+        Self {
+            rewrites: io::stderr().is_terminal(),
+            every,
+            shown: None,
+        }
+    }
+
+    /// Whether it is time for a line.
+    pub(crate) fn is_due(&self) -> bool {
+        self.shown
+            .is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
+    }
+
+    /// A line is due now. Returns whether it is the first.
+    pub(crate) fn begin(&mut self) -> bool {
+        self.shown.replace(Instant::now()).is_none()
+    }
+
+    /// Show `line`; where it would stay, only if it `may_stay`.
+    pub(crate) fn show(&self, line: &str, may_stay: bool) {
+        if self.rewrites {
+            write_stderr(&format!("\r\x1b[K{line}"));
+        } else if may_stay {
+            write_stderr(&format!("{line}\n"));
+        }
+    }
+
+    /// No line follows.
+    pub(crate) fn end(&self) {
+        if self.rewrites {
+            write_stderr("\n");
+        }
+    }
+}
+
+/// Write to standard error; a reader that was closed does not end what is under way.
+pub(crate) fn write_stderr(text: &str) {
+    let mut stderr = io::stderr();
+    let _ = stderr
+        .write_all(text.as_bytes())
+        .and_then(|()| stderr.flush());
+}
