@@ -116,8 +116,7 @@ pub(crate) fn attack(
         collisions: summary["collisions"].as_u64().unwrap_or_default(),
         pose_excess_m: number(&summary, "pose_error_m") - number(undisturbed, "pose_error_m"),
         stopping_time_s: number(&summary, "stopping_time_s"),
-        // Each signal may cost one wheel count.
-        pose_allowance_m: f64::from(kills) * options.loaded.body().metres_per_count(),
+        pose_allowance_m: pose_allowance_m(&options.loaded, kills),
         kills,
     };
     if let Some(mut robot) = robot {
@@ -133,6 +132,17 @@ pub(crate) fn attack(
         fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
     }
     Ok(())
+}
+
+/// How much worse than the undisturbed run's the pose may be at the end, metres.
+///
+/// Each signal may cost one wheel count of way. And a run that was hit goes another way, so its wheels are read at other
+/// fractions of a count: one count between the wheels turns the heading by `count / track`, which is that much of the
+/// distance to the target across it.
+fn pose_allowance_m(mission: &Mission, kills: u32) -> f64 {
+    let body = mission.body();
+    let target = mission.start_pose().position.distance(mission.target);
+    body.metres_per_count() * (f64::from(kills) + target / body.track_m)
 }
 
 /// A robot that does not end with its supervisor.
