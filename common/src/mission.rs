@@ -9,6 +9,8 @@ mod error;
 mod robot;
 mod simulation;
 
+use std::path::PathBuf;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -158,6 +160,10 @@ pub struct Planner {
     /// [`Planner::EVIDENTIAL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
+    /// The executable of the planner stage, in place of `firsthand`'s own; it is given the command line of
+    /// [`stage_command`](crate::stage_command). A run file has it absolute.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub executable: Option<PathBuf>,
 }
 
 impl Planner {
