@@ -151,7 +151,7 @@ pub struct Mapper {
     pub map_within_m: f64,
 }
 
-/// How the field is posed.
+/// Which planner, and how its field is posed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {

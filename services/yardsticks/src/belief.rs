@@ -143,29 +143,9 @@ fn ring(middle: DVec2, reach: u32) -> impl Iterator<Item = Cell> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-    use common::grid::Part;
-
-    /// The header and the cells of a map drawn row by row, the first one with the greatest y: `#` is hazard. Cells of
-    /// 0.1 m, the middle one at (0, 0).
-    pub(crate) fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
-        let frame = GridFrame {
-            cells: rows.len() as u32,
-            resolution_m: 0.1,
-            centre: DVec2::ZERO,
-        };
-        let letters = rows.iter().rev().flat_map(|row| row.bytes());
-        let state = |letter| match letter {
-            b'#' => CellState::Sensed as u8,
-            _ => CellState::Free as u8,
-        };
-        let header = GridHeader {
-            part: Part::whole(frame, 1),
-            ..GridHeader::default()
-        };
-        (header, letters.map(state).collect())
-    }
+    use crate::testing::drawn;
 
     fn belief(rows: &[&str]) -> Belief {
         let (header, cells) = drawn(rows);

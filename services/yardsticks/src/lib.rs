@@ -15,4 +15,6 @@ pub mod belief;
 pub mod bug;
 pub mod planner;
 pub mod shell;
+#[cfg(test)]
+mod testing;
 pub mod wavefront;

@@ -112,25 +112,9 @@ impl Guide {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use std::path::Path;
-
+mod tests {
     use super::*;
-
-    /// A mission to (x, y) metres.
-    pub(crate) fn mission([x, y]: [f64; 2]) -> Mission {
-        let text = format!("target = [{x:?}, {y:?}]");
-        Mission::parse(&text, Path::new("test.toml")).unwrap()
-    }
-
-    /// A robot at (x, y) metres that faces along x.
-    pub(crate) fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
-        PoseSample {
-            x_m,
-            y_m,
-            ..PoseSample::default()
-        }
-    }
+    use crate::testing::{mission, pose};
 
     #[test]
     fn a_robot_without_a_way_is_told_so_and_looks_around() {

@@ -1,8 +1,5 @@
 use super::*;
-use crate::{
-    belief::tests::drawn,
-    planner::tests::{mission, pose},
-};
+use crate::testing::{drawn, mission, pose};
 use common::samples::{GridHeader, GuidanceSample, GuidanceStatus};
 
 /// Cells of 0.1 m with (0, 0) in the middle: a wall across the line, its ends 0.5 m off.

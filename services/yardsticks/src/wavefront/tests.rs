@@ -1,8 +1,5 @@
 use super::*;
-use crate::{
-    belief::tests::drawn,
-    planner::tests::{mission, pose},
-};
+use crate::testing::{drawn, mission, pose};
 use common::samples::{GuidanceSample, GuidanceStatus};
 
 const WALL: [&str; 9] = [
