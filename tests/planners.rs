@@ -103,8 +103,8 @@ fn a_stage_started_by_another_becomes_the_planner_that_the_mission_names() {
         "{}",
         executable.display()
     );
-    let (_, summary) = run.finish();
-    assert_eq!(summary["outcome"], "reached", "{summary}");
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
     for mut stage in stages {
         stage.wait().unwrap();
     }
