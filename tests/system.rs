@@ -16,6 +16,7 @@ mod foreign_payload;
 mod kills;
 mod missions;
 mod operators;
+mod planners;
 mod repeatability;
 mod replaced_bus;
 mod resume;

@@ -4,13 +4,19 @@
 //! A supervisor that only watches links its run directory into the robot's domain, and publishes in the roster which
 //! stages have no process. A stage takes its place when the roster shows it free.
 
-use std::{fs, os::fd::OwnedFd, time::Duration};
+use std::{
+    fs::{self, File},
+    os::fd::OwnedFd,
+    path::PathBuf,
+    time::Duration,
+};
 
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
 
 use crate::{
     bus::Bus,
     domain::{Domain, RobotName},
+    mission::Mission,
     roster::Roster,
     run::{self, Run},
     samples::{Order, name_str},
@@ -20,10 +26,18 @@ use crate::{
 /// The roster is published five times a second, and the place of a process that has ended is free in the next.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Take the place of `stage` in the run of `robot`.
-pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
-    name_process(stage)?;
-    let domain = Domain::of(robot.clone());
+/// The mission of `robot`, whose supervisor only watches.
+///
+/// # Errors
+/// When there is no such supervisor.
+pub fn mission(robot: &RobotName) -> Result<Mission, StageError> {
+    let (directory, _stage_lock) = enter_run(&Domain::of(robot.clone()))?;
+    Ok(Run::load(&directory)?.mission)
+}
+
+/// Count as a process of `domain` until the file is dropped; the directory of its run.
+fn enter_run(domain: &Domain) -> Result<(PathBuf, File), StageError> {
+    let robot = &domain.robot;
     if !domain.directory().exists() {
         return Err(StageError::Other(format!(
             "robot {:?} has no supervisor here; start one first, with `firsthand run --watch-only`",
@@ -31,13 +45,21 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
         )));
     }
     // Waits while the supervisor makes the bus.
-    let stage_lock = enter(&domain)?;
+    let stage_lock = enter(domain)?;
     let directory = fs::read_link(domain.run_link()).map_err(|_| {
         StageError::Other(format!(
             "the supervisor of robot {:?} starts its stages itself; to start them yourself, give `firsthand run` --watch-only",
             robot.to_string()
         ))
     })?;
+    Ok((directory, stage_lock))
+}
+
+/// Take the place of `stage` in the run of `robot`.
+pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, StageError> {
+    name_process(stage)?;
+    let domain = Domain::of(robot.clone());
+    let (directory, stage_lock) = enter_run(&domain)?;
     let run = Run::load(&directory)?;
     let bus = Bus::join(&domain, stage)?;
     let place = wait_for_place(&bus, stage)?;

@@ -23,7 +23,8 @@
 //! | [`waiter`] | one wait for topics, sockets, signals, processes |
 //! | [`run`] | what the supervisor gives the stages of a run |
 //! | [`start`] | how a stage's process takes its place in a run |
-//! | `external` | the same for a stage that the supervisor did not start |
+//! | [`external`] | the same for a stage that the supervisor did not start |
+//! | [`stage_command`] | the command line of a stage's process |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
 
@@ -32,7 +33,7 @@ pub mod bus;
 pub mod checkpoint;
 pub mod clock;
 pub mod domain;
-mod external;
+pub mod external;
 pub mod faults;
 pub mod geometry;
 pub mod grid;
@@ -48,6 +49,7 @@ pub mod run;
 pub mod samples;
 pub mod shell;
 pub mod signals;
+pub mod stage_command;
 pub mod start;
 pub mod step;
 pub mod topics;

@@ -9,6 +9,8 @@ mod error;
 mod robot;
 mod simulation;
 
+use std::path::PathBuf;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -149,7 +151,7 @@ pub struct Mapper {
     pub map_within_m: f64,
 }
 
-/// How the field is posed.
+/// Which planner, and how its field is posed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
@@ -158,6 +160,10 @@ pub struct Planner {
     /// [`Planner::EVIDENTIAL_SCREENING_M`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
+    /// The executable of the planner stage, in place of `firsthand`'s own; it is given the command line of
+    /// [`stage_command`](crate::stage_command). A run file has it absolute.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub executable: Option<PathBuf>,
 }
 
 impl Planner {

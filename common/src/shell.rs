@@ -4,8 +4,10 @@
 //! A stage's own shell file implements [`Process`]: it wires topics to its pure step, and nothing else.
 
 use std::{
+    env,
     os::fd::OwnedFd,
     path::PathBuf,
+    process::ExitCode,
     time::{Duration, Instant},
 };
 
@@ -18,6 +20,7 @@ use crate::{
     run::{self, Run},
     samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
     signals::{SIGTERM, Signals},
+    stage_command,
     start::{self, Generation, Joined, Start, system},
     topics::{self, AnyTopic as _},
     waiter::Waiter,
@@ -109,6 +112,28 @@ pub trait Process: Sized {
         Ok(())
     }
 }
+
+/// The `main` of an executable that has one stage, `stage`: takes its place in the run that the command line says, and
+/// runs it until it is asked to stop. An error goes to standard error, which the supervisor keeps as the stage's log.
+pub fn main<P: Process>(stage: &'static str) -> ExitCode {
+    let start = match stage_command::start(stage, env::args_os().skip(1)) {
+        Ok(start) => start,
+        Err(error) => {
+            eprintln!("{error}");
+            return ExitCode::from(WRONG_USAGE);
+        }
+    };
+    match run_stage::<P>(&start) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{stage}: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// The exit code of a command line that is none, as that of `firsthand`.
+const WRONG_USAGE: u8 = 2;
 
 /// Run a stage until it is asked to stop.
 ///

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Which of a stage's processes in a run this is: each start of a stage is a generation.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Generation {
     /// The stage's name in the table.
     pub stage: &'static str,
@@ -76,6 +76,20 @@ pub enum StageError {
         /// What the system reports.
         source: std::io::Error,
     },
+}
+
+/// The exit code of a stage that the bus refused: the supervisor then makes the bus anew.
+pub const REFUSED: u8 = 8;
+
+impl StageError {
+    /// The exit code of a stage's process that ends with this.
+    #[must_use]
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Bus(_) => REFUSED,
+            _ => 1,
+        }
+    }
 }
 
 /// Take the place that the supervisor, the parent, says.

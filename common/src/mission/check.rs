@@ -434,6 +434,15 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         0.0..=1.0,
         "m",
     )?;
+    if let Some(executable) = &mission.planner.executable
+        && executable.as_os_str().is_empty()
+    {
+        return Err(objection(
+            "planner.executable",
+            "it is empty",
+            "name an executable, or leave the key out",
+        ));
+    }
     if let Some(screening) = mission.planner.screening_m {
         // Shorter than that it would not be resolved by the grid.
         let least = mission.grid_frame().resolution_m / 2.0;

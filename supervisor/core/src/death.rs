@@ -8,10 +8,13 @@ use std::{
     time::Duration,
 };
 
-use common::samples::{DeathCause, DeathSample, NextStep, name, words};
+use common::{
+    samples::{DeathCause, DeathSample, NextStep, name, words},
+    start,
+};
 use serde::Serialize;
 
-use crate::{process::ExitCause, stages::REFUSED};
+use crate::process::ExitCause;
 
 /// Bytes of its log that are recorded as a stage's last words: a few lines.
 const LAST_WORDS: u64 = 400;
@@ -63,7 +66,7 @@ pub enum Next {
 impl Death {
     /// Whether it ended because the bus refused it.
     pub fn was_refused(&self) -> bool {
-        self.cause == ExitCause::Exited(REFUSED.into())
+        self.cause == ExitCause::Exited(start::REFUSED.into())
     }
 
     /// Log it.

@@ -34,6 +34,7 @@
 //! | `stall` | whether the robot stalls, and the next recovery step, pure |
 //! | `supervisor` | the loop, which asks these |
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
+//! | [`planner_executable`] | the executable that a mission names for the planner, checked |
 //! | [`process`] | a process that is watched, signalled, reaped |
 //! | `stage_process`, `stage_processes` | one stage with its policy and process; all of them |
 //! | `bus_endpoints`, [`observer`] | what the supervisor reads from and writes to the bus |
@@ -59,6 +60,7 @@ mod order;
 mod orphans;
 pub mod outcome;
 mod output_watchdog;
+pub mod planner_executable;
 pub mod policy;
 pub mod process;
 mod progress;

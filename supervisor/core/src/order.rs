@@ -11,7 +11,7 @@ pub(crate) struct Snapshot {
     pub all_running: bool,
     /// The link hears the robot.
     pub robot_answers: bool,
-    /// The planner has published a field: the first tick should not wait for it.
+    /// `firsthand`'s own planner has published a field: the first tick should not wait for it.
     pub field_known: bool,
     /// An operator said stop, and has not said resume.
     pub operator_stop: bool,

@@ -2,6 +2,7 @@
 //! through a pidfd, signalled, and reaped if it is a child.
 
 use std::{
+    ffi::OsStr,
     fmt, fs, io,
     os::{
         fd::{AsFd, BorrowedFd, OwnedFd},
@@ -20,13 +21,18 @@ const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
 /// A `firsthand` subcommand in a process of its own.
 ///
-/// Through `/proc/self/exe`, so that a rebuild under way does no harm; in a process group of its own, so
-/// that a terminal's Ctrl-C reaches the supervisor alone, which stops things in order.
+/// Through `/proc/self/exe`, so that a rebuild under way does no harm.
 pub fn firsthand(arguments: &[&str]) -> Command {
-    let mut command = Command::new("/proc/self/exe");
+    let mut command = child("/proc/self/exe");
+    command.arg0("firsthand").args(arguments);
     command
-        .arg0("firsthand")
-        .args(arguments)
+}
+
+/// A process of `program`, in a process group of its own, so that a terminal's Ctrl-C reaches the supervisor alone, which
+/// stops things in order.
+pub fn child(program: impl AsRef<OsStr>) -> Command {
+    let mut command = Command::new(program);
+    command
         .process_group(0)
         // The supervisor's connection to systemd is not its children's.
         .env_remove("NOTIFY_SOCKET")

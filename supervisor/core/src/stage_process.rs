@@ -8,8 +8,11 @@ use std::{
 };
 
 use common::{
+    mission::Mission,
     run,
     samples::{HealthSample, HealthState, RosterEntry, StageState, name},
+    stage_command,
+    start::Generation,
 };
 use rustix::process::Signal;
 use thiserror::Error;
@@ -17,7 +20,7 @@ use thiserror::Error;
 use crate::{
     death::{Death, Next, last_words},
     policy::{Action, Event, Now, Phase, Policy},
-    process::{ExitCause, Process, firsthand},
+    process::{ExitCause, Process, child, firsthand},
     stages::Stage,
 };
 
@@ -32,6 +35,8 @@ pub struct StageProcessError {
 /// One stage and its current generation. Times are readings of its owner's clock.
 pub(crate) struct StageProcess {
     pub stage: &'static Stage,
+    /// Of another executable than this one, where the mission names one.
+    executable: Option<PathBuf>,
     policy: Policy,
     process: Option<Process>,
     generation: u32,
@@ -45,10 +50,12 @@ pub(crate) struct StageProcess {
 }
 
 impl StageProcess {
-    /// Of `stage`, which does not run yet, with a map of so many `cells`.
-    pub(crate) fn new(stage: &'static Stage, cells: usize) -> Self {
+    /// Of `stage` in `mission`, which does not run yet.
+    pub(crate) fn new(stage: &'static Stage, mission: &Mission) -> Self {
+        let cells = mission.grid_frame().area();
         Self {
             stage,
+            executable: stage.executable(mission).map(Path::to_path_buf),
             policy: Policy::new(stage.deadlines_on(cells)),
             process: None,
             generation: 0,
@@ -159,21 +166,17 @@ impl StageProcess {
     fn spawn(&self, directory: &Path, first_tick: u64) -> io::Result<Process> {
         let log = self.log(directory);
         let log = File::options().create(true).append(true).open(log)?;
-        let directory = directory
-            .to_str()
-            .ok_or_else(|| io::Error::other("the run directory's name is not UTF-8"))?;
-        let mut command = firsthand(&[
-            "stage",
-            self.stage.name,
-            "--run",
-            directory,
-            "--generation",
-            &self.generation.to_string(),
-            "--first-tick",
-            &first_tick.to_string(),
-            "--supervisor",
-            &std::process::id().to_string(),
-        ]);
+        let generation = Generation {
+            stage: self.stage.name,
+            directory: directory.to_path_buf(),
+            number: self.generation,
+            first_tick,
+        };
+        let mut command = self
+            .executable
+            .as_ref()
+            .map_or_else(|| firsthand(&[]), child);
+        command.args(stage_command::arguments(&generation, std::process::id()));
         command.stdout(Stdio::null()).stderr(log);
         Process::spawn(command)
     }

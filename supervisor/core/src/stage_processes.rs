@@ -9,6 +9,7 @@ use std::{
 
 use common::{
     bus::Bus,
+    mission::Mission,
     samples::{HealthSample, RosterEntry, name_str},
 };
 use rustix::process::Signal;
@@ -46,12 +47,13 @@ pub struct StageProcesses {
 }
 
 impl StageProcesses {
-    /// None running yet; their logs go to the run `directory`, their map has so many `cells`.
-    pub fn new(directory: PathBuf, starter: Starter, cells: usize) -> Self {
+    /// None running yet; their logs go to the run `directory`, map and executables are those of `mission`.
+    pub fn new(directory: PathBuf, starter: Starter, mission: &Mission) -> Self {
+        let cells = mission.grid_frame().area();
         let stages = start_order().into_iter();
         Self {
             stages: stages
-                .map(|stage| StageProcess::new(stage, cells))
+                .map(|stage| StageProcess::new(stage, mission))
                 .collect(),
             watchdog: OutputWatchdog::new(cells),
             directory,

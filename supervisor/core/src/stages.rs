@@ -2,9 +2,10 @@
 //!
 //! Start order, deadlines, `firsthand stage`, `firsthand stages` and the tables of the documentation come from it.
 
-use std::time::Duration;
+use std::{path::Path, time::Duration};
 
 use common::{
+    mission::Mission,
     shell::run_stage,
     start::{StageError, Start},
     topics::{
@@ -45,6 +46,12 @@ pub struct Deadlines {
 }
 
 impl Stage {
+    /// The executable that `mission` names for this stage; none where the stage is `firsthand`'s own.
+    pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
+        let named = mission.planner.executable.as_deref();
+        named.filter(|_| self.name == PLANNER)
+    }
+
     /// Its deadlines on a map of so many `cells`.
     pub fn deadlines_on(&self, cells: usize) -> Deadlines {
         let more = self.per_million_cells.mul_f64(cells as f64 * 1e-6);
@@ -83,8 +90,8 @@ const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
 /// never late in a run of 97 s: a full solve, a keyframe of the field and the backlog fall into one iteration.
 const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
-/// The exit code of a stage that the bus refused.
-pub const REFUSED: u8 = 8;
+/// The name of the stage that gives guidance: a mission may name an executable for it.
+pub const PLANNER: &str = "planner";
 
 /// Every stage, in the order of the pipeline.
 pub static TABLE: [Stage; 5] = [
@@ -119,7 +126,7 @@ pub static TABLE: [Stage; 5] = [
         run: run_stage::<mapper::shell::Shell>,
     },
     Stage {
-        name: "planner",
+        name: PLANNER,
         inputs: &[&POSE, &GRID],
         feedback: &[],
         outputs: &[&GUIDANCE, &FIELD],

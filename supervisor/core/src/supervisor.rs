@@ -28,6 +28,7 @@ use crate::{
     service_manager::ServiceManager,
     simulator::Simulator,
     stage_processes::{StageProcesses, Starter},
+    stages,
     stall::{self, StallWatch},
 };
 
@@ -123,10 +124,9 @@ impl<'a> Supervisor<'a> {
             mission: mission.clone(),
         };
         run.save(directory)?;
-        let cells = mission.grid_frame().area();
         let mut supervisor = Self {
             options,
-            stages: StageProcesses::new(directory.clone(), options.starter, cells),
+            stages: StageProcesses::new(directory.clone(), options.starter, mission),
             robot,
             bus: BusEndpoints::open(lock)?,
             state_file,
@@ -247,7 +247,7 @@ impl<'a> Supervisor<'a> {
             was_ready: self.decision.ready,
             all_running: self.stages.all_running(),
             robot_answers: record.link.is_some_and(|link| link.connected == 1),
-            field_known: record.field.frame().is_some(),
+            field_known: record.field.frame().is_some() || self.is_planner_foreign(),
             operator_stop: self.state_file.state.operator_stop,
             stage_held: !self.stages.held().is_empty(),
         });
@@ -262,6 +262,11 @@ impl<'a> Supervisor<'a> {
         }
         self.decision = decision;
         changed
+    }
+
+    /// Whether the mission names an executable for the planner: that one need not publish a field.
+    fn is_planner_foreign(&self) -> bool {
+        self.options.mission.planner.executable.is_some()
     }
 
     /// Judge whether the mission is over.
@@ -311,7 +316,7 @@ impl<'a> Supervisor<'a> {
         self.bus.publish_stall(&pose, stall);
         records::append(&self.options.directory, records::STALLS, &stall);
         match stall.recovery() {
-            RecoveryStep::Replan => self.stages.replace("planner", self.first_tick()),
+            RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
             // The new epoch is in the directive.
             RecoveryStep::Forget => self.publish_state()?,
             RecoveryStep::GiveUp => {

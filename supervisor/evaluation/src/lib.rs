@@ -5,6 +5,7 @@
 //! | [`worlds`] | where worlds come from: drawn from a seed, or read from files |
 //! | [`shortest_path`] | whether a body gets through a world, and how short its way can be |
 //! | [`trial`] | a mission in a world, and the rules it is judged by |
+//! | [`setting`] | what missions on the same worlds differ by |
 //! | [`row`] | one mission's result |
 //! | [`table`] | the rows in a file, as they come and in order |
 //! | [`runner`] | the missions, several at a time |
@@ -16,6 +17,7 @@
 pub mod report;
 pub mod row;
 pub mod runner;
+pub mod setting;
 pub mod shortest_path;
 pub mod statistics;
 pub mod table;

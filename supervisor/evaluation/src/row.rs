@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::trial::Trial;
+use crate::{setting::Setting, trial::Trial};
 
 /// How a mission ended, by the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -77,6 +77,8 @@ pub struct Row {
     pub seed: u64,
     /// The setting's name.
     pub setting: String,
+    /// The planner.
+    pub planner: String,
     /// By the ground truth.
     pub outcome: Outcome,
     /// What the run said.
@@ -123,7 +125,7 @@ const BARN_CLIP: [f64; 2] = [2.0, 8.0];
 impl Row {
     /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
     #[must_use]
-    pub fn new(trial: &Trial, seed: u64, setting: &str, summary: &Summary) -> Self {
+    pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
         let rules = &trial.rules;
         let straight_m = trial.mission.target.length();
         let outcome = outcome(summary, rules.success_within_m);
@@ -146,7 +148,8 @@ impl Row {
         Self {
             world: trial.world.clone(),
             seed,
-            setting: setting.to_owned(),
+            setting: setting.name.clone(),
+            planner: setting.planner.clone(),
             outcome,
             reason: summary.reason.clone(),
             time_s,
@@ -171,7 +174,7 @@ impl Row {
 
     /// A mission that gave no summary.
     #[must_use]
-    pub fn aborted(trial: &Trial, seed: u64, setting: &str, reason: String) -> Self {
+    pub fn aborted(trial: &Trial, seed: u64, setting: &Setting, reason: String) -> Self {
         let nothing = Summary {
             outcome: "aborted".to_owned(),
             reason,
@@ -221,6 +224,14 @@ mod tests {
     use common::mission::Mission;
     use std::path::Path;
 
+    fn setting() -> Setting {
+        Setting {
+            name: "a".to_owned(),
+            planner: "harmonic".to_owned(),
+            set: Vec::new(),
+        }
+    }
+
     fn trial(optimal_time_s: Option<f64>) -> Trial {
         let mission = Mission::parse("target = [4, 0]", Path::new("test.toml")).unwrap();
         assert!(matches!(
@@ -255,8 +266,9 @@ mod tests {
 
     #[test]
     fn success_is_what_the_ground_truth_says() {
-        let outcome =
-            |said, distance| Row::new(&trial(None), 1, "a", &summary(said, distance)).outcome;
+        let outcome = |said, distance| {
+            Row::new(&trial(None), 1, &setting(), &summary(said, distance)).outcome
+        };
         assert_eq!(outcome("reached", 0.4), Outcome::Success);
         assert_eq!(outcome("reached", 0.6), Outcome::WrongPlace);
         assert_eq!(outcome("collision", 0.1), Outcome::Collision);
@@ -265,15 +277,22 @@ mod tests {
 
     #[test]
     fn metrics_are_those_of_their_definitions() {
-        let row = Row::new(&trial(None), 1, "a", &summary("reached", 0.1));
+        let row = Row::new(&trial(None), 1, &setting(), &summary("reached", 0.1));
         assert_eq!((row.k, row.spl, row.barn_score), (1.25, 0.8, None));
-        let lost = Row::new(&trial(None), 1, "a", &summary("timeout", 3.0));
+        let lost = Row::new(&trial(None), 1, &setting(), &summary("timeout", 3.0));
         assert_eq!(lost.spl, 0.0);
     }
 
     #[test]
     fn the_barn_clock_starts_with_the_motion_and_the_score_is_clipped() {
-        let row = |optimal| Row::new(&trial(Some(optimal)), 1, "a", &summary("reached", 0.1));
+        let row = |optimal| {
+            Row::new(
+                &trial(Some(optimal)),
+                1,
+                &setting(),
+                &summary("reached", 0.1),
+            )
+        };
         assert_eq!(row(6.0).time_s, 24.0);
         assert_eq!(row(6.0).barn_score, Some(0.25));
         assert_eq!(

@@ -13,21 +13,13 @@ use thiserror::Error;
 
 use crate::{
     row::{Row, Summary},
+    setting::Setting,
     table::{Table, TableError},
     trial::Trial,
 };
 
 /// Name of the picture that a run leaves in its directory.
 const PICTURE: &str = "picture.svg";
-
-/// What is set for all missions of a row of totals.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Setting {
-    /// Its name.
-    pub name: String,
-    /// KEY=VALUE over the mission.
-    pub set: Vec<String>,
-}
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -204,7 +196,7 @@ fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError
         .output()
         .map_err(system("start a mission"))?;
     let row = match serde_json::from_slice::<Summary>(&output.stdout) {
-        Ok(summary) => Row::new(trial, *seed, &setting.name, &summary),
+        Ok(summary) => Row::new(trial, *seed, setting, &summary),
         Err(_) => {
             let said = String::from_utf8_lossy(&output.stderr);
             let reason = said
@@ -213,7 +205,7 @@ fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError
                 .last()
                 .unwrap_or("no summary")
                 .to_owned();
-            Row::aborted(trial, *seed, &setting.name, reason)
+            Row::aborted(trial, *seed, setting, reason)
         }
     };
     if row.outcome != crate::row::Outcome::Success {

@@ -13,12 +13,14 @@ use clap::Args;
 use common::mission::{Mission, Model};
 use evaluation::{
     report::{self, Report},
-    runner::{self, Plan, Progress, Setting},
+    runner::{self, Plan, Progress},
+    setting::Setting,
     table::Table,
     trial::BodySize,
     worlds::{self, Worlds},
 };
 use serde_json::json;
+use supervisor::planner_executable;
 
 use super::{Failure, print_text};
 use crate::progress_line::{ProgressLine, write_stderr};
@@ -43,6 +45,10 @@ pub(crate) struct Arguments {
     /// evidential or paper; several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     method: Vec<String>,
+    /// harmonic; the yardsticks wavefront (shortest paths) and bug (Bug2); any executable of a planner. Several, with
+    /// commas, are compared on the same worlds.
+    #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
+    planner: Vec<String>,
     /// laboratory or measured.
     #[arg(long, default_value = "measured")]
     realism: String,
@@ -70,6 +76,13 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// The planner that is `firsthand`'s own.
+const HARMONIC: &str = "harmonic";
+/// The other planners that come with it, and their executables beside this one.
+const YARDSTICKS: [(&str, &str); 2] = [
+    ("wavefront", "firsthand-wavefront"),
+    ("bug", "firsthand-bug"),
+];
 /// Free ground that a world leaves the body on both sides of its narrowest way, metres.
 const MARGIN_M: f64 = 0.05;
 /// In the directory of an evaluation: what it is of, its rows, its page.
@@ -80,7 +93,7 @@ const PAGE_FILE: &str = "index.html";
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let settings = settings(arguments);
+    let settings = settings(arguments)?;
     let described = described(arguments, &settings);
     prepare(arguments, &described)?;
     let found = worlds::find(
@@ -168,8 +181,8 @@ fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     )
 }
 
-/// The settings to compare; the first is what the others are compared with.
-fn settings(arguments: &Arguments) -> Vec<Setting> {
+/// The settings to compare, each planner by each method; the first is what the others are compared with.
+fn settings(arguments: &Arguments) -> Result<Vec<Setting>, Failure> {
     let mut set = vec![
         format!("simulation.realism='{}'", arguments.realism),
         format!("robot.model='{}'", arguments.robot),
@@ -179,24 +192,46 @@ fn settings(arguments: &Arguments) -> Vec<Setting> {
         [] => vec!["evidential".to_owned()],
         methods => methods.to_vec(),
     };
-    let mut settings: Vec<Setting> = methods
-        .iter()
-        .map(|method| Setting {
-            name: method.clone(),
-            set: [&set[..], &[format!("method='{method}'")]].concat(),
-        })
-        .collect();
+    let mut settings = Vec::new();
+    for planner in &arguments.planner {
+        let executable = executable(planner)?;
+        for method in &methods {
+            let mut set = [&set[..], &[format!("method='{method}'")]].concat();
+            set.extend(executable.clone());
+            settings.push(Setting {
+                name: match (&arguments.planner[..], &methods[..]) {
+                    ([_], _) if planner == HARMONIC => method.clone(),
+                    (_, [_]) => planner.clone(),
+                    _ => format!("{planner} {method}"),
+                },
+                planner: planner.clone(),
+                set,
+            });
+        }
+    }
     for versus in &arguments.versus {
-        let first = settings[0].set.clone();
+        let first = settings[0].clone();
+        let more = versus.split(',').map(str::to_owned);
         settings.push(Setting {
             name: versus.clone(),
-            set: first
-                .into_iter()
-                .chain(versus.split(',').map(str::to_owned))
-                .collect(),
+            set: first.set.into_iter().chain(more).collect(),
+            ..first
         });
     }
-    settings
+    Ok(settings)
+}
+
+/// KEY=VALUE that makes a mission's planner the one called so; none for `firsthand`'s own.
+fn executable(planner: &str) -> Result<Option<String>, Failure> {
+    if planner == HARMONIC {
+        return Ok(None);
+    }
+    let yardstick = YARDSTICKS.iter().find(|(name, _)| *name == planner);
+    let named = yardstick.map_or(planner, |(_, executable)| executable);
+    // Told before anything starts, rather than by each mission.
+    planner_executable::find(Path::new(named))?;
+    let value = toml::Value::from(named);
+    Ok(Some(format!("planner.executable={value}")))
 }
 
 /// The body that every world must let through.

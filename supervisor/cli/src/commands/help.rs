@@ -31,7 +31,7 @@ macro_rules! guide {
 }
 
 /// Every page, in the order to read them. None has the name of a subcommand.
-static GUIDE: [Page; 14] = guide! {
+static GUIDE: [Page; 15] = guide! {
     "method",
     "mission-file",
     "attach",
@@ -45,6 +45,7 @@ static GUIDE: [Page; 14] = guide! {
     "glossary",
     "CONTRIBUTING",
     "add-a-stage",
+    "write-a-planner",
     "CHANGELOG",
 };
 

@@ -16,6 +16,7 @@ use crate::{
 use supervisor::{
     Options, Progress, Starter,
     outcome::{Ending, Outcome},
+    planner_executable,
     recovery::{self, RecoveredRun, SUMMARY},
 };
 
@@ -117,8 +118,10 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
 /// The run in `directory`, to go on with.
 fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
     let recovered = RecoveredRun::load(&directory)?;
+    let mut mission = recovered.run.mission.clone();
+    planner_executable::resolve(&mut mission)?;
     Ok(Options {
-        mission: recovered.run.mission.clone(),
+        mission,
         robot: recovered.run.robot.clone(),
         pace: recovered.pace(),
         directory,
@@ -147,6 +150,7 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
         }
         mission.timeout_s = timeout;
     }
+    planner_executable::resolve(&mut mission)?;
     Ok(mission)
 }
 

@@ -313,6 +313,15 @@ fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
 }
 
 #[test]
+fn the_planner_on_its_page_is_the_one_that_is_built() {
+    let example = root().join("supervisor/guide/example-planner/src/main.rs");
+    let code = fs::read_to_string(example).unwrap();
+    let page = page("write-a-planner").unwrap().text;
+    assert!(page.contains(&format!("```rust\n{code}```")));
+    assert!(code.lines().count() < 100);
+}
+
+#[test]
 fn the_readme_is_shorter_than_200_lines() {
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     assert!(readme.lines().count() < 200);

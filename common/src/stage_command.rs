@@ -1,0 +1,191 @@
+//! The command line of a stage's process: what the supervisor writes and every executable of a stage reads.
+//!
+//! | form | started by |
+//! |---|---|
+//! | `stage NAME --run DIR --generation N --first-tick T --supervisor PID` | the supervisor |
+//! | `stage NAME [--robot R]` | systemd or a person, for a supervisor that only watches |
+
+use std::{ffi::OsString, path::PathBuf, str::FromStr};
+
+use thiserror::Error;
+
+use crate::{
+    domain::RobotName,
+    start::{Generation, Start},
+};
+
+/// The word before the stage's name.
+pub const SUBCOMMAND: &str = "stage";
+/// The robot of an external stage, if none is named.
+const DEFAULT_ROBOT: &str = "x80";
+
+/// A command line that starts no stage.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error(
+    "{problem}; the supervisor starts stages (`firsthand run`), or, where it only watches, `stage {stage} --robot NAME`"
+)]
+pub struct StageCommandError {
+    stage: &'static str,
+    problem: String,
+}
+
+/// What the supervisor `supervisor` gives to the process of `generation`, after the executable's name.
+#[must_use]
+pub fn arguments(generation: &Generation, supervisor: u32) -> Vec<OsString> {
+    let Generation {
+        stage,
+        directory,
+        number,
+        first_tick,
+    } = generation;
+    vec![
+        SUBCOMMAND.into(),
+        stage.into(),
+        "--run".into(),
+        directory.into(),
+        "--generation".into(),
+        number.to_string().into(),
+        "--first-tick".into(),
+        first_tick.to_string().into(),
+        "--supervisor".into(),
+        supervisor.to_string().into(),
+    ]
+}
+
+/// The start of `stage` that `arguments` ask for, the words after the executable's name: for an executable that has
+/// this one stage.
+///
+/// # Errors
+/// When they are no command line of a stage, or that of another one.
+pub fn start(
+    stage: &'static str,
+    arguments: impl IntoIterator<Item = OsString>,
+) -> Result<Start, StageCommandError> {
+    let mut arguments = arguments.into_iter();
+    let named = [arguments.next(), arguments.next()];
+    if named != [Some(SUBCOMMAND.into()), Some(stage.into())] {
+        let named: Vec<_> = named.into_iter().flatten().collect();
+        let problem = format!("this executable is the stage {stage}, and was given {named:?}");
+        return Err(StageCommandError { stage, problem });
+    }
+    start_with(stage, arguments)
+}
+
+/// The start of `stage` with `options`, the words after its name.
+///
+/// # Errors
+/// When an option is unknown, lacks its value, or does not go with the others.
+pub fn start_with(
+    stage: &'static str,
+    options: impl IntoIterator<Item = OsString>,
+) -> Result<Start, StageCommandError> {
+    let failed = |problem: String| StageCommandError { stage, problem };
+    let (mut run, mut robot) = (None::<PathBuf>, None::<RobotName>);
+    let (mut number, mut first_tick, mut supervisor) = (None, None, None);
+    let mut options = options.into_iter();
+    while let Some(option) = options.next() {
+        let value = options.next();
+        let value = value.ok_or_else(|| failed(format!("{} has no value", option.display())))?;
+        match option.to_str() {
+            Some("--run") => run = Some(value.into()),
+            Some(name @ "--generation") => number = Some(parsed(stage, name, &value)?),
+            Some(name @ "--first-tick") => first_tick = Some(parsed(stage, name, &value)?),
+            Some(name @ "--supervisor") => supervisor = Some(parsed(stage, name, &value)?),
+            Some(name @ "--robot") => robot = Some(parsed(stage, name, &value)?),
+            _ => return Err(failed(format!("{} is no option", option.display()))),
+        }
+    }
+    match (run, supervisor, robot) {
+        (Some(directory), Some(supervisor), None) => Ok(Start::Child {
+            generation: Generation {
+                stage,
+                directory,
+                number: number.unwrap_or(1),
+                first_tick: first_tick.unwrap_or(0),
+            },
+            supervisor,
+        }),
+        (None, None, robot) if number.is_none() && first_tick.is_none() => Ok(Start::External {
+            stage,
+            robot: match robot {
+                Some(robot) => robot,
+                None => parsed(stage, "--robot", &DEFAULT_ROBOT.into())?,
+            },
+        }),
+        _ => Err(failed(
+            "--run, --supervisor, --generation and --first-tick go together, without --robot"
+                .to_owned(),
+        )),
+    }
+}
+
+fn parsed<T: FromStr>(
+    stage: &'static str,
+    option: &str,
+    value: &OsString,
+) -> Result<T, StageCommandError> {
+    let parsed = value.to_str().and_then(|value| value.parse().ok());
+    parsed.ok_or_else(|| StageCommandError {
+        stage,
+        problem: format!("{option} {} is no value for it", value.display()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(line: &str) -> Vec<OsString> {
+        line.split_whitespace().map(OsString::from).collect()
+    }
+
+    #[test]
+    fn a_stage_reads_what_the_supervisor_writes() {
+        let written = Generation {
+            stage: "planner",
+            directory: "/runs/a b".into(),
+            number: 3,
+            first_tick: 77,
+        };
+        let read = start("planner", arguments(&written, 4711)).unwrap();
+        let Start::Child {
+            generation,
+            supervisor,
+        } = read
+        else {
+            panic!("{read:?}");
+        };
+        assert_eq!((generation, supervisor), (written, 4711));
+    }
+
+    #[test]
+    fn a_stage_started_by_a_person_is_external() {
+        for (line, name) in [("", "x80"), ("--robot r2", "r2")] {
+            let read = start_with("planner", words(line)).unwrap();
+            let Start::External { stage, robot } = read else {
+                panic!("{read:?}");
+            };
+            assert_eq!((stage, robot.to_string().as_str()), ("planner", name));
+        }
+    }
+
+    #[test]
+    fn a_command_line_that_is_none_is_refused_with_what_is_wrong() {
+        for (line, problem) in [
+            ("", "was given []"),
+            ("stage mapper --robot a", "mapper"),
+            ("stage planner --run", "--run has no value"),
+            ("stage planner --supervisor x", "--supervisor x"),
+            ("stage planner --robot a/b", "--robot a/b"),
+            ("stage planner --warp 9", "--warp is no option"),
+            ("stage planner --run /tmp", "go together"),
+            (
+                "stage planner --run /tmp --supervisor 1 --robot a",
+                "go together",
+            ),
+        ] {
+            let said = start("planner", words(line)).unwrap_err().to_string();
+            assert!(said.contains(problem), "{line:?}: {said}");
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The executable that a mission names for the planner: found, checked and made absolute before anything starts.
+
+use std::{
+    env, io,
+    path::{Path, PathBuf},
+};
+
+use common::mission::Mission;
+use rustix::fs::{Access, access};
+use thiserror::Error;
+
+/// The planner that a mission names cannot be started.
+#[derive(Debug, Error)]
+#[error(
+    "planner.executable {}: {problem}; give a path to an executable of a planner, a name on PATH, or leave the key out", named.display()
+)]
+pub struct PlannerExecutableError {
+    named: PathBuf,
+    problem: String,
+}
+
+/// Make the `planner.executable` of `mission` absolute, if it names one.
+///
+/// # Errors
+/// As [`find`].
+pub fn resolve(mission: &mut Mission) -> Result<(), PlannerExecutableError> {
+    if let Some(named) = &mut mission.planner.executable {
+        *named = find(named)?;
+    }
+    Ok(())
+}
+
+/// The absolute path of the executable that is `named`: a path from the current directory, or a name alone beside this
+/// executable or on `PATH`.
+///
+/// # Errors
+/// When there is none, or it cannot be executed.
+pub fn find(named: &Path) -> Result<PathBuf, PlannerExecutableError> {
+    let failed = |problem: String| PlannerExecutableError {
+        named: named.to_path_buf(),
+        problem,
+    };
+    let is_name = named.components().count() == 1 && !named.is_absolute();
+    let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
+    let found = if is_name {
+        let found = folders().map(|folder| folder.join(named));
+        let found = found.into_iter().find(|candidate| check(candidate).is_ok());
+        found.ok_or_else(|| failed("it is neither beside firsthand nor on PATH".to_owned()))?
+    } else {
+        let absolute = std::path::absolute(named).map_err(|error| failed(error.to_string()))?;
+        check(&absolute).map_err(|error| failed(error.to_string()))?;
+        absolute
+    };
+    if found.to_str().is_none() {
+        return Err(failed("its path is not UTF-8".to_owned()));
+    }
+    Ok(found)
+}
+
+/// Where a name alone is looked for, in order, as absolute paths.
+fn folders() -> impl Iterator<Item = PathBuf> {
+    let own = env::current_exe().ok();
+    let beside = own.and_then(|own| Some(own.parent()?.to_path_buf()));
+    let path = env::var_os("PATH").unwrap_or_default();
+    let path: Vec<_> = env::split_paths(&path)
+        .filter(|folder| folder.is_absolute())
+        .collect();
+    beside.into_iter().chain(path)
+}
+
+/// Whether this user may execute the file at `path`.
+fn check(path: &Path) -> io::Result<()> {
+    if path.metadata()?.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    access(path, Access::EXEC_OK).map_err(|errno| match errno {
+        rustix::io::Errno::ACCESS => io::Error::other("it is not executable (chmod +x)"),
+        errno => errno.into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{fs, os::unix::fs::PermissionsExt as _};
+
+    fn resolved(named: &Path) -> Result<PathBuf, String> {
+        let text = format!("target = [1, 0]\nplanner.executable = {named:?}");
+        let mut mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        resolve(&mut mission).map_err(|error| error.to_string())?;
+        Ok(mission.planner.executable.unwrap())
+    }
+
+    #[test]
+    fn a_path_is_taken_from_the_current_directory_and_a_name_from_path_and_both_are_made_absolute()
+    {
+        let shell = resolved(Path::new("sh")).unwrap();
+        assert!(shell.is_absolute() && shell.ends_with("sh"), "{shell:?}");
+        let here = env::current_dir().unwrap();
+        let up: PathBuf = here.components().skip(1).map(|_| "..").collect();
+        let relative = up.join(shell.strip_prefix("/").unwrap());
+        let found = resolved(&relative).unwrap();
+        assert!(found.is_absolute(), "{found:?}");
+        assert_eq!(
+            fs::canonicalize(found).unwrap(),
+            fs::canonicalize(shell).unwrap()
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_executed_is_refused_by_name_with_what_is_wrong() {
+        let folder = tempfile::tempdir().unwrap();
+        let plain = folder.path().join("plain");
+        fs::write(&plain, "").unwrap();
+        fs::set_permissions(&plain, fs::Permissions::from_mode(0o644)).unwrap();
+        for (named, problem) in [
+            (plain.as_path(), "chmod +x"),
+            (folder.path(), "is a directory"),
+            (&folder.path().join("none"), "No such file"),
+            (Path::new("no-such-planner"), "nor on PATH"),
+        ] {
+            let said = resolved(named).unwrap_err();
+            let name = named.to_str().unwrap();
+            assert!(said.contains(name) && said.contains(problem), "{said}");
+        }
+    }
+}

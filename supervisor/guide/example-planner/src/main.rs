@@ -1,0 +1,98 @@
+//! Straight to the target, as long as no hazard cell is ahead.
+
+use std::process::ExitCode;
+
+use common::{
+    bus::{Reader, SliceReader, Writer},
+    grid::{Applied, CellState, Replica},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
+    shell::{self, Context, Process, Progress, StageError},
+    topics::{GRID, GUIDANCE, POSE},
+};
+use glam::DVec2;
+
+/// So far ahead the map must be free, metres.
+const AHEAD_M: f64 = 0.5;
+
+struct Planner {
+    grid: SliceReader<GridHeader, u8>,
+    pose: Reader<PoseSample>,
+    guidance: Writer<GuidanceSample>,
+    target: DVec2,
+    map: Replica<u8>,
+    latest: Option<PoseSample>,
+    progress: Progress,
+}
+
+impl Process for Planner {
+    fn open(context: &mut Context) -> Result<Self, StageError> {
+        context.waiter.on(context.bus.wakeup(&GRID)?);
+        let generation = context.generation.number;
+        Ok(Self {
+            grid: context.bus.slice_reader(&GRID)?,
+            pose: context.bus.reader(&POSE)?,
+            guidance: context.bus.writer(&GUIDANCE, generation)?,
+            target: context.run.mission.target,
+            map: Replica::default(),
+            latest: None,
+            progress: Progress::default(),
+        })
+    }
+
+    fn turn(&mut self) -> Result<Progress, StageError> {
+        while let Some(grid) = self.grid.take()? {
+            let header = *grid.header();
+            if self.map.apply(&header.part, &grid) == Applied::Missed {
+                continue; // The mapper publishes the whole map again within a second.
+            }
+            let (tick, time) = (header.stamp.tick, header.stamp.time());
+            self.progress = Progress { tick, time };
+            // The pose of a tick is published before its grid.
+            self.latest = self.pose.newest()?.or(self.latest);
+            if let Some(pose) = self.latest.take_if(|pose| pose.stamp.tick == tick) {
+                let guidance = self.guide(&pose, &header);
+                self.guidance.publish(tick, time, guidance)?;
+            }
+        }
+        Ok(self.progress)
+    }
+}
+
+impl Planner {
+    fn guide(&self, pose: &PoseSample, header: &GridHeader) -> GuidanceSample {
+        let here = pose.pose().position;
+        let to_target = self.target - here;
+        let direction = to_target.normalize_or(DVec2::X);
+        let ahead = AHEAD_M.min(to_target.length()) / 10.0;
+        let mut points = (1..=10).map(|step| here + direction * ahead * f64::from(step));
+        let (status, direction) = match points.all(|at| self.is_free(at)) {
+            true => (GuidanceStatus::Along, direction),
+            false => (GuidanceStatus::Unreachable, DVec2::ZERO),
+        };
+        GuidanceSample {
+            ex: direction.x,
+            ey: direction.y,
+            distance_m: to_target.length(),
+            speed_limit_m_s: f64::INFINITY,
+            status: status.into(),
+            pose_ns: pose.stamp.stamp_ns,
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            heading_rad: pose.heading_rad,
+            grid_version: header.part.version,
+            safety_events: header.safety_events,
+            epoch: header.epoch,
+            ..GuidanceSample::default()
+        }
+    }
+
+    fn is_free(&self, at: DVec2) -> bool {
+        let frame = self.map.frame();
+        let index = frame.and_then(|frame| Some(frame.index(frame.cell_at(at)?)));
+        index.is_some_and(|index| !CellState::from_byte(self.map.cells()[index]).is_hazard())
+    }
+}
+
+fn main() -> ExitCode {
+    shell::main::<Planner>("planner")
+}

@@ -1,0 +1,165 @@
+//! Planners that are executables of their own: a mission names them, and they are treated as every stage.
+
+use std::{fs, process::Stdio};
+
+use rustix::process::Signal;
+
+use crate::support::{
+    self, Run, assert_nothing_left, directory_of, find, firsthand, output, signal_process,
+};
+
+/// The planners to compare with.
+const YARDSTICKS: [(&str, &str); 2] = [
+    ("wavefront", env!("CARGO_BIN_EXE_firsthand-wavefront")),
+    ("bug", env!("CARGO_BIN_EXE_firsthand-bug")),
+];
+/// In the way, known beforehand: the way around it is the same in every run.
+const DRUM: [&str; 6] = [
+    "--set",
+    "known.drum=[{at=[1.8, 0.1], radius_m=0.3}]",
+    "--set",
+    "world.drum=[{at=[1.8, 0.1], radius_m=0.3}]",
+    "--set",
+    "mapper.clearance_m=0.1",
+];
+
+/// The assignment that makes `executable` the planner.
+fn planner(executable: &str) -> String {
+    format!("planner.executable='{executable}'")
+}
+
+#[test]
+fn a_mission_with_a_planner_of_its_own_arrives_though_the_planner_is_killed_on_the_way() {
+    for (name, executable) in YARDSTICKS {
+        let set = planner(executable);
+        let arguments = [&DRUM[..], &["--pace", "4", "--set", &set]].concat();
+        let mut run = Run::start(name, "open-room", &arguments);
+        // At 0.25 m/s it goes around the drum by then.
+        run.wait_until_under_way(6.0);
+        run.kill_and_await_successor("planner", Signal::KILL);
+        let deaths = run.directory().join("deaths.jsonl");
+        let (code, summary, _kept) = run.finish_in();
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(0), &"reached".into()),
+            "{name}: {summary}"
+        );
+        assert_eq!(summary["collisions"], 0, "{name}: {summary}");
+        assert_eq!(summary["restarts"]["planner"], 1, "{name}: {summary}");
+        // The harmonic planner would have solved its field.
+        assert_eq!(summary["full_solves"], 0, "{name}: {summary}");
+        let deaths = support::records(&deaths);
+        assert!(deaths.iter().any(|death| death["stage"] == "planner"));
+        assert_nothing_left(name);
+    }
+}
+
+#[test]
+fn a_run_with_a_planner_named_by_a_relative_path_is_resumed_from_elsewhere() {
+    let robot = "elsewhere";
+    let directory = directory_of(robot);
+    let folder = directory.path();
+    std::os::unix::fs::symlink(YARDSTICKS[0].1, folder.join("planner")).unwrap();
+    let mut first = firsthand(&["run", "open-room", "--robot", robot, "--pace", "4"])
+        .args(["--out", "run", "--set", &planner("./planner")])
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    support::wait_for_status(robot, |status| {
+        status["order"] == "driving" && find(status, "planner")["state"] == "running"
+    });
+    signal_process(first.id(), Signal::KILL);
+    first.wait().unwrap();
+    let resumed = firsthand(&["run", "--json", "--resume"])
+        .arg(folder.join("run"))
+        .current_dir("/")
+        .output()
+        .unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&resumed.stdout).unwrap();
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    assert_eq!(summary["full_solves"], 0, "{summary}");
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn a_stage_started_by_another_becomes_the_planner_that_the_mission_names() {
+    let robot = "own-units";
+    let set = planner(YARDSTICKS[0].1);
+    let arguments = ["--pace", "4", "--watch-only", "--set", &set];
+    let mut run = Run::start(robot, "open-room", &arguments);
+    run.wait_until("there is a bus", |status| status["order"] == "starting");
+    let start = |stage: &&str| {
+        let mut command = firsthand(&["stage", stage, "--robot", robot]);
+        command.stderr(Stdio::null()).spawn().unwrap()
+    };
+    let stages: Vec<_> = support::STAGES.iter().map(start).collect();
+    let status = run.wait_until("it drives", |status| status["order"] == "driving");
+    let pid = support::pid(&status, "planner");
+    let executable = fs::read_link(format!("/proc/{pid}/exe")).unwrap();
+    assert!(
+        executable.ends_with("firsthand-wavefront"),
+        "{}",
+        executable.display()
+    );
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
+    for mut stage in stages {
+        stage.wait().unwrap();
+    }
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn a_planner_that_cannot_be_started_is_refused_by_name_before_anything_starts() {
+    let directory = tempfile::tempdir().unwrap();
+    let runs = directory.path().to_str().unwrap();
+    let plain = directory.path().join("plain");
+    fs::write(&plain, "").unwrap();
+    let plain = plain.to_str().unwrap();
+    for (named, problem) in [("./no-such-planner", "No such file"), (plain, "chmod +x")] {
+        let set = planner(named);
+        let run = ["run", "--robot", "no-plan", "--runs", runs, "--set", &set];
+        let evaluate = ["evaluate", "--planner", named, "--out", runs];
+        for arguments in [&run[..], &evaluate] {
+            let output = output(arguments);
+            let said = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(1), "{said}");
+            assert!(said.contains(named) && said.contains(problem), "{said}");
+        }
+    }
+    let left = fs::read_dir(directory.path()).unwrap();
+    assert_eq!(left.count(), 1, "the plain file alone");
+    assert_nothing_left("no-plan");
+}
+
+#[test]
+fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("out");
+    let out = out.to_str().unwrap();
+    let planners = ["--planner", "harmonic,bug", "--count", "1", "--out", out];
+    let compared = output(&[&["evaluate", "--json"], &planners[..]].concat());
+    let object: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    assert_eq!(object["setting"], "harmonic", "{object}");
+    assert_eq!(object["versus"][0]["totals"]["setting"], "bug", "{object}");
+    assert_eq!(object["versus"][0]["pairs"], 1, "{object}");
+    let rows = fs::read_to_string(format!("{out}/rows.csv")).unwrap();
+    let column = rows.lines().map(|row| row.split(',').nth(3).unwrap());
+    let mut column: Vec<_> = column.collect();
+    column.sort_unstable();
+    assert_eq!(column, ["bug", "harmonic", "planner"]);
+    let other = [
+        "evaluate",
+        "--planner",
+        "bug",
+        "--count",
+        "1",
+        "--out",
+        out,
+        "--resume",
+    ];
+    let said = String::from_utf8(output(&other).stderr).unwrap();
+    assert!(said.contains("was another"), "{said}");
+}
