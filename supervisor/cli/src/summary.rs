@@ -54,6 +54,10 @@ pub(crate) struct Summary {
     pub(crate) looks: u64,
     /// Mission time that it looked.
     pub(crate) look_s: f64,
+    /// Share of the ticks in which the front sonar gave no distance. This and the next are of the last supervisor's part.
+    pub(crate) sonar_unavailable_share: Option<f64>,
+    /// The greatest commanded speed of either wheel less the least one, rad/s.
+    pub(crate) wheel_range_rad_s: Option<f64>,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
     /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last one's
@@ -132,6 +136,9 @@ impl Summary {
             local_updates,
             looks: record.looks,
             look_s: record.look_ticks as f64 / mission.robot.rate_hz,
+            sonar_unavailable_share: last_tick
+                .and_then(|tick| record.sonar.at(tick).unavailable_share()),
+            wheel_range_rad_s: last_tick.and_then(|tick| record.wheels.at(tick).range_rad_s()),
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: finished.restarts.clone(),
             resumes: *resumes,

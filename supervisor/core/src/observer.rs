@@ -8,13 +8,16 @@ use common::{
     latency::Histogram,
     samples::{
         CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        GuidanceStatus, HealthSample, LinkSample, PoseSample,
+        GuidanceStatus, HealthSample, LinkSample, PoseSample, RangeSample,
     },
     topics::{self, AnyTopic as _},
     waiter::Waiter,
 };
 
-use crate::stage_processes::StageProcesses;
+use crate::{
+    stage_processes::StageProcesses,
+    totals::{SonarTotals, Totals, WheelTotals},
+};
 
 /// Guidance samples recorded: the one of the arrival tick must still be there when the command is seen.
 const MOST_GUIDANCE: usize = 1024;
@@ -25,6 +28,7 @@ const MOST_POSES: usize = 80_000;
 pub struct Observer {
     health: Reader<HealthSample>,
     link: Reader<LinkSample>,
+    range: Reader<RangeSample>,
     pose: Reader<PoseSample>,
     grid: SliceReader<GridHeader, u8>,
     guidance: Reader<GuidanceSample>,
@@ -57,6 +61,10 @@ pub struct Record {
     pub looks: u64,
     /// Ticks it looked.
     pub look_ticks: u64,
+    /// What the sonar gave.
+    pub sonar: Totals<SonarTotals>,
+    /// What the wheels were commanded.
+    pub wheels: Totals<WheelTotals>,
     /// How long full solves took.
     pub full_solves: Histogram,
     /// How long local updates took.
@@ -75,6 +83,7 @@ impl Observer {
         Ok(Self {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,
+            range: bus.reader(&topics::RANGE)?,
             pose: bus.reader(&topics::POSE)?,
             grid: bus.slice_reader(&topics::GRID)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
@@ -101,6 +110,8 @@ impl Observer {
         while let Some(command) = self.command.take()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
+            let tick = command.stamp.tick;
+            record.wheels.add(tick, |totals| totals.with(&command));
             if CommandState::from_byte(command.state) == CommandState::Arrived {
                 record.arrival.get_or_insert(command);
             }
@@ -115,6 +126,10 @@ impl Observer {
         }
         while let Some(field) = self.field.take()? {
             record.field.apply(&field.header().part, &field);
+        }
+        while let Some(range) = self.range.take()? {
+            let tick = range.stamp.tick;
+            record.sonar.add(tick, |totals| totals.with(&range));
         }
         while let Some(pose) = self.pose.take()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
