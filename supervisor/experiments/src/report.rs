@@ -54,6 +54,8 @@ fn cells(experiment: &Experiment, result: &ExperimentResult) -> Vec<(&'static st
         ("method", result.method.as_str().to_owned()),
         ("arrived", format!("{}/{}", result.arrived, result.count)),
         ("touched", result.touched.to_string()),
+        ("wrong place", result.wrong_place.to_string()),
+        ("other", result.others.to_string()),
         (
             "paper, s",
             time.map_or("-".to_owned(), |time| format!("{time:.0}")),
@@ -106,6 +108,8 @@ impl<'a> Report<'a> {
                 found["arrived"] = json!(result.arrived);
                 found["arrival_interval"] = json!(interval);
                 found["touched"] = json!(result.touched);
+                found["wrong_place"] = json!(result.wrong_place);
+                found["others"] = json!(result.others);
                 object.insert(result.method.as_str().to_owned(), found);
             }
             let its = self.expectations.iter();

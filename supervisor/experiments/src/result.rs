@@ -19,6 +19,10 @@ pub struct ExperimentResult {
     pub arrived: usize,
     /// Those that touched something.
     pub touched: usize,
+    /// Those that stopped elsewhere: by dead reckoning they were at the target.
+    pub wrong_place: usize,
+    /// Those that ended otherwise: out of time, gave up, failed.
+    pub others: usize,
     /// Share that arrived.
     pub arrival: Estimate,
     /// What was measured.
@@ -51,7 +55,8 @@ impl ExperimentResult {
         let is_its = |row: &&Row| row.world == experiment.name && row.setting == method.as_str();
         let rows: Vec<&Row> = rows.iter().filter(is_its).collect();
         let ended = |outcome| rows.iter().filter(|row| row.outcome == outcome).count();
-        let arrived = ended(Outcome::Success);
+        let [arrived, touched, wrong_place] =
+            [Outcome::Success, Outcome::Collision, Outcome::WrongPlace].map(ended);
         let spread = |value: fn(&Row) -> Option<f64>| {
             let all = rows.iter().filter(|row| row.outcome == Outcome::Success);
             Spread::of(all.filter_map(|row| value(row)))
@@ -60,7 +65,9 @@ impl ExperimentResult {
             method,
             count: rows.len(),
             arrived,
-            touched: ended(Outcome::Collision),
+            touched,
+            wrong_place,
+            others: rows.len() - arrived - touched - wrong_place,
             arrival: share(arrived, rows.len()),
             spreads: Spreads {
                 time_s: spread(|row| Some(row.time_s)),
