@@ -31,7 +31,7 @@ macro_rules! guide {
 }
 
 /// Every page, in the order to read them. None has the name of a subcommand.
-static GUIDE: [Page; 14] = guide! {
+static GUIDE: [Page; 15] = guide! {
     "method",
     "mission-file",
     "attach",
@@ -39,6 +39,7 @@ static GUIDE: [Page; 14] = guide! {
     "break-it",
     "field-tool",
     "evaluate-worlds",
+    "the-papers-experiments",
     "figures",
     "capabilities",
     "tables",
