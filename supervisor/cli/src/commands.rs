@@ -21,6 +21,8 @@ pub(crate) mod latency;
 mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
+#[cfg(feature = "tools")]
+pub(crate) mod replay_log;
 pub(crate) mod run;
 #[cfg(feature = "simulator")]
 pub(crate) mod sim;

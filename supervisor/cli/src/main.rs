@@ -22,7 +22,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 #[cfg(feature = "simulator")]
 use commands::sim;
 #[cfg(feature = "tools")]
-use commands::{chaos, evaluate, experiments, field, latency};
+use commands::{chaos, evaluate, experiments, field, latency, replay_log};
 use commands::{check, fault, help, install, missions, operate, run, stage, status, tables};
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
@@ -56,6 +56,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     #[cfg(feature = "tools")]
     Experiments(experiments::Arguments),
+    #[cfg(feature = "tools")]
+    ReplayLog(replay_log::Arguments),
     Status(status::Arguments),
     Stop(operate::Stop),
     Resume(operate::Resume),
@@ -114,6 +116,8 @@ fn main() -> ExitCode {
         Command::Evaluate(arguments) => evaluate::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Experiments(arguments) => experiments::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::ReplayLog(arguments) => replay_log::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Stop(arguments) => operate::stop(&arguments),
         Command::Resume(arguments) => operate::resume(&arguments),

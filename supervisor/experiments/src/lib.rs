@@ -7,9 +7,13 @@
 //! | [`result`] | what became of one experiment by one method |
 //! | [`expectation`] | what the paper says of its experiments, and whether it holds here |
 //! | [`report`] | all of it as a table, a page and objects |
+//! | [`sonar_log`] | reads a log of real sonars |
+//! | [`replay`] | gives one to mapper and planner |
 
 pub mod expectation;
 pub mod experiment;
 pub mod method;
+pub mod replay;
 pub mod report;
 pub mod result;
+pub mod sonar_log;
