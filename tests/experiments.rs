@@ -24,7 +24,7 @@ fn experiments(out: &Path, more: &[&str]) -> Result<Vec<Value>, String> {
     let output = output(&[&common[..], more].concat());
     if output.status.success() {
         let lines = String::from_utf8(output.stdout).unwrap();
-        let objects = lines.lines().map(|line| serde_json::from_str(line));
+        let objects = lines.lines().map(serde_json::from_str);
         Ok(objects.collect::<Result<_, _>>().unwrap())
     } else {
         Err(String::from_utf8(output.stderr).unwrap())

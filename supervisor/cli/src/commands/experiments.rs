@@ -93,7 +93,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             writeln!(text, "{object}")?;
         }
     } else {
-        write!(text, "{report}rows and pictures: {}\n", page.display())?;
+        writeln!(text, "{report}rows and pictures: {}", page.display())?;
     }
     print_text(&text)?;
     Ok(ExitCode::SUCCESS)
