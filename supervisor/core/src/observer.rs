@@ -8,7 +8,7 @@ use common::{
     latency::Histogram,
     samples::{
         CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        GuidanceStatus, HealthSample, LinkSample, PoseSample, RangeSample,
+        GuidanceStatus, HealthSample, LinkSample, PoseSample,
     },
     topics::{self, AnyTopic as _},
     waiter::Waiter,
@@ -16,7 +16,7 @@ use common::{
 
 use crate::{
     stage_processes::StageProcesses,
-    totals::{SonarTotals, Totals, WheelTotals},
+    totals::{Totals, WheelTotals},
 };
 
 /// Guidance samples recorded: the one of the arrival tick must still be there when the command is seen.
@@ -28,7 +28,6 @@ const MOST_POSES: usize = 80_000;
 pub struct Observer {
     health: Reader<HealthSample>,
     link: Reader<LinkSample>,
-    range: Reader<RangeSample>,
     pose: Reader<PoseSample>,
     grid: SliceReader<GridHeader, u8>,
     guidance: Reader<GuidanceSample>,
@@ -61,8 +60,6 @@ pub struct Record {
     pub looks: u64,
     /// Ticks it looked.
     pub look_ticks: u64,
-    /// What the sonar gave.
-    pub sonar: Totals<SonarTotals>,
     /// What the wheels were commanded.
     pub wheels: Totals<WheelTotals>,
     /// How long full solves took.
@@ -83,7 +80,6 @@ impl Observer {
         Ok(Self {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,
-            range: bus.reader(&topics::RANGE)?,
             pose: bus.reader(&topics::POSE)?,
             grid: bus.slice_reader(&topics::GRID)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
@@ -126,10 +122,6 @@ impl Observer {
         }
         while let Some(field) = self.field.take()? {
             record.field.apply(&field.header().part, &field);
-        }
-        while let Some(range) = self.range.take()? {
-            let tick = range.stamp.tick;
-            record.sonar.add(tick, |totals| totals.with(&range));
         }
         while let Some(pose) = self.pose.take()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);

@@ -1,9 +1,9 @@
-//! Totals of what a run's signals did, as of each of the newest ticks: what came after the arrival does not count, and the
-//! arrival may be read after it.
+//! Totals of what the wheels were commanded, as of each of the newest ticks: what came after the arrival does not count, and
+//! the arrival may be read after it.
 
 use std::collections::VecDeque;
 
-use common::samples::{CommandSample, CommandState, RangeSample, RangeStatus};
+use common::samples::{CommandSample, CommandState};
 
 /// Ticks whose totals are kept: that of the arrival must still be there when the command is seen.
 const MOST: usize = 1024;
@@ -47,33 +47,6 @@ impl<T: Copy + Default> Totals<T> {
     }
 }
 
-/// What the front sonar gave.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SonarTotals {
-    ticks: u64,
-    unavailable: u64,
-}
-
-impl SonarTotals {
-    pub(crate) fn with(self, range: &RangeSample) -> Self {
-        let available = matches!(
-            RangeStatus::from_byte(range.status),
-            RangeStatus::Measured | RangeStatus::AtContact
-        );
-        Self {
-            ticks: self.ticks + 1,
-            unavailable: self.unavailable + u64::from(!available),
-        }
-    }
-
-    /// Share of the ticks in which the sonar gave no distance: nothing in range, no echo, no frame, no valid reading.
-    /// None before the first.
-    #[must_use]
-    pub fn unavailable_share(self) -> Option<f64> {
-        (self.ticks > 0).then(|| self.unavailable as f64 / self.ticks as f64)
-    }
-}
-
 /// The extremes of both wheels' commanded speeds, rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WheelTotals {
@@ -105,31 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_came_after_the_tick_asked_for_does_not_count_and_a_repeated_tick_counts_once() {
-        let mut totals = Totals::<SonarTotals>::default();
-        let statuses = [
-            (1, RangeStatus::Measured),
-            (2, RangeStatus::Nothing),
-            (2, RangeStatus::Nothing),
-            (3, RangeStatus::AtContact),
-            (4, RangeStatus::Invalid),
-            (5, RangeStatus::Absent),
-        ];
-        for (tick, status) in statuses {
-            let range = RangeSample {
-                status: status.into(),
-                ..RangeSample::default()
-            };
-            totals.add(tick, |before| before.with(&range));
-        }
-        assert_eq!(totals.at(0).unavailable_share(), None);
-        assert_eq!(totals.at(1).unavailable_share(), Some(0.0));
-        assert_eq!(totals.at(4).unavailable_share(), Some(0.5));
-        assert_eq!(totals.at(9).unavailable_share(), Some(0.6));
-    }
-
-    #[test]
-    fn the_dynamic_range_is_over_both_wheels_and_over_commands_that_drive() {
+    fn the_dynamic_range_is_over_both_wheels_and_commands_that_drive_up_to_the_tick_asked_for() {
         let mut totals = Totals::<WheelTotals>::default();
         let commands = [
             (CommandState::Halt, 0.0, 0.0),
