@@ -9,6 +9,7 @@ mod bad_input;
 mod blocked_starts;
 mod consumers;
 mod evaluation;
+mod experiments;
 mod failsafe;
 mod faults;
 mod field;

@@ -38,6 +38,9 @@ pub struct Mission {
     /// How the robot is brought there.
     #[serde(default)]
     pub method: Method,
+    /// Whether what the sonar gives is mapped. Without it the robot goes by [`Mission::known`] alone.
+    #[serde(default = "defaults::sensing")]
+    pub sensing: bool,
     /// How near the target counts as reached, metres.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
@@ -194,6 +197,9 @@ pub struct Controller {
 mod defaults {
     pub(super) const fn arrival_tolerance_m() -> f64 {
         0.15
+    }
+    pub(super) const fn sensing() -> bool {
+        true
     }
     pub(super) const fn timeout_s() -> f64 {
         180.0

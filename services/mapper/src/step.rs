@@ -116,6 +116,7 @@ pub struct Mapper {
     /// The paper's Im of (19).
     margin: i64,
     evidential: Evidential,
+    sensing: bool,
     map_within: f64,
     sensor_forward: f64,
     sensor_bearing: f64,
@@ -145,6 +146,7 @@ impl Step for Mapper {
             target: frame.cell_at(mission.target),
             margin: i64::from(margin),
             evidential,
+            sensing: mission.sensing,
             map_within: mission.mapper.map_within_m,
             sensor_forward: mission.sonar.forward_m,
             sensor_bearing: mission.sonar.bearing_deg.to_radians(),
@@ -264,6 +266,7 @@ impl Mapper {
         self.belief.rolled += last.distance(now.position)
             + self.half_track * (now.heading - self.belief.heading).abs();
         (self.belief.robot, self.belief.heading) = (now.position, now.heading);
+        let range = range.filter(|_| self.sensing);
         let changed = match &self.belief.sensed {
             Sensed::Hits => self.mark_hit(pose, range),
             Sensed::Evidence(_) => self.weigh(pose, range, rolled),

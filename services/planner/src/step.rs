@@ -33,7 +33,7 @@ const WAY_OUT_M_S: f64 = 0.08;
 /// What a direction of the field is checked for before it is given.
 #[derive(Clone, Copy, Debug)]
 enum Advisor {
-    /// The paper's method: nothing, the robot goes where the field points.
+    /// The paper's method, and any without sensing: nothing, the robot goes where the field points.
     Follow,
     /// The evidential method: whether the sonar looked there.
     LookFirst(ActiveSensing),
@@ -90,8 +90,10 @@ impl Step for Planner {
             target: mission.target,
             screening: screening(mission),
             advisor: match mission.method {
-                Method::Paper => Advisor::Follow,
-                Method::Evidential => Advisor::LookFirst(ActiveSensing::new(mission)),
+                Method::Evidential if mission.sensing => {
+                    Advisor::LookFirst(ActiveSensing::new(mission))
+                }
+                Method::Paper | Method::Evidential => Advisor::Follow,
             },
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),

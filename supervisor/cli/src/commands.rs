@@ -8,6 +8,8 @@ pub(crate) mod check;
 mod directories;
 #[cfg(feature = "tools")]
 pub(crate) mod evaluate;
+#[cfg(feature = "tools")]
+pub(crate) mod experiments;
 pub(crate) mod fault;
 #[cfg(feature = "tools")]
 pub(crate) mod field;
@@ -15,8 +17,12 @@ pub(crate) mod help;
 pub(crate) mod install;
 #[cfg(feature = "tools")]
 pub(crate) mod latency;
+#[cfg(feature = "tools")]
+mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
+#[cfg(feature = "tools")]
+pub(crate) mod replay_log;
 pub(crate) mod run;
 #[cfg(feature = "simulator")]
 pub(crate) mod sim;

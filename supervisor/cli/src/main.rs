@@ -22,7 +22,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 #[cfg(feature = "simulator")]
 use commands::sim;
 #[cfg(feature = "tools")]
-use commands::{chaos, evaluate, field, latency};
+use commands::{chaos, evaluate, experiments, field, latency, replay_log};
 use commands::{check, fault, help, install, missions, operate, run, stage, status, tables};
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
@@ -54,6 +54,10 @@ enum Command {
     Latency(latency::Arguments),
     #[cfg(feature = "tools")]
     Evaluate(evaluate::Arguments),
+    #[cfg(feature = "tools")]
+    Experiments(experiments::Arguments),
+    #[cfg(feature = "tools")]
+    ReplayLog(replay_log::Arguments),
     Status(status::Arguments),
     Stop(operate::Stop),
     Resume(operate::Resume),
@@ -110,6 +114,10 @@ fn main() -> ExitCode {
         Command::Latency(arguments) => latency::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Evaluate(arguments) => evaluate::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Experiments(arguments) => experiments::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::ReplayLog(arguments) => replay_log::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Stop(arguments) => operate::stop(&arguments),
         Command::Resume(arguments) => operate::resume(&arguments),

@@ -54,6 +54,11 @@ pub(crate) struct Summary {
     pub(crate) looks: u64,
     /// Mission time that it looked.
     pub(crate) look_s: f64,
+    /// Share of the ticks in which the front sonar gave no distance, by the ground truth: a supervisor on a busy machine
+    /// may miss samples.
+    pub(crate) sonar_unavailable_share: Option<f64>,
+    /// The greatest commanded speed of either wheel less the least one, rad/s, in the last supervisor's part.
+    pub(crate) wheel_range_rad_s: Option<f64>,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
     /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last one's
@@ -132,6 +137,8 @@ impl Summary {
             local_updates,
             looks: record.looks,
             look_s: record.look_ticks as f64 / mission.robot.rate_hz,
+            sonar_unavailable_share: sonar_unavailable_share(truth),
+            wheel_range_rad_s: last_tick.and_then(|tick| record.wheels.at(tick).range_rad_s()),
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: finished.restarts.clone(),
             resumes: *resumes,
@@ -248,4 +255,38 @@ fn path_length(truth: &[GroundTruthTick]) -> f64 {
         .windows(2)
         .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))
         .sum()
+}
+
+/// Share of the ticks whose front sonar byte is no distance: 255, nothing in range, or 0, not valid.
+fn sonar_unavailable_share(truth: &[GroundTruthTick]) -> Option<f64> {
+    let unavailable = truth.iter().filter(|tick| matches!(tick.sonar_cm, 0 | 255));
+    (!truth.is_empty()).then(|| unavailable.count() as f64 / truth.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sonar_is_unavailable_where_its_byte_is_no_distance() {
+        let tick = |sonar_cm| GroundTruthTick {
+            tick: 0,
+            time_s: 0.0,
+            x: 0.0,
+            y: 0.0,
+            heading: 0.0,
+            v: 0.0,
+            omega: 0.0,
+            clearance_m: 1.0,
+            contacts: 0,
+            left_counts: 0,
+            right_counts: 0,
+            sonar_cm,
+            stopping_time_s: 0.0,
+            radio: None,
+        };
+        assert_eq!(sonar_unavailable_share(&[]), None);
+        let truth = [255, 0, 255, 254, 4].map(tick);
+        assert_eq!(sonar_unavailable_share(&truth), Some(0.6));
+    }
 }

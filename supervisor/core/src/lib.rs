@@ -37,7 +37,7 @@
 //! | [`planner_executable`] | the executable that a mission names for the planner, checked |
 //! | [`process`] | a process that is watched, signalled, reaped |
 //! | `stage_process`, `stage_processes` | one stage with its policy and process; all of them |
-//! | `bus_endpoints`, [`observer`] | what the supervisor reads from and writes to the bus |
+//! | `bus_endpoints`, [`observer`], [`totals`] | what the supervisor reads from and writes to the bus; totals of it |
 //! | `cleanup` | when the bus is cleaned of what ended processes held |
 //! | `run_clock` | mission time of a run, and its first tick that is not made yet |
 //! | `death`, `records` | the record of a death; files of records in the run directory |
@@ -76,6 +76,7 @@ mod stage_processes;
 pub mod stages;
 mod stall;
 mod supervisor;
+pub mod totals;
 
 pub use domain_error::DomainError;
 pub use error::SupervisorError;

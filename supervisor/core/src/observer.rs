@@ -14,7 +14,10 @@ use common::{
     waiter::Waiter,
 };
 
-use crate::stage_processes::StageProcesses;
+use crate::{
+    stage_processes::StageProcesses,
+    totals::{Totals, WheelTotals},
+};
 
 /// Guidance samples recorded: the one of the arrival tick must still be there when the command is seen.
 const MOST_GUIDANCE: usize = 1024;
@@ -57,6 +60,8 @@ pub struct Record {
     pub looks: u64,
     /// Ticks it looked.
     pub look_ticks: u64,
+    /// What the wheels were commanded.
+    pub wheels: Totals<WheelTotals>,
     /// How long full solves took.
     pub full_solves: Histogram,
     /// How long local updates took.
@@ -101,6 +106,8 @@ impl Observer {
         while let Some(command) = self.command.take()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
+            let tick = command.stamp.tick;
+            record.wheels.add(tick, |totals| totals.with(&command));
             if CommandState::from_byte(command.state) == CommandState::Arrived {
                 record.arrival.get_or_insert(command);
             }

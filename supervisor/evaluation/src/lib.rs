@@ -10,10 +10,13 @@
 //! | [`table`] | the rows in a file, as they come and in order |
 //! | [`runner`] | the missions, several at a time |
 //! | [`statistics`], [`totals`] | shares with their intervals; the result of each setting, and paired differences |
-//! | [`report`] | all of it as a page |
+//! | [`report`], [`page`] | all of it as a page; what every page has |
+//! | [`directory`] | where all of it lies |
 //!
 //! Every setting runs on the same worlds with the same noise, so that two of them differ by what was set alone.
 
+pub mod directory;
+pub mod page;
 pub mod report;
 pub mod row;
 pub mod runner;

@@ -3,6 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use crate::{
+    page::{END, escaped, head},
     row::{Outcome, Row},
     runner::Plan,
     totals::{Comparison, Totals},
@@ -74,7 +75,7 @@ impl Totals {
 #[must_use]
 pub fn html(plan: &Plan, rows: &[Row], command: &str) -> String {
     let report = Report::new(plan, rows);
-    let mut page = String::from(HEAD);
+    let mut page = head("Evaluation");
     let _ = write!(
         page,
         "<h1>Evaluation</h1>\n<p><code>{}</code></p>\n<table><tr><th>setting</th><th>missions</th>",
@@ -132,21 +133,6 @@ pub fn html(plan: &Plan, rows: &[Row], command: &str) -> String {
             page.push_str("</figure>\n");
         }
     }
-    page.push_str("</body></html>\n");
+    page.push_str(END);
     page
-}
-
-const HEAD: &str = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>Evaluation</title>\n<style>\
-body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\
-table{border-collapse:collapse;display:block;overflow-x:auto}td,th{border:1px solid #cbd2d9;padding:.3em .6em;text-align:left;vertical-align:top}\
-code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);margin:.5em .2em;vertical-align:top}img{width:100%}\
-</style></head>\n<body>\n";
-
-/// `text` where markup is read.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }

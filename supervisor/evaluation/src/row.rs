@@ -60,6 +60,8 @@ pub struct Summary {
     /// Mission time at which the robot had moved 0.1 m in truth.
     departed_s: Option<f64>,
     safety_events: u64,
+    sonar_unavailable_share: Option<f64>,
+    wheel_range_rad_s: Option<f64>,
     looks: u64,
     look_s: f64,
     replans: u64,
@@ -105,6 +107,10 @@ pub struct Row {
     pub true_distance_m: Option<f64>,
     /// Echoes that were mapped.
     pub safety_events: u64,
+    /// Share of the ticks in which the sonar gave no distance.
+    pub sonar_unavailable_share: Option<f64>,
+    /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
+    pub wheel_range_rad_s: Option<f64>,
     /// Times the robot stopped to look.
     pub looks: u64,
     /// Time it looked.
@@ -163,6 +169,8 @@ impl Row {
             pose_error_m: summary.pose_error_m,
             true_distance_m: summary.true_distance_m,
             safety_events: summary.safety_events,
+            sonar_unavailable_share: summary.sonar_unavailable_share,
+            wheel_range_rad_s: summary.wheel_range_rad_s,
             looks: summary.looks,
             look_s: summary.look_s,
             replans: summary.replans,
@@ -185,6 +193,8 @@ impl Row {
             true_distance_m: None,
             departed_s: None,
             safety_events: 0,
+            sonar_unavailable_share: None,
+            wheel_range_rad_s: None,
             looks: 0,
             look_s: 0.0,
             replans: 0,
@@ -258,7 +268,8 @@ mod tests {
     fn summary(outcome: &str, true_distance_m: f64) -> Summary {
         let text = format!(
             r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
-            "pose_error_m": 0.1, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3, "looks": 1,
+            "pose_error_m": 0.1, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
+            "sonar_unavailable_share": 0.5, "wheel_range_rad_s": 2.0, "looks": 1,
             "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1}}"#
         );
         serde_json::from_str(&text).unwrap()

@@ -12,7 +12,7 @@ use supervisor::process::firsthand;
 use thiserror::Error;
 
 use crate::{
-    row::{Row, Summary},
+    row::{Outcome, Row, Summary},
     setting::Setting,
     table::{Table, TableError},
     trial::Trial,
@@ -28,10 +28,14 @@ pub struct Plan {
     pub trials: Vec<Trial>,
     /// Every one of them on every world.
     pub settings: Vec<Setting>,
-    /// Noise seeds on every world, counted on from one world to the next.
+    /// Noise seeds on every world.
     pub repeats: u64,
     /// The first noise seed.
     pub seed: u64,
+    /// Whether every world has the same noise seeds; else they are counted on from one world to the next.
+    pub same_seeds: bool,
+    /// Besides those of failures, the pictures of missions with this noise seed are kept.
+    pub pictured_seed: Option<u64>,
     /// Missions at once.
     pub jobs: usize,
     /// Where worlds, rows and pictures of failures go; exists.
@@ -84,16 +88,24 @@ impl Plan {
         self.directory.join("worlds").join(name)
     }
 
-    /// Where the picture of a failure lies.
+    /// Where the picture of a mission lies, if it was kept.
     #[must_use]
     pub fn picture(&self, row: &Row) -> PathBuf {
-        picture(&self.directory, row)
+        self.directory.join(picture(row))
+    }
+
+    fn keeps_picture(&self, row: &Row) -> bool {
+        row.outcome != Outcome::Success || self.pictured_seed == Some(row.seed)
     }
 
     fn jobs(&self) -> impl Iterator<Item = Job<'_>> {
         let worlds = (0..).zip(&self.trials);
         worlds.flat_map(move |(number, trial)| {
-            let first = self.seed + number * self.repeats;
+            let first = if self.same_seeds {
+                self.seed
+            } else {
+                self.seed + number * self.repeats
+            };
             (first..first + self.repeats).flat_map(move |seed| {
                 let settings = self.settings.iter();
                 settings.map(move |setting| Job {
@@ -106,9 +118,15 @@ impl Plan {
     }
 }
 
-fn picture(directory: &Path, row: &Row) -> PathBuf {
+/// Where the picture of a mission lies in the directory of its plan.
+#[must_use]
+pub fn picture(row: &Row) -> PathBuf {
+    let folder = match row.outcome {
+        Outcome::Success => "pictures",
+        _ => "failures",
+    };
     let name = format!("{}-{}-{}.svg", row.world, row.seed, row.setting);
-    directory.join("failures").join(name.replace(
+    Path::new(folder).join(name.replace(
         |c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)),
         "_",
     ))
@@ -123,7 +141,8 @@ pub fn run(
     table: &mut Table,
     watch: &mut dyn FnMut(&Progress),
 ) -> Result<(), RunnerError> {
-    for folder in ["worlds", "failures"] {
+    let pictures = plan.pictured_seed.map(|_| "pictures");
+    for folder in ["worlds", "failures"].into_iter().chain(pictures) {
         let folder = plan.directory.join(folder);
         fs::create_dir_all(&folder).map_err(system(format!("make {}", folder.display())))?;
     }
@@ -208,9 +227,9 @@ fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError
             Row::aborted(trial, *seed, setting, reason)
         }
     };
-    if row.outcome != crate::row::Outcome::Success {
+    if plan.keeps_picture(&row) {
         // A mission that could not start has none.
-        let _ = fs::rename(directory.join(PICTURE), picture(&plan.directory, &row));
+        let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
     }
     let _ = fs::remove_dir_all(&directory);
     Ok(row)

@@ -1,5 +1,7 @@
 //! Intervals: how sure a share or a difference of shares is.
 
+use serde::Serialize;
+
 /// Quantile of the normal distribution for 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
@@ -59,11 +61,41 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
 /// The median; none of nothing.
 #[must_use]
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let upper = *values.get(values.len() / 2)?;
-    let lower = values[(values.len() - 1) / 2];
-    Some((lower + upper) / 2.0)
+    Some(Spread::of(values)?.median)
+}
+
+/// Where the middle of some values lies, and the middle half of them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// A quarter of the values is below.
+    pub low: f64,
+    /// Half of them is.
+    pub median: f64,
+    /// Three quarters are.
+    pub high: f64,
+}
+
+impl Spread {
+    /// Of some values, linear between neighbours; none of nothing.
+    #[must_use]
+    pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<f64> = values.collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
+        let at = |share: f64| {
+            let place = share * last as f64;
+            let (below, above) = (
+                values[place.floor() as usize],
+                values[place.ceil() as usize],
+            );
+            below + (above - below) * place.fract()
+        };
+        Some(Self {
+            low: at(0.25),
+            median: at(0.5),
+            high: at(0.75),
+        })
+    }
 }
 
 /// The mean; none of nothing.
@@ -96,6 +128,13 @@ mod tests {
         assert!(found.low > 0.0 && found.high < 0.17, "{found:?}");
         let none = paired_difference(0, 0, 100);
         assert!(none.low < 0.0 && none.high > 0.0, "{none:?}");
+    }
+
+    #[test]
+    fn a_spread_holds_the_middle_half() {
+        let spread = Spread::of([5.0, 1.0, 2.0, 4.0, 3.0].into_iter()).unwrap();
+        assert_eq!((spread.low, spread.median, spread.high), (2.0, 3.0, 4.0));
+        assert_eq!(Spread::of(std::iter::empty()), None);
     }
 
     #[test]

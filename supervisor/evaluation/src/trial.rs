@@ -87,6 +87,23 @@ impl Trial {
     }
 }
 
+impl Trial {
+    /// The trial `world` by `mission` as it is, if a body can get from start to target in its world.
+    #[must_use]
+    pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
+        let start = mission.start_pose().position;
+        match shortest_path(&mission.world, start, mission.target, body.swept_m()) {
+            ShortestPath::Found(shortest_m) => Some(Self {
+                world,
+                mission,
+                shortest_m,
+                rules: Rules::default(),
+            }),
+            ShortestPath::None | ShortestPath::TooLarge => None,
+        }
+    }
+}
+
 /// The body that a world must let through.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySize {

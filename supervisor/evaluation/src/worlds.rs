@@ -18,10 +18,7 @@ use common::mission::Mission;
 
 pub use self::error::WorldError;
 use self::{corridors::Bends, random::Random, rooms::Doors};
-use crate::{
-    shortest_path::{ShortestPath, shortest_path},
-    trial::{BodySize, Rules, Scene, Trial},
-};
+use crate::trial::{BodySize, Rules, Scene, Trial};
 
 /// Draws that may fail in a row before a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
@@ -200,20 +197,9 @@ fn spread(trials: &mut Vec<Trial>, count: usize) {
 /// A mission file as a world.
 fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
     let mission = Mission::load(file)?;
-    let path = shortest_path(
-        &mission.world,
-        mission.start_pose().position,
-        mission.target,
-        body.swept_m(),
-    );
-    match path {
-        ShortestPath::Found(shortest_m) => found.trials.push(Trial {
-            world: mission.name.clone(),
-            mission,
-            shortest_m,
-            rules: Rules::default(),
-        }),
-        ShortestPath::None | ShortestPath::TooLarge => found.unsolvable += 1,
+    match Trial::of_mission(mission.name.clone(), mission, body) {
+        Some(trial) => found.trials.push(trial),
+        None => found.unsolvable += 1,
     }
     Ok(())
 }

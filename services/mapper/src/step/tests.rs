@@ -188,3 +188,21 @@ fn a_tick_given_twice_is_one_safety_event() {
     assert_eq!(mapper.hear(&pose, Some(&range)).area(), 0);
     assert_eq!(mapper.state().safety_events(), 1);
 }
+
+#[test]
+fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
+    for method in ["paper", "evidential"] {
+        let text = format!(
+            "target = [1.5, 0.0]\nmethod = '{method}'\nsensing = false\nknown.drum = [{{ at = [1, 1], radius_m = 0.2 }}]"
+        );
+        let mut mapper = Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+        let before = mapper.state().cells().to_vec();
+        assert!(before.contains(&(CellState::Known as u8)), "{method}");
+        let echo = reading(RangeStatus::Measured, 0.5);
+        for tick in 0..10 {
+            mapper.hear(&at(tick, 0.0, 0.0, 0.0), Some(&echo));
+        }
+        assert_eq!(mapper.state().cells(), before, "{method}");
+        assert_eq!(mapper.state().safety_events(), 0, "{method}");
+    }
+}

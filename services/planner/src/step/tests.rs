@@ -182,6 +182,21 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
 }
 
 #[test]
+fn an_evidential_robot_without_sensing_does_not_look_first() {
+    let mission = Mission {
+        method: Method::Evidential,
+        sensing: false,
+        ..mission()
+    };
+    let mut planner = Planner::new(&mission);
+    let (header, cells) = keyframe(1, |_| false);
+    planner.take_grid(&header, &cells).unwrap();
+    let guidance = planner.guide(&at(0.0, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(guidance.speed_limit_m_s, f64::INFINITY);
+}
+
+#[test]
 fn over_swept_ground_an_evidential_robot_goes_at_full_speed() {
     let guidance = evidential(|_| true).guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);

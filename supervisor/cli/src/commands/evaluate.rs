@@ -5,16 +5,15 @@ use std::{
     num::NonZero,
     path::{Path, PathBuf},
     process::ExitCode,
-    thread,
-    time::{Duration, Instant},
 };
 
 use clap::Args;
 use common::mission::{Mission, Model};
 use evaluation::{
+    directory::{self, PAGE_FILE, ROWS_FILE},
     report::{self, Report},
-    runner::{self, Plan, Progress},
-    setting::Setting,
+    runner::{self, Plan},
+    setting::{HARMONIC, Setting},
     table::Table,
     trial::BodySize,
     worlds::{self, Worlds},
@@ -22,8 +21,12 @@ use evaluation::{
 use serde_json::json;
 use supervisor::planner_executable;
 
-use super::{Failure, print_text};
-use crate::progress_line::{ProgressLine, write_stderr};
+use super::{
+    Failure,
+    mission_progress::{MissionProgress, jobs},
+    print_text,
+};
+use crate::progress_line::write_stderr;
 
 /// Run missions on many worlds and count, by the ground truth, how many succeed: with 95 % intervals, every failure
 /// with its picture. Worlds and noise follow from the seed.
@@ -76,8 +79,6 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The planner that is `firsthand`'s own.
-const HARMONIC: &str = "harmonic";
 /// The other planners that come with it, and their executables beside this one.
 const YARDSTICKS: [(&str, &str); 2] = [
     ("wavefront", "firsthand-wavefront"),
@@ -85,34 +86,26 @@ const YARDSTICKS: [(&str, &str); 2] = [
 ];
 /// Free ground that a world leaves the body on both sides of its narrowest way, metres.
 const MARGIN_M: f64 = 0.05;
-/// In the directory of an evaluation: what it is of, its rows, its page.
-const PLAN_FILE: &str = "plan.txt";
-const ROWS_FILE: &str = "rows.csv";
-const PAGE_FILE: &str = "index.html";
-/// A line that cannot be rewritten comes so seldom.
-const LINE_EVERY: Duration = Duration::from_secs(10);
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
-    prepare(arguments, &described)?;
+    let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
     let found = worlds::find(
         &arguments.worlds,
         arguments.count,
         arguments.seed,
         &body(&arguments.robot)?,
     )?;
-    let jobs = arguments.jobs.map_or_else(
-        || thread::available_parallelism().map_or(1, NonZero::get),
-        NonZero::get,
-    );
     let plan = Plan {
         trials: found.trials,
         settings,
         repeats: arguments.repeats,
         seed: arguments.seed,
-        jobs,
-        directory: fs::canonicalize(&arguments.out)?,
+        jobs: jobs(arguments.jobs),
+        same_seeds: false,
+        pictured_seed: None,
+        directory,
     };
     write_stderr(&format!(
         "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
@@ -120,9 +113,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         found.unsolvable
     ));
     let mut table = Table::open(&plan.directory.join(ROWS_FILE))?;
-    let mut console = Console::new();
+    let mut console = MissionProgress::new("");
     runner::run(&plan, &mut table, &mut |progress| console.show(progress))?;
-    console.line.end();
+    console.end();
     table.sort()?;
     let page = plan.directory.join(PAGE_FILE);
     fs::write(&page, report::html(&plan, table.rows(), &described))?;
@@ -134,32 +127,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     print_text(&text)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The directory: a new one, or that of the same evaluation.
-fn prepare(arguments: &Arguments, described: &str) -> Result<(), Failure> {
-    let out = &arguments.out;
-    let file = out.join(PLAN_FILE);
-    let earlier = fs::read_to_string(&file).ok();
-    match earlier {
-        Some(earlier) if arguments.resume && earlier.trim() == described => return Ok(()),
-        Some(earlier) if arguments.resume => {
-            let (out, earlier) = (out.display(), earlier.trim());
-            return Err(format!("--resume: the evaluation in {out} was another: {earlier}").into());
-        }
-        Some(_) => {
-            let out = out.display();
-            return Err(format!(
-                "{out} holds an evaluation; go on with it with --resume, or give another --out"
-            )
-            .into());
-        }
-        None => {}
-    }
-    fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
-    fs::write(&file, format!("{described}\n"))
-        .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
-    Ok(())
 }
 
 /// The command that gives these rows.
@@ -269,35 +236,4 @@ fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
         object["versus"] = others.into();
     }
     Ok(object)
-}
-
-/// Progress on standard error.
-struct Console {
-    began: Instant,
-    line: ProgressLine,
-}
-
-impl Console {
-    fn new() -> Self {
-        Self {
-            began: Instant::now(),
-            line: ProgressLine::new(LINE_EVERY),
-        }
-    }
-
-    fn show(&mut self, progress: &Progress) {
-        if !self.line.is_due() {
-            return;
-        }
-        self.line.begin();
-        let Progress {
-            ended,
-            all,
-            ended_now,
-        } = *progress;
-        let each = self.began.elapsed().as_secs_f64() / ended_now.max(1) as f64;
-        let left = each * (all - ended) as f64;
-        let line = format!("{ended} of {all} missions, {left:.0} s left");
-        self.line.show(&line, true);
-    }
 }

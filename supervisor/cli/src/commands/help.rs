@@ -39,6 +39,7 @@ static GUIDE: [Page; 15] = guide! {
     "break-it",
     "field-tool",
     "evaluate-worlds",
+    "the-papers-experiments",
     "figures",
     "capabilities",
     "tables",
@@ -74,7 +75,7 @@ pub(crate) fn topics() -> String {
     let mut list = String::from("Guide (firsthand help TOPIC):\n");
     for page in &GUIDE {
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "  {:<14} {}", page.topic(), page.title());
+        let _ = writeln!(list, "  {:<22} {}", page.topic(), page.title());
     }
     list
 }

@@ -22,7 +22,13 @@ macro_rules! shipped {
 }
 
 /// Name and text of every shipped mission.
-pub(crate) static SHIPPED: [(&str, &str); 3] = shipped!("open-room", "obstacle-course", "trap");
+pub(crate) static SHIPPED: [(&str, &str); 5] = shipped!(
+    "open-room",
+    "obstacle-course",
+    "trap",
+    "passage",
+    "one-drum"
+);
 
 /// Why a mission cannot be loaded.
 #[derive(Debug, Error)]
