@@ -16,6 +16,7 @@ use crate::{
     saved_state::SavedState,
     sensors::{self, Ranging},
     streams::{Due, Streams},
+    wheel_errors::WheelErrors,
     world::World,
 };
 
@@ -48,6 +49,8 @@ pub struct Robot {
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     wiring: Wiring,
+    /// True wheel diameters over nominal ones.
+    diameter: Wheels<f64>,
     longest_step: f64,
     metres_per_count: f64,
 
@@ -97,26 +100,33 @@ impl Robot {
     /// The robot of `mission`, booted and standing at the start; tick 0 is measured.
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
+        Self::with_noise(mission, mission.seed)
+    }
+
+    /// The robot of `mission` with the noise of `seed`.
+    fn with_noise(mission: &Mission, seed: u64) -> Self {
         let physics = mission.simulation.physics();
         let size = mission.body();
         let top_counts = size.top_speed_m_s / size.metres_per_count();
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
         let world = World::new(mission);
+        let wheel_errors = WheelErrors::of(mission);
         let mut robot = Self {
             physics,
             ignores_time: mission.simulation.ignores_time,
             stops_when_silent: mission.simulation.stops_when_silent_s,
             rate_hz: mission.robot.rate_hz,
             wiring: Wiring::of(mission),
+            diameter: wheel_errors.diameter,
             longest_step,
             metres_per_count: size.metres_per_count(),
-            body: Body::new(mission, &world),
+            body: Body::new(mission, &world, wheel_errors.track),
             world,
             motors: std::array::from_fn(|_| Motor::new(physics.wheels, top_counts)),
             streams: Streams::default(),
-            ranging: Ranging::new(mission),
-            wheel_noise: Noise::new(mission.seed, Source::Wheels),
-            count_noise: Noise::new(mission.seed, Source::Counts),
+            ranging: Ranging::new(mission, seed),
+            wheel_noise: Noise::new(seed, Source::Wheels),
+            count_noise: Noise::new(seed, Source::Counts),
             time: 0.0,
             tick: 0,
             heard_at: 0.0,
@@ -136,15 +146,14 @@ impl Robot {
     /// The robot of `mission` where an earlier process left it, booted anew but for its counts.
     #[must_use]
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
-        let mut robot = Self::new(&Mission {
-            // The same readings again would be no readings.
-            seed: mission.seed.wrapping_add(saved.tick + 1),
-            ..mission.clone()
-        });
+        // The same readings again would be no readings.
+        let seed = mission.seed.wrapping_add(saved.tick + 1);
+        let mut robot = Self::with_noise(mission, seed);
         robot.tick = saved.tick;
         robot.time = saved.time_s;
         (robot.heard_at, robot.ordered_at) = (saved.time_s, saved.time_s);
         robot.stopping_time = saved.stopping_time_s;
+        robot.ranging.restore(saved.silent);
         for (motor, turned) in robot.motors.iter_mut().zip(saved.turned) {
             motor.restore(turned);
         }
@@ -166,6 +175,7 @@ impl Robot {
             turned: std::array::from_fn(|channel| self.motors[channel].turned()),
             contacts: self.body.contacts(),
             stopping_time_s: self.stopping_time,
+            silent: self.ranging.silent(),
         }
     }
 
@@ -274,12 +284,23 @@ impl Robot {
         }
     }
 
+    /// When the ultrasonic rangers listen for the next tick, if that is before the tick and has not been yet.
+    fn listens_at(&self) -> Option<f64> {
+        let age = self.physics.sonar.age_s;
+        (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
+    }
+
     /// Let mission time pass until `end`, seconds, in short steps, none of which reaches across the end
-    /// of a timed command. A time gone by is none.
+    /// of a timed command or the moment of a range. A time gone by is none.
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
+            if self.listens_at().is_some_and(|moment| moment <= self.time) {
+                self.ranging
+                    .listen(&self.world, &self.body, &self.physics.sonar);
+            }
             let ends = self.motors.iter().filter_map(Motor::ends_at);
             let until = ends
+                .chain(self.listens_at())
                 .filter(|moment| *moment > self.time)
                 .fold(end, f64::min);
             let span = until - self.time;
@@ -319,21 +340,34 @@ impl Robot {
             right: asked(channel.right, sign.right),
         };
         let wheels = self.physics.wheels;
-        let ground = rolled.map(|metres| {
+        let diameter = self.diameter;
+        let rims = Wheels {
+            left: rolled.left * diameter.left,
+            right: rolled.right * diameter.right,
+        };
+        let ground = rims.map(|metres| {
             let lost = noise.normal(wheels.slip_noise * metres.abs().sqrt());
             metres * (1.0 - wheels.slip_share) + lost
         });
         let went = self.body.roll(ground, &self.world);
-        // A wheel that slips turns all the same; one whose body is held does not.
+        // A wheel that slips turns all the same; one whose body is held turns as far as it slips at the contact.
         let held = went != ground;
-        let turned = if held { went } else { rolled };
-        let mut turn = |channel: usize, sign: f64, metres: f64| {
-            if let Some(motor) = self.motors.get_mut(channel) {
-                motor.turn(sign * metres / self.metres_per_count, dt, held);
+        let grip = 1.0 - wheels.contact_slip;
+        let mut turn = |channel: usize, sign: f64, rolled: f64, went: f64| {
+            let counts = |metres: f64| sign * metres / self.metres_per_count;
+            let Some(motor) = self.motors.get_mut(channel) else {
+                return;
+            };
+            if held {
+                motor.turn(counts(went * grip + rolled * wheels.contact_slip));
+                motor.hold(counts(went) / dt, grip);
+            } else {
+                motor.turn(counts(rolled));
             }
         };
-        turn(channel.left, sign.left, turned.left);
-        turn(channel.right, sign.right, turned.right);
+        let (left, right) = (went.left / diameter.left, went.right / diameter.right);
+        turn(channel.left, sign.left, rolled.left, left);
+        turn(channel.right, sign.right, rolled.right, right);
         self.least_clearance = self.least_clearance.min(self.body.clearance());
         if self
             .rims()
@@ -349,7 +383,10 @@ impl Robot {
         let Wiring { channel, sign } = self.wiring;
         let rim =
             |channel: usize, sign: f64| sign * self.motors[channel].speed() * self.metres_per_count;
-        [rim(channel.left, sign.left), rim(channel.right, sign.right)]
+        [
+            rim(channel.left, sign.left) * self.diameter.left,
+            rim(channel.right, sign.right) * self.diameter.right,
+        ]
     }
 
     /// Let mission time pass until the next tick and measure there.

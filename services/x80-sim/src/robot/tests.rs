@@ -8,6 +8,8 @@ use proptest::prelude::*;
 
 use super::*;
 
+mod realism;
+
 fn mission(text: &str) -> Mission {
     let text = format!("target = [3, 0]\n{text}");
     Mission::parse(&text, Path::new("m.toml")).unwrap()
