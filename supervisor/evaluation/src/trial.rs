@@ -2,7 +2,7 @@
 
 use common::{
     geometry::Shapes,
-    mission::{Mission, MissionError},
+    mission::{Heights, Mission, MissionError, Realism},
 };
 use glam::DVec2;
 use std::path::Path;
@@ -72,8 +72,9 @@ impl Trial {
         rules: Rules,
         body: &BodySize,
     ) -> Result<Option<Self>, MissionError> {
+        let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
         let ShortestPath::Found(shortest_m) =
-            shortest_path(&scene.shapes, scene.start, scene.target, body.swept_m())
+            shortest_path(&touched, scene.start, scene.target, body.swept_m())
         else {
             return Ok(None);
         };

@@ -201,7 +201,7 @@ fn spread(trials: &mut Vec<Trial>, count: usize) {
 fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
     let mission = Mission::load(file)?;
     let path = shortest_path(
-        &mission.world,
+        &mission.obstacles(),
         mission.start_pose().position,
         mission.target,
         body.swept_m(),
