@@ -37,6 +37,7 @@
 //! ```
 
 pub mod body;
+mod drivetrain;
 mod error;
 pub mod infrared;
 pub mod motor;

@@ -4,13 +4,14 @@ use common::{
     ground_truth::GroundTruthTick,
     mission::{Mission, Physics},
     wire::{
-        Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
-        StandardSensors, SystemSignal,
+        Addressing, Command, CustomSensors, Frame, Motion, MotorSensors, Report, StandardSensors,
+        SystemSignal,
     },
 };
 
 use crate::{
     body::{Body, Wheels},
+    drivetrain::Drivetrain,
     motor::Motor,
     noise::{Noise, Source},
     saved_state::SavedState,
@@ -48,11 +49,8 @@ pub struct Robot {
     ignores_time: bool,
     stops_when_silent: Option<f64>,
     rate_hz: f64,
-    wiring: Wiring,
-    /// True wheel diameters over nominal ones.
-    diameter: Wheels<f64>,
+    drivetrain: Drivetrain,
     longest_step: f64,
-    metres_per_count: f64,
 
     world: World,
     body: Body,
@@ -75,27 +73,6 @@ pub struct Robot {
     motor: MotorSensors,
 }
 
-/// Which channel drives which wheel, and which way.
-#[derive(Clone, Copy, Debug)]
-struct Wiring {
-    channel: Wheels<usize>,
-    sign: Wheels<f64>,
-}
-
-impl Wiring {
-    fn of(mission: &Mission) -> Self {
-        let wheels = Wheels {
-            left: mission.robot.left,
-            right: mission.robot.right,
-        };
-        Self {
-            // A mission is checked: channels are 0 and 1.
-            channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
-            sign: wheels.map(|wheel| if wheel.reversed { -1.0 } else { 1.0 }),
-        }
-    }
-}
-
 impl Robot {
     /// The robot of `mission`, booted and standing at the start; tick 0 is measured.
     #[must_use]
@@ -116,10 +93,8 @@ impl Robot {
             ignores_time: mission.simulation.ignores_time,
             stops_when_silent: mission.simulation.stops_when_silent_s,
             rate_hz: mission.robot.rate_hz,
-            wiring: Wiring::of(mission),
-            diameter: wheel_errors.diameter,
+            drivetrain: Drivetrain::new(mission, wheel_errors.diameter),
             longest_step,
-            metres_per_count: size.metres_per_count(),
             body: Body::new(mission, &world, wheel_errors.track),
             world,
             motors: std::array::from_fn(|_| Motor::new(physics.wheels, top_counts)),
@@ -192,7 +167,7 @@ impl Robot {
 
     fn is_moving(&self) -> bool {
         let ordered = self.motors.iter().any(|motor| motor.ends_at().is_some());
-        ordered || self.rims().into_iter().any(|rim| rim != 0.0)
+        ordered || self.rims() != Wheels::default()
     }
 
     /// Mission time, seconds.
@@ -326,67 +301,32 @@ impl Robot {
         let (centre, radius) = (self.body.pose().position, self.body.radius());
         self.world.advance(self.time + dt, centre, radius);
 
-        let Wiring { channel, sign } = self.wiring;
         let (now, noise) = (self.time, &mut self.wheel_noise);
-        let motors = &mut self.motors;
-        let mut asked = |channel: usize, sign: f64| {
-            let counts = motors
-                .get_mut(channel)
-                .map_or(0.0, |m| m.step(now, dt, noise));
-            sign * counts * self.metres_per_count
-        };
-        let rolled = Wheels {
-            left: asked(channel.left, sign.left),
-            right: asked(channel.right, sign.right),
-        };
+        let drivetrain = self.drivetrain;
+        let asked = drivetrain.step(&mut self.motors, now, dt, noise);
         let wheels = self.physics.wheels;
-        let diameter = self.diameter;
-        let rims = Wheels {
-            left: rolled.left * diameter.left,
-            right: rolled.right * diameter.right,
-        };
-        let ground = rims.map(|metres| {
+        let ground = drivetrain.rims(asked).map(|metres| {
             let lost = noise.normal(wheels.slip_noise * metres.abs().sqrt());
             metres * (1.0 - wheels.slip_share) + lost
         });
         let went = self.body.roll(ground, &self.world);
         // A wheel that slips turns all the same; one whose body is held turns as far as it slips at the contact.
-        let held = went != ground;
-        let grip = 1.0 - wheels.contact_slip;
-        let mut turn = |channel: usize, sign: f64, rolled: f64, went: f64| {
-            let counts = |metres: f64| sign * metres / self.metres_per_count;
-            let Some(motor) = self.motors.get_mut(channel) else {
-                return;
-            };
-            if held {
-                motor.turn(counts(went * grip + rolled * wheels.contact_slip));
-                motor.hold(counts(went) / dt, grip);
-            } else {
-                motor.turn(counts(rolled));
-            }
+        let grip = if went == ground {
+            0.0
+        } else {
+            1.0 - wheels.contact_slip
         };
-        let (left, right) = (went.left / diameter.left, went.right / diameter.right);
-        turn(channel.left, sign.left, rolled.left, left);
-        turn(channel.right, sign.right, rolled.right, right);
+        drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         self.least_clearance = self.least_clearance.min(self.body.clearance());
-        if self
-            .rims()
-            .into_iter()
-            .any(|rim| rim.abs() > GroundTruthTick::AT_REST_M_S)
-        {
+        let rims = self.rims();
+        if rims.left.abs().max(rims.right.abs()) > GroundTruthTick::AT_REST_M_S {
             self.stopping_time = self.stopping_time.max(now + dt - self.ordered_at);
         }
     }
 
-    /// Speeds of the left and the right rim, m/s, forward positive.
-    fn rims(&self) -> [f64; 2] {
-        let Wiring { channel, sign } = self.wiring;
-        let rim =
-            |channel: usize, sign: f64| sign * self.motors[channel].speed() * self.metres_per_count;
-        [
-            rim(channel.left, sign.left) * self.diameter.left,
-            rim(channel.right, sign.right) * self.diameter.right,
-        ]
+    /// Speeds of the rims, m/s, forward positive.
+    fn rims(&self) -> Wheels<f64> {
+        self.drivetrain.rim_speeds(&self.motors)
     }
 
     /// Let mission time pass until the next tick and measure there.
@@ -436,16 +376,8 @@ impl Robot {
     /// What is true at this tick. The least clearance begins anew.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
-        let Wiring { channel, sign } = self.wiring;
-        let [left, right] = self.rims();
-        let counts = |channel: usize, sign: f64| {
-            let position = self.motor.encoders[channel].position;
-            if sign < 0.0 {
-                (COUNT_CYCLE - position) % COUNT_CYCLE
-            } else {
-                position
-            }
-        };
+        let Wheels { left, right } = self.rims();
+        let counts = self.drivetrain.counts(&self.motor.encoders);
         let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
         self.least_clearance = self.body.clearance();
         GroundTruthTick {
@@ -458,8 +390,8 @@ impl Robot {
             omega: (right - left) / self.body.track(),
             clearance_m,
             contacts: self.body.contacts(),
-            left_counts: counts(channel.left, sign.left),
-            right_counts: counts(channel.right, sign.right),
+            left_counts: counts.left,
+            right_counts: counts.right,
             sonar_cm: self.ranging.front(&self.standard),
             stopping_time_s: self.stopping_time,
             radio: None,

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use common::wire::{Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between};
+use common::wire::{
+    COUNT_CYCLE, Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between,
+};
 
 use proptest::prelude::*;
 

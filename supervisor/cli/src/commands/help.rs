@@ -31,9 +31,10 @@ macro_rules! guide {
 }
 
 /// Every page, in the order to read them. None has the name of a subcommand.
-static GUIDE: [Page; 14] = guide! {
+static GUIDE: [Page; 15] = guide! {
     "method",
     "mission-file",
+    "simulation",
     "attach",
     "deploy",
     "break-it",
