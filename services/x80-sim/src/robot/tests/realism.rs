@@ -156,3 +156,30 @@ fn infrared_rangers_look_over_what_is_low() {
     let (low, high) = (infrared("top_m = 0.1"), infrared(""));
     assert!(high > low + 100, "{high} {low}");
 }
+
+#[test]
+fn a_resumed_robot_has_the_wheels_and_the_silences_it_had() {
+    let text = "seed = 4\n[simulation.wheels]\ndiameter_spread = 0.05\n[simulation.sonar]\nsilence_share = 0.5\nsilence_mean_s = 60";
+    let curvature = |robot: &mut Robot| {
+        let before = robot.ground_truth();
+        send(robot, forward(562, None));
+        robot.advance_to(robot.time_s() + 4.0);
+        let after = robot.ground_truth();
+        let way = (after.x - before.x).hypot(after.y - before.y);
+        (after.heading - before.heading) / way
+    };
+    let mut first = robot(text);
+    let had = curvature(&mut first);
+    assert!(had.abs() > 0.01, "{had}");
+    first.come_to_rest();
+    let saved = first.saved_state();
+    let mut resumed = Robot::restored(&mission(text), &saved);
+    assert!((curvature(&mut resumed) - had).abs() < 1e-3);
+    // A run of a minute does not end within a few readings; drawn anew, half of the six would differ.
+    let silent = resumed.saved_state().silent;
+    let kept = silent
+        .iter()
+        .zip(saved.silent)
+        .filter(|(now, then)| **now == *then);
+    assert!(kept.count() >= 5, "{silent:?} {:?}", saved.silent);
+}
