@@ -5,35 +5,105 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// A cable drum: a disc.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Drum {
-    /// Centre, metres.
-    pub at: DVec2,
-    /// Radius, metres.
-    pub radius_m: f64,
+/// From which height to which something reaches, and how much of a sound comes back from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile {
+    /// Its lowest height above the floor, metres.
+    pub bottom_m: f64,
+    /// Its highest, metres; infinite for what is higher than any robot.
+    pub top_m: f64,
+    /// Amplitude of its echo over that of a hard thing of its form; 1 is hard.
+    pub echo: f64,
 }
 
-/// A wall: a polyline without thickness.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Wall {
-    /// Corners in order, metres; at least two.
-    pub points: Vec<DVec2>,
+impl Profile {
+    /// Vertical distance from `height_m` to its nearest part, metres; 0 where it is as high as that.
+    #[must_use]
+    pub fn height_gap(&self, height_m: f64) -> f64 {
+        (self.bottom_m - height_m)
+            .max(height_m - self.top_m)
+            .max(0.0)
+    }
+
+    /// Whether any of it is between two heights, metres.
+    #[must_use]
+    pub fn is_between(&self, lower_m: f64, upper_m: f64) -> bool {
+        self.bottom_m < upper_m && self.top_m > lower_m
+    }
 }
 
-/// A crate, desk or cabinet: a rectangle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Box2 {
-    /// Centre, metres.
-    pub at: DVec2,
-    /// Full extent along its own two axes, metres.
-    pub size_m: DVec2,
-    /// Counter-clockwise turn of its first axis, degrees.
-    #[serde(default)]
-    pub angle_deg: f64,
+/// A shape is what it looks like from above, and the keys of a [`Profile`].
+macro_rules! shape {
+    (
+        $(#[$about:meta])*
+        $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty,)* }
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$doc])* pub $field: $type,)*
+            /// Its lowest height above the floor, metres; without it, it stands on the floor.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub bottom_m: Option<f64>,
+            /// Its highest, metres; without it, it is higher than the robot.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub top_m: Option<f64>,
+            /// Amplitude of its echo over that of a hard thing; without it, it is hard.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub echo: Option<f64>,
+        }
+
+        impl $name {
+            /// Its heights and its echo.
+            #[must_use]
+            pub fn profile(&self) -> Profile {
+                Profile {
+                    bottom_m: self.bottom_m.unwrap_or(0.0),
+                    top_m: self.top_m.unwrap_or(f64::INFINITY),
+                    echo: self.echo.unwrap_or(1.0),
+                }
+            }
+        }
+    };
+}
+
+shape! {
+    /// A cable drum, a post, the leg of a table or chair (a radius of 0.01 to 0.015 m): a disc.
+    Drum {
+        /// Centre, metres.
+        at: DVec2,
+        /// Radius, metres.
+        radius_m: f64,
+    }
+}
+
+shape! {
+    /// A wall: a polyline without thickness.
+    Wall {
+        /// Corners in order, metres; at least two.
+        points: Vec<DVec2>,
+    }
+}
+
+shape! {
+    /// A crate, desk or cabinet: a rectangle.
+    Box2 {
+        /// Centre, metres.
+        at: DVec2,
+        /// Full extent along its own two axes, metres.
+        size_m: DVec2,
+        /// Counter-clockwise turn of its first axis, degrees.
+        #[serde(default)]
+        angle_deg: f64,
+    }
+}
+
+impl Wall {
+    /// Its straight edges, as (from, to).
+    pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+        self.points.windows(2).map(|pair| (pair[0], pair[1]))
+    }
 }
 
 impl Box2 {
@@ -44,6 +114,12 @@ impl Box2 {
         let half = self.size_m / 2.0;
         [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
             .map(|(a, b)| self.at + axis.rotate(half * DVec2::new(a, b)))
+    }
+
+    /// The four edges, as (from, to).
+    pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + use<> {
+        let corners = self.corners();
+        (0..4).map(move |side| (corners[side], corners[(side + 1) % 4]))
     }
 }
 
@@ -71,29 +147,31 @@ impl Shapes {
 
     /// Every straight edge of walls and boxes, as (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
-        let walls = self
-            .walls
-            .iter()
-            .flat_map(|wall| wall.points.windows(2).map(|pair| (pair[0], pair[1])));
-        let boxes = self.boxes.iter().flat_map(|block| {
-            let corners = block.corners();
-            (0..4).map(move |side| (corners[side], corners[(side + 1) % 4]))
-        });
+        let walls = self.walls.iter().flat_map(Wall::edges);
+        let boxes = self.boxes.iter().flat_map(Box2::edges);
         walls.chain(boxes)
     }
 
     /// Everything that stands here, one by one.
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> + '_ {
-        let walls = self.walls.iter().flat_map(|wall| {
-            wall.points
-                .windows(2)
-                .map(|pair| Piece::Edge(pair[0], pair[1]))
-        });
+        let edges = self.walls.iter().flat_map(Wall::edges);
+        let walls = edges.map(|(from, to)| Piece::Edge(from, to));
         self.drums
             .iter()
             .map(Piece::Drum)
             .chain(walls)
             .chain(self.boxes.iter().map(Piece::Box))
+    }
+
+    /// Those of which something is between two heights, metres: what a body of that extent can touch.
+    #[must_use]
+    pub fn between(&self, lower_m: f64, upper_m: f64) -> Self {
+        let mut shapes = self.clone();
+        let meets = |profile: Profile| profile.is_between(lower_m, upper_m);
+        shapes.drums.retain(|drum| meets(drum.profile()));
+        shapes.walls.retain(|wall| meets(wall.profile()));
+        shapes.boxes.retain(|block| meets(block.profile()));
+        shapes
     }
 
     /// Distance from `point` to the nearest surface, metres; negative inside a drum or a box,
@@ -184,14 +262,17 @@ mod tests {
             drums: vec![Drum {
                 at: DVec2::new(2.0, 0.0),
                 radius_m: 0.5,
+                ..Drum::default()
             }],
             walls: vec![Wall {
                 points: vec![DVec2::new(-1.0, -3.0), DVec2::new(-1.0, 3.0)],
+                ..Wall::default()
             }],
             boxes: vec![Box2 {
                 at: DVec2::new(0.0, 4.0),
                 size_m: DVec2::new(2.0, 1.0),
                 angle_deg: 90.0,
+                ..Box2::default()
             }],
         };
         assert_eq!(shapes.clearance(DVec2::ZERO), 1.0, "the wall is nearest");
@@ -204,6 +285,35 @@ mod tests {
         );
         let inside = shapes.clearance(DVec2::new(0.0, 4.0));
         assert!((inside + 0.5).abs() < 1e-12, "inside the box: {inside}");
+    }
+
+    #[test]
+    fn a_body_meets_what_is_between_its_lowest_and_its_highest_part() {
+        let block = |bottom_m, top_m| Box2 {
+            bottom_m,
+            top_m,
+            size_m: DVec2::ONE,
+            ..Box2::default()
+        };
+        let shapes = Shapes {
+            boxes: vec![
+                block(None, None),
+                block(None, Some(0.02)),
+                block(None, Some(0.1)),
+                block(Some(0.24), Some(0.3)),
+                block(Some(0.7), None),
+            ],
+            ..Shapes::default()
+        };
+        let met = shapes.between(0.03, 0.255).boxes;
+        let tops: Vec<_> = met.iter().map(|block| block.top_m).collect();
+        assert_eq!(tops, [None, Some(0.1), Some(0.3)]);
+        let profile = met[1].profile();
+        assert!(
+            (profile.height_gap(0.18) - 0.08).abs() < 1e-12,
+            "{profile:?}"
+        );
+        assert_eq!(profile.height_gap(0.05), 0.0);
     }
 
     #[test]

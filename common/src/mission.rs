@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub use error::MissionError;
 pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig};
 pub use simulation::{
-    BatteryPhysics, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
+    BatteryPhysics, Heights, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
     SonarPhysics, Thing, WheelPhysics,
 };
 
@@ -284,6 +284,12 @@ impl Mission {
             position: DVec2::ZERO,
             heading: self.start.heading_deg.to_radians(),
         }
+    }
+
+    /// What of the world the robot's body can touch; the rest it passes under or over.
+    #[must_use]
+    pub fn obstacles(&self) -> Shapes {
+        self.simulation.physics().heights.touched(&self.world)
     }
 
     /// The body of the robot: its model with what the mission overrides.

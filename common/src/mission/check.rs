@@ -1,5 +1,6 @@
 //! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
 
+mod shapes;
 mod simulation;
 
 use std::{
@@ -36,8 +37,6 @@ fn read_bounded(path: &Path) -> io::Result<String> {
 const MIN_CELLS: u32 = 10;
 /// The longest mission, seconds: a day.
 const MAX_TIMEOUT_S: f64 = 86_400.0;
-/// More shapes than this in a file are a mistake.
-const MAX_POINTS: usize = 100_000;
 
 impl Mission {
     /// Parse and validate `text`; `origin` names it in errors.
@@ -257,45 +256,6 @@ impl Checker {
             "give two finite numbers, metres",
         ))
     }
-
-    fn shapes(
-        &mut self,
-        key: &'static str,
-        shapes: &crate::geometry::Shapes,
-    ) -> Result<(), Objection> {
-        for drum in &shapes.drums {
-            self.point(key, drum.at)?;
-            within(key, drum.radius_m, 0.001..=1000.0, "m of drum radius")?;
-        }
-        for wall in &shapes.walls {
-            if wall.points.len() < 2 {
-                return Err(objection(
-                    key,
-                    "a wall has fewer than two points",
-                    "give two or more",
-                ));
-            }
-            for point in &wall.points {
-                self.point(key, *point)?;
-            }
-            self.points += wall.points.len();
-        }
-        for block in &shapes.boxes {
-            self.point(key, block.at)?;
-            within(key, block.size_m.x, 0.001..=1000.0, "m of box")?;
-            within(key, block.size_m.y, 0.001..=1000.0, "m of box")?;
-            within(key, block.angle_deg, -360.0..=360.0, "degrees")?;
-        }
-        self.points += shapes.drums.len() + shapes.boxes.len();
-        if self.points > MAX_POINTS {
-            return Err(objection(
-                key,
-                format!("more than {MAX_POINTS} shapes and corners"),
-                "simplify the outline",
-            ));
-        }
-        Ok(())
-    }
 }
 
 fn robot(mission: &Mission) -> Result<(), Objection> {
@@ -454,7 +414,7 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
 /// A robot that starts inside a hazard has already collided.
 fn start_is_free(mission: &Mission) -> Result<(), Objection> {
     let radius = mission.body().radius_m;
-    for (key, shapes) in [("world", &mission.world), ("known", &mission.known)] {
+    for (key, shapes) in [("world", &mission.obstacles()), ("known", &mission.known)] {
         let clearance = shapes.clearance(DVec2::ZERO);
         if clearance <= radius {
             return Err(objection(

@@ -26,6 +26,8 @@ pub struct Simulation {
     pub infrared: InfraredKeys,
     /// The wheels' speed loops.
     pub wheels: WheelKeys,
+    /// At which heights the body and its sensors are.
+    pub heights: HeightKeys,
     /// The batteries.
     pub battery: BatteryKeys,
     /// The radio between host and robot.
@@ -175,14 +177,32 @@ section! {
         edge_reach_m in 0.0..=2.55 => 1.2, 1.2;
         /// Share of pings at a wall too oblique to answer that come back by a second wall.
         multipath_share in 0.0..=1.0 => 0.0, 0.3;
-        /// Share of answers lost.
-        dropout_share in 0.0..=1.0 => 0.0, 0.02;
+        /// Share of answers lost one by one.
+        dropout_share in 0.0..=1.0 => 0.0, 0.0;
         /// The same where the answer is weak: near the limits, and from edges.
         weak_dropout_share in 0.0..=1.0 => 0.0, 0.1;
         /// Share of pings answered short by nothing at all.
         false_echo_share in 0.0..=1.0 => 0.0, 0.005;
         /// Share of pings that hear a neighbour's answer.
         crosstalk_share in 0.0..=1.0 => 0.0, 0.005;
+        /// Share of the readings in which a ranger hears nothing, whatever stands there: runs of silence, each ranger's
+        /// for itself (a two-state model, E. N. Gilbert 1960). 2 % has been seen on X80s.
+        silence_share in 0.0..=0.5 => 0.0, 0.02;
+        /// Mean duration of such a run, seconds.
+        ///
+        /// From a public eight-sonar log of an L-shaped corridor (Udacity RoboND, 413 samples, one each 0.21 s): the
+        /// silences between two echoes of 2.55 m at most that differ by no more than the robot moved and 0.1 m,
+        /// while it moved 0.5 m at most. There are four, of 1, 2, 3 and 7 readings: 3.25 on average, 0.7 s, and 0.9 % of
+        /// the 1,402 readings that are echoes of 2.55 m at most or one of these. Without the limit of 0.5 m there is a
+        /// fifth, of 17 (2.1 % in all). The longer ones, up to 142, look out into the corridor: geometry makes those.
+        silence_mean_s in 0.001..=60.0 => 0.7, 0.7;
+        /// How long before the wheel counts of the same tick a range was measured, seconds; a tick at most. A range that was
+        /// taken at any moment between two ticks of 7 Hz is half a period old on average: nominal, not measured.
+        age_s in 0.0..=1.0 => 0.0, 0.07;
+        /// How far a post 3 cm in diameter is heard on the axis, metres. All other echoes follow: see
+        /// `x80_sim::sonar`. Devantech's technical page of the SRF04, another ranger at 40 kHz, gives "more than 2 m" for a
+        /// broom handle of 3 cm; nobody has measured the X80's.
+        post_reach_m in 0.05..=10.0 => 2.55, 2.0;
     }
 }
 
@@ -213,6 +233,36 @@ section! {
         slip_noise in 0.0..=0.5 => 0.0, 0.005;
         /// Standard deviation of a reported wheel position, counts.
         count_noise in 0.0..=100.0 => 0.0, 0.5;
+        /// Diameter of the right wheel over that of the left one; their mean is the nominal one.
+        diameter_ratio in 0.8..=1.25 => 1.0, 1.0;
+        /// Greatest share by which that ratio is off as well, evenly drawn from the seed: each seed has a robot of its
+        /// own. Unequal diameters and an uncertain track are the two systematic errors that dominate dead reckoning
+        /// (J. Borenstein, L. Feng, "Measurement and correction of systematic odometry errors in mobile robots", IEEE
+        /// Trans. Robotics and Automation 12(6), 1996: UMBmark). 0.5 % is a common size, not a measurement of an X80.
+        diameter_spread in 0.0..=0.1 => 0.0, 0.005;
+        /// Track on the ground over the nominal one.
+        track_scale in 0.8..=1.25 => 1.0, 1.0;
+        /// Greatest share by which that is off as well, evenly drawn from the seed; the same source.
+        track_spread in 0.0..=0.1 => 0.0, 0.005;
+        /// Share of the way asked of a wheel that it turns on, slipping, while something holds the body; 0 is a wheel
+        /// that stalls. The vendor gives each motor of an X80 22 kg cm: 26 N at the rim, 52 N together. Tyres hold at most
+        /// the weight, 3.5 kg or 34 N, times the friction: they slip before the motors stall.
+        contact_slip in 0.0..=1.0 => 0.0, 1.0;
+    }
+}
+
+section! {
+    /// At which heights above the floor the body and its sensors are, the same in both presets. The X80's drawing gives
+    /// none: nominal values. They matter where a shape of the world has `bottom_m` or `top_m`.
+    Heights, written as HeightKeys in "simulation.heights" {
+        /// What is lower passes under the body, metres.
+        ground_clearance_m in 0.0..=5.0 => 0.03, 0.03;
+        /// What is higher passes over it, metres.
+        body_top_m in 0.01..=5.0 => 0.255, 0.255;
+        /// The ultrasonic rangers, metres.
+        sonar_m in 0.0..=5.0 => 0.18, 0.18;
+        /// The infrared rangers, metres.
+        infrared_m in 0.0..=5.0 => 0.18, 0.18;
     }
 }
 
@@ -252,6 +302,14 @@ section! {
     }
 }
 
+impl Heights {
+    /// Those of `shapes` that the body can touch.
+    #[must_use]
+    pub fn touched(&self, shapes: &Shapes) -> Shapes {
+        shapes.between(self.ground_clearance_m, self.body_top_m)
+    }
+}
+
 /// The simulated X80, every value known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Physics {
@@ -261,6 +319,8 @@ pub struct Physics {
     pub infrared: InfraredPhysics,
     /// The wheels'.
     pub wheels: WheelPhysics,
+    /// The heights of the body and its sensors.
+    pub heights: Heights,
     /// The batteries'.
     pub battery: BatteryPhysics,
     /// The radio's.
@@ -275,6 +335,7 @@ impl Simulation {
             sonar: self.sonar.over(self.realism),
             infrared: self.infrared.over(self.realism),
             wheels: self.wheels.over(self.realism),
+            heights: self.heights.over(self.realism),
             battery: self.battery.over(self.realism),
             radio: self.radio.over(self.realism),
         }
@@ -285,6 +346,7 @@ impl Simulation {
         physics.sonar.check()?;
         physics.infrared.check()?;
         physics.wheels.check()?;
+        physics.heights.check()?;
         physics.battery.check()?;
         physics.radio.check()
     }

@@ -46,16 +46,17 @@ pub struct Body {
 }
 
 impl Body {
-    /// The body of `mission`'s robot at its start in `world`.
+    /// The body of `mission`'s robot at its start in `world`, its track `track_scale` times the nominal one.
     #[must_use]
-    pub fn new(mission: &Mission, world: &World) -> Self {
+    pub fn new(mission: &Mission, world: &World, track_scale: f64) -> Self {
         let body = mission.body();
+        let track = body.track_m * track_scale;
         let pose = mission.start_pose();
         let top = body.top_speed_m_s / body.wheel_radius_m;
         Self {
-            drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, top),
+            drive: DifferentialDrive::new(body.wheel_radius_m, track, top),
             wheel_radius: body.wheel_radius_m,
-            track: body.track_m,
+            track,
             radius: body.radius_m,
             pose,
             clearance: world.clearance(pose.position) - body.radius_m,
@@ -85,7 +86,7 @@ impl Body {
         self.radius
     }
 
-    /// W: its track, metres.
+    /// Its true track, metres: W is the nominal one.
     #[must_use]
     pub fn track(&self) -> f64 {
         self.track
@@ -104,8 +105,7 @@ impl Body {
     }
 
     /// Move as the wheels ask, in metres of ground, and no farther than `world` lets it: it slides along
-    /// what it touches, or halts. Returns how far the wheels have really gone, metres: a wheel of a
-    /// body that is held stands.
+    /// what it touches, or halts. Returns how far the ground under either wheel has really gone by, metres.
     pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
         let turned = asked.map(|metres| metres / self.wheel_radius);
         let step = self.drive.twist(WheelSpeeds {
@@ -136,7 +136,7 @@ impl Body {
         for push in 0..PUSHES {
             let position = self.pose.position;
             let nearest = world
-                .surfaces()
+                .touchable()
                 .map(|surface| (surface.distance(position) - self.radius, surface))
                 .min_by(|(a, _), (b, _)| a.total_cmp(b));
             self.clearance = nearest.map_or(f64::INFINITY, |(gap, _)| gap);
@@ -167,7 +167,7 @@ mod tests {
         let text = format!("target = [0, -5]\n{text}");
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
         (
-            Body::new(&mission, &World::new(&mission)),
+            Body::new(&mission, &World::new(&mission), 1.0),
             World::new(&mission),
         )
     }

@@ -25,7 +25,7 @@ pub fn read(
         };
         let ranger = mount.on(pose);
         let range = world
-            .first_hit(ranger.position, ranger.axis())
+            .first_hit(ranger.position, ranger.axis(), world.heights().infrared_m)
             .map_or(NOTHING_M, |(range, _)| range);
         let counts = f64::from(infrared_ad(range)) + noise.normal(physics.noise_counts);
         counts.round().clamp(0.0, 4095.0) as u16

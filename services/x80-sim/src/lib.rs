@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`world`] | what stands around the robot, and what comes and goes |
 //! | [`body`] | a disc on two wheels, and what it touches |
+//! | [`wheel_errors`] | how far its wheels are from what the mission says |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
 //! | [`sonar`], [`infrared`], [`sensors`] | what is heard and seen, as the frames carry it |
 //! | [`noise`] | seeded randomness, one stream for each source |
@@ -36,6 +37,7 @@
 //! ```
 
 pub mod body;
+mod drivetrain;
 mod error;
 pub mod infrared;
 pub mod motor;
@@ -45,9 +47,11 @@ pub mod robot;
 pub mod saved_state;
 pub mod sensors;
 pub mod shell;
+mod silence;
 pub mod sonar;
 mod streams;
 mod transport;
+pub mod wheel_errors;
 pub mod world;
 
 pub use error::SimError;

@@ -228,14 +228,16 @@ impl Motor {
         counts + jitter * dt
     }
 
-    /// The wheel has really turned by `counts` in `dt` seconds. One whose body is `held` loses the speed
-    /// it could not turn with; a push gives it none.
-    pub fn turn(&mut self, counts: f64, dt: f64, held: bool) {
+    /// The wheel has really turned by `counts`.
+    pub fn turn(&mut self, counts: f64) {
         self.turned += counts;
-        if held && dt > 0.0 {
-            let real = counts / dt;
-            self.speed = real.clamp(self.speed.min(0.0), self.speed.max(0.0));
-        }
+    }
+
+    /// The ground under it lets the wheel go at `speed` counts per second only; `grip` is the share of its own speed that it
+    /// loses by that, 0 where it slips freely. A push gives it none.
+    pub fn hold(&mut self, speed: f64, grip: f64) {
+        let held = speed.clamp(self.speed.min(0.0), self.speed.max(0.0));
+        self.speed = held * grip + self.speed * (1.0 - grip);
     }
 
     /// The speed that the order asks for at mission time `now`, gain, dead band and limit applied.

@@ -16,6 +16,10 @@ pub enum Source {
     Counts = 4,
     /// The radio.
     Radio = 5,
+    /// Diameters and track of the wheels.
+    WheelErrors = 6,
+    /// Runs of silence of the ultrasonic rangers.
+    Silence = 7,
 }
 
 /// A seeded stream of random numbers.

@@ -4,18 +4,20 @@ use common::{
     ground_truth::GroundTruthTick,
     mission::{Mission, Physics},
     wire::{
-        Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
-        StandardSensors, SystemSignal,
+        Addressing, Command, CustomSensors, Frame, Motion, MotorSensors, Report, StandardSensors,
+        SystemSignal,
     },
 };
 
 use crate::{
     body::{Body, Wheels},
+    drivetrain::Drivetrain,
     motor::Motor,
     noise::{Noise, Source},
     saved_state::SavedState,
     sensors::{self, Ranging},
     streams::{Due, Streams},
+    wheel_errors::WheelErrors,
     world::World,
 };
 
@@ -47,9 +49,8 @@ pub struct Robot {
     ignores_time: bool,
     stops_when_silent: Option<f64>,
     rate_hz: f64,
-    wiring: Wiring,
+    drivetrain: Drivetrain,
     longest_step: f64,
-    metres_per_count: f64,
 
     world: World,
     body: Body,
@@ -72,51 +73,35 @@ pub struct Robot {
     motor: MotorSensors,
 }
 
-/// Which channel drives which wheel, and which way.
-#[derive(Clone, Copy, Debug)]
-struct Wiring {
-    channel: Wheels<usize>,
-    sign: Wheels<f64>,
-}
-
-impl Wiring {
-    fn of(mission: &Mission) -> Self {
-        let wheels = Wheels {
-            left: mission.robot.left,
-            right: mission.robot.right,
-        };
-        Self {
-            // A mission is checked: channels are 0 and 1.
-            channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
-            sign: wheels.map(|wheel| if wheel.reversed { -1.0 } else { 1.0 }),
-        }
-    }
-}
-
 impl Robot {
     /// The robot of `mission`, booted and standing at the start; tick 0 is measured.
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
+        Self::with_noise(mission, mission.seed)
+    }
+
+    /// The robot of `mission` with the noise of `seed`.
+    fn with_noise(mission: &Mission, seed: u64) -> Self {
         let physics = mission.simulation.physics();
         let size = mission.body();
         let top_counts = size.top_speed_m_s / size.metres_per_count();
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
         let world = World::new(mission);
+        let wheel_errors = WheelErrors::of(mission);
         let mut robot = Self {
             physics,
             ignores_time: mission.simulation.ignores_time,
             stops_when_silent: mission.simulation.stops_when_silent_s,
             rate_hz: mission.robot.rate_hz,
-            wiring: Wiring::of(mission),
+            drivetrain: Drivetrain::new(mission, wheel_errors.diameter),
             longest_step,
-            metres_per_count: size.metres_per_count(),
-            body: Body::new(mission, &world),
+            body: Body::new(mission, &world, wheel_errors.track),
             world,
             motors: std::array::from_fn(|_| Motor::new(physics.wheels, top_counts)),
             streams: Streams::default(),
-            ranging: Ranging::new(mission),
-            wheel_noise: Noise::new(mission.seed, Source::Wheels),
-            count_noise: Noise::new(mission.seed, Source::Counts),
+            ranging: Ranging::new(mission, seed),
+            wheel_noise: Noise::new(seed, Source::Wheels),
+            count_noise: Noise::new(seed, Source::Counts),
             time: 0.0,
             tick: 0,
             heard_at: 0.0,
@@ -136,15 +121,14 @@ impl Robot {
     /// The robot of `mission` where an earlier process left it, booted anew but for its counts.
     #[must_use]
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
-        let mut robot = Self::new(&Mission {
-            // The same readings again would be no readings.
-            seed: mission.seed.wrapping_add(saved.tick + 1),
-            ..mission.clone()
-        });
+        // The same readings again would be no readings.
+        let seed = mission.seed.wrapping_add(saved.tick + 1);
+        let mut robot = Self::with_noise(mission, seed);
         robot.tick = saved.tick;
         robot.time = saved.time_s;
         (robot.heard_at, robot.ordered_at) = (saved.time_s, saved.time_s);
         robot.stopping_time = saved.stopping_time_s;
+        robot.ranging.restore(saved.silent);
         for (motor, turned) in robot.motors.iter_mut().zip(saved.turned) {
             motor.restore(turned);
         }
@@ -166,6 +150,7 @@ impl Robot {
             turned: std::array::from_fn(|channel| self.motors[channel].turned()),
             contacts: self.body.contacts(),
             stopping_time_s: self.stopping_time,
+            silent: self.ranging.silent(),
         }
     }
 
@@ -182,7 +167,7 @@ impl Robot {
 
     fn is_moving(&self) -> bool {
         let ordered = self.motors.iter().any(|motor| motor.ends_at().is_some());
-        ordered || self.rims().into_iter().any(|rim| rim != 0.0)
+        ordered || self.rims() != Wheels::default()
     }
 
     /// Mission time, seconds.
@@ -274,12 +259,23 @@ impl Robot {
         }
     }
 
+    /// When the ultrasonic rangers listen for the next tick, if that is before the tick and has not been yet.
+    fn listens_at(&self) -> Option<f64> {
+        let age = self.physics.sonar.age_s;
+        (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
+    }
+
     /// Let mission time pass until `end`, seconds, in short steps, none of which reaches across the end
-    /// of a timed command. A time gone by is none.
+    /// of a timed command or the moment of a range. A time gone by is none.
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
+            if self.listens_at().is_some_and(|moment| moment <= self.time) {
+                self.ranging
+                    .listen(&self.world, &self.body, &self.physics.sonar);
+            }
             let ends = self.motors.iter().filter_map(Motor::ends_at);
             let until = ends
+                .chain(self.listens_at())
                 .filter(|moment| *moment > self.time)
                 .fold(end, f64::min);
             let span = until - self.time;
@@ -305,51 +301,32 @@ impl Robot {
         let (centre, radius) = (self.body.pose().position, self.body.radius());
         self.world.advance(self.time + dt, centre, radius);
 
-        let Wiring { channel, sign } = self.wiring;
         let (now, noise) = (self.time, &mut self.wheel_noise);
-        let motors = &mut self.motors;
-        let mut asked = |channel: usize, sign: f64| {
-            let counts = motors
-                .get_mut(channel)
-                .map_or(0.0, |m| m.step(now, dt, noise));
-            sign * counts * self.metres_per_count
-        };
-        let rolled = Wheels {
-            left: asked(channel.left, sign.left),
-            right: asked(channel.right, sign.right),
-        };
+        let drivetrain = self.drivetrain;
+        let asked = drivetrain.step(&mut self.motors, now, dt, noise);
         let wheels = self.physics.wheels;
-        let ground = rolled.map(|metres| {
+        let ground = drivetrain.rims(asked).map(|metres| {
             let lost = noise.normal(wheels.slip_noise * metres.abs().sqrt());
             metres * (1.0 - wheels.slip_share) + lost
         });
         let went = self.body.roll(ground, &self.world);
-        // A wheel that slips turns all the same; one whose body is held does not.
-        let held = went != ground;
-        let turned = if held { went } else { rolled };
-        let mut turn = |channel: usize, sign: f64, metres: f64| {
-            if let Some(motor) = self.motors.get_mut(channel) {
-                motor.turn(sign * metres / self.metres_per_count, dt, held);
-            }
+        // A wheel that slips turns all the same; one whose body is held turns as far as it slips at the contact.
+        let grip = if went == ground {
+            0.0
+        } else {
+            1.0 - wheels.contact_slip
         };
-        turn(channel.left, sign.left, turned.left);
-        turn(channel.right, sign.right, turned.right);
+        drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         self.least_clearance = self.least_clearance.min(self.body.clearance());
-        if self
-            .rims()
-            .into_iter()
-            .any(|rim| rim.abs() > GroundTruthTick::AT_REST_M_S)
-        {
+        let rims = self.rims();
+        if rims.left.abs().max(rims.right.abs()) > GroundTruthTick::AT_REST_M_S {
             self.stopping_time = self.stopping_time.max(now + dt - self.ordered_at);
         }
     }
 
-    /// Speeds of the left and the right rim, m/s, forward positive.
-    fn rims(&self) -> [f64; 2] {
-        let Wiring { channel, sign } = self.wiring;
-        let rim =
-            |channel: usize, sign: f64| sign * self.motors[channel].speed() * self.metres_per_count;
-        [rim(channel.left, sign.left), rim(channel.right, sign.right)]
+    /// Speeds of the rims, m/s, forward positive.
+    fn rims(&self) -> Wheels<f64> {
+        self.drivetrain.rim_speeds(&self.motors)
     }
 
     /// Let mission time pass until the next tick and measure there.
@@ -399,16 +376,8 @@ impl Robot {
     /// What is true at this tick. The least clearance begins anew.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
-        let Wiring { channel, sign } = self.wiring;
-        let [left, right] = self.rims();
-        let counts = |channel: usize, sign: f64| {
-            let position = self.motor.encoders[channel].position;
-            if sign < 0.0 {
-                (COUNT_CYCLE - position) % COUNT_CYCLE
-            } else {
-                position
-            }
-        };
+        let Wheels { left, right } = self.rims();
+        let counts = self.drivetrain.counts(&self.motor.encoders);
         let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
         self.least_clearance = self.body.clearance();
         GroundTruthTick {
@@ -421,8 +390,8 @@ impl Robot {
             omega: (right - left) / self.body.track(),
             clearance_m,
             contacts: self.body.contacts(),
-            left_counts: counts(channel.left, sign.left),
-            right_counts: counts(channel.right, sign.right),
+            left_counts: counts.left,
+            right_counts: counts.right,
             sonar_cm: self.ranging.front(&self.standard),
             stopping_time_s: self.stopping_time,
             radio: None,

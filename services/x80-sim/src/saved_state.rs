@@ -24,6 +24,8 @@ pub struct SavedState {
     pub(crate) turned: [f64; 6],
     /// How often the body has touched something.
     pub(crate) contacts: u64,
+    /// Which ultrasonic rangers are in a run of silence.
+    pub(crate) silent: [bool; 6],
     /// The longest that a wheel turned after the last motion command, seconds.
     pub(crate) stopping_time_s: f64,
 }

@@ -1,7 +1,7 @@
 //! What the robot's sensors read at a tick.
 
 use common::{
-    mission::{Mission, Physics},
+    mission::{Mission, Physics, SonarPhysics},
     wire::{COUNT_CYCLE, CustomSensors, Encoder, LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors},
 };
 
@@ -10,6 +10,7 @@ use crate::{
     infrared,
     motor::Motor,
     noise::{Noise, Source},
+    silence::Silence,
     sonar::{self, Mount},
     world::World,
 };
@@ -29,15 +30,18 @@ const CURRENT: (f64, f64) = (20.0, 0.2);
 pub struct Ranging {
     front: usize,
     mounts: [Option<Mount>; 6],
+    silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
+    /// What the ultrasonic rangers have heard for the next tick.
+    heard: Option<[u8; 6]>,
 }
 
 impl Ranging {
     /// The rangers of `mission`'s robot: the front one, one at either side of it, and what the mission
-    /// adds.
+    /// adds. Their noise follows from `seed`.
     #[must_use]
-    pub fn new(mission: &Mission) -> Self {
+    pub fn new(mission: &Mission, seed: u64) -> Self {
         let front = usize::from(mission.sonar.index) % 6;
         let mut mounts = [None; 6];
         let ahead = mission.sonar.bearing_deg;
@@ -59,8 +63,14 @@ impl Ranging {
         Self {
             front,
             mounts,
-            sonar_noise: Noise::new(mission.seed, Source::Sonar),
-            infrared_noise: Noise::new(mission.seed, Source::Infrared),
+            silence: Silence::new(
+                &mission.simulation.physics().sonar,
+                1.0 / mission.robot.rate_hz,
+                seed,
+            ),
+            sonar_noise: Noise::new(seed, Source::Sonar),
+            infrared_noise: Noise::new(seed, Source::Infrared),
+            heard: None,
         }
     }
 
@@ -70,7 +80,52 @@ impl Ranging {
         sensors.ultrasonic[self.front]
     }
 
-    /// The standard and the custom frame at mission time `time`, seconds.
+    /// Which ultrasonic rangers are silent.
+    #[must_use]
+    pub fn silent(&self) -> [bool; 6] {
+        self.silence.silent()
+    }
+
+    /// Go on with those silent.
+    pub(crate) fn restore(&mut self, silent: [bool; 6]) {
+        self.silence.restore(silent);
+    }
+
+    /// Whether the ultrasonic rangers have listened for the next tick.
+    #[must_use]
+    pub fn has_listened(&self) -> bool {
+        self.heard.is_some()
+    }
+
+    /// Let the ultrasonic rangers listen for the next tick: once.
+    pub fn listen(&mut self, world: &World, body: &Body, physics: &SonarPhysics) {
+        if self.heard.is_none() {
+            self.heard = Some(self.heard_now(world, body, physics));
+        }
+    }
+
+    fn heard_now(&mut self, world: &World, body: &Body, physics: &SonarPhysics) -> [u8; 6] {
+        let silent = self.silence.step();
+        let noise = &mut self.sonar_noise;
+        let mut ranges: [f64; 6] = std::array::from_fn(|index| {
+            let range = self.mounts[index].map_or(f64::INFINITY, |mount| {
+                sonar::listen(world, mount.on(body.pose()), physics, noise)
+            });
+            if silent[index] { f64::INFINITY } else { range }
+        });
+        let heard = ranges;
+        for (index, range) in ranges.iter_mut().enumerate() {
+            let neighbour = heard[(index + 1) % 6].min(heard[(index + 5) % 6]);
+            let listens = self.mounts[index].is_some() && !silent[index];
+            if listens && noise.chance(physics.crosstalk_share) {
+                *range = range.min(neighbour);
+            }
+        }
+        ranges.map(|range| sonar::byte(range, physics, noise))
+    }
+
+    /// The standard and the custom frame at mission time `time`, seconds. Ultrasonic rangers that have not listened yet
+    /// do so now.
     pub fn measure(
         &mut self,
         world: &World,
@@ -78,25 +133,11 @@ impl Ranging {
         time: f64,
         physics: &Physics,
     ) -> (StandardSensors, CustomSensors) {
-        let pose = body.pose();
-        let noise = &mut self.sonar_noise;
-        let mut ranges = self.mounts.map(|mount| {
-            mount.map_or(f64::INFINITY, |mount| {
-                sonar::listen(world, mount.on(pose), &physics.sonar, noise)
-            })
-        });
-        let heard = ranges;
-        for (index, range) in ranges.iter_mut().enumerate() {
-            let neighbour = heard[(index + 1) % 6].min(heard[(index + 5) % 6]);
-            let listens = self.mounts[index].is_some();
-            if listens && noise.chance(physics.sonar.crosstalk_share) {
-                *range = range.min(neighbour);
-            }
-        }
-        let ultrasonic = ranges.map(|range| sonar::byte(range, &physics.sonar, noise));
+        let heard = self.heard.take();
+        let ultrasonic = heard.unwrap_or_else(|| self.heard_now(world, body, &physics.sonar));
         let infrared = infrared::read(
             world,
-            pose,
+            body.pose(),
             body.radius(),
             &physics.infrared,
             &mut self.infrared_noise,

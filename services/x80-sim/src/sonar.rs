@@ -4,6 +4,16 @@
 //! back only from where the wall is square to the sound: a wall answers at the foot of the
 //! perpendicular while that is not too far off the axis, a drum over a wider angle, an edge sometimes.
 //! What does not answer still hides what is behind it.
+//!
+//! An echo is heard where its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r: the
+//! mirror image of the transmitter in a plane is 2 r away, and air at 40 kHz takes alpha = 1.3 dB/m (ISO 9613-1, 20 degrees
+//! Celsius, half saturated). A cylinder of radius a spreads the sound further, by sqrt(a / (a + r)): a wave front of radius r
+//! comes back from it with radius a r / (a + 2 r) in the level plane. That is geometrical acoustics, for k a well above
+//! 1: a post of 1.25 cm has k a = 9. A soft surface gives back its share `echo`. The threshold is the amplitude of a post
+//! 3 cm in diameter at `post_reach_m`. A wall is so heard far beyond [`REACH_M`].
+//!
+//! What ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level, from a
+//! distance on. A smooth one answers with no more than its edge.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,7 +22,7 @@ use glam::DVec2;
 
 use crate::{
     noise::Noise,
-    world::{Surface, World},
+    world::{Solid, Surface, World},
 };
 
 /// The farthest range a ranger gives, metres.
@@ -21,6 +31,10 @@ pub const REACH_M: f64 = 2.55;
 const HIDES_M: f64 = 0.01;
 /// A reflected beam starts so far off its mirror, or it would meet it again, metres.
 const NUDGE_M: f64 = 1e-6;
+/// What air takes from sound at 40 kHz, dB per metre.
+const ABSORPTION_DB_PER_M: f64 = 1.3;
+/// Radius of the post whose reach is known, metres.
+const POST_RADIUS_M: f64 = 0.015;
 
 /// How a ranger is mounted, looking outward.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +61,9 @@ impl Mount {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// Unit vector from the ranger.
+    /// The same from above.
+    level_range: f64,
+    /// Unit vector from the ranger, from above.
     along: DVec2,
     /// An answer near a limit, or of an edge: often lost.
     weak: bool,
@@ -95,17 +111,18 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
 
 /// What a ranger at `pose` hears: metres, infinite for nothing. Noise of the range is not in it yet.
 pub fn listen(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> f64 {
-    let receiver = Receiver::new(pose, physics);
+    let height = world.heights().sonar_m;
+    let receiver = Receiver::new(pose, height, physics);
     let mut candidates: Vec<Candidate> = world
-        .surfaces()
-        .flat_map(|surface| receiver.candidates(surface))
+        .solids()
+        .flat_map(|solid| receiver.candidates(&solid))
         .flatten()
         .collect();
     candidates.sort_by(|a, b| a.range.total_cmp(&b.range));
     let answer = candidates.into_iter().find(|candidate| {
         let hidden = world
-            .first_hit(pose.position, candidate.along)
-            .is_some_and(|(first, _)| first < candidate.range - HIDES_M);
+            .first_hit(pose.position, candidate.along, height)
+            .is_some_and(|(first, _)| first < candidate.level_range - HIDES_M);
         !hidden && (candidate.share >= 1.0 || noise.chance(candidate.share))
     });
     let lost = match answer {
@@ -137,14 +154,14 @@ fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise
     if !noise.chance(physics.multipath_share) {
         return None;
     }
-    let axis = pose.axis();
-    let (there, Surface::Face { from, to }) = world.first_hit(pose.position, axis)? else {
+    let (axis, height) = (pose.axis(), world.heights().sonar_m);
+    let (there, Surface::Face { from, to }) = world.first_hit(pose.position, axis, height)? else {
         return None;
     };
     let normal = (to - from).perp().try_normalize()?;
     let onward = axis - 2.0 * axis.dot(normal) * normal;
     let mirror = pose.position + axis * there;
-    let (further, second) = world.first_hit(mirror + onward * NUDGE_M, onward)?;
+    let (further, second) = world.first_hit(mirror + onward * NUDGE_M, onward, height)?;
     let outward = second.outward(mirror)?;
     let square = off_axis(outward, -onward) <= physics.wall_limit_deg.to_radians();
     let range = there + further + NUDGE_M;
@@ -156,10 +173,14 @@ struct Receiver<'a> {
     physics: &'a SonarPhysics,
     cone: Sector,
     lobe: f64,
+    /// Above the floor, metres.
+    height: f64,
+    /// The least amplitude that is heard.
+    threshold: f64,
 }
 
 impl<'a> Receiver<'a> {
-    fn new(pose: Pose2, physics: &'a SonarPhysics) -> Self {
+    fn new(pose: Pose2, height: f64, physics: &'a SonarPhysics) -> Self {
         let half = physics.cone_deg.to_radians();
         Self {
             physics,
@@ -169,6 +190,8 @@ impl<'a> Receiver<'a> {
                 half,
             },
             lobe: physics.lobe_deg.to_radians().max(half),
+            height,
+            threshold: amplitude(physics.post_reach_m, Some(POST_RADIUS_M)),
         }
     }
 
@@ -184,12 +207,42 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// Up to two places of a surface that may answer.
-    fn candidates(&self, surface: Surface) -> [Option<Candidate>; 2] {
-        match surface {
-            Surface::Drum { at, radius } => [self.drum(at, radius), None],
-            Surface::Face { from, to } => self.face(from, to),
+    /// Up to two places of `solid` that may answer.
+    fn candidates(&self, solid: &Solid) -> [Option<Candidate>; 2] {
+        let (found, radius) = match solid.surface {
+            Surface::Drum { at, radius } => ([self.drum(at, radius), None], Some(radius)),
+            Surface::Face { from, to } => (self.face(from, to), None),
+        };
+        let gap = solid.profile.height_gap(self.height);
+        found.map(|candidate| {
+            let candidate = self.off_level(candidate?, gap)?;
+            let heard = solid.profile.echo * amplitude(candidate.range, radius);
+            (heard >= self.threshold).then_some(candidate)
+        })
+    }
+
+    /// `candidate` where its nearest part is `gap` metres above or below the ranger.
+    fn off_level(&self, candidate: Candidate, gap: f64) -> Option<Candidate> {
+        if gap == 0.0 {
+            return Some(candidate);
         }
+        let range = candidate.range.hypot(gap);
+        let in_cone = gap.atan2(candidate.range) <= self.cone.half && range <= REACH_M;
+        let raised = Candidate { range, ..candidate };
+        if self.is_rough() {
+            return in_cone.then_some(raised);
+        }
+        let share = candidate.share.min(self.physics.edge_share);
+        (in_cone && range <= self.physics.edge_reach_m && share > 0.0).then_some(Candidate {
+            weak: true,
+            share,
+            ..raised
+        })
+    }
+
+    /// Whether every surface answers wherever the cone meets it.
+    fn is_rough(&self) -> bool {
+        self.physics.wall_limit_deg.to_radians() >= FRAC_PI_2
     }
 
     fn drum(&self, at: DVec2, radius: f64) -> Option<Candidate> {
@@ -233,7 +286,7 @@ impl<'a> Receiver<'a> {
             0.0
         };
         // A rough wall answers even where the cone only grazes it.
-        if off <= limit + 1e-12 || limit >= FRAC_PI_2 {
+        if off <= limit + 1e-12 || self.is_rough() {
             let share = (foot + origin - from).dot(along) / (to - from).length();
             if (0.0..=1.0).contains(&share) && foot.length() <= self.reach(off) {
                 let weak = off > 0.8 * limit || off > self.cone.half + 1e-12;
@@ -255,9 +308,16 @@ impl<'a> Receiver<'a> {
     }
 }
 
+/// Amplitude of the echo of a hard plane at `range` metres, or of a cylinder of `radius`, in units of its own.
+fn amplitude(range: f64, radius: Option<f64>) -> f64 {
+    let spread = radius.map_or(1.0, |radius| (radius / (radius + range)).sqrt());
+    spread * 10_f64.powf(-2.0 * ABSORPTION_DB_PER_M * range / 20.0) / range
+}
+
 fn heard(offset: DVec2, weak: bool) -> Candidate {
     Candidate {
         range: offset.length(),
+        level_range: offset.length(),
         along: offset.normalize_or_zero(),
         weak,
         share: 1.0,

@@ -1,12 +1,12 @@
 //! What stands around the robot: the mission's world, and things that appear, vanish or move.
 
 use common::{
-    geometry::{Shapes, nearest_on_segment},
-    mission::{Mission, Thing},
+    geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
+    mission::{Heights, Mission, Thing},
 };
 use glam::DVec2;
 
-/// One surface: all the robot can touch or hear.
+/// One surface, as it is seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
     /// A disc.
@@ -87,20 +87,44 @@ impl Surface {
     }
 }
 
-fn surfaces_of(shapes: &Shapes) -> Vec<Surface> {
-    let drums = shapes.drums.iter().map(|drum| Surface::Drum {
-        at: drum.at,
-        radius: drum.radius_m,
+/// A surface with its heights and its echo: all the robot can touch, hear or see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solid {
+    /// From above.
+    pub surface: Surface,
+    /// From the side.
+    pub profile: Profile,
+}
+
+fn solids_of(shapes: &Shapes) -> Vec<Solid> {
+    let drums = shapes.drums.iter().map(|drum| Solid {
+        surface: Surface::Drum {
+            at: drum.at,
+            radius: drum.radius_m,
+        },
+        profile: drum.profile(),
     });
-    let faces = shapes.edges().map(|(from, to)| Surface::Face { from, to });
-    drums.chain(faces).collect()
+    let face = |profile| {
+        move |(from, to)| Solid {
+            surface: Surface::Face { from, to },
+            profile,
+        }
+    };
+    let walls = |wall: &'_ Wall| wall.edges().map(face(wall.profile())).collect::<Vec<_>>();
+    let boxes = |block: &Box2| block.edges().map(face(block.profile())).collect::<Vec<_>>();
+    let walls = shapes.walls.iter().flat_map(walls);
+    drums
+        .chain(walls)
+        .chain(shapes.boxes.iter().flat_map(boxes))
+        .collect()
 }
 
 /// Everything that stands, at one time.
 #[derive(Clone, Debug)]
 pub struct World {
-    standing: Vec<Surface>,
+    standing: Vec<Solid>,
     things: Vec<Visitor>,
+    heights: Heights,
 }
 
 /// A thing that is not always there.
@@ -108,7 +132,7 @@ pub struct World {
 struct Visitor {
     thing: Thing,
     /// As the mission writes it.
-    surfaces: Vec<Surface>,
+    solids: Vec<Solid>,
     /// Where it is now.
     offset: DVec2,
     present: bool,
@@ -119,14 +143,15 @@ impl World {
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
-            surfaces: surfaces_of(&thing.shape),
+            solids: solids_of(&thing.shape),
             thing: thing.clone(),
             offset: DVec2::ZERO,
             present: false,
         };
         let mut world = Self {
-            standing: surfaces_of(&mission.world),
+            standing: solids_of(&mission.world),
             things: mission.simulation.things.iter().map(visitor).collect(),
+            heights: mission.simulation.physics().heights,
         };
         world.advance(0.0, DVec2::ZERO, mission.body().radius_m);
         world
@@ -143,8 +168,14 @@ impl World {
         }
     }
 
-    /// Every surface that is there now.
-    pub fn surfaces(&self) -> impl Iterator<Item = Surface> + '_ {
+    /// At which heights the body and its sensors are.
+    #[must_use]
+    pub fn heights(&self) -> &Heights {
+        &self.heights
+    }
+
+    /// Everything that is there now.
+    pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
         self.standing
             .iter()
@@ -152,34 +183,49 @@ impl World {
             .chain(visiting.flat_map(Visitor::now))
     }
 
-    /// Distance from `point` to the nearest surface, metres; infinite where nothing stands.
+    /// Every surface that the body can touch.
+    pub fn touchable(&self) -> impl Iterator<Item = Surface> + '_ {
+        let Heights {
+            ground_clearance_m,
+            body_top_m,
+            ..
+        } = self.heights;
+        self.solids()
+            .filter(move |solid| solid.profile.is_between(ground_clearance_m, body_top_m))
+            .map(|solid| solid.surface)
+    }
+
+    /// Distance from `point` to the nearest surface that the body can touch, metres; infinite where nothing stands.
     #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
-        self.surfaces()
+        self.touchable()
             .map(|surface| surface.distance(point))
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Distance along the ray from `origin` in the unit direction `along` to the first surface, metres,
-    /// and that surface.
+    /// Distance along the level ray at `height_m` from `origin` in the unit direction `along` to the first surface,
+    /// metres, and that surface.
     #[must_use]
-    pub fn first_hit(&self, origin: DVec2, along: DVec2) -> Option<(f64, Surface)> {
-        self.surfaces()
-            .filter_map(|surface| Some((surface.hit(origin, along)?, surface)))
+    pub fn first_hit(&self, origin: DVec2, along: DVec2, height_m: f64) -> Option<(f64, Surface)> {
+        self.solids()
+            .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
+            .filter_map(|Solid { surface, .. }| Some((surface.hit(origin, along)?, surface)))
             .min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 }
 
 impl Visitor {
-    fn now(&self) -> impl Iterator<Item = Surface> + '_ {
-        self.surfaces
-            .iter()
-            .map(|surface| surface.moved(self.offset))
+    fn now(&self) -> impl Iterator<Item = Solid> + '_ {
+        self.solids.iter().map(|solid| Solid {
+            surface: solid.surface.moved(self.offset),
+            ..*solid
+        })
     }
 
     fn is_clear_of(&self, centre: DVec2, radius: f64) -> bool {
         let inside_box = self.thing.shape.clearance(centre - self.offset) < 0.0;
-        !inside_box && self.now().all(|surface| surface.distance(centre) > radius)
+        let touches = |solid: Solid| solid.surface.distance(centre) <= radius;
+        !inside_box && !self.now().any(touches)
     }
 }
 
@@ -218,13 +264,15 @@ mod tests {
         let world = world(
             "world.drum = [{ at = [3, 0], radius_m = 0.5 }]\nworld.wall = [{ points = [[2, -1], [2, 1]] }]",
         );
-        let (range, _) = world.first_hit(DVec2::ZERO, DVec2::X).unwrap();
+        let (range, _) = world.first_hit(DVec2::ZERO, DVec2::X, 0.2).unwrap();
         assert_eq!(range, 2.0, "the wall hides the drum");
-        let (range, _) = world.first_hit(DVec2::new(4.0, 0.0), DVec2::NEG_X).unwrap();
+        let (range, _) = world
+            .first_hit(DVec2::new(4.0, 0.0), DVec2::NEG_X, 0.2)
+            .unwrap();
         assert_eq!(range, 0.5, "from behind, the drum");
-        assert_eq!(world.first_hit(DVec2::ZERO, DVec2::Y), None);
+        assert_eq!(world.first_hit(DVec2::ZERO, DVec2::Y, 0.2), None);
         assert_eq!(
-            world.first_hit(DVec2::ZERO, DVec2::NEG_X),
+            world.first_hit(DVec2::ZERO, DVec2::NEG_X, 0.2),
             None,
             "a ray does not look back"
         );
@@ -255,5 +303,19 @@ mod tests {
         assert_eq!(world.clearance(DVec2::ZERO), f64::INFINITY, "it waits");
         world.advance(3.0, DVec2::new(0.0, 0.0), 0.1);
         assert_eq!(world.clearance(DVec2::ZERO), 0.5);
+    }
+
+    #[test]
+    fn what_is_low_or_hangs_over_is_touched_only_where_the_body_is_as_high() {
+        let clearance = |heights: &str| {
+            world(&format!(
+                "world.box = [{{ at = [1, 0], size_m = [1, 1], {heights} }}]"
+            ))
+            .clearance(DVec2::ZERO)
+        };
+        assert_eq!(clearance("top_m = 0.1"), 0.5, "a low box");
+        assert_eq!(clearance("top_m = 0.02"), f64::INFINITY, "a door sill");
+        assert_eq!(clearance("bottom_m = 0.22"), 0.5, "the bar of a chair");
+        assert_eq!(clearance("bottom_m = 0.7"), f64::INFINITY, "a table top");
     }
 }

@@ -177,6 +177,7 @@ mod tests {
         Shapes {
             walls: vec![Wall {
                 points: points.iter().map(|&point| point.into()).collect(),
+                ..Wall::default()
             }],
             ..Shapes::default()
         }
@@ -215,6 +216,7 @@ mod tests {
             for side in [-1.0, 1.0] {
                 shapes.walls.push(Wall {
                     points: vec![DVec2::new(1.0, side), DVec2::new(1.0, side * gap / 2.0)],
+                    ..Wall::default()
                 });
             }
             shortest_path(&shapes, DVec2::ZERO, DVec2::new(2.0, 0.0), 0.2)

@@ -2,7 +2,7 @@
 
 use common::{
     geometry::Shapes,
-    mission::{Mission, MissionError},
+    mission::{Heights, Mission, MissionError, Realism},
 };
 use glam::DVec2;
 use std::path::Path;
@@ -72,8 +72,9 @@ impl Trial {
         rules: Rules,
         body: &BodySize,
     ) -> Result<Option<Self>, MissionError> {
+        let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
         let ShortestPath::Found(shortest_m) =
-            shortest_path(&scene.shapes, scene.start, scene.target, body.swept_m())
+            shortest_path(&touched, scene.start, scene.target, body.swept_m())
         else {
             return Ok(None);
         };
@@ -92,7 +93,7 @@ impl Trial {
     #[must_use]
     pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
         let start = mission.start_pose().position;
-        match shortest_path(&mission.world, start, mission.target, body.swept_m()) {
+        match shortest_path(&mission.obstacles(), start, mission.target, body.swept_m()) {
             ShortestPath::Found(shortest_m) => Some(Self {
                 world,
                 mission,

@@ -89,7 +89,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
         guidance: lines.is_some(),
         isolated: has_isolated_cells(grid, field),
         hazard: hazard.as_ref(),
-        world: !scene.mission.world.is_empty(),
+        world: &scene.mission.world,
         motion: &motion,
     };
 

@@ -1,5 +1,6 @@
 //! Around the plot: title, axes, legend, captions.
 
+use common::geometry::Shapes;
 use glam::DVec2;
 
 use super::{
@@ -9,7 +10,7 @@ use super::{
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, WIDTH, escape, ink, round_up},
     scene::Scene,
     streamlines::arrowhead,
-    world,
+    world::{self, Outline},
 };
 
 /// Text without fonts of its own; digits of one width where the font has them.
@@ -167,7 +168,7 @@ pub(super) struct Legend<'a> {
     /// Whether from some cells that were believed free the target cannot be reached.
     pub(super) isolated: bool,
     pub(super) hazard: Option<&'a BelievedHazard>,
-    pub(super) world: bool,
+    pub(super) world: &'a Shapes,
     pub(super) motion: &'a Motion<'a>,
 }
 
@@ -262,9 +263,14 @@ impl Legend<'_> {
                 column.row("perimeter", cell(ink::PERIMETER));
             }
         }
-        if self.world {
+        if !self.world.is_empty() {
             column.heading("Really there");
-            column.row("drum, box, wall", |at| patch(at, &world::solid()));
+            for outline in Outline::ALL
+                .into_iter()
+                .filter(|outline| outline.is_in(self.world))
+            {
+                column.row(outline.name(), |at| patch(at, &outline.solid()));
+            }
         }
     }
 

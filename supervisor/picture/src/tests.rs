@@ -352,3 +352,25 @@ fn the_same_scene_gives_the_same_bytes() {
     let run = three_drums();
     assert_eq!(svg(&run.scene()), svg(&run.scene()));
 }
+
+#[test]
+fn what_is_low_is_dashed_what_is_soft_dotted_and_the_legend_says_so() {
+    let drawn = |profile: &str| {
+        let mut run = three_drums();
+        let text =
+            format!("target = [3, 0]\nworld.drum = [{{ at = [1, 1], radius_m = 0.3{profile} }}]");
+        run.mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let picture = svg(&Scene {
+            grid: None,
+            field: None,
+            ..run.scene()
+        });
+        assert_well_formed(&picture);
+        ["drum, box, wall", "low or overhanging", "absorbs sound"]
+            .map(|words| picture.contains(words))
+    };
+    assert_eq!(drawn(""), [true, false, false]);
+    assert_eq!(drawn(", top_m = 0.1"), [false, true, false]);
+    assert_eq!(drawn(", bottom_m = 0.2"), [false, true, false]);
+    assert_eq!(drawn(", echo = 0.2"), [false, false, true]);
+}

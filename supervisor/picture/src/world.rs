@@ -1,6 +1,8 @@
 //! What is really there, over what was believed: dark outlines and a hatch, so that both show.
+//!
+//! What does not reach from the floor to above the robot has dashed outlines, what absorbs sound dotted ones.
 
-use common::geometry::Shapes;
+use common::geometry::{Profile, Shapes};
 
 use super::page::{Path, View, ink};
 
@@ -9,37 +11,110 @@ pub(super) const HATCH: &str = "<pattern id=\"hatch\" width=\"6\" height=\"6\" \
      patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
      <path d=\"M0 0V6\" stroke=\"#27313b\" stroke-width=\"2.2\" stroke-opacity=\"0.6\"/></pattern>";
 
-/// Attributes of everything solid.
-pub(super) fn solid() -> String {
-    format!(
-        "fill=\"url(#hatch)\" stroke=\"{}\" stroke-width=\"1.6\" stroke-linejoin=\"round\"",
-        ink::WORLD
-    )
+/// How a thing is outlined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outline {
+    /// Hard, from the floor to above the robot.
+    Full,
+    /// Lower than that, or above the floor.
+    Partial,
+    /// As high as the first, but it gives back less than all of a sound.
+    Soft,
+}
+
+impl Outline {
+    /// All, in the order in which they are drawn.
+    pub(super) const ALL: [Self; 3] = [Self::Full, Self::Partial, Self::Soft];
+
+    fn of(profile: Profile) -> Self {
+        if profile.bottom_m > 0.0 || profile.top_m.is_finite() {
+            Self::Partial
+        } else if profile.echo < 1.0 {
+            Self::Soft
+        } else {
+            Self::Full
+        }
+    }
+
+    /// Whether anything in `world` is drawn so.
+    pub(super) fn is_in(self, world: &Shapes) -> bool {
+        let drums = world.drums.iter().map(|drum| drum.profile());
+        let walls = world.walls.iter().map(|wall| wall.profile());
+        let boxes = world.boxes.iter().map(|block| block.profile());
+        drums
+            .chain(walls)
+            .chain(boxes)
+            .any(|profile| Self::of(profile) == self)
+    }
+
+    /// Its line of the legend.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "drum, box, wall",
+            Self::Partial => "low or overhanging",
+            Self::Soft => "absorbs sound",
+        }
+    }
+
+    const fn dashes(self) -> &'static str {
+        match self {
+            Self::Full => "",
+            Self::Partial => " stroke-dasharray=\"7 4\"",
+            Self::Soft => " stroke-dasharray=\"1.6 3.2\"",
+        }
+    }
+
+    /// Attributes of everything solid.
+    pub(super) fn solid(self) -> String {
+        format!(
+            "fill=\"url(#hatch)\" stroke=\"{}\" stroke-width=\"1.6\" stroke-linejoin=\"round\"{}",
+            ink::WORLD,
+            self.dashes()
+        )
+    }
+
+    fn line(self) -> String {
+        // Round caps would close the gaps between dots.
+        let cap = if self == Self::Full { "round" } else { "butt" };
+        format!(
+            "fill=\"none\" stroke=\"{}\" stroke-width=\"3.2\" stroke-linejoin=\"round\" \
+             stroke-linecap=\"{cap}\"{}",
+            ink::WORLD,
+            self.dashes()
+        )
+    }
 }
 
 /// The layer.
 pub(super) fn layer(view: &View, world: &Shapes) -> String {
+    let outlines = Outline::ALL
+        .into_iter()
+        .filter(|outline| outline.is_in(world));
+    outlines
+        .map(|outline| outlined(view, world, outline))
+        .collect()
+}
+
+/// Everything of `world` that has this outline.
+fn outlined(view: &View, world: &Shapes, outline: Outline) -> String {
     let mut bodies = Path::default();
-    for drum in &world.drums {
+    let has_it = |profile| Outline::of(profile) == outline;
+    for drum in world.drums.iter().filter(|drum| has_it(drum.profile())) {
         if view.shows(drum.at, drum.radius_m) {
             bodies.circle(view.place(drum.at), view.px(drum.radius_m));
         }
     }
-    for block in &world.boxes {
+    for block in world.boxes.iter().filter(|block| has_it(block.profile())) {
         if view.shows(block.at, block.size_m.length()) {
             bodies.polygon(block.corners().map(|corner| view.place(corner)));
         }
     }
-    let walls: String = world
-        .walls
-        .iter()
+    let walls = world.walls.iter().filter(|wall| has_it(wall.profile()));
+    let walls: String = walls
         .map(|wall| {
-            view.line(wall.points.iter().copied()).element(&format!(
-                "fill=\"none\" stroke=\"{}\" stroke-width=\"3.2\" stroke-linejoin=\"round\" \
-                 stroke-linecap=\"round\"",
-                ink::WORLD
-            ))
+            view.line(wall.points.iter().copied())
+                .element(&outline.line())
         })
         .collect();
-    bodies.element(&solid()) + &walls
+    bodies.element(&outline.solid()) + &walls
 }

@@ -148,6 +148,14 @@ mod tests {
                 "m.toml:2: simulation.thing: ",
             ),
             (
+                "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 1, bottom_m = 0.3, top_m = 0.2 }]",
+                "m.toml:2: simulation.thing: top_m = 0.2 is not above bottom_m = 0.3",
+            ),
+            (
+                "[[world.wall]]\npoints = [[2, 0], [2, 1]]\necho = 2",
+                "m.toml:2: world: 2 as echo is out of range",
+            ),
+            (
                 "[[simulation.ring]]\nindex = 6\nforward_m = 0\nbearing_deg = 0",
                 "m.toml:2: simulation.ring: ",
             ),

@@ -20,7 +20,7 @@ fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
     (0..steps)
         .map(|step| {
             let counts = motor.step(from + step as f64 * DT, DT, &mut noise);
-            motor.turn(counts, DT, false);
+            motor.turn(counts);
             motor.speed()
         })
         .collect()

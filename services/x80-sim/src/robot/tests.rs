@@ -2,11 +2,15 @@
 
 use std::path::Path;
 
-use common::wire::{Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between};
+use common::wire::{
+    COUNT_CYCLE, Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between,
+};
 
 use proptest::prelude::*;
 
 use super::*;
+
+mod realism;
 
 fn mission(text: &str) -> Mission {
     let text = format!("target = [3, 0]\n{text}");

@@ -164,3 +164,39 @@ fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
     assert!((sd - (4.0_f64 + 1.0 / 12.0).sqrt()).abs() < 0.05, "{sd}");
     assert_eq!(byte(f64::INFINITY, &physics, &mut noise), 255);
 }
+
+/// The farthest at which the smooth disc of `radius_m` and `echo` straight ahead is heard, metres.
+fn reach_of(radius_m: f64, echo: f64) -> f64 {
+    let is_heard = |centimetres: &u16| {
+        let at = f64::from(*centimetres) / 100.0 + radius_m;
+        let scene = format!(
+            "world.drum = [{{ at = [{at}, 0], radius_m = {radius_m}, echo = {echo} }}]\nrobot.radius_m = 0.01"
+        );
+        smooth(&scene, 0.0).is_finite()
+    };
+    f64::from((5..=255).rev().find(is_heard).unwrap_or(0)) / 100.0
+}
+
+#[test]
+fn a_thin_post_is_heard_less_far_than_a_drum_and_a_soft_one_less_far_still() {
+    close(reach_of(0.015, 1.0), 2.0);
+    let leg = reach_of(0.0125, 1.0);
+    assert!((1.8..1.95).contains(&leg), "{leg} m");
+    close(reach_of(0.12, 1.0), 2.55);
+    let soft = reach_of(0.12, 0.2);
+    assert!((1.2..1.7).contains(&soft), "{soft} m");
+}
+
+#[test]
+fn in_the_laboratory_every_hard_thing_thicker_than_a_post_is_heard_as_far_as_the_ranger_reaches() {
+    let leg = "world.drum = [{ at = [2.564, 0], radius_m = 0.015 }]";
+    close(laboratory(leg, 0.0), 2.549);
+}
+
+#[test]
+fn what_is_low_hides_nothing_that_is_higher() {
+    let scene =
+        format!("{WALL}\nworld.box = [{{ at = [0.35, 0], size_m = [0.1, 2], top_m = 0.05 }}]");
+    // The cone meets what is 0.05 m high from 0.13 m / tan(15 degrees) = 0.49 m on.
+    close(laboratory(&scene, 0.0), 1.5);
+}

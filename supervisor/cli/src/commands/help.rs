@@ -23,7 +23,7 @@ struct Page {
 
 macro_rules! guide {
     ($($file:literal),* $(,)?) => {
-        [$(Page {
+        &[$(Page {
             file: $file,
             text: include_str!(concat!("../../../guide/", $file, ".md")),
         }),*]
@@ -31,9 +31,10 @@ macro_rules! guide {
 }
 
 /// Every page, in the order to read them. None has the name of a subcommand.
-static GUIDE: [Page; 15] = guide! {
+static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
+    "simulation",
     "attach",
     "deploy",
     "break-it",
@@ -73,7 +74,7 @@ fn page(topic: &str) -> Option<&'static Page> {
 /// The pages, one a line, as the help of the whole command line lists them.
 pub(crate) fn topics() -> String {
     let mut list = String::from("Guide (firsthand help TOPIC):\n");
-    for page in &GUIDE {
+    for page in GUIDE {
         // Writing to a String cannot fail.
         let _ = writeln!(list, "  {:<22} {}", page.topic(), page.title());
     }

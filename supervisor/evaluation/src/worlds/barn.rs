@@ -59,6 +59,7 @@ pub(super) fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
         cylinders.entry(row.world).or_default().push(Drum {
             at: DVec2::new(row.x_m, row.y_m),
             radius_m: row.radius_m,
+            ..Drum::default()
         });
     }
     let index = file.with_file_name("index.csv");
@@ -113,6 +114,7 @@ fn cylinders(text: &str) -> Option<Vec<Drum>> {
             drums.push(Drum {
                 at: DVec2::new(x, y),
                 radius_m,
+                ..Drum::default()
             });
         }
     }
@@ -140,6 +142,7 @@ fn scene(drums: Vec<Drum>) -> Scene {
             drums,
             walls: vec![Wall {
                 points: corners.to_vec(),
+                ..Wall::default()
             }],
             ..Shapes::default()
         },
@@ -193,6 +196,7 @@ mod tests {
         let want = Drum {
             at: DVec2::new(-1.5, 2.25),
             radius_m: 0.075,
+            ..Drum::default()
         };
         assert_eq!(cylinders(text), Some(vec![want]));
         assert_eq!(cylinders("<world></world>"), None);

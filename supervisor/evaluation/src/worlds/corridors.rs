@@ -40,7 +40,10 @@ pub(super) fn draw(random: &mut Random, bends: Bends) -> Scene {
     };
     Scene {
         shapes: Shapes {
-            walls: vec![Wall { points }],
+            walls: vec![Wall {
+                points,
+                ..Wall::default()
+            }],
             ..Shapes::default()
         },
         start: axis[0] + ahead * 0.6,

@@ -81,6 +81,7 @@ pub(super) fn closed(least: DVec2, greatest: DVec2) -> Wall {
     ];
     Wall {
         points: corners.to_vec(),
+        ..Wall::default()
     }
 }
 
@@ -92,6 +93,7 @@ fn partition(shapes: &mut Shapes, at: f64, middle: f64, gap: f64, half_width: f6
     ] {
         shapes.walls.push(Wall {
             points: vec![DVec2::new(at, from), DVec2::new(at, to)],
+            ..Wall::default()
         });
     }
 }
@@ -104,7 +106,11 @@ fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2)
         0..=4 => {
             let radius_m = random.within(0.12, 0.35);
             if is_free(radius_m) {
-                shapes.drums.push(Drum { at, radius_m });
+                shapes.drums.push(Drum {
+                    at,
+                    radius_m,
+                    ..Drum::default()
+                });
             }
         }
         5..=7 => {
@@ -115,6 +121,7 @@ fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2)
                     at,
                     size_m,
                     angle_deg,
+                    ..Box2::default()
                 });
             }
         }
@@ -124,6 +131,7 @@ fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2)
             if is_free(half) {
                 shapes.walls.push(Wall {
                     points: vec![at - along, at + along],
+                    ..Wall::default()
                 });
             }
         }

@@ -38,6 +38,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     match sides {
         Sides::Walls => shapes.walls.push(Wall {
             points: corners.to_vec(),
+            ..Wall::default()
         }),
         Sides::Drums => {
             for pair in corners.windows(2) {
@@ -45,6 +46,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
                 shapes.drums.extend((0..=steps as u32).map(|step| Drum {
                     at: pair[0].lerp(pair[1], f64::from(step) / steps),
                     radius_m: DRUM_RADIUS_M,
+                    ..Drum::default()
                 }));
             }
         }

@@ -129,6 +129,7 @@ fn arguments(command: &[String]) -> Option<&[String]> {
         ["sudo", "-u", _, "firsthand", ..] => 4,
         ["do" | "sudo", "firsthand", ..] => 2,
         ["cargo", "run", "--", ..] => 3,
+        ["cargo", "run", "--release", "--", ..] => 4,
         ["cargo", "run", "--release"] => 3,
         ["firsthand", ..] => 1,
         _ => return None,
@@ -325,4 +326,38 @@ fn the_planner_on_its_page_is_the_one_that_is_built() {
 fn the_readme_is_shorter_than_200_lines() {
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     assert!(readme.lines().count() < 200);
+}
+
+#[test]
+fn the_guides_values_of_the_simulation_are_the_presets() {
+    let physics = |realism: &str, setting: &str| {
+        let set = [
+            format!("simulation.realism='{realism}'"),
+            setting.to_owned(),
+        ];
+        let mission = missions::load("obstacle-course", &set);
+        mission
+            .unwrap_or_else(|error| panic!("{setting}: {error}"))
+            .simulation
+            .physics()
+    };
+    let mut values = 0;
+    for line in page("simulation").unwrap().text.lines() {
+        let cells: Vec<_> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let (key, columns) = match *cells.as_slice() {
+            [key, value, _] => (format!("heights.{}", key.trim_matches('`')), [value, value]),
+            [key, laboratory, measured, _] => {
+                (key.trim_matches('`').to_owned(), [laboratory, measured])
+            }
+            _ => continue,
+        };
+        for (realism, value) in ["laboratory", "measured"].into_iter().zip(columns) {
+            if value.parse::<f64>().is_ok() {
+                let written = physics(realism, &format!("simulation.{key}={value}"));
+                assert_eq!(written, physics(realism, "seed=1"), "{key} = {value}");
+                values += 1;
+            }
+        }
+    }
+    assert_eq!(values, 28, "values were found");
 }

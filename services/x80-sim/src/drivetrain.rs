@@ -1,0 +1,126 @@
+//! Between the channels of the motor board and the ground: which channel drives which wheel, which way, and how large that
+//! wheel really is.
+
+use common::{
+    mission::Mission,
+    wire::{COUNT_CYCLE, Encoder},
+};
+
+use crate::{body::Wheels, motor::Motor, noise::Noise};
+
+/// How the wheels hang on the motors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drivetrain {
+    channel: Wheels<usize>,
+    sign: Wheels<f64>,
+    /// Of a wheel of nominal diameter.
+    metres_per_count: f64,
+    /// True diameters over the nominal one.
+    diameter: Wheels<f64>,
+}
+
+impl Drivetrain {
+    /// That of `mission`'s robot, its wheels `diameter` times the nominal one.
+    pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
+        let wheels = Wheels {
+            left: mission.robot.left,
+            right: mission.robot.right,
+        };
+        Self {
+            // A mission is checked: channels are 0 and 1.
+            channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
+            sign: wheels.map(|wheel| if wheel.reversed { -1.0 } else { 1.0 }),
+            metres_per_count: mission.body().metres_per_count(),
+            diameter,
+        }
+    }
+
+    /// What the speed loops ask of the wheels from mission time `now` for `dt` seconds, metres of nominal wheels.
+    pub(crate) fn step(
+        &self,
+        motors: &mut [Motor; 6],
+        now: f64,
+        dt: f64,
+        noise: &mut Noise,
+    ) -> Wheels<f64> {
+        let mut asked = |channel: usize, sign: f64| {
+            let counts = motors
+                .get_mut(channel)
+                .map_or(0.0, |motor| motor.step(now, dt, noise));
+            sign * counts * self.metres_per_count
+        };
+        Wheels {
+            left: asked(self.channel.left, self.sign.left),
+            right: asked(self.channel.right, self.sign.right),
+        }
+    }
+
+    /// How far the rims go when nominal wheels would go `metres`.
+    pub(crate) fn rims(&self, metres: Wheels<f64>) -> Wheels<f64> {
+        Wheels {
+            left: metres.left * self.diameter.left,
+            right: metres.right * self.diameter.right,
+        }
+    }
+
+    /// The wheels have turned in `dt` seconds: by the share `grip` with the ground, which went by `went` metres, and by the rest
+    /// as they were `asked`.
+    pub(crate) fn turn(
+        &self,
+        motors: &mut [Motor; 6],
+        asked: Wheels<f64>,
+        went: Wheels<f64>,
+        grip: f64,
+        dt: f64,
+    ) {
+        let mut turn = |channel: usize, sign: f64, asked: f64, went: f64| {
+            let Some(motor) = motors.get_mut(channel) else {
+                return;
+            };
+            let counts = |metres: f64| sign * metres / self.metres_per_count;
+            motor.turn(counts(went * grip + asked * (1.0 - grip)));
+            if grip > 0.0 {
+                motor.hold(counts(went) / dt, grip);
+            }
+        };
+        let Wheels { left, right } = self.diameter;
+        turn(
+            self.channel.left,
+            self.sign.left,
+            asked.left,
+            went.left / left,
+        );
+        turn(
+            self.channel.right,
+            self.sign.right,
+            asked.right,
+            went.right / right,
+        );
+    }
+
+    /// Speeds of the rims, m/s, forward positive.
+    pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> Wheels<f64> {
+        let speed =
+            |channel: usize, sign: f64| sign * motors[channel].speed() * self.metres_per_count;
+        self.rims(Wheels {
+            left: speed(self.channel.left, self.sign.left),
+            right: speed(self.channel.right, self.sign.right),
+        })
+    }
+
+    /// Counts of the wheels as `encoders` show them, growing forward.
+    pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> Wheels<u16> {
+        let counts = |channel: usize, sign: f64| {
+            let position = encoders[channel].position;
+            if sign < 0.0 {
+                (COUNT_CYCLE - position) % COUNT_CYCLE
+            } else {
+                position
+            }
+        };
+        Wheels {
+            left: counts(self.channel.left, self.sign.left),
+            right: counts(self.channel.right, self.sign.right),
+        }
+    }
+}
