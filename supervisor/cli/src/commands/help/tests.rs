@@ -298,7 +298,7 @@ fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
     let help = crate::Arguments::command().render_long_help().to_string();
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let package = fs::read_to_string(root().join(".ci/package-files")).unwrap();
-    for page in &GUIDE {
+    for page in GUIDE {
         let topic = page.topic();
         assert!(page.text.starts_with("# "), "{topic} has no title");
         assert!(help.contains(page.title()), "{topic}");
