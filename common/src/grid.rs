@@ -10,7 +10,7 @@ mod frame;
 mod part;
 mod replica;
 
-pub use frame::{Cell, CellState, GridFrame, MAX_CELLS, Window};
+pub use frame::{Cell, CellState, GridFrame, MAX_CELLS, MIN_CELLS, Window};
 pub use part::Part;
 pub use replica::{Applied, Replica};
 

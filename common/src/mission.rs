@@ -21,7 +21,11 @@ pub use simulation::{
     SonarPhysics, Thing, WheelPhysics,
 };
 
-use crate::{geometry::Shapes, grid::GridFrame, kinematics::Pose2};
+use crate::{
+    geometry::Shapes,
+    grid::{GridFrame, MIN_CELLS},
+    kinematics::Pose2,
+};
 
 /// A mission as it is written. Every key but `target` has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -116,10 +120,18 @@ pub struct Start {
 pub struct Perimeter {
     /// D: side of the square, metres.
     pub width_m: f64,
-    /// N: cells along each side.
-    pub cells: u32,
+    /// N: cells along each side. Without it cells have 0.05 m with the evidential method, a quarter of the X80's body,
+    /// and 0.1 m with the paper's: [`Mission::grid_frame`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<u32>,
     /// Centre of the square, metres.
     pub centre: DVec2,
+}
+
+impl Perimeter {
+    /// A grid has no more cells a side than this unless the mission says so: what the planner follows at the robot's rate
+    /// with time to spare.
+    const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
 /// How wheel counts become a pose.
@@ -150,8 +162,9 @@ pub struct Mapper {
     pub margin_m: f64,
     /// The evidential method: what is left free between the body and a hit, metres.
     pub clearance_m: f64,
-    /// Hits farther than this are no safety event yet, metres.
-    pub map_within_m: f64,
+    /// Hits farther than this are no safety event yet, metres; without it what [`Mission::map_within_m`] says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map_within_m: Option<f64>,
 }
 
 /// Which planner, and how its field is posed.
@@ -179,12 +192,13 @@ impl Planner {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Controller {
-    /// vd: the most tangential speed asked for, m/s.
-    pub speed_m_s: f64,
+    /// vd: the most tangential speed asked for, m/s; without it what [`Mission::speed_m_s`] says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_m_s: Option<f64>,
     /// wd: the most turn rate asked for, rad/s.
     pub turn_rad_s: f64,
-    /// The evidential method: the most turn rate on the spot, rad/s. A sonar of 7 Hz and 15 degrees of half cone still
-    /// hears everything twice at 1.4.
+    /// The evidential method: the most turn rate on the spot, rad/s. At 2.0 a sonar of 7 Hz looks every 16 degrees, and
+    /// hears all of its cone of 15 degrees to either side nearly twice.
     pub look_rad_s: f64,
     /// Rc: where slowing down before the target begins, metres.
     pub slow_radius_m: f64,
@@ -213,7 +227,7 @@ impl Default for Perimeter {
     fn default() -> Self {
         Self {
             width_m: 12.0,
-            cells: 120,
+            cells: None,
             centre: DVec2::ZERO,
         }
     }
@@ -224,7 +238,7 @@ impl Default for Mapper {
         Self {
             margin_m: 0.25,
             clearance_m: 0.03,
-            map_within_m: 1.0,
+            map_within_m: None,
         }
     }
 }
@@ -232,9 +246,9 @@ impl Default for Mapper {
 impl Default for Controller {
     fn default() -> Self {
         Self {
-            speed_m_s: 0.25,
+            speed_m_s: None,
             turn_rad_s: 0.8,
-            look_rad_s: 1.4,
+            look_rad_s: 2.0,
             slow_radius_m: 0.4,
             dead_zone: 0.05,
             modulated: true,
@@ -246,10 +260,21 @@ impl Mission {
     /// Delta = D / N and where the cells lie.
     #[must_use]
     pub fn grid_frame(&self) -> GridFrame {
+        let Perimeter {
+            width_m, centre, ..
+        } = self.perimeter;
+        let cells = self.perimeter.cells.unwrap_or_else(|| {
+            let side_m = match self.method {
+                Method::Evidential => 0.05,
+                Method::Paper => 0.1,
+            };
+            let cells = (width_m / side_m).round();
+            cells.clamp(f64::from(MIN_CELLS), Perimeter::DEFAULT_MOST_CELLS) as u32
+        });
         GridFrame {
-            cells: self.perimeter.cells,
-            resolution_m: self.perimeter.width_m / f64::from(self.perimeter.cells),
-            centre: self.perimeter.centre,
+            cells,
+            resolution_m: width_m / f64::from(cells),
+            centre,
         }
     }
 
@@ -260,6 +285,28 @@ impl Mission {
         // The hit's own cell covers half a cell; what rounding adds is no further cell.
         let cells = self.mapper.margin_m / self.grid_frame().resolution_m - 0.5;
         (cells - 1e-6).ceil().max(0.0) as u32
+    }
+
+    /// vd, m/s: `controller.speed_m_s`, or what the method takes where the mission does not say. The evidential method
+    /// stops within what it has seen, the paper's has no such rule.
+    #[must_use]
+    pub fn speed_m_s(&self) -> f64 {
+        let default = match self.method {
+            Method::Evidential => 0.5,
+            Method::Paper => 0.25,
+        };
+        self.controller.speed_m_s.unwrap_or(default)
+    }
+
+    /// How far hits are mapped, metres: `mapper.map_within_m`, or what the method takes where the mission does not say.
+    /// Farther out the arc of an echo is wider than the gaps it would close.
+    #[must_use]
+    pub fn map_within_m(&self) -> f64 {
+        let default = match self.method {
+            Method::Evidential => 0.6,
+            Method::Paper => 1.0,
+        };
+        self.mapper.map_within_m.unwrap_or(default)
     }
 
     /// The screening length of the field, metres: `planner.screening_m`, or what the method takes where the mission

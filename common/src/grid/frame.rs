@@ -48,6 +48,8 @@ impl CellState {
     }
 }
 
+/// The fewest cells along a side: fewer leave no room between the perimeter's two sides.
+pub const MIN_CELLS: u32 = 10;
 /// The most cells along a side: 4096 x 4096 is the largest field that is solved.
 pub const MAX_CELLS: u32 = 4096;
 

@@ -15,7 +15,7 @@ use toml::de::{DeTable, DeValue};
 use super::{Mission, error::MissionError};
 use crate::{
     address::{Address, AddressError, FORMS},
-    grid::MAX_CELLS,
+    grid::{MAX_CELLS, MIN_CELLS},
     wire::MOTOR_SCALE_V,
 };
 
@@ -33,8 +33,6 @@ fn read_bounded(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// Fewer cells than this leave no room between the perimeter's two sides.
-const MIN_CELLS: u32 = 10;
 /// The longest mission, seconds: a day.
 const MAX_TIMEOUT_S: f64 = 86_400.0;
 
@@ -199,10 +197,11 @@ impl Checker {
     fn perimeter(&mut self, mission: &Mission) -> Result<(), Objection> {
         let perimeter = &mission.perimeter;
         within("perimeter.width_m", perimeter.width_m, 0.5..=1000.0, "m")?;
-        if !(MIN_CELLS..=MAX_CELLS).contains(&perimeter.cells) {
+        let cells = mission.grid_frame().cells;
+        if !(MIN_CELLS..=MAX_CELLS).contains(&cells) {
             return Err(objection(
                 "perimeter.cells",
-                format!("a grid of {0} x {0} cells cannot be", perimeter.cells),
+                format!("a grid of {cells} x {cells} cells cannot be"),
                 format!("give {MIN_CELLS} to {MAX_CELLS}"),
             ));
         }
@@ -352,7 +351,7 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
     let top = mission.body().top_speed_m_s;
     within(
         "controller.speed_m_s",
-        controller.speed_m_s,
+        mission.speed_m_s(),
         0.001..=top,
         "m/s",
     )?;
@@ -377,7 +376,7 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
     within("controller.dead_zone", controller.dead_zone, 0.0..=0.9, "")?;
     within(
         "mapper.map_within_m",
-        mission.mapper.map_within_m,
+        mission.map_within_m(),
         0.04..=2.54,
         "m",
     )?;

@@ -54,8 +54,26 @@ impl PoseSample {
     }
 }
 
+/// How many readings a `grid` sample carries at most.
+pub const CLEAR_BEAMS: usize = 128;
+
+/// One reading of the sonar as evidence of free ground: nothing that is square to the beam stands nearer than `clear_m`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
+#[type_name("firsthand.ClearBeam")]
+#[repr(C)]
+pub struct ClearBeam {
+    /// The sensor, metres in the mission frame.
+    pub x_m: f32,
+    /// The sensor, metres in the mission frame.
+    pub y_m: f32,
+    /// Where it looked, radians counter-clockwise from x.
+    pub bearing_rad: f32,
+    /// So far nothing answered, metres.
+    pub clear_m: f32,
+}
+
 /// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.GridHeader")]
 #[repr(C)]
 pub struct GridHeader {
@@ -67,6 +85,33 @@ pub struct GridHeader {
     pub safety_events: u64,
     /// The belief's epoch: grows when the sensed belief was reset.
     pub epoch: u64,
+    /// How many of `clear_beams` are readings; none by the paper's method.
+    pub clear_beam_count: u64,
+    /// The newest readings, oldest first.
+    pub clear_beams: [ClearBeam; CLEAR_BEAMS],
+}
+
+impl GridHeader {
+    /// The newest readings, oldest first.
+    #[must_use]
+    pub fn clear_beams(&self) -> &[ClearBeam] {
+        // Shared memory is outside: the count may be anything.
+        let count = usize::try_from(self.clear_beam_count).unwrap_or(CLEAR_BEAMS);
+        &self.clear_beams[..count.min(CLEAR_BEAMS)]
+    }
+}
+
+impl Default for GridHeader {
+    fn default() -> Self {
+        Self {
+            stamp: Stamp::default(),
+            part: Part::default(),
+            safety_events: 0,
+            epoch: 0,
+            clear_beam_count: 0,
+            clear_beams: [ClearBeam::default(); CLEAR_BEAMS],
+        }
+    }
 }
 
 wire_enum! {
@@ -76,7 +121,7 @@ wire_enum! {
         Waiting = 0,
         /// Go along (ex, ey).
         Along = 1,
-        /// The robot's cell is the target's.
+        /// The robot has arrived beside the target, which is not free itself: no free place is nearer.
         AtTarget = 2,
         /// The robot stands in a hazard cell: (ex, ey) leads to the nearest free one.
         WayOut = 3,

@@ -19,6 +19,9 @@ const TURN_GAIN: f64 = 3.0;
 /// Cosine from which on a robot follows its guidance however little way it is given: it would stall for ever.
 const CREEPS: f64 = 0.98;
 
+/// No farther from its target than this a robot has arrived beside it, whatever the planner says, metres.
+const BESIDE_M: f64 = 0.5;
+
 /// How the robot stands to the guidance: (14), with the heading in place of the measured velocity, which
 /// is undefined at rest, where every mission starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,7 +101,7 @@ impl Step for Controller {
             drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, top),
             target: mission.target,
             tolerance: mission.arrival_tolerance_m,
-            speed: settings.speed_m_s,
+            speed: mission.speed_m_s(),
             turn: settings.turn_rad_s,
             look: settings.look_rad_s,
             slow_radius: settings.slow_radius_m,
@@ -127,7 +130,10 @@ impl Step for Controller {
         let pose = guidance.pose();
         let distance = pose.position.distance(self.target);
         // Latched: a robot at rest on the edge of the circle must not start again over a count.
-        self.arrived |= distance <= self.tolerance;
+        // So does one beside a target that is not free, where the planner says that it is as near as it can be.
+        let status = GuidanceStatus::from_byte(guidance.status);
+        self.arrived |= distance <= self.tolerance
+            || status == GuidanceStatus::AtTarget && distance <= BESIDE_M;
         let command = CommandSample {
             distance_m: distance,
             pose_ns: guidance.pose_ns,
@@ -144,7 +150,6 @@ impl Step for Controller {
         // Shared memory is outside too: only a direction is followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let sane = unit && distance.is_finite() && pose.heading.is_finite();
-        let status = GuidanceStatus::from_byte(guidance.status);
         let alignment = Alignment::of(pose.axis(), direction);
         let twist = if sane {
             self.motion(status, alignment, distance, guidance.speed_limit_m_s)

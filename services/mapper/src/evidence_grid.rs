@@ -155,7 +155,7 @@ impl EvidenceGrid {
             .echo
             .map_or(f64::INFINITY, |range| range - sonar.before_m);
         let clear_to = passed_to.min(beam.reach);
-        let swept_to = passed_to.min(beam.reach * sonar.swept_beyond);
+        let swept_to = passed_to.min(sonar.swept_m.max(beam.reach));
         let known_to = echo.map_or(swept_to, |range| range + sonar.behind_m);
         let far = known_to
             .max(sonar.pointed_m)

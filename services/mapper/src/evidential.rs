@@ -9,8 +9,10 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    clear_beams::ClearBeams,
     evidence_grid::{Beam, EvidenceGrid, Flip, lattice, step_m},
     inflation::{Geometry, Inflation},
+    reading::Reading,
     sonar_model::SonarModel,
 };
 
@@ -18,20 +20,17 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
+    beams: ClearBeams,
     /// Recomputed from the evidence, so not saved.
     #[serde(skip)]
     inflation: Inflation,
 }
 
-/// A reading of the sonar, where it was taken.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Reading {
-    /// The sensor, metres.
-    pub(crate) origin: DVec2,
-    /// Which way it looked: a unit vector.
-    pub(crate) axis: DVec2,
-    /// The echo's range, metres; none where nothing answered.
-    pub(crate) echo: Option<f64>,
+impl EvidenceMap {
+    /// The newest readings as evidence of free ground.
+    pub(crate) const fn beams(&self) -> &ClearBeams {
+        &self.beams
+    }
 }
 
 /// What a reading brought.
@@ -67,7 +66,7 @@ impl Evidential {
                 reach: radius + mission.mapper.clearance_m + grid.resolution_m / 2.0,
             },
             radius,
-            map_within: mission.mapper.map_within_m,
+            map_within: mission.map_within_m(),
         }
     }
 
@@ -80,13 +79,14 @@ impl Evidential {
     pub(crate) fn empty(&self) -> EvidenceMap {
         EvidenceMap {
             evidence: EvidenceGrid::none(&self.geometry.lattice),
+            beams: ClearBeams::default(),
             inflation: Inflation::new(&self.geometry),
         }
     }
 
     /// Bytes of a saved map.
     pub(crate) const fn saved_bytes(&self) -> usize {
-        4 * self.geometry.lattice.area() + 64
+        4 * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 64
     }
 
     /// Complete a map that was saved; one of another mission is refused.
@@ -109,16 +109,19 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take what was heard, if the sonar gave a reading at all, by a robot at `robot`.
+    /// Take what was heard, if the sonar gave a reading at all, by a robot at `robot` whose wheels have rolled `rolled_m`
+    /// metres.
     pub(crate) fn take(
         &self,
         map: &mut EvidenceMap,
         robot: DVec2,
         reading: Option<Reading>,
+        rolled_m: f64,
     ) -> News {
         let Some(reading) = reading else {
             return News::default();
         };
+        map.beams.take(&self.sonar, &reading, rolled_m);
         let beam = Beam {
             origin: reading.origin,
             axis: reading.axis,
@@ -161,6 +164,7 @@ impl Evidential {
             0.0
         };
         let mut flips = Vec::new();
+        map.beams.clear();
         let lattice = &self.geometry.lattice;
         map.evidence
             .forget(&self.sonar, lattice, (robot, keep), &mut flips);

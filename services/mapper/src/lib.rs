@@ -5,15 +5,19 @@
 //! | [`step`] | the mapper itself, pure: poses with ranges in, the window of the grid that changed out |
 //! | `sonar_model` | THE numbers of what an echo, and its absence, mean for the cells around |
 //! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
+//! | `reading` | a reading of the sonar, where it was taken |
+//! | `clear_beams` | the newest readings as evidence of free ground, for the planner |
 //! | `inflation` | occupied cells grown by the robot's body |
 //! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
 //! | `fault` | hazard believed on purpose |
 //! | [`shell`] | wires the step to the topics `pose`, `range`, `directive` and `grid`, saves its state |
 
+mod clear_beams;
 mod evidence_grid;
 mod evidential;
 mod fault;
 mod inflation;
+mod reading;
 pub mod shell;
 mod sonar_model;
 pub mod step;

@@ -23,7 +23,8 @@ pub(crate) struct SonarModel {
     pub(crate) band_m: f64,
     /// Weight of an echo in the middle of its arc.
     pub(crate) hit: f64,
-    /// Weight of an echo at the end of its arc, where the sound is weakest; in between it falls linearly.
+    /// Weight of an echo at the end of its arc, where the sound is weakest; in between it falls linearly. None: what stands
+    /// there is heard better by a beam that points there, and gaps stay open.
     pub(crate) hit_at_edge: f64,
 
     /// What stands nearer than this before an echo may be its cause, metres: no beam passed there.
@@ -56,9 +57,9 @@ pub(crate) struct SonarModel {
     /// Half the angle in which a beam without echo sweeps ground. Less than the cone has: a surface that only just
     /// reaches into the cone throws the sound away.
     pub(crate) swept: f64,
-    /// Ground is swept so many times farther than echoes are mapped: an echo there is too wide to be mapped, yet no echo
-    /// says that the ground is free.
-    pub(crate) swept_beyond: f64,
+    /// So far ground is swept, metres, though echoes are mapped less far: an echo there is too wide to be mapped, yet no
+    /// echo says that the ground is free.
+    pub(crate) swept_m: f64,
     /// Half the angle in which the sonar counts as pointed at a cell that it cannot see, ...
     pub(crate) pointed: f64,
     /// ... how far ahead of the sensor, metres, ...
@@ -68,6 +69,14 @@ pub(crate) struct SonarModel {
     /// Swept ground stays so while the wheels roll this far, turns on the spot included, metres: wheels slip, and by then
     /// the pose is off by about the clearance that hazards are given.
     pub(crate) swept_for_m: f64,
+
+    /// No echo from within this says that no face square to the beam is there, metres. Half a metre less than the sonar's
+    /// reach, where answers grow weak.
+    pub(crate) clear_m: f64,
+    /// What echoes may be nearer than its range by so much, metres: noise, the byte's centimetre.
+    pub(crate) ahead_of_echo_m: f64,
+    /// A reading is evidence of free ground until the wheels have rolled this far, turns on the spot included, metres.
+    pub(crate) clear_for_m: f64,
 
     /// Of the robot's footprint so much at the rim is not sure to be free, metres: the pose drifts.
     pub(crate) rim_m: f64,
@@ -82,7 +91,7 @@ impl Default for SonarModel {
             arc: 16.0 * DEGREE,
             band_m: 0.04,
             hit: 4.0,
-            hit_at_edge: 2.0,
+            hit_at_edge: 0.0,
             before_m: 0.08,
             behind_m: 0.10,
             pass: 2,
@@ -96,11 +105,14 @@ impl Default for SonarModel {
             released: 0,
             explains: 6,
             swept: 12.0 * DEGREE,
-            swept_beyond: 1.25,
+            swept_m: 1.25,
             pointed: 6.0 * DEGREE,
             pointed_m: 0.40,
             pointed_enough: 4,
             swept_for_m: 1.5,
+            clear_m: 2.0,
+            ahead_of_echo_m: 0.05,
+            clear_for_m: 6.0,
             rim_m: 0.02,
             near_m: 0.6,
         }

@@ -15,8 +15,9 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    evidential::{EvidenceMap, Evidential, Reading},
+    evidential::{EvidenceMap, Evidential},
     fault,
+    reading::Reading,
 };
 
 /// "4 cm or nearer" is mapped at 4 cm.
@@ -147,7 +148,7 @@ impl Step for Mapper {
             margin: i64::from(margin),
             evidential,
             sensing: mission.sensing,
-            map_within: mission.mapper.map_within_m,
+            map_within: mission.map_within_m(),
             sensor_forward: mission.sonar.forward_m,
             sensor_bearing: mission.sonar.bearing_deg.to_radians(),
             footprint: mission.body().radius_m,
@@ -219,12 +220,16 @@ impl Mapper {
     /// The header of a `grid` sample with `part` of this belief.
     #[must_use]
     pub fn header(&self, part: Part) -> GridHeader {
-        GridHeader {
+        let mut header = GridHeader {
             part,
             safety_events: self.belief.safety_events,
             epoch: self.belief.epoch,
             ..GridHeader::default()
+        };
+        if let Sensed::Evidence(map) = &self.belief.sensed {
+            map.beams().fill(&mut header);
         }
+        header
     }
 
     /// Everything within `reach` metres of what the mission knows is hazard, and so is the perimeter.
@@ -308,7 +313,9 @@ impl Mapper {
             echo,
         });
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        let news = self.evidential.take(map, robot.position, reading);
+        let news = self
+            .evidential
+            .take(map, robot.position, reading, self.belief.rolled);
         let changed = self.redraw(stale.union(news.window));
         self.belief.safety_events += u64::from(news.safety_event);
         changed

@@ -1,8 +1,9 @@
 //! Active sensing: what the evidential method makes of a direction before the robot goes there.
 //!
-//! The one sonar looks ahead, and the body is wider than its cone where it matters. So before the robot
-//! drives over ground, the sonar must have been pointed there; and it drives no faster than it could stop
-//! before the next thing it believes in, or the next ground it has not seen.
+//! The one sonar looks ahead, the body is wider than its cone where it matters, and faces at a slant do not answer. So
+//! before the robot drives over ground, the sonar must have been pointed there, and square to every face that could be
+//! touched there; and it drives no faster than it could stop before the next thing it believes in, or the next ground
+//! it has not seen.
 //!
 //! All of it is computed from the belief and the pose alone: a scan is nothing but looking, tick by tick,
 //! at ground that was not swept yet, so the next process of a planner that was killed goes on with it.
@@ -15,16 +16,16 @@ use common::{
 use glam::DVec2;
 use harmonic::{Field, Guidance};
 
+use crate::unheard_faces::UnheardFaces;
+
 /// From point to point along a way, metres.
 const STEP_M: f64 = 0.05;
-/// The ground under so much of the way ahead must have been swept, metres.
+/// The ground under so much of the way ahead must have been swept, and no face could be touched there unheard, metres.
 const SWEPT_AHEAD_M: f64 = 0.25;
 /// So far ahead it is looked at at all, metres.
 const AHEAD_M: f64 = 0.4;
 /// In this time the robot must be able to stop: the sonar's period, the radio's, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// What must have been swept to either side of the body, metres.
-const SIDE_M: f64 = 0.03;
 /// Cells of a fine grid are looked at no closer than this, metres.
 const GRAIN_M: f64 = 0.025;
 
@@ -38,7 +39,7 @@ pub(crate) enum Advice {
 }
 
 /// The belief the advice is given on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct View<'a> {
     /// How the cells lie.
     pub(crate) frame: GridFrame,
@@ -46,6 +47,8 @@ pub(crate) struct View<'a> {
     pub(crate) cells: &'a [u8],
     /// The field over them.
     pub(crate) field: &'a Field,
+    /// What the newest readings say of faces.
+    pub(crate) faces: UnheardFaces,
 }
 
 /// The robot as the advice sees it.
@@ -62,22 +65,33 @@ impl ActiveSensing {
     /// For a mission's robot.
     pub(crate) fn new(mission: &Mission) -> Self {
         Self {
-            radius: mission.body().radius_m + SIDE_M + mission.grid_frame().resolution_m / 2.0,
-            speed: mission.controller.speed_m_s,
+            radius: mission.body().radius_m,
+            speed: mission.speed_m_s(),
             turn: mission.controller.turn_rad_s,
             bearing: DVec2::from_angle(mission.sonar.bearing_deg.to_radians()),
         }
+    }
+
+    /// The body's, metres.
+    pub(crate) const fn radius(&self) -> f64 {
+        self.radius
     }
 
     /// Advice for a robot at `pose` that is to go along `direction`, a unit vector.
     pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Advice {
         let way = view.way(pose.position, direction);
         let steps = (SWEPT_AHEAD_M / STEP_M) as usize;
-        let unseen = way
+        let ahead = &way[..steps.min(way.len())];
+        let ground = ahead
             .iter()
-            .take(steps)
             .flat_map(|&at| view.unswept(at, self.radius))
             .filter_map(|at| (at - pose.position).try_normalize());
+        let before = std::iter::once(&pose.position).chain(ahead);
+        let faces = before.zip(ahead).flat_map(|(&from, &to)| {
+            let along = (to - from).normalize_or(direction);
+            view.faces.normals(to, along)
+        });
+        let unseen = ground.chain(faces);
         match scan(self.bearing.rotate(pose.axis()), unseen) {
             // The robot turns until its sonar faces it.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
@@ -91,8 +105,11 @@ impl ActiveSensing {
         let steps = (AHEAD_M / STEP_M) as usize;
         let open = |step: &usize| {
             let way = *step as f64 * STEP_M;
-            let at = pose.along_arc(way, way * curvature).position;
-            !view.is_hazard(at) && view.unswept(at, self.radius).next().is_none()
+            let ahead = pose.along_arc(way, way * curvature);
+            let at = ahead.position;
+            !view.is_hazard(at)
+                && view.unswept(at, self.radius).next().is_none()
+                && view.faces.normals(at, ahead.axis()).next().is_none()
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         free as f64 * STEP_M / STOPS_WITHIN_S

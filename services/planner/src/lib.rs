@@ -7,7 +7,9 @@
 //! - [`background_solver`]: the thread of full solves beside the live field.
 
 mod active_sensing;
+mod aim;
 pub mod background_solver;
 mod fault;
 pub mod shell;
 pub mod step;
+mod unheard_faces;

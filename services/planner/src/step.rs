@@ -19,7 +19,9 @@ use harmonic::{
 };
 
 use crate::active_sensing::{ActiveSensing, Advice, View};
+use crate::aim;
 use crate::fault::lead_astray;
+use crate::unheard_faces::UnheardFaces;
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 
@@ -67,6 +69,18 @@ struct Live {
     frame: GridFrame,
     domain: Domain,
     field: Field,
+}
+
+/// As near as this to the middle of the cell that is aimed at beside the target, the robot has arrived, metres.
+const BESIDE_M: f64 = 0.12;
+
+impl Live {
+    /// Whether the field leads to a cell beside `target`, and the robot has come there.
+    fn is_beside_the_target(&self, target: DVec2, robot: DVec2) -> bool {
+        let aim = grid_cell(self.domain.target());
+        let own = self.frame.cell_at(target) == Some(aim);
+        !own && self.frame.centre_of(aim).distance(robot) <= BESIDE_M
+    }
 }
 
 /// The job that the background solver runs.
@@ -162,7 +176,7 @@ impl Planner {
         let side = frame.cells as usize;
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
         // The solver refuses a target outside the map.
-        let target = frame.cell_at(self.target);
+        let target = self.aim(&frame);
         let target = target.map_or(Cell::new(side, side), field_cell);
         let domain =
             Domain::new(side, side, blocked.collect(), target)?.with_screening(&self.screening)?;
@@ -176,7 +190,22 @@ impl Planner {
         Ok(Work::FullSolve)
     }
 
+    /// The cell that the field is to lead to: the target's, or with the evidential method the free one next to it.
+    fn aim(&self, frame: &GridFrame) -> Option<grid::Cell> {
+        match self.advisor {
+            Advisor::Follow => frame.cell_at(self.target),
+            Advisor::LookFirst(_) => aim::cell(frame, self.grid.cells(), self.target),
+        }
+    }
+
     fn update(&mut self, window: Window) -> Result<Work, SolveError> {
+        let same_aim = |live: &Live| {
+            let aim = self.aim(&live.frame);
+            aim.map(field_cell) == Some(live.domain.target())
+        };
+        if !self.live.as_ref().is_some_and(same_aim) {
+            return self.solve();
+        }
         let Some(live) = &mut self.live else {
             return self.solve();
         };
@@ -297,6 +326,9 @@ impl Planner {
             Some(live) => {
                 let at = live.frame.to_cells(pose.position);
                 match live.field.guidance(at.x, at.y) {
+                    _ if live.is_beside_the_target(self.target, pose.position) => {
+                        (GuidanceStatus::AtTarget, pose.axis())
+                    }
                     Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
                     Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
                     // Within the target's cell the field has said all it knows; the rest is straight.
@@ -343,6 +375,7 @@ impl Planner {
             frame: live.frame,
             cells: self.grid.cells(),
             field: &live.field,
+            faces: UnheardFaces::new(self.belief.clear_beams(), sensing.radius()),
         };
         match status {
             GuidanceStatus::Along => match sensing.advise(&view, pose, direction) {
@@ -415,6 +448,14 @@ fn changes_in(domain: &Domain, frame: &GridFrame, window: Window, cells: &[u8]) 
 /// A cell of the grid as the field library names it: the one place where one becomes the other.
 const fn field_cell(cell: grid::Cell) -> Cell {
     Cell::new(cell.col as usize, cell.row as usize)
+}
+
+/// The reverse of [`field_cell`].
+const fn grid_cell(cell: Cell) -> grid::Cell {
+    grid::Cell {
+        col: cell.col as u32,
+        row: cell.row as u32,
+    }
 }
 
 const fn is_hazard(cell: u8) -> bool {

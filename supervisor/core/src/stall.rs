@@ -126,12 +126,12 @@ impl StallWatch {
         let slowest_turn = TAU / controller.turn_rad_s.min(controller.look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         Self {
-            moved_m: MOVED_M.min(controller.speed_m_s * seconds * SHARE),
+            moved_m: MOVED_M.min(mission.speed_m_s() * seconds * SHARE),
             turned_rad: TURNED_RAD.min(controller.turn_rad_s * seconds * SHARE),
             place_m: match mission.method {
-                Method::Evidential => PLACE_M.min(controller.speed_m_s * at_a_place * SHARE),
+                Method::Evidential => PLACE_M.min(mission.speed_m_s() * at_a_place * SHARE),
                 // It turns as it drives.
-                Method::Paper => CIRCLES * 2.0 * controller.speed_m_s / controller.turn_rad_s,
+                Method::Paper => CIRCLES * 2.0 * mission.speed_m_s() / controller.turn_rad_s,
             },
             pinned_after: STALLED_AFTER + Duration::from_secs_f64(at_a_place),
             cut_off_after: match mission.method {

@@ -9,8 +9,8 @@ use std::path::Path;
 
 use crate::shortest_path::{ShortestPath, shortest_path};
 
-/// Cells of a trial's grid, metres, where the mission does not say otherwise.
-const CELL_M: f64 = 0.1;
+/// The perimeter's width is a multiple of this, metres: a whole number of cells by either method.
+const WIDTH_STEP_M: f64 = 0.1;
 /// Free ground between what stands in a world and the perimeter around it, metres.
 const RIM_M: f64 = 0.6;
 
@@ -133,14 +133,11 @@ fn mission(world: &str, scene: &Scene, shortest_m: f64) -> Result<Mission, Missi
     let shapes = moved(&scene.shapes, -scene.start);
     let (least, greatest) = bounds(&shapes, target);
     let centre = (least + greatest) / 2.0;
-    let cells = (((greatest - least).max_element() + 2.0 * RIM_M) / CELL_M).ceil();
+    let width_m =
+        (((greatest - least).max_element() + 2.0 * RIM_M) / WIDTH_STEP_M).ceil() * WIDTH_STEP_M;
     let text = format!(
-        "target = [{:?}, {:?}]\nperimeter = {{ width_m = {:?}, cells = {cells}, centre = [{:?}, {:?}] }}",
-        target.x,
-        target.y,
-        cells * CELL_M,
-        centre.x,
-        centre.y,
+        "target = [{:?}, {:?}]\nperimeter = {{ width_m = {width_m:?}, centre = [{:?}, {:?}] }}",
+        target.x, target.y, centre.x, centre.y,
     );
     let mut mission = Mission::parse(&text, Path::new(world))?;
     mission.name = world.to_owned();

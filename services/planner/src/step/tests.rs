@@ -1,5 +1,5 @@
 use super::*;
-use common::grid::Part;
+use common::{grid::Part, samples::ClearBeam};
 use std::path::Path;
 
 fn mission() -> Mission {
@@ -155,7 +155,21 @@ fn evidential(swept: impl Fn(DVec2) -> bool) -> Planner {
         method: Method::Evidential,
         ..mission()
     };
-    let (header, mut cells) = keyframe(1, |_| false);
+    let (mut header, mut cells) = keyframe(1, |_| false);
+    // A scan to both sides heard nothing.
+    header.clear_beam_count = 11;
+    for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
+        let bearing = (index as f32 - 5.0) * 15.0_f32.to_radians();
+        let (x_m, y_m, clear_m) = (0.0, 0.0, 2.0);
+        *beam = ClearBeam {
+            x_m,
+            y_m,
+            bearing_rad: bearing,
+            clear_m,
+        };
+    }
+    // The first of them looked ahead.
+    header.clear_beams.swap(0, 5);
     let frame = mission.grid_frame();
     for (index, state) in cells.iter_mut().enumerate() {
         let cell = grid::Cell {
@@ -194,6 +208,17 @@ fn an_evidential_robot_without_sensing_does_not_look_first() {
     let guidance = planner.guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert_eq!(guidance.speed_limit_m_s, f64::INFINITY);
+}
+
+#[test]
+fn an_evidential_robot_looks_square_to_the_faces_it_could_touch_unheard() {
+    // All ground swept, by a sonar that looked ahead only.
+    let mut planner = evidential(|_| true);
+    planner.belief.clear_beam_count = 1;
+    let guidance = planner.guide(&at(0.0, 0.0));
+    assert_eq!(status(&guidance), GuidanceStatus::Look);
+    let to_the_side = guidance.ey.atan2(guidance.ex).to_degrees().abs();
+    assert!((45.0..=90.0).contains(&to_the_side), "{to_the_side}");
 }
 
 #[test]

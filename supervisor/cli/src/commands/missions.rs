@@ -166,7 +166,7 @@ mod tests {
         .unwrap();
         assert_eq!(
             (mission.start.heading_deg, mission.perimeter.cells),
-            (90.0, 60)
+            (90.0, Some(60))
         );
         assert_eq!(
             mission.perimeter.width_m, 9.0,

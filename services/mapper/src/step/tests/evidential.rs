@@ -5,7 +5,7 @@ use super::*;
 /// Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead, the body's radius 0.19 m.
 fn mapper(extra: &str) -> Mapper {
     let text = format!(
-        "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar = {{ forward_m = 0.2 }}\n{extra}"
+        "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar = {{ forward_m = 0.2 }}\n{extra}\n[mapper]\nmap_within_m = 1.0\n"
     );
     Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
 }
@@ -154,4 +154,32 @@ fn the_targets_cell_is_never_hazard() {
     hear(&mut mapper, 0, 1.3, 0.0, Some(0.5));
     assert!(state(&mapper, 1.9, 0.0).is_hazard());
     assert!(!state(&mapper, 2.0, 0.0).is_hazard());
+}
+
+#[test]
+fn readings_are_published_until_the_wheels_have_rolled_too_far() {
+    let beams = |mapper: &Mapper| {
+        let header = mapper.header(Part::default());
+        header.clear_beams().to_vec()
+    };
+    let mut mapper = mapper("");
+    hear(&mut mapper, 0, 0.0, 0.0, Some(0.7));
+    hear(&mut mapper, 1, 0.0, 0.5, None);
+    let [echo, silence] = beams(&mapper)[..] else {
+        panic!("{:?}", beams(&mapper));
+    };
+    assert!((f64::from(echo.x_m) - 0.2).abs() < 1e-6 && echo.bearing_rad == 0.0);
+    assert!((0.6..0.7).contains(&echo.clear_m), "{echo:?}");
+    assert!(
+        silence.bearing_rad == 0.5 && silence.clear_m >= 1.5,
+        "{silence:?}"
+    );
+    // On the spot, till the wheels have rolled more than a reading is good for.
+    for tick in 2..200 {
+        hear(&mut mapper, tick, 0.0, 0.5 + tick as f64, None);
+    }
+    assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
+    // A reset forgets them: a wrong pose may be why.
+    mapper.forget(1);
+    assert!(beams(&mapper).is_empty());
 }

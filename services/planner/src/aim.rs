@@ -1,0 +1,80 @@
+//! Which cell the field leads to.
+//!
+//! The target is a point in the world, and the robot's pose drifts against the world: by the time it comes near, the
+//! target may be believed to lie where the body cannot be. Then the field leads to the free cell next to it, and there
+//! the robot has arrived: no nearer place is free.
+
+use common::grid::{Cell, CellState, GridFrame};
+use glam::DVec2;
+
+/// How far from a target that is not free the robot may be sent, metres: less than its body's width.
+const REACH_M: f64 = 0.35;
+
+/// The cell to lead to for a robot that is to go to `target`: the one nearest to it with free cells all around, or the
+/// target's own where none is within reach; none outside the map.
+pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cell> {
+    let own = frame.cell_at(target)?;
+    let is_free = |cell: Cell| !CellState::from_byte(cells[frame.index(cell)]).is_hazard();
+    if around(frame, own, 1).all(is_free) {
+        return Some(own);
+    }
+    let distance = |cell: &Cell| frame.centre_of(*cell).distance(frame.centre_of(own));
+    let reach = (REACH_M / frame.resolution_m) as u32;
+    let nearest = around(frame, own, reach)
+        .filter(|cell| distance(cell) <= REACH_M && around(frame, *cell, 1).all(is_free))
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.or(Some(own))
+}
+
+/// The cells at most `reach` away from `middle` in column and row, as far as they lie on the map.
+fn around(frame: &GridFrame, middle: Cell, reach: u32) -> impl Iterator<Item = Cell> + use<> {
+    let last = frame.cells - 1;
+    let span = move |at: u32| at.saturating_sub(reach)..=(at + reach).min(last);
+    span(middle.row).flat_map(move |row| span(middle.col).map(move |col| Cell { col, row }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME: GridFrame = GridFrame {
+        cells: 41,
+        resolution_m: 0.05,
+        centre: DVec2::ZERO,
+    };
+
+    /// The map with hazard where `is_hazard` says so of a cell's middle.
+    fn aim(target: DVec2, is_hazard: impl Fn(DVec2) -> bool) -> Option<DVec2> {
+        let mut cells = vec![CellState::Free as u8; FRAME.area()];
+        for row in 0..FRAME.cells {
+            for col in 0..FRAME.cells {
+                let cell = Cell { col, row };
+                if is_hazard(FRAME.centre_of(cell)) {
+                    cells[FRAME.index(cell)] = CellState::Sensed as u8;
+                }
+            }
+        }
+        cell(&FRAME, &cells, target).map(|cell| FRAME.centre_of(cell))
+    }
+
+    #[test]
+    fn a_free_target_is_aimed_at_itself() {
+        assert_eq!(
+            aim(DVec2::new(0.5, 0.0), |_| false),
+            Some(DVec2::new(0.5, 0.0))
+        );
+    }
+
+    #[test]
+    fn a_target_in_a_wall_is_approached_from_the_side_that_is_nearer() {
+        let aim = aim(DVec2::new(0.5, 0.0), |at| (0.43..0.72).contains(&at.x)).unwrap();
+        assert!(aim.distance(DVec2::new(0.35, 0.0)) < 1e-6, "{aim}");
+    }
+
+    #[test]
+    fn a_target_deep_inside_stays_where_it_is_and_one_off_the_map_is_none() {
+        let target = DVec2::new(0.5, 0.0);
+        assert_eq!(aim(target, |at| at.distance(target) < 0.6), Some(target));
+        assert_eq!(aim(DVec2::new(5.0, 0.0), |_| false), None);
+    }
+}
