@@ -2,7 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{setting::Setting, trial::Trial};
+use crate::{
+    latency::Quantiles,
+    setting::Setting,
+    table::{Key, Record},
+    trial::Trial,
+};
 
 /// How a mission ended, by the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -68,9 +73,17 @@ pub struct Summary {
     resets: u64,
     full_solves: u64,
     local_updates: u64,
+    /// From the datagram in to the datagram out.
+    #[serde(default)]
+    pub(crate) tick_latency_us: Quantiles,
+    #[serde(default)]
+    pub(crate) full_solve_us: Quantiles,
+    #[serde(default)]
+    pub(crate) local_update_us: Quantiles,
 }
 
-/// One mission's result. Metres and mission seconds; without latencies, which no two runs share.
+/// One mission's result. Metres and mission seconds; without latencies, which no two runs share: these have a table of
+/// their own, see [`Latency`](crate::latency::Latency).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The world.
@@ -201,13 +214,16 @@ impl Row {
             resets: 0,
             full_solves: 0,
             local_updates: 0,
+            tick_latency_us: Quantiles::default(),
+            full_solve_us: Quantiles::default(),
+            local_update_us: Quantiles::default(),
         };
         Self::new(trial, seed, setting, &nothing)
     }
+}
 
-    /// What makes it the row it is.
-    #[must_use]
-    pub fn key(&self) -> (String, u64, String) {
+impl Record for Row {
+    fn key(&self) -> Key {
         (self.world.clone(), self.seed, self.setting.clone())
     }
 }
