@@ -9,6 +9,7 @@ use common::{
 };
 
 use crate::{
+    decisive,
     domain::DomainLock,
     error::{SupervisorError, system},
     observer::Record,
@@ -22,6 +23,9 @@ use crate::{
 pub struct Finished {
     /// How it ended, and why.
     pub ending: Ending,
+    /// The tick that decided it; none where no tick did. What came after it does not count: how much that is depends on
+    /// how fast the stop was.
+    pub last_tick: Option<u64>,
     /// What was read from the bus.
     pub record: Record,
     /// What really happened, of a simulated robot.
@@ -58,10 +62,20 @@ pub fn run(
     let ending = ending?;
     stopped?;
     let simulator = supervisor.robot.simulator;
+    let truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
+    let record = supervisor.bus.observer.record;
+    let (ending, last_tick) = decisive::first(
+        ending,
+        &record,
+        &truth,
+        options.mission.timeout_s,
+        supervisor.stall_watch.tick(),
+    );
     Ok(Finished {
         ending,
-        record: supervisor.bus.observer.record,
-        truth: simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec()),
+        last_tick,
+        record,
+        truth,
         restarts: supervisor.stages.restarts().collect(),
         resumes: supervisor.state_file.state.resumes,
         replans: supervisor.stall_watch.replans(),
