@@ -4,7 +4,6 @@ use std::{collections::BTreeMap, fmt};
 
 use common::{
     clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
-    samples::PoseSample,
 };
 use serde::Serialize;
 
@@ -78,7 +77,7 @@ pub(crate) struct Summary {
 const DEPARTED_M: f64 = 0.1;
 
 impl Summary {
-    /// Of a finished run. What came after the tick that decided its end does not count.
+    /// Of a finished run. What came after that was decided does not count.
     pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
         let Finished {
             ending,
@@ -89,10 +88,7 @@ impl Summary {
         let last_tick = finished.last_tick.or(record.newest_tick());
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
-        let truth = truth_until(
-            &finished.truth,
-            pose.filter(|_| finished.last_tick.is_some()),
-        );
+        let truth = &finished.truth[..];
         let (full_solves, local_updates) = record.solves(guidance);
         let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
@@ -111,9 +107,10 @@ impl Summary {
             min_clearance_m: clearance
                 .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             collisions,
-            pose_error_m: pose
-                .zip(truth.last())
-                .map(|(pose, truth)| truth.pose_error_m(pose)),
+            pose_error_m: pose.and_then(|pose| {
+                let its = truth.iter().rev().find(|tick| tick.is_of(pose));
+                Some(its.or(truth.last())?.pose_error_m(pose))
+            }),
             true_distance_m: truth
                 .last()
                 .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
@@ -218,19 +215,6 @@ impl fmt::Display for Summary {
         }
         Ok(())
     }
-}
-
-/// The ground truth up to the tick of `pose`; all of it without one. A robot at rest shows the same counts for many ticks,
-/// and the two number theirs alike where nothing was lost on the way.
-fn truth_until<'a>(
-    truth: &'a [GroundTruthTick],
-    pose: Option<&PoseSample>,
-) -> &'a [GroundTruthTick] {
-    let its = pose.and_then(|pose| {
-        let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
-        shown.min_by_key(|(_, it)| it.tick.abs_diff(pose.stamp.tick))
-    });
-    its.map_or(truth, |(last, _)| &truth[..=last])
 }
 
 fn path_length(truth: &[GroundTruthTick]) -> f64 {

@@ -1,4 +1,4 @@
-//! Which of the things that end a mission came first, and at which tick. Pure.
+//! Which of the things that end a mission came first, and what of the run counts. Pure.
 //!
 //! The stages go on until the supervisor has seen one of them and stopped the robot. How far they get by then depends on
 //! the machine; what came first does not.
@@ -16,44 +16,81 @@ pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTic
     truth.get(truth.partition_point(|tick| tick.contacts == 0))
 }
 
-/// The ending of a run that was seen to end with `ending`, and the tick that decided it; none where no tick did. `stall`
-/// is the tick of the newest stall.
+/// What decided how a run ended.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Decided {
+    /// How it ended.
+    pub ending: Ending,
+    /// The last tick that was complete by then; none where no tick decided. Of the tick of a touch, a timeout or a stall
+    /// itself the stages may have been stopped halfway.
+    pub last_tick: Option<u64>,
+    /// So many ticks of the ground truth count: those up to the touch, or up to the last tick.
+    pub truth_ticks: usize,
+}
+
+/// Of a run that was seen to end with `ending`. `stall` is the tick of the newest stall.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
     truth: &[GroundTruthTick],
     timeout_s: f64,
     stall: Option<u64>,
-) -> (Ending, Option<u64>) {
+) -> Decided {
+    let undecided = |ending| Decided {
+        ending,
+        last_tick: None,
+        truth_ticks: truth.len(),
+    };
     if ending.outcome == Outcome::Aborted {
-        return (ending, None);
+        return undecided(ending);
     }
-    let contact = first_contact(truth).map(|contact| {
-        let tick = tick_of(contact, &record.poses);
-        (tick, touched([contact.x, contact.y]))
-    });
+    let poses = &record.poses;
+    let contact = first_contact(truth)
+        .map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
     let arrival = record
         .arrival
         .map(|command| (command.stamp.tick, reached(command.distance_m)));
-    let late = record
-        .poses
-        .partition_point(|pose| pose.stamp.time().seconds() < timeout_s);
-    let timeout = record
-        .poses
+    let late = poses.partition_point(|pose| pose.stamp.time().seconds() < timeout_s);
+    let timeout = poses
         .get(late)
         .map(|pose| (pose.stamp.tick, timed_out(timeout_s)));
     let stall = stall.filter(|_| ending.outcome == Outcome::Unreachable);
     let stall = stall.map(|tick| (tick, ending.clone()));
     // Of two at one tick the one named first.
-    [contact, arrival, timeout, stall]
-        .into_iter()
-        .flatten()
-        .min_by_key(|&(tick, _)| tick)
-        .map_or((ending, None), |(tick, first)| (first, Some(tick)))
+    let events = [contact, arrival, timeout, stall];
+    let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
+        return undecided(ending);
+    };
+    let last_tick = match ending.outcome {
+        // Its command is the last of the mission.
+        Outcome::Reached => tick,
+        _ => tick.saturating_sub(1),
+    };
+    let truth_ticks = match ending.outcome {
+        Outcome::Collision => truth.partition_point(|tick| tick.contacts == 0) + 1,
+        _ => record
+            .pose_at(last_tick)
+            .and_then(|pose| truth_of(pose, truth))
+            .map_or(truth.len(), |index| index + 1),
+    };
+    Decided {
+        ending,
+        last_tick: Some(last_tick),
+        truth_ticks,
+    }
 }
 
-/// The tick of the pose that was computed from what the robot measured at `truth`. A robot at rest measures the same for
-/// many ticks, and the two number theirs alike where nothing was lost on the way.
+/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks,
+/// and the two number theirs alike where nothing was lost on the way.
+fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
+    let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
+    shown
+        .min_by_key(|(_, it)| it.tick.abs_diff(pose.stamp.tick))
+        .map(|(index, _)| index)
+}
+
+/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none yet, the robot's number
+/// of it.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()
@@ -123,26 +160,31 @@ mod tests {
         use Outcome::{Aborted, Collision, Reached, Timeout, Unreachable};
         #[rustfmt::skip]
         let rows = [
-            ("the arrival", 10, Some(8), None, Reached, (Reached, Some(8))),
-            ("a touch before the arrival, which was read first", 12, Some(8), Some(6), Reached, (Collision, Some(6))),
-            ("an arrival before a touch, which was read first", 12, Some(8), Some(9), Collision, (Reached, Some(8))),
-            ("a touch at the tick of the arrival", 12, Some(8), Some(8), Reached, (Collision, Some(8))),
-            ("a touch seen some ticks later", 15, None, Some(6), Collision, (Collision, Some(6))),
-            ("the timeout seen some ticks later", 25, None, None, Timeout, (Timeout, Some(20))),
-            ("a stall", 18, None, None, Unreachable, (Unreachable, Some(15))),
-            ("a touch before a stall", 18, None, Some(3), Unreachable, (Collision, Some(3))),
-            ("what no tick decided", 18, None, Some(3), Aborted, (Aborted, None)),
+            ("the arrival", 10, Some(8), None, Reached, (Reached, Some(8), 9)),
+            ("a touch before the arrival, which was read first", 12, Some(8), Some(6), Reached, (Collision, Some(5), 7)),
+            ("an arrival before a touch, which was read first", 12, Some(8), Some(9), Collision, (Reached, Some(8), 9)),
+            ("a touch at the tick of the arrival", 12, Some(8), Some(8), Reached, (Collision, Some(7), 9)),
+            ("a touch seen some ticks later", 15, None, Some(6), Collision, (Collision, Some(5), 7)),
+            ("the timeout seen some ticks later", 25, None, None, Timeout, (Timeout, Some(19), 20)),
+            ("a stall", 18, None, None, Unreachable, (Unreachable, Some(14), 15)),
+            ("a touch before a stall", 18, None, Some(3), Unreachable, (Collision, Some(2), 4)),
+            ("what no tick decided", 18, None, Some(3), Aborted, (Aborted, None, 18)),
         ];
         for (what, ticks, arrival, contact, seen, want) in rows {
             let (record, truth) = run(ticks, arrival, contact);
-            let (ending, tick) = first(
+            let decided = first(
                 Ending::failed(seen, ""),
                 &record,
                 &truth,
                 TIMEOUT_S,
                 Some(15),
             );
-            assert_eq!((ending.outcome, tick), want, "{what}");
+            let Decided {
+                ending,
+                last_tick,
+                truth_ticks,
+            } = decided;
+            assert_eq!((ending.outcome, last_tick, truth_ticks), want, "{what}");
         }
     }
 }

@@ -3,18 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    row::{Row, Summary},
+    row::Row,
     statistics::median,
+    summary::Summary,
     table::{Key, Record},
 };
-
-/// Quantiles of a duration, microseconds; none of nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-pub(crate) struct Quantiles {
-    p50: Option<f64>,
-    p99: Option<f64>,
-    max: Option<f64>,
-}
 
 /// One mission's latencies, microseconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,6 +6,7 @@
 //! | [`shortest_path`] | whether a body gets through a world, and how short its way can be |
 //! | [`trial`] | a mission in a world, and the rules it is judged by |
 //! | [`setting`] | what missions on the same worlds differ by |
+//! | [`summary`] | what a run says at its end |
 //! | [`row`], [`latency`] | one mission's result; how long its ticks and solves took |
 //! | [`table`], [`results`] | rows in a file, as they come and in order; both tables |
 //! | [`runner`] | the missions, several at a time |
@@ -25,6 +26,7 @@ pub mod runner;
 pub mod setting;
 pub mod shortest_path;
 pub mod statistics;
+pub mod summary;
 pub mod table;
 pub mod totals;
 pub mod trial;

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    latency::Quantiles,
     setting::Setting,
+    summary::{Quantiles, Summary},
     table::{Key, Record},
     trial::Trial,
 };
@@ -50,36 +50,6 @@ impl Outcome {
             Self::Aborted => "aborted",
         }
     }
-}
-
-/// What is read of the last line of `firsthand run --json`.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Summary {
-    outcome: String,
-    reason: String,
-    mission_time_s: f64,
-    path_length_m: f64,
-    min_clearance_m: Option<f64>,
-    pose_error_m: Option<f64>,
-    true_distance_m: Option<f64>,
-    /// Mission time at which the robot had moved 0.1 m in truth.
-    departed_s: Option<f64>,
-    safety_events: u64,
-    sonar_unavailable_share: Option<f64>,
-    wheel_range_rad_s: Option<f64>,
-    looks: u64,
-    look_s: f64,
-    replans: u64,
-    resets: u64,
-    full_solves: u64,
-    local_updates: u64,
-    /// From the datagram in to the datagram out.
-    #[serde(default)]
-    pub(crate) tick_latency_us: Quantiles,
-    #[serde(default)]
-    pub(crate) full_solve_us: Quantiles,
-    #[serde(default)]
-    pub(crate) local_update_us: Quantiles,
 }
 
 /// One mission's result. Metres and mission seconds; without latencies, which no two runs share: these have a table of
@@ -286,7 +256,8 @@ mod tests {
             r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
             "pose_error_m": 0.1, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
             "sonar_unavailable_share": 0.5, "wheel_range_rad_s": 2.0, "looks": 1,
-            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1}}"#
+            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1,
+            "tick_latency_us": {{"p50": 300.0, "p99": 900.5, "max": null}}, "full_solve_us": {{}}, "local_update_us": {{}}}}"#
         );
         serde_json::from_str(&text).unwrap()
     }

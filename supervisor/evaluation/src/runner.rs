@@ -14,8 +14,9 @@ use thiserror::Error;
 use crate::{
     latency::Latency,
     results::Results,
-    row::{Outcome, Row, Summary},
+    row::{Outcome, Row},
     setting::Setting,
+    summary::Summary,
     table::TableError,
     trial::Trial,
 };
