@@ -53,9 +53,65 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let resumed = evaluate(name, &["--seed", "5", "--resume"]).unwrap();
     assert_eq!(resumed["count"], 2, "{resumed}");
     assert_eq!(resumed["success"], whole["success"]);
+    let again = std::fs::read_to_string(out.join("rows.csv")).unwrap();
+    assert_eq!(again, rows, "the rows follow from the seed");
+    let latencies = std::fs::read_to_string(out.join("latencies.csv")).unwrap();
+    assert_eq!(latencies.lines().count(), 3, "{latencies}");
 
     let refused = evaluate(name, &["--seed", "5"]).unwrap_err();
     assert!(refused.contains("--resume"), "{refused}");
     let refused = evaluate(name, &["--seed", "6", "--resume"]).unwrap_err();
     assert!(refused.contains("was another"), "{refused}");
+}
+
+#[test]
+fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
+    let folder = tempfile::tempdir().unwrap();
+    // A hall of 6 m by 3 m with a wall across its lower half, its corner at (-10, 20).
+    let (cols, rows) = (60, 30);
+    let grey = |at: usize| {
+        let (col, row) = (at % cols, at / cols);
+        let rim = col == 0 || row == 0 || col + 1 == cols || row + 1 == rows;
+        if rim || (col == 30 && row > 15) {
+            0
+        } else {
+            254
+        }
+    };
+    let mut image = format!("P5 {cols} {rows} 255\n").into_bytes();
+    image.extend((0..cols * rows).map(grey));
+    std::fs::write(folder.path().join("hall.pgm"), image).unwrap();
+    let map = folder.path().join("hall.yaml");
+    let yaml = "image: hall.pgm\nresolution: 0.1\norigin: [-10, 20, 0]";
+    std::fs::write(&map, yaml).unwrap();
+    let out = folder.path().join("out");
+    let (map, out) = (map.to_str().unwrap(), out.to_str().unwrap());
+    let common = ["evaluate", "--worlds", map, "--out", out, "--json"];
+    let ends = ["--start", "-9,21,0", "--target", "-5,21"];
+    let more = ["--realism", "laboratory"];
+    let ended = output(&[&common[..], &ends, &more].concat());
+    let found: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(
+        (&found["count"], &found["success"]),
+        (&1.into(), &1.0.into()),
+        "{found}"
+    );
+    assert!(
+        found["median_k"].as_f64() > Some(1.05),
+        "around the wall: {found}"
+    );
+
+    let refused = |arguments: &[&str]| {
+        let refused = output(&[&["evaluate"], arguments].concat());
+        assert!(!refused.status.success());
+        String::from_utf8(refused.stderr).unwrap()
+    };
+    let other = folder.path().join("other");
+    let other = ["--out", other.to_str().unwrap()];
+    let drawn = refused(&[&ends[..], &["--worlds", "rooms"], &other].concat());
+    assert!(drawn.contains("--start"), "{drawn}");
+    let alone = refused(&["--worlds", map, "--start", "1,2,3"]);
+    assert!(alone.contains("--target"), "{alone}");
+    let words = refused(&["--worlds", map, "--start", "here", "--target", "1,2"]);
+    assert!(words.contains("3 numbers"), "{words}");
 }

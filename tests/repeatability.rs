@@ -130,6 +130,26 @@ fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
 }
 
 #[test]
+fn a_mission_that_ends_by_a_touch_or_its_timeout_gives_the_same_summary_to_the_bit() {
+    // Blind: hits beyond 5 cm are not mapped.
+    let blind = [
+        "--set",
+        "method='paper'",
+        "--set",
+        "mapper.map_within_m=0.05",
+    ];
+    for (outcome, arguments) in [("collision", &blind[..]), ("timeout", &["--timeout", "5"])] {
+        let summary = || numbers(support::run("again", "obstacle-course", arguments).1);
+        let one = summary();
+        assert_eq!(one["outcome"], outcome, "{one}");
+        for _ in 0..4 {
+            assert_eq!(summary(), one);
+        }
+    }
+    assert_nothing_left("again");
+}
+
+#[test]
 fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
     // At this speed the mission has tens of thousands of ticks: seconds to be stopped in.
     let slow = ["--set", "controller.speed_m_s=0.002", "--timeout", "20000"];

@@ -220,8 +220,11 @@ impl Piece<'_> {
             }
             Self::Edge(from, to) => (from.min(*to), from.max(*to)),
             Self::Box(block) => {
-                let reach = DVec2::splat(block.size_m.length() / 2.0);
-                (block.at - reach, block.at + reach)
+                let [first, rest @ ..] = block.corners();
+                let wider = |(least, greatest): (DVec2, DVec2), corner| {
+                    (least.min(corner), greatest.max(corner))
+                };
+                rest.into_iter().fold((first, first), wider)
             }
         }
     }

@@ -4,11 +4,10 @@ use std::{collections::BTreeMap, fmt};
 
 use common::{
     clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
-    samples::PoseSample,
 };
 use serde::Serialize;
 
-use supervisor::{Finished, outcome::Outcome};
+use supervisor::{Finished, outcome::Outcome, totals::LookTotals};
 
 /// Quantiles of a duration, microseconds; none of nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -78,7 +77,7 @@ pub(crate) struct Summary {
 const DEPARTED_M: f64 = 0.1;
 
 impl Summary {
-    /// Of a finished run. What came after the arrival does not count: it depends on how fast the stop was.
+    /// Of a finished run. What came after that was decided does not count.
     pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
         let Finished {
             ending,
@@ -86,32 +85,19 @@ impl Summary {
             resumes,
             ..
         } = finished;
-        let arrival = record
-            .arrival
-            .filter(|_| ending.outcome == Outcome::Reached);
-        let last_tick = match arrival {
-            Some(command) => Some(command.stamp.tick),
-            None => record.newest_tick(),
-        };
+        let last_tick = finished.last_tick.or(record.newest_tick());
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
-        let truth = truth_until(&finished.truth, pose, arrival.is_some());
+        let truth = &finished.truth[..];
         let (full_solves, local_updates) = record.solves(guidance);
         let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
         let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
         let collisions = truth.last().map(|tick| tick.contacts);
-        // The ground truth comes through a pipe of its own: a touch on the way may be read after the arrival.
-        let touched = ending.outcome == Outcome::Reached && collisions.is_some_and(|n| n > 0);
-        let (outcome, reason) = if touched {
-            let reason = "touched something on the way to the target".to_owned();
-            (Outcome::Collision, reason)
-        } else {
-            (ending.outcome, ending.reason.clone())
-        };
+        let looks = last_tick.map_or(LookTotals::default(), |tick| record.looks.at(tick));
         Self {
-            outcome,
-            reason,
+            outcome: ending.outcome,
+            reason: ending.reason.clone(),
             mission_time_s: time.seconds(),
             path_length_m: match ended {
                 Some(_) if *resumes == 0 => path_length(truth),
@@ -121,9 +107,10 @@ impl Summary {
             min_clearance_m: clearance
                 .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
             collisions,
-            pose_error_m: pose
-                .zip(truth.last())
-                .map(|(pose, truth)| truth.pose_error_m(pose)),
+            pose_error_m: pose.and_then(|pose| {
+                let its = truth.iter().rev().find(|tick| tick.is_of(pose));
+                Some(its.or(truth.last())?.pose_error_m(pose))
+            }),
             true_distance_m: truth
                 .last()
                 .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
@@ -135,8 +122,8 @@ impl Summary {
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves,
             local_updates,
-            looks: record.looks,
-            look_s: record.look_ticks as f64 / mission.robot.rate_hz,
+            looks: looks.looks,
+            look_s: looks.ticks as f64 / mission.robot.rate_hz,
             sonar_unavailable_share: sonar_unavailable_share(truth),
             wheel_range_rad_s: last_tick.and_then(|tick| record.wheels.at(tick).range_rad_s()),
             ticks: last_tick.map_or(0, |tick| tick + 1),
@@ -228,26 +215,6 @@ impl fmt::Display for Summary {
         }
         Ok(())
     }
-}
-
-/// The ground truth up to the tick of `pose`. All of it when the run did not end by arriving.
-fn truth_until<'a>(
-    truth: &'a [GroundTruthTick],
-    pose: Option<&PoseSample>,
-    arrived: bool,
-) -> &'a [GroundTruthTick] {
-    if !arrived {
-        return truth;
-    }
-    let shows = |tick: &GroundTruthTick| pose.is_some_and(|pose| tick.is_of(pose));
-    let end = truth.iter().rposition(shows).map_or(truth.len(), |last| {
-        // A robot at rest shows the same counts for many ticks: the first of them is the arrival.
-        truth[..=last]
-            .iter()
-            .rposition(|tick| !shows(tick))
-            .map_or(0, |before| before + 1)
-    });
-    &truth[..truth.len().min(end + 1)]
 }
 
 fn path_length(truth: &[GroundTruthTick]) -> f64 {

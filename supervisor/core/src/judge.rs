@@ -60,8 +60,25 @@ pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
         .or_else(|| arrived(snapshot))
         .or_else(|| ended_by_failsafe(snapshot))
         .or_else(|| collided(snapshot))
-        .or_else(|| timed_out(snapshot))
+        .or_else(|| overran(snapshot))
         .or_else(|| stuck(snapshot, now))
+}
+
+/// The robot arrived so far from the target, metres.
+pub(crate) fn reached(distance_m: f64) -> Ending {
+    let reason = format!("{distance_m:.2} m from the target");
+    Ending::asked_for(Outcome::Reached, reason)
+}
+
+/// The robot touched something when it was there, metres.
+pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
+    let reason = format!("touched something near ({x:.2}, {y:.2})");
+    Ending::failed(Outcome::Collision, reason)
+}
+
+/// So many seconds of mission time were not enough.
+pub(crate) fn timed_out(timeout_s: f64) -> Ending {
+    Ending::failed(Outcome::Timeout, format!("not there after {timeout_s} s"))
 }
 
 fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
@@ -70,9 +87,7 @@ fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
 }
 
 fn arrived(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    let distance = snapshot.arrived_m?;
-    let reason = format!("{distance:.2} m from the target");
-    Some(Ending::asked_for(Outcome::Reached, reason))
+    snapshot.arrived_m.map(reached)
 }
 
 fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
@@ -83,15 +98,12 @@ fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
 }
 
 fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    let [x, y] = snapshot.collision_m?;
-    let reason = format!("touched something near ({x:.2}, {y:.2})");
-    Some(Ending::failed(Outcome::Collision, reason))
+    snapshot.collision_m.map(touched)
 }
 
-fn timed_out(snapshot: &Snapshot<'_>) -> Option<Ending> {
+fn overran(snapshot: &Snapshot<'_>) -> Option<Ending> {
     let timeout_s = snapshot.timeout_s;
-    let reason = || format!("not there after {timeout_s} s");
-    (snapshot.time.seconds() >= timeout_s).then(|| Ending::failed(Outcome::Timeout, reason()))
+    (snapshot.time.seconds() >= timeout_s).then(|| timed_out(timeout_s))
 }
 
 fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {

@@ -31,6 +31,7 @@
 //! | `output_watchdog` | whether each stage answers what it reads, pure |
 //! | `order` | whether the robot may drive, pure |
 //! | `judge` | whether the mission is over, pure; [`outcome`] is its result |
+//! | `decisive` | which of the things that end a mission came first, and at which tick, pure |
 //! | `stall` | whether the robot stalls, and the next recovery step, pure |
 //! | `supervisor` | the loop, which asks these |
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
@@ -51,6 +52,7 @@
 mod bus_endpoints;
 mod cleanup;
 mod death;
+mod decisive;
 pub mod domain;
 mod domain_error;
 mod error;

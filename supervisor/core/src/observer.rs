@@ -8,7 +8,7 @@ use common::{
     latency::Histogram,
     samples::{
         CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        GuidanceStatus, HealthSample, LinkSample, PoseSample,
+        HealthSample, LinkSample, PoseSample,
     },
     topics::{self, AnyTopic as _},
     waiter::Waiter,
@@ -16,7 +16,7 @@ use common::{
 
 use crate::{
     stage_processes::StageProcesses,
-    totals::{Totals, WheelTotals},
+    totals::{LookTotals, Totals, WheelTotals},
 };
 
 /// Guidance samples recorded: the one of the arrival tick must still be there when the command is seen.
@@ -56,10 +56,8 @@ pub struct Record {
     latencies: BTreeMap<u32, LinkSample>,
     /// The newest counts of each generation of the planner: full solves, local updates.
     planners: BTreeMap<u32, (u64, u64)>,
-    /// Times the robot stopped to look.
-    pub looks: u64,
-    /// Ticks it looked.
-    pub look_ticks: u64,
+    /// How often and how long the robot stopped to look.
+    pub looks: Totals<LookTotals>,
     /// What the wheels were commanded.
     pub wheels: Totals<WheelTotals>,
     /// How long full solves took.
@@ -96,11 +94,6 @@ impl Observer {
             roster_changed |= stages.on_health(&health);
         }
         let record = &mut self.record;
-        while let Some(link) = self.link.take()? {
-            stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
-            record.latencies.insert(link.stamp.generation, link);
-            record.link = Some(link);
-        }
         // The command of a tick is read before the samples it was computed from, so that these are in the record when
         // the command is.
         while let Some(command) = self.command.take()? {
@@ -135,6 +128,12 @@ impl Observer {
             }
             record.poses.push(pose);
         }
+        // What the link passes is what poses come from.
+        while let Some(link) = self.link.take()? {
+            stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
+            record.latencies.insert(link.stamp.generation, link);
+            record.link = Some(link);
+        }
         Ok(roster_changed)
     }
 }
@@ -151,15 +150,8 @@ impl Record {
         if counts.1 > local {
             self.local_updates.record(guidance.local_update_ns);
         }
-        let is_look = |guidance: &GuidanceSample| {
-            GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look
-        };
-        if is_look(&guidance) {
-            let before = self.guidance.back();
-            self.looks += u64::from(!before.is_some_and(is_look));
-            let is_new_tick = before.is_none_or(|it| it.stamp.tick < guidance.stamp.tick);
-            self.look_ticks += u64::from(is_new_tick);
-        }
+        self.looks
+            .add(guidance.stamp.tick, |totals| totals.with(&guidance));
         if self.guidance.len() == MOST_GUIDANCE {
             self.guidance.pop_front();
         }
@@ -172,6 +164,21 @@ impl Record {
             .iter()
             .rev()
             .find(|guidance| guidance.stamp.tick <= tick)
+    }
+
+    /// The pose and the guidance of every tick after `last` of which both are here, oldest first.
+    pub(crate) fn ticks_since(
+        &self,
+        last: Option<u64>,
+    ) -> impl Iterator<Item = (&PoseSample, &GuidanceSample)> {
+        let first = last.map_or(0, |tick| tick + 1);
+        let new = self.poses.partition_point(|pose| pose.stamp.tick < first);
+        let guidance_of = |tick: u64| {
+            let guidance = self.guidance_at(tick);
+            guidance.filter(|guidance| guidance.stamp.tick == tick)
+        };
+        let ticks = self.poses[new..].iter();
+        ticks.filter_map(move |pose| Some((pose, guidance_of(pose.stamp.tick)?)))
     }
 
     /// The newest guidance.

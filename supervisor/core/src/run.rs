@@ -9,6 +9,7 @@ use common::{
 };
 
 use crate::{
+    decisive,
     domain::DomainLock,
     error::{SupervisorError, system},
     observer::Record,
@@ -22,9 +23,12 @@ use crate::{
 pub struct Finished {
     /// How it ended, and why.
     pub ending: Ending,
+    /// The last complete tick before that was decided; none where no tick decided. What came after it does not count: how
+    /// much that is depends on how fast the stop was.
+    pub last_tick: Option<u64>,
     /// What was read from the bus.
     pub record: Record,
-    /// What really happened, of a simulated robot.
+    /// What really happened until then, of a simulated robot.
     pub truth: Vec<GroundTruthTick>,
     /// Times each stage was started again.
     pub restarts: BTreeMap<&'static str, u32>,
@@ -58,10 +62,21 @@ pub fn run(
     let ending = ending?;
     stopped?;
     let simulator = supervisor.robot.simulator;
-    Ok(Finished {
+    let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
+    let record = supervisor.bus.observer.record;
+    let decided = decisive::first(
         ending,
-        record: supervisor.bus.observer.record,
-        truth: simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec()),
+        &record,
+        &truth,
+        options.mission.timeout_s,
+        supervisor.stall_watch.tick(),
+    );
+    truth.truncate(decided.truth_ticks);
+    Ok(Finished {
+        ending: decided.ending,
+        last_tick: decided.last_tick,
+        record,
+        truth,
         restarts: supervisor.stages.restarts().collect(),
         resumes: supervisor.state_file.state.resumes,
         replans: supervisor.stall_watch.replans(),

@@ -167,7 +167,12 @@ impl StallWatch {
         self.epoch
     }
 
-    /// Look at the newest tick of a robot that is ordered to drive; each is looked at once. `held` says that something
+    /// The tick that was looked at last: the one of the stall, when the last step found one.
+    pub(crate) const fn tick(&self) -> Option<u64> {
+        self.tick
+    }
+
+    /// Look at a tick of a robot that is ordered to drive; each is looked at once. `held` says that something
     /// else holds the robot: the link's failsafe, a stage that is down.
     pub(crate) fn step(
         &mut self,

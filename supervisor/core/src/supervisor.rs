@@ -16,6 +16,7 @@ use common::{
 use crate::{
     bus_endpoints::BusEndpoints,
     cleanup::Cleanup,
+    decisive,
     domain::DomainLock,
     error::{SupervisorError, system},
     judge::{self, TickProgress},
@@ -274,8 +275,7 @@ impl<'a> Supervisor<'a> {
         let now = Instant::now();
         let record = &self.bus.observer.record;
         let simulator = self.robot.simulator.as_ref();
-        let truth = simulator.and_then(|simulator| simulator.truth().last());
-        let collision = truth.filter(|truth| truth.contacts > 0);
+        let collision = simulator.and_then(|simulator| decisive::first_contact(simulator.truth()));
         judge::judge(
             &judge::Snapshot {
                 arrived_m: record.arrival.map(|command| command.distance_m),
@@ -300,16 +300,21 @@ impl<'a> Supervisor<'a> {
 
     /// Look for a stall, and take the next recovery step. The last one ends the mission.
     fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
-        let record = &self.bus.observer.record;
-        let (Some(pose), Some(guidance)) = (record.pose, record.newest_guidance()) else {
-            return Ok(None);
-        };
         if self.decision.order() != Order::Drive {
             return Ok(None);
         }
+        let record = &self.bus.observer.record;
         let stopped = record.link.is_none_or(|link| link.stopped());
         let held = stopped || !self.stages.all_running();
-        let Some(stall) = self.stall_watch.step(&pose, guidance, held) else {
+        // Several may have passed since the last look: a stall is one whether each was seen alone or not.
+        let mut found = None;
+        for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
+            if let Some(stall) = self.stall_watch.step(pose, guidance, held) {
+                found = Some((*pose, stall));
+                break;
+            }
+        }
+        let Some((pose, stall)) = found else {
             return Ok(None);
         };
         stall::log(&stall);

@@ -1,9 +1,9 @@
-//! Totals of what the wheels were commanded, as of each of the newest ticks: what came after the arrival does not count, and
-//! the arrival may be read after it.
+//! Totals of what the wheels were commanded and how the robot looked, as of each of the newest ticks: what came after the
+//! end does not count, and the end may be read after it.
 
 use std::collections::VecDeque;
 
-use common::samples::{CommandSample, CommandState};
+use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus};
 
 /// Ticks whose totals are kept: that of the arrival must still be there when the command is seen.
 const MOST: usize = 1024;
@@ -70,6 +70,28 @@ impl WheelTotals {
     #[must_use]
     pub fn range_rad_s(self) -> Option<f64> {
         self.extremes.map(|[least, greatest]| greatest - least)
+    }
+}
+
+/// How the robot stopped to look.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LookTotals {
+    /// Times it did.
+    pub looks: u64,
+    /// Ticks it looked.
+    pub ticks: u64,
+    looking: bool,
+}
+
+impl LookTotals {
+    /// With one more tick.
+    pub(crate) fn with(self, guidance: &GuidanceSample) -> Self {
+        let looking = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look;
+        Self {
+            looks: self.looks + u64::from(looking && !self.looking),
+            ticks: self.ticks + u64::from(looking),
+            looking,
+        }
     }
 }
 

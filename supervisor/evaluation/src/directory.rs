@@ -9,8 +9,6 @@ use thiserror::Error;
 
 /// In the directory: the command that gives its rows.
 const PLAN_FILE: &str = "plan.txt";
-/// In the directory: the rows.
-pub const ROWS_FILE: &str = "rows.csv";
 /// In the directory: the page of results.
 pub const PAGE_FILE: &str = "index.html";
 

@@ -3,7 +3,9 @@
 use std::fmt::{self, Write as _};
 
 use crate::{
+    latency::{self, Latency},
     page::{END, escaped, head},
+    results::Results,
     row::{Outcome, Row},
     runner::Plan,
     totals::{Comparison, Totals},
@@ -73,7 +75,8 @@ impl Totals {
 
 /// The page; pictures are beside it, as [`Plan::picture`] says. `command` is how to make it again.
 #[must_use]
-pub fn html(plan: &Plan, rows: &[Row], command: &str) -> String {
+pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
+    let rows = results.rows.rows();
     let report = Report::new(plan, rows);
     let mut page = head("Evaluation");
     let _ = write!(
@@ -107,6 +110,7 @@ pub fn html(plan: &Plan, rows: &[Row], command: &str) -> String {
     for comparison in &report.comparisons {
         let _ = writeln!(page, "<p>{}</p>", escaped(&comparison.to_string()));
     }
+    add_latencies(&mut page, plan, results.latencies.rows());
     for outcome in Outcome::ALL.into_iter().skip(1) {
         let failures: Vec<&Row> = rows.iter().filter(|row| row.outcome == outcome).collect();
         if failures.is_empty() {
@@ -135,4 +139,30 @@ pub fn html(plan: &Plan, rows: &[Row], command: &str) -> String {
     }
     page.push_str(END);
     page
+}
+
+/// Medians over the missions of each setting.
+fn add_latencies(page: &mut String, plan: &Plan, latencies: &[Latency]) {
+    if latencies.is_empty() {
+        return;
+    }
+    page.push_str(
+        "<h2>Latencies</h2>\n<p>Microseconds of this machine, medians over the missions; each mission is in <code>latencies.csv</code>.</p>\n\
+<table><tr><th>setting</th><th>of a</th><th>median</th><th>99 %</th><th>longest</th></tr>\n",
+    );
+    for setting in &plan.settings {
+        for (name, values) in latency::medians(&setting.name, latencies) {
+            let _ = write!(
+                page,
+                "<tr><td>{}</td><td>{name}</td>",
+                escaped(&setting.name)
+            );
+            for value in values {
+                let value = value.map_or(String::new(), |value| format!("{value:.0}"));
+                let _ = write!(page, "<td>{value}</td>");
+            }
+            page.push_str("</tr>\n");
+        }
+    }
+    page.push_str("</table>\n");
 }

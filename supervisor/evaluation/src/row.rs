@@ -2,7 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{setting::Setting, trial::Trial};
+use crate::{
+    setting::Setting,
+    summary::{Quantiles, Summary},
+    table::{Key, Record},
+    trial::Trial,
+};
 
 /// How a mission ended, by the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -47,30 +52,8 @@ impl Outcome {
     }
 }
 
-/// What is read of the last line of `firsthand run --json`.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Summary {
-    outcome: String,
-    reason: String,
-    mission_time_s: f64,
-    path_length_m: f64,
-    min_clearance_m: Option<f64>,
-    pose_error_m: Option<f64>,
-    true_distance_m: Option<f64>,
-    /// Mission time at which the robot had moved 0.1 m in truth.
-    departed_s: Option<f64>,
-    safety_events: u64,
-    sonar_unavailable_share: Option<f64>,
-    wheel_range_rad_s: Option<f64>,
-    looks: u64,
-    look_s: f64,
-    replans: u64,
-    resets: u64,
-    full_solves: u64,
-    local_updates: u64,
-}
-
-/// One mission's result. Metres and mission seconds; without latencies, which no two runs share.
+/// One mission's result. Metres and mission seconds; without latencies, which no two runs share: these have a table of
+/// their own, see [`Latency`](crate::latency::Latency).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The world.
@@ -201,13 +184,16 @@ impl Row {
             resets: 0,
             full_solves: 0,
             local_updates: 0,
+            tick_latency_us: Quantiles::default(),
+            full_solve_us: Quantiles::default(),
+            local_update_us: Quantiles::default(),
         };
         Self::new(trial, seed, setting, &nothing)
     }
+}
 
-    /// What makes it the row it is.
-    #[must_use]
-    pub fn key(&self) -> (String, u64, String) {
+impl Record for Row {
+    fn key(&self) -> Key {
         (self.world.clone(), self.seed, self.setting.clone())
     }
 }
@@ -270,7 +256,8 @@ mod tests {
             r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
             "pose_error_m": 0.1, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
             "sonar_unavailable_share": 0.5, "wheel_range_rad_s": 2.0, "looks": 1,
-            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1}}"#
+            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1,
+            "tick_latency_us": {{"p50": 300.0, "p99": 900.5, "max": null}}, "full_solve_us": {{}}, "local_update_us": {{}}}}"#
         );
         serde_json::from_str(&text).unwrap()
     }

@@ -12,9 +12,12 @@ use supervisor::process::firsthand;
 use thiserror::Error;
 
 use crate::{
-    row::{Outcome, Row, Summary},
+    latency::Latency,
+    results::Results,
+    row::{Outcome, Row},
     setting::Setting,
-    table::{Table, TableError},
+    summary::Summary,
+    table::TableError,
     trial::Trial,
 };
 
@@ -132,13 +135,13 @@ pub fn picture(row: &Row) -> PathBuf {
     ))
 }
 
-/// Run all missions of `plan` whose rows are not in `table` yet. `watch` is told after each.
+/// Run all missions of `plan` whose rows are not in `results` yet. `watch` is told after each.
 ///
 /// # Errors
 /// When a file cannot be written. A mission that fails is a row.
 pub fn run(
     plan: &Plan,
-    table: &mut Table,
+    results: &mut Results,
     watch: &mut dyn FnMut(&Progress),
 ) -> Result<(), RunnerError> {
     let pictures = plan.pictured_seed.map(|_| "pictures");
@@ -152,7 +155,7 @@ pub fn run(
         text.and_then(|text| fs::write(&file, text))
             .map_err(system(format!("write {}", file.display())))?;
     }
-    let done = table.keys();
+    let done = results.rows.keys();
     let all = plan.jobs().count();
     let left = plan.jobs().filter(|job| {
         let key = (job.trial.world.clone(), job.seed, job.setting.name.clone());
@@ -165,7 +168,7 @@ pub fn run(
         ended_now: 0,
     };
     let queue = Mutex::new(left.into_iter());
-    let (give, rows) = channel();
+    let (give, rows) = channel::<Result<_, RunnerError>>();
     thread::scope(|scope| {
         for worker in 0..plan.jobs.max(1) {
             let (give, queue) = (give.clone(), &queue);
@@ -182,8 +185,11 @@ pub fn run(
             });
         }
         drop(give);
-        for row in rows {
-            table.add(row?)?;
+        for ended in rows {
+            let (row, latency) = ended?;
+            // First, so that a mission whose row is there has both.
+            latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
+            results.rows.add(row)?;
             progress.ended += 1;
             progress.ended_now += 1;
             watch(&progress);
@@ -192,8 +198,12 @@ pub fn run(
     })
 }
 
-/// One mission, in processes of its own.
-fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError> {
+/// One mission, in processes of its own. One that gave no summary has no latencies.
+fn mission(
+    plan: &Plan,
+    job: &Job<'_>,
+    worker: usize,
+) -> Result<(Row, Option<Latency>), RunnerError> {
     let Job {
         trial,
         setting,
@@ -214,8 +224,12 @@ fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError
         .stderr(Stdio::piped())
         .output()
         .map_err(system("start a mission"))?;
-    let row = match serde_json::from_slice::<Summary>(&output.stdout) {
-        Ok(summary) => Row::new(trial, *seed, setting, &summary),
+    let (row, latency) = match serde_json::from_slice::<Summary>(&output.stdout) {
+        Ok(summary) => {
+            let row = Row::new(trial, *seed, setting, &summary);
+            let latency = Latency::new(&row, &summary);
+            (row, Some(latency))
+        }
         Err(_) => {
             let said = String::from_utf8_lossy(&output.stderr);
             let reason = said
@@ -224,7 +238,7 @@ fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError
                 .last()
                 .unwrap_or("no summary")
                 .to_owned();
-            Row::aborted(trial, *seed, setting, reason)
+            (Row::aborted(trial, *seed, setting, reason), None)
         }
     };
     if plan.keeps_picture(&row) {
@@ -232,5 +246,5 @@ fn mission(plan: &Plan, job: &Job<'_>, worker: usize) -> Result<Row, RunnerError
         let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
     }
     let _ = fs::remove_dir_all(&directory);
-    Ok(row)
+    Ok((row, latency))
 }

@@ -1,4 +1,4 @@
-//! The rows of an evaluation in a CSV file: appended as missions end, sorted when all have.
+//! Rows in a CSV file, one for each mission: appended as missions end, sorted when all have.
 
 use std::{
     collections::BTreeSet,
@@ -7,9 +7,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
-use crate::row::Row;
+/// World, noise seed and setting: what makes a mission the one it is.
+pub type Key = (String, u64, String);
+
+/// A row of a table.
+pub trait Record: Serialize + DeserializeOwned {
+    /// Of which mission it is.
+    fn key(&self) -> Key;
+}
 
 /// A table that cannot be read or written.
 #[derive(Debug, Error)]
@@ -22,12 +30,12 @@ pub struct TableError {
 
 /// The file, and what is in it.
 #[derive(Debug)]
-pub struct Table {
+pub struct Table<R> {
     file: PathBuf,
-    rows: Vec<Row>,
+    rows: Vec<R>,
 }
 
-impl Table {
+impl<R: Record> Table<R> {
     /// A table in `file`: with the rows that are there already, or empty.
     ///
     /// # Errors
@@ -49,21 +57,21 @@ impl Table {
 
     /// What is in it.
     #[must_use]
-    pub fn rows(&self) -> &[Row] {
+    pub fn rows(&self) -> &[R] {
         &self.rows
     }
 
     /// The missions whose rows are there.
     #[must_use]
-    pub fn keys(&self) -> BTreeSet<(String, u64, String)> {
-        self.rows.iter().map(Row::key).collect()
+    pub fn keys(&self) -> BTreeSet<Key> {
+        self.rows.iter().map(R::key).collect()
     }
 
     /// Append a row to the file.
     ///
     /// # Errors
     /// When the disk is full, say.
-    pub fn add(&mut self, row: Row) -> Result<(), TableError> {
+    pub fn add(&mut self, row: R) -> Result<(), TableError> {
         let opened = File::options().append(true).open(&self.file);
         let opened = opened.map_err(|error| self.failed("append to")(error.into()))?;
         let mut writer = csv::WriterBuilder::new()
@@ -75,12 +83,14 @@ impl Table {
         Ok(())
     }
 
-    /// Sort the rows, by world, seed and setting, and write them anew.
+    /// Sort the rows, by world, seed and setting, and write them anew; of two of one mission the later one.
     ///
     /// # Errors
     /// When the disk is full, say.
     pub fn sort(&mut self) -> Result<(), TableError> {
-        self.rows.sort_by_key(Row::key);
+        self.rows.reverse();
+        self.rows.sort_by_key(R::key);
+        self.rows.dedup_by_key(|row| row.key());
         self.save()
     }
 

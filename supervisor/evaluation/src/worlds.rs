@@ -2,23 +2,21 @@
 
 mod barn;
 mod corridors;
+mod ends;
 mod error;
+mod files;
+mod floor;
+mod found;
+mod furnished;
 mod random;
 mod rooms;
 mod traps;
 
-use std::{
-    convert::Infallible,
-    fmt, fs,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::{convert::Infallible, fmt, path::PathBuf, str::FromStr};
 
-use common::mission::Mission;
-
-pub use self::error::WorldError;
-use self::{corridors::Bends, random::Random, rooms::Doors};
-use crate::trial::{BodySize, Rules, Scene, Trial};
+use self::{corridors::Bends, files::Asked, random::Random, rooms::Doors};
+pub use self::{ends::Ends, error::WorldError, found::Found};
+use crate::trial::{BodySize, Rules, Scene};
 
 /// Draws that may fail in a row before a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
@@ -36,17 +34,20 @@ pub enum Worlds {
     Corridors,
     /// Straight empty corridors from 0.8 m.
     StraightCorridors,
-    /// A file or a folder: a mission, a BARN `.world` or table of cylinders.
+    /// Rooms with tables, chairs, low and soft things.
+    Furnished,
+    /// A file or a folder: a mission, a ROS map, a BARN `.world` or table of cylinders.
     Path(PathBuf),
 }
 
 /// Kinds that are drawn, by their names.
-const DRAWN: [(&str, Worlds); 5] = [
+const DRAWN: [(&str, Worlds); 6] = [
     ("rooms", Worlds::Rooms),
     ("doors", Worlds::Doors),
     ("traps", Worlds::Traps),
     ("corridors", Worlds::Corridors),
     ("straight-corridors", Worlds::StraightCorridors),
+    ("furnished", Worlds::Furnished),
 ];
 
 impl FromStr for Worlds {
@@ -68,25 +69,20 @@ impl fmt::Display for Worlds {
     }
 }
 
-/// Trials, and what was left out on the way to them.
-#[derive(Debug, Default)]
-pub struct Found {
-    /// Each solvable.
-    pub trials: Vec<Trial>,
-    /// Worlds that the body could not cross.
-    pub unsolvable: usize,
-}
-
-/// `count` trials of `worlds` under `seed`; of files all, without a count.
+/// `count` trials of `worlds` under `seed`; of files all, without a count. `ends` are for maps alone.
 ///
 /// # Errors
-/// When a file cannot be read, or no world can be crossed.
+/// When a file cannot be read, `ends` are given without a map, or no world can be crossed.
 pub fn find(
     worlds: &Worlds,
     count: Option<usize>,
     seed: u64,
+    ends: Option<Ends>,
     body: &BodySize,
 ) -> Result<Found, WorldError> {
+    if ends.is_some() && !matches!(worlds, Worlds::Path(_)) {
+        return Err(WorldError::NoMap);
+    }
     let drawn = |kind: u64, name: &str, draw: &dyn Fn(&mut Random, usize) -> Scene| {
         draw_until(count.unwrap_or(100), seed, kind, name, body, draw)
     };
@@ -104,7 +100,8 @@ pub fn find(
         Worlds::StraightCorridors => drawn(5, "straight-corridors", &|random, _| {
             corridors::draw(random, Bends::None)
         })?,
-        Worlds::Path(path) => from_path(path, count, body)?,
+        Worlds::Furnished => drawn(6, "furnished", &furnished::draw)?,
+        Worlds::Path(path) => files::read(path, Asked { count, seed, ends }, body)?,
     };
     if found.trials.is_empty() {
         return Err(WorldError::Unsolvable {
@@ -130,105 +127,15 @@ fn draw_until(
         let scene = draw(&mut Random::new(seed, kind, drawn), number);
         drawn += 1;
         let world = format!("{name}-{seed}-{number:04}");
-        match Trial::new(world, &scene, Rules::default(), body)? {
-            Some(trial) => found.trials.push(trial),
-            None => found.unsolvable += 1,
-        }
+        found.add(world, &scene, Rules::default(), body)?;
     }
     Ok(found)
-}
-
-/// The worlds of a file, or of every file in a folder that is one, by name; `count` of them spread evenly.
-fn from_path(path: &Path, count: Option<usize>, body: &BodySize) -> Result<Found, WorldError> {
-    let mut files = vec![path.to_path_buf()];
-    if path.is_dir() {
-        files = fs::read_dir(path)
-            .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect())
-            .map_err(WorldError::unreadable(path))?;
-        files.retain(|file| Kind::of(file).is_some());
-        files.sort();
-    }
-    let mut found = Found::default();
-    for file in &files {
-        let scenes = match Kind::of(file) {
-            Some(Kind::Mission) => {
-                add_mission(&mut found, file, body)?;
-                continue;
-            }
-            Some(Kind::Gazebo) => vec![barn::gazebo(file)?],
-            Some(Kind::Cylinders) => barn::table(file)?,
-            None => {
-                return Err(WorldError::malformed(
-                    file,
-                    "not a world; give a mission (.toml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
-                ));
-            }
-        };
-        for (world, scene, rules) in scenes {
-            match Trial::new(world, &scene, rules, body)? {
-                Some(mut trial) => {
-                    trial.mission.timeout_s = barn::TIMEOUT_S;
-                    trial.mission.arrival_tolerance_m = rules.success_within_m * 0.7;
-                    found.trials.push(trial);
-                }
-                None => found.unsolvable += 1,
-            }
-        }
-    }
-    if let Some(count) = count {
-        spread(&mut found.trials, count);
-    }
-    Ok(found)
-}
-
-/// Keep `count` of `trials`, evenly spread over them.
-fn spread(trials: &mut Vec<Trial>, count: usize) {
-    let all = trials.len();
-    if count < all {
-        let mut index = 0;
-        trials.retain(|_| {
-            let before = index * count / all;
-            index += 1;
-            index * count / all > before
-        });
-    }
-}
-
-/// A mission file as a world.
-fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
-    let mission = Mission::load(file)?;
-    match Trial::of_mission(mission.name.clone(), mission, body) {
-        Some(trial) => found.trials.push(trial),
-        None => found.unsolvable += 1,
-    }
-    Ok(())
-}
-
-/// What a file holds, by its name.
-#[derive(Clone, Copy)]
-enum Kind {
-    Mission,
-    Gazebo,
-    Cylinders,
-}
-
-impl Kind {
-    fn of(file: &Path) -> Option<Self> {
-        let name = file.file_name()?.to_string_lossy();
-        if name.ends_with(".toml") {
-            Some(Self::Mission)
-        } else if name.ends_with(".world") {
-            Some(Self::Gazebo)
-        } else if name.ends_with("cylinders.csv") || name.ends_with(".csv.gz") {
-            Some(Self::Cylinders)
-        } else {
-            None
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use common::mission::{Heights, Mission, Realism};
+
     use super::*;
 
     const BODY: BodySize = BodySize {
@@ -244,9 +151,10 @@ mod tests {
             Worlds::Traps,
             Worlds::Corridors,
             Worlds::StraightCorridors,
+            Worlds::Furnished,
         ] {
             let missions = |seed| -> Vec<Mission> {
-                let found = find(&worlds, Some(6), seed, &BODY).unwrap();
+                let found = find(&worlds, Some(6), seed, None, &BODY).unwrap();
                 found
                     .trials
                     .into_iter()
@@ -265,29 +173,26 @@ mod tests {
             Worlds::Doors,
             Worlds::Traps,
             Worlds::Corridors,
+            Worlds::Furnished,
         ] {
-            for trial in find(&worlds, Some(20), 3, &BODY).unwrap().trials {
+            for trial in find(&worlds, Some(20), 3, None, &BODY).unwrap().trials {
                 let mission = &trial.mission;
                 let name = &trial.world;
                 assert!(trial.shortest_m >= mission.target.length() - 1e-9, "{name}");
                 assert!(trial.shortest_m < 5.0 * mission.target.length(), "{name}");
+                let touched = Heights::preset(Realism::default()).touched(&mission.world);
                 for place in [glam::DVec2::ZERO, mission.target] {
-                    assert!(mission.world.clearance(place) > BODY.radius_m, "{name}");
+                    assert!(touched.clearance(place) > BODY.radius_m, "{name}");
                 }
             }
         }
     }
 
     #[test]
-    fn a_count_takes_worlds_from_the_whole_of_a_folder() {
-        let folder = tempfile::tempdir().unwrap();
-        for number in 0..10 {
-            let file = folder.path().join(format!("m{number}.toml"));
-            fs::write(file, "target = [2, 0]").unwrap();
+    fn the_guide_has_every_kind_of_world() {
+        let page = include_str!("../../guide/evaluate-worlds.md");
+        for (name, _) in DRAWN {
+            assert!(page.contains(&format!("\n| `{name}` | ")), "{name}");
         }
-        let worlds = Worlds::Path(folder.path().to_path_buf());
-        let found = find(&worlds, Some(3), 1, &BODY).unwrap();
-        let names: Vec<_> = found.trials.iter().map(|trial| &*trial.world).collect();
-        assert_eq!(names, ["m3", "m6", "m9"]);
     }
 }

@@ -6,7 +6,8 @@
 //! | `image` | a PGM (any Netpbm) or PNG image |
 //! | `moving_ai` | the `.map` grids of the MovingAI benchmarks |
 //!
-//! [`load`] chooses one by the file's name. [`Map`] is what they read, [`MapError`] why they could not.
+//! [`load`] chooses one by the file's name, [`load_placed`] reads a ROS map with its place in metres. [`Map`] is what they
+//! read, [`MapError`] why they could not.
 //!
 //! Files come from anywhere: sizes are checked before memory is taken, and everything that cannot be read is refused
 //! with the file, the cause and the remedy.
@@ -21,7 +22,8 @@ mod ros;
 use std::path::Path;
 
 pub use error::MapError;
-pub use map::Map;
+pub use map::{Map, PlacedMap};
+pub use ros::load_placed;
 
 /// The map in `file`, whose name says how to read it.
 pub fn load(file: &Path) -> Result<Map, MapError> {

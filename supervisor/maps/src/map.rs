@@ -11,6 +11,17 @@ pub struct Map {
     pub blocked: Vec<bool>,
 }
 
+/// A map of cells, and where it lies.
+#[derive(Debug)]
+pub struct PlacedMap {
+    /// The cells.
+    pub map: Map,
+    /// Side of a cell, metres.
+    pub cell_m: f64,
+    /// The corner of the map where x and y are least, metres.
+    pub corner_m: [f64; 2],
+}
+
 impl Map {
     /// A map of `free` cells. Its rim counts as blocked, as the perimeter of a mission does.
     pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {

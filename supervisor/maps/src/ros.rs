@@ -1,20 +1,27 @@
 //! Map files of the ROS map_server: a YAML that names an image and says how to read it.
 //!
-//! Resolution and origin are not read: a field is solved in cells.
+//! [`load`] does not read resolution and origin: a field is solved in cells. [`load_placed`] does.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
 
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{
     error::MapError,
     file::read,
     image::{self, Lightness},
-    map::Map,
+    map::{Map, PlacedMap},
 };
 
 /// A map file says a dozen short things.
 const LONGEST: u64 = 64 << 10;
+/// Sides of a cell that a map of a building may have, metres.
+const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
+/// Nothing lies farther from the origin than this, metres.
+const FARTHEST_M: f64 = 1e6;
 
 /// The keys that matter here; other programs keep theirs in the same file.
 #[derive(Deserialize)]
@@ -25,6 +32,13 @@ struct MapFile {
     free_thresh: Option<f64>,
     occupied_thresh: Option<f64>,
     mode: Option<String>,
+}
+
+/// The keys that say where the map lies.
+#[derive(Deserialize)]
+struct Place {
+    resolution: f64,
+    origin: Vec<f64>,
 }
 
 /// The map_server writes 0 and 1, people write false and true.
@@ -43,18 +57,61 @@ impl Default for Negate {
 
 /// The map a YAML describes.
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
-    let text = String::from_utf8(read(file, LONGEST)?).map_err(|_| {
-        MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map")
-    })?;
-    let parsed: MapFile = serde_saphyr::from_str(&text).map_err(|error| {
+    image_of(file, &text(file)?)
+}
+
+/// The map that the YAML `file` of the ROS map_server describes, and where it lies.
+pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
+    let text = text(file)?;
+    let place: Place = parse(file, &text, "resolution: METRES` and `origin: [x, y, 0]")?;
+    if !CELL_M.contains(&place.resolution) {
+        let problem = format!(
+            "resolution: {} is not the side of a cell; set it to {} to {} m",
+            place.resolution,
+            CELL_M.start(),
+            CELL_M.end()
+        );
+        return Err(MapError::malformed(file, problem));
+    }
+    match place.origin[..] {
+        [x, y, turn] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && turn == 0.0 => {
+            Ok(PlacedMap {
+                map: image_of(file, &text)?,
+                cell_m: place.resolution,
+                corner_m: [x, y],
+            })
+        }
+        _ => Err(MapError::malformed(
+            file,
+            format!(
+                "origin: {:?} is not read here; set it to [x, y, 0] in metres, the image not turned",
+                place.origin.get(..3).unwrap_or(&place.origin)
+            ),
+        )),
+    }
+}
+
+fn text(file: &Path) -> Result<String, MapError> {
+    String::from_utf8(read(file, LONGEST)?)
+        .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
+}
+
+/// The keys of `text` that `T` has; `needed` says what that is at least.
+fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T, MapError> {
+    serde_saphyr::from_str(text).map_err(|error| {
         let problem = error.to_string();
         // What follows shows the source over several lines.
         let cause = problem.lines().next().unwrap_or_default();
         MapError::malformed(
             file,
-            format!("not a map_server map: {cause}; it needs at least `image: FILE`"),
+            format!("not a map_server map: {cause}; it needs at least `{needed}`"),
         )
-    })?;
+    })
+}
+
+/// The image that the YAML `text` of `file` names.
+fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
+    let parsed: MapFile = parse(file, text, "image: FILE")?;
     let lightness = parsed.lightness(file)?;
     let folder = file.parent().unwrap_or(Path::new(""));
     // `join` leaves an absolute path as it is.
@@ -109,12 +166,20 @@ mod tests {
 
     /// The map of that YAML beside an image of 5 x 5 pixels of one grey.
     fn map_of(yaml: &str, grey: u8) -> Result<Map, MapError> {
+        read_by(load, yaml, grey)
+    }
+
+    fn read_by<T>(
+        read: fn(&Path) -> Result<T, MapError>,
+        yaml: &str,
+        grey: u8,
+    ) -> Result<T, MapError> {
         let directory = tempfile::tempdir().unwrap();
         let image = [b"P5 5 5 255\n".as_slice(), &[grey; 25]].concat();
         std::fs::write(directory.path().join("grey.pgm"), image).unwrap();
         let file = directory.path().join("map.yaml");
         std::fs::write(&file, yaml).unwrap();
-        load(&file)
+        read(&file)
     }
 
     fn is_free(yaml: &str, grey: u8) -> bool {
@@ -175,5 +240,26 @@ mod tests {
             map_of(&"#".repeat(1 << 17), 255),
             Err(MapError::TooLong { .. })
         ));
+    }
+
+    #[test]
+    fn a_placed_map_has_its_cells_in_metres_and_one_that_lies_nowhere_is_refused_with_its_key() {
+        let placed = |place: &str| read_by(load_placed, &format!("image: grey.pgm\n{place}"), 255);
+        let map = placed("resolution: 0.05\norigin: [-2.5, 3, 0.0]").unwrap();
+        assert_eq!((map.cell_m, map.corner_m), (0.05, [-2.5, 3.0]));
+        let cases = [
+            ("origin: [0, 0, 0]", "resolution"),
+            ("resolution: 0.05", "origin"),
+            ("resolution: 0\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: -1\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: .nan\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: 0.05\norigin: [0, 0]", "origin"),
+            ("resolution: 0.05\norigin: [0, .inf, 0]", "origin"),
+            ("resolution: 0.05\norigin: [0, 0, 0.7]", "origin"),
+        ];
+        for (place, named) in cases {
+            let error = placed(place).unwrap_err().to_string();
+            assert!(error.contains(named), "{place:?} gave {error}");
+        }
     }
 }

@@ -10,14 +10,15 @@ use std::{
 use clap::Args;
 use common::mission::{Mission, Model};
 use evaluation::{
-    directory::{self, PAGE_FILE, ROWS_FILE},
+    directory::{self, PAGE_FILE},
     report::{self, Report},
+    results::Results,
     runner::{self, Plan},
     setting::{HARMONIC, Setting},
-    table::Table,
     trial::BodySize,
-    worlds::{self, Worlds},
+    worlds::{self, Ends, Worlds},
 };
+use glam::DVec2;
 use serde_json::json;
 use supervisor::planner_executable;
 
@@ -32,13 +33,19 @@ use crate::progress_line::write_stderr;
 /// with its picture. Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// rooms, doors, traps, corridors, straight-corridors; a mission file, a BARN .world or cylinders.csv; a folder of
-    /// such files.
+    /// rooms, doors, traps, corridors, straight-corridors, furnished; a mission file, a ROS map (.yaml), a BARN .world or
+    /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
     worlds: Worlds,
-    /// So many worlds; 100 if they are drawn, all if they are read.
+    /// So many worlds; 100 if they are drawn, all if they are read, ten starts and targets on a map without any.
     #[arg(long)]
     count: Option<usize>,
+    /// On a ROS map: where the robot starts and its heading, metres and degrees of the map.
+    #[arg(long, value_name = "X,Y,DEG", requires = "target", allow_hyphen_values = true, value_parser = numbers::<3>)]
+    start: Option<[f64; 3]>,
+    /// On a ROS map: where it is to go, metres of the map.
+    #[arg(long, value_name = "X,Y", requires = "start", allow_hyphen_values = true, value_parser = numbers::<2>)]
+    target: Option<[f64; 2]>,
     /// Seed of the worlds and of the noise in them.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -95,6 +102,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         &arguments.worlds,
         arguments.count,
         arguments.seed,
+        arguments.ends(),
         &body(&arguments.robot)?,
     )?;
     let plan = Plan {
@@ -112,14 +120,14 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         plan.trials.len(),
         found.unsolvable
     ));
-    let mut table = Table::open(&plan.directory.join(ROWS_FILE))?;
+    let mut results = Results::open(&plan.directory)?;
     let mut console = MissionProgress::new("");
-    runner::run(&plan, &mut table, &mut |progress| console.show(progress))?;
+    runner::run(&plan, &mut results, &mut |progress| console.show(progress))?;
     console.end();
-    table.sort()?;
+    results.sort()?;
     let page = plan.directory.join(PAGE_FILE);
-    fs::write(&page, report::html(&plan, table.rows(), &described))?;
-    let report = Report::new(&plan, table.rows());
+    fs::write(&page, report::html(&plan, &results, &described))?;
+    let report = Report::new(&plan, results.rows.rows());
     let text = if arguments.json {
         format!("{}\n", as_json(&report)?)
     } else {
@@ -129,18 +137,45 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+impl Arguments {
+    /// Start and target on a map, if they were given.
+    fn ends(&self) -> Option<Ends> {
+        let ([x, y, heading_deg], [to_x, to_y]) = (self.start?, self.target?);
+        Some(Ends {
+            start: DVec2::new(x, y),
+            heading: heading_deg.to_radians(),
+            target: DVec2::new(to_x, to_y),
+        })
+    }
+}
+
+/// `N` numbers between commas, none larger than a map is far from its origin.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parsed: Result<Vec<f64>, _> = text.split(',').map(|it| it.trim().parse()).collect();
+    let numbers = parsed.ok().and_then(|it| <[f64; N]>::try_from(it).ok());
+    numbers
+        .filter(|numbers| numbers.iter().all(|number| number.abs() <= 1e6))
+        .ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
 /// The command that gives these rows.
 fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     let worlds = &arguments.worlds;
     let count = arguments
         .count
         .map_or(String::new(), |count| format!(" --count {count}"));
+    let ends = match (arguments.start, arguments.target) {
+        (Some([x, y, deg]), Some([to_x, to_y])) => {
+            format!(" --start {x},{y},{deg} --target {to_x},{to_y}")
+        }
+        _ => String::new(),
+    };
     let settings: Vec<String> = settings
         .iter()
         .map(|setting| format!("{}: {}", setting.name, setting.set.join(" ")))
         .collect();
     format!(
-        "firsthand evaluate --worlds {worlds}{count} --seed {} --repeats {} --robot {} [{}]",
+        "firsthand evaluate --worlds {worlds}{ends}{count} --seed {} --repeats {} --robot {} [{}]",
         arguments.seed,
         arguments.repeats,
         arguments.robot,

@@ -5,9 +5,9 @@ use std::{fmt::Write as _, fs, num::NonZero, path::PathBuf, process::ExitCode};
 use clap::Args;
 use common::mission::Realism;
 use evaluation::{
-    directory::{self, PAGE_FILE, ROWS_FILE},
+    directory::{self, PAGE_FILE},
+    results::Results,
     runner::{self, Plan},
-    table::Table,
     trial::Trial,
 };
 use experiments::{
@@ -64,7 +64,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let chosen = experiment::named(&arguments.only)?;
     let described = described(arguments, &chosen);
     let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
-    let mut table = Table::open(&directory.join(ROWS_FILE))?;
+    let mut results = Results::open(&directory)?;
     for method in Method::ALL {
         let its = chosen.iter().filter(|it| it.is_run_by(method));
         let trials: Vec<Trial> = its.map(|it| it.trial()).collect::<Result<_, _>>()?;
@@ -79,11 +79,11 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             directory: directory.clone(),
         };
         let mut console = MissionProgress::new(&format!("{}: ", method.as_str()));
-        runner::run(&plan, &mut table, &mut |progress| console.show(progress))?;
+        runner::run(&plan, &mut results, &mut |progress| console.show(progress))?;
         console.end();
     }
-    table.sort()?;
-    let report = Report::new(&chosen, table.rows());
+    results.sort()?;
+    let report = Report::new(&chosen, results.rows.rows());
     let page = directory.join(PAGE_FILE);
     fs::write(&page, report.html(&described, FIRST_SEED))
         .map_err(|error| format!("cannot write {}: {error}", page.display()))?;

@@ -6,13 +6,14 @@ use std::{
 };
 
 use common::mission::MissionError;
+use maps::MapError;
 use thiserror::Error;
 
 /// Worlds that cannot be had.
 #[derive(Debug, Error)]
 pub enum WorldError {
     /// The file system refused.
-    #[error("cannot read {}: {source}; give rooms, doors, traps, corridors, straight-corridors, a file or a folder", file.display())]
+    #[error("cannot read {}: {source}; give a kind of world, a file or a folder, see `firsthand help evaluate-worlds`", file.display())]
     Unreadable {
         /// What was given.
         file: PathBuf,
@@ -27,6 +28,22 @@ pub enum WorldError {
         /// What is wrong, and what to do.
         problem: String,
     },
+    /// A map that cannot be read.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// A map of more than a building.
+    #[error("{}: {side_m:.0} m on a side, a world has at most {most_m:.0} m; crop the map", file.display())]
+    TooLarge {
+        /// The map.
+        file: PathBuf,
+        /// Its longer side, metres.
+        side_m: f64,
+        /// The longest that is taken, metres.
+        most_m: f64,
+    },
+    /// Start and target were given for worlds that have their own.
+    #[error("--start and --target are for ROS maps; give one to --worlds, or leave them out")]
+    NoMap,
     /// No mission can be made of it.
     #[error(transparent)]
     Mission(#[from] MissionError),

@@ -1,0 +1,190 @@
+//! Which of the things that end a mission came first, and what of the run counts. Pure.
+//!
+//! The stages go on until the supervisor has seen one of them and stopped the robot. How far they get by then depends on
+//! the machine; what came first does not.
+
+use common::{ground_truth::GroundTruthTick, samples::PoseSample};
+
+use crate::{
+    judge::{reached, timed_out, touched},
+    observer::Record,
+    outcome::{Ending, Outcome},
+};
+
+/// The first tick of the simulated robot at which its body had touched something.
+pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTick> {
+    truth.get(truth.partition_point(|tick| tick.contacts == 0))
+}
+
+/// What decided how a run ended.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Decided {
+    /// How it ended.
+    pub ending: Ending,
+    /// The last tick that was complete by then; none where no tick decided. Of the tick of a touch, a timeout or a stall
+    /// itself the stages may have been stopped halfway.
+    pub last_tick: Option<u64>,
+    /// So many ticks of the ground truth count: those up to the touch, or up to the last tick.
+    pub truth_ticks: usize,
+}
+
+/// Of a run that was seen to end with `ending`. `stall` is the tick of the newest stall.
+pub(crate) fn first(
+    ending: Ending,
+    record: &Record,
+    truth: &[GroundTruthTick],
+    timeout_s: f64,
+    stall: Option<u64>,
+) -> Decided {
+    let undecided = |ending| Decided {
+        ending,
+        last_tick: None,
+        truth_ticks: truth.len(),
+    };
+    if ending.outcome == Outcome::Aborted {
+        return undecided(ending);
+    }
+    let poses = &record.poses;
+    let contact = first_contact(truth)
+        .map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
+    let arrival = record
+        .arrival
+        .map(|command| (command.stamp.tick, reached(command.distance_m)));
+    let late = poses.partition_point(|pose| pose.stamp.time().seconds() < timeout_s);
+    let timeout = poses
+        .get(late)
+        .map(|pose| (pose.stamp.tick, timed_out(timeout_s)));
+    let stall = stall.filter(|_| ending.outcome == Outcome::Unreachable);
+    let stall = stall.map(|tick| (tick, ending.clone()));
+    // Of two at one tick the one named first.
+    let events = [contact, arrival, timeout, stall];
+    let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
+        return undecided(ending);
+    };
+    let last_tick = match ending.outcome {
+        // Its command is the last of the mission.
+        Outcome::Reached => tick,
+        _ => tick.saturating_sub(1),
+    };
+    let truth_ticks = match ending.outcome {
+        Outcome::Collision => truth.partition_point(|tick| tick.contacts == 0) + 1,
+        _ => record
+            .pose_at(last_tick)
+            .and_then(|pose| truth_of(pose, truth))
+            .map_or(truth.len(), |index| index + 1),
+    };
+    Decided {
+        ending,
+        last_tick: Some(last_tick),
+        truth_ticks,
+    }
+}
+
+/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks,
+/// and the two number theirs alike where nothing was lost on the way.
+fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
+    let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
+    shown
+        .min_by_key(|(_, it)| it.tick.abs_diff(pose.stamp.tick))
+        .map(|(index, _)| index)
+}
+
+/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none yet, the robot's number
+/// of it.
+fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
+    poses
+        .iter()
+        .filter(|pose| truth.is_of(pose))
+        .map(|pose| pose.stamp.tick)
+        .min_by_key(|tick| tick.abs_diff(truth.tick))
+        .unwrap_or(truth.tick)
+}
+
+#[cfg(test)]
+mod tests {
+    use common::samples::{CommandSample, Stamp};
+
+    use super::*;
+
+    const TIMEOUT_S: f64 = 20.0;
+
+    fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
+        GroundTruthTick {
+            tick,
+            time_s: tick as f64,
+            x: 0.0,
+            y: 0.0,
+            heading: 0.0,
+            v: 0.0,
+            omega: 0.0,
+            clearance_m: 1.0,
+            contacts,
+            left_counts: tick as u16,
+            right_counts: tick as u16,
+            sonar_cm: 255,
+            stopping_time_s: 0.0,
+            radio: None,
+        }
+    }
+
+    /// A run of `ticks` ticks of a second, in which the robot arrived and touched something at given ones.
+    fn run(
+        ticks: u64,
+        arrival: Option<u64>,
+        contact: Option<u64>,
+    ) -> (Record, Vec<GroundTruthTick>) {
+        let stamp = |tick| Stamp {
+            tick,
+            stamp_ns: tick * 1_000_000_000,
+            ..Stamp::default()
+        };
+        let pose = |tick| PoseSample {
+            stamp: stamp(tick),
+            left_counts: tick as u16,
+            right_counts: tick as u16,
+            ..PoseSample::default()
+        };
+        let mut record = Record::default();
+        record.poses = (0..ticks).map(pose).collect();
+        record.arrival = arrival.map(|tick| CommandSample {
+            stamp: stamp(tick),
+            ..CommandSample::default()
+        });
+        let touched = |tick| u64::from(contact.is_some_and(|contact| tick >= contact));
+        let truth = (0..ticks).map(|tick| truth(tick, touched(tick))).collect();
+        (record, truth)
+    }
+
+    #[test]
+    fn what_came_first_ends_a_run_however_late_it_was_seen() {
+        use Outcome::{Aborted, Collision, Reached, Timeout, Unreachable};
+        #[rustfmt::skip]
+        let rows = [
+            ("the arrival", 10, Some(8), None, Reached, (Reached, Some(8), 9)),
+            ("a touch before the arrival, which was read first", 12, Some(8), Some(6), Reached, (Collision, Some(5), 7)),
+            ("an arrival before a touch, which was read first", 12, Some(8), Some(9), Collision, (Reached, Some(8), 9)),
+            ("a touch at the tick of the arrival", 12, Some(8), Some(8), Reached, (Collision, Some(7), 9)),
+            ("a touch seen some ticks later", 15, None, Some(6), Collision, (Collision, Some(5), 7)),
+            ("the timeout seen some ticks later", 25, None, None, Timeout, (Timeout, Some(19), 20)),
+            ("a stall", 18, None, None, Unreachable, (Unreachable, Some(14), 15)),
+            ("a touch before a stall", 18, None, Some(3), Unreachable, (Collision, Some(2), 4)),
+            ("what no tick decided", 18, None, Some(3), Aborted, (Aborted, None, 18)),
+        ];
+        for (what, ticks, arrival, contact, seen, want) in rows {
+            let (record, truth) = run(ticks, arrival, contact);
+            let decided = first(
+                Ending::failed(seen, ""),
+                &record,
+                &truth,
+                TIMEOUT_S,
+                Some(15),
+            );
+            let Decided {
+                ending,
+                last_tick,
+                truth_ticks,
+            } = decided;
+            assert_eq!((ending.outcome, last_tick, truth_ticks), want, "{what}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! How long a mission's ticks and solves took: a table beside that of the results, because no two runs share it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    row::Row,
+    statistics::median,
+    summary::Summary,
+    table::{Key, Record},
+};
+
+/// One mission's latencies, microseconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Latency {
+    /// The world.
+    pub world: String,
+    /// Seed of the simulation's noise.
+    pub seed: u64,
+    /// The setting's name.
+    pub setting: String,
+    /// A tick, from the datagram in to the datagram out: median.
+    pub tick_p50_us: Option<f64>,
+    /// The same, 99 of 100.
+    pub tick_p99_us: Option<f64>,
+    /// The same, the longest.
+    pub tick_max_us: Option<f64>,
+    /// A full solve of the field: median.
+    pub full_solve_p50_us: Option<f64>,
+    /// The same, 99 of 100.
+    pub full_solve_p99_us: Option<f64>,
+    /// The same, the longest.
+    pub full_solve_max_us: Option<f64>,
+    /// A local update of the field: median.
+    pub local_update_p50_us: Option<f64>,
+    /// The same, 99 of 100.
+    pub local_update_p99_us: Option<f64>,
+    /// The same, the longest.
+    pub local_update_max_us: Option<f64>,
+}
+
+impl Latency {
+    /// Of the mission of `row`, which ended with `summary`.
+    pub(crate) fn new(row: &Row, summary: &Summary) -> Self {
+        let (world, seed, setting) = row.key();
+        let Summary {
+            tick_latency_us: tick,
+            full_solve_us: full,
+            local_update_us: local,
+            ..
+        } = summary;
+        Self {
+            world,
+            seed,
+            setting,
+            tick_p50_us: tick.p50,
+            tick_p99_us: tick.p99,
+            tick_max_us: tick.max,
+            full_solve_p50_us: full.p50,
+            full_solve_p99_us: full.p99,
+            full_solve_max_us: full.max,
+            local_update_p50_us: local.p50,
+            local_update_p99_us: local.p99,
+            local_update_max_us: local.max,
+        }
+    }
+}
+
+impl Record for Latency {
+    fn key(&self) -> Key {
+        (self.world.clone(), self.seed, self.setting.clone())
+    }
+}
+
+/// What the page says of a duration: its name, and the medians over the missions of median, 99 % and longest,
+/// microseconds.
+pub(crate) type Line = (&'static str, [Option<f64>; 3]);
+
+/// The medians over all missions of `setting`.
+pub(crate) fn medians(setting: &str, latencies: &[Latency]) -> [Line; 3] {
+    type Column = fn(&Latency) -> Option<f64>;
+    let over = |column: Column| {
+        let its = latencies.iter().filter(|it| it.setting == setting);
+        median(its.filter_map(column))
+    };
+    [
+        (
+            "tick",
+            [
+                over(|it| it.tick_p50_us),
+                over(|it| it.tick_p99_us),
+                over(|it| it.tick_max_us),
+            ],
+        ),
+        (
+            "full solve",
+            [
+                over(|it| it.full_solve_p50_us),
+                over(|it| it.full_solve_p99_us),
+                over(|it| it.full_solve_max_us),
+            ],
+        ),
+        (
+            "local update",
+            [
+                over(|it| it.local_update_p50_us),
+                over(|it| it.local_update_p99_us),
+                over(|it| it.local_update_max_us),
+            ],
+        ),
+    ]
+}

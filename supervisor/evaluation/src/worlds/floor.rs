@@ -1,0 +1,309 @@
+//! A ROS map as a world: what is not known to be free is solid, a wall or not seen by whoever made the map.
+//!
+//! Only cells beside ground that the start is connected to can be met; they become boxes, as few as runs of cells make.
+
+use std::{collections::VecDeque, f64::consts::PI, path::Path};
+
+use common::geometry::{Box2, Shapes};
+use glam::DVec2;
+use maps::{MapError, PlacedMap};
+
+use super::{ends::Ends, error::WorldError, random::Random};
+
+/// Sides of a map of a building, metres: what the check of solvability looks at.
+const LARGEST_M: f64 = 95.0;
+/// More boxes than this are no building.
+const MOST_BOXES: usize = 20_000;
+/// Straight distance of a target that is drawn, metres.
+const DRAWN_M: [f64; 2] = [3.0, 15.0];
+/// Starts that may be drawn without a target for them.
+const MOST_STARTS: usize = 50;
+
+/// The floor of a building.
+#[derive(Debug)]
+pub(super) struct Floor {
+    map: PlacedMap,
+}
+
+impl Floor {
+    /// The map of a YAML file.
+    pub(super) fn load(file: &Path) -> Result<Self, WorldError> {
+        let map = maps::load_placed(file)?;
+        let side_m = map.map.cols.max(map.map.rows) as f64 * map.cell_m;
+        if side_m > LARGEST_M {
+            return Err(WorldError::TooLarge {
+                file: file.to_path_buf(),
+                side_m,
+                most_m: LARGEST_M,
+            });
+        }
+        Ok(Self { map })
+    }
+
+    /// What stands around the ground that a robot at `start` is connected to, metres.
+    pub(super) fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
+        let free: Vec<bool> = self.map.map.blocked.iter().map(|it| !it).collect();
+        let reached = self.connected(&free, self.cell(start));
+        let boxes = self.boxes(&reached);
+        if boxes.len() > MOST_BOXES {
+            let problem = format!(
+                "its walls are more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
+            );
+            return Err(MapError::Malformed {
+                file: file.to_path_buf(),
+                problem,
+            }
+            .into());
+        }
+        Ok(Shapes {
+            boxes,
+            ..Shapes::default()
+        })
+    }
+
+    /// For each stream of random numbers a start, and a target 3 to 15 m away that a body is connected to which needs
+    /// `swept_m` around its centre; fewer where there is hardly any.
+    pub(super) fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
+        let roomy = self.roomy(swept_m);
+        let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();
+        // Where one draw finds nothing, the next would hardly.
+        streams
+            .map_while(|mut random| self.draw_one(&mut random, &roomy, &places))
+            .collect()
+    }
+
+    /// One start and target on the cells `roomy`, which are those of `places`.
+    fn draw_one(&self, random: &mut Random, roomy: &[bool], places: &[usize]) -> Option<Ends> {
+        for _ in 0..MOST_STARTS {
+            let start = *places.get(random.below(places.len()))?;
+            let connected = self.connected(roomy, Some(start));
+            let at = self.centre(start);
+            let fits = |place: usize| {
+                let distance = self.centre(place).distance(at);
+                connected[place] && (DRAWN_M[0]..=DRAWN_M[1]).contains(&distance)
+            };
+            let targets: Vec<usize> = places.iter().copied().filter(|&it| fits(it)).collect();
+            if let Some(&target) = targets.get(random.below(targets.len())) {
+                return Some(Ends {
+                    start: at,
+                    heading: random.within(-PI, PI),
+                    target: self.centre(target),
+                });
+            }
+        }
+        None
+    }
+
+    /// The cell at a place, if it is on the map.
+    fn cell(&self, at: DVec2) -> Option<usize> {
+        let away = ((at - DVec2::from(self.map.corner_m)) / self.map.cell_m).floor();
+        let size = DVec2::new(self.map.map.cols as f64, self.map.map.rows as f64);
+        let inside = away.cmpge(DVec2::ZERO).all() && away.cmplt(size).all();
+        // Row 0 is at the top.
+        let row = size.y - 1.0 - away.y;
+        inside.then_some((row * size.x + away.x) as usize)
+    }
+
+    /// The middle of a cell, metres.
+    fn centre(&self, cell: usize) -> DVec2 {
+        let (col, row) = (cell % self.map.map.cols, cell / self.map.map.cols);
+        self.place(col as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// The place `cols` cells from the left edge and `rows` from the top one, metres.
+    fn place(&self, cols: f64, rows: f64) -> DVec2 {
+        let up = self.map.map.rows as f64 - rows;
+        DVec2::from(self.map.corner_m) + DVec2::new(cols, up) * self.map.cell_m
+    }
+
+    /// The cells of `open` that are connected to `from`, itself included. The rim of a map is never open.
+    fn connected(&self, open: &[bool], from: Option<usize>) -> Vec<bool> {
+        let cols = self.map.map.cols;
+        let mut connected = vec![false; open.len()];
+        let mut next: VecDeque<usize> = from.into_iter().collect();
+        while let Some(cell) = next.pop_front() {
+            if open[cell] && !connected[cell] {
+                connected[cell] = true;
+                next.extend([cell - 1, cell + 1, cell - cols, cell + cols]);
+            }
+        }
+        connected
+    }
+
+    /// The free cells at least `swept_m` away from the middle of any other.
+    fn roomy(&self, swept_m: f64) -> Vec<bool> {
+        let map = &self.map.map;
+        let reach = (swept_m / self.map.cell_m + 0.5).ceil() as usize;
+        let mut roomy: Vec<bool> = map.blocked.iter().map(|it| !it).collect();
+        for solid in self.beside(&roomy.clone()) {
+            let (col, row) = (solid % map.cols, solid / map.cols);
+            for y in row.saturating_sub(reach)..=(row + reach).min(map.rows - 1) {
+                for x in col.saturating_sub(reach)..=(col + reach).min(map.cols - 1) {
+                    let (dx, dy) = (x.abs_diff(col), y.abs_diff(row));
+                    if dx * dx + dy * dy <= reach * reach {
+                        roomy[y * map.cols + x] = false;
+                    }
+                }
+            }
+        }
+        roomy
+    }
+
+    /// The solid cells that touch one of `ground`, by an edge or a corner.
+    fn beside(&self, ground: &[bool]) -> Vec<usize> {
+        let (cols, rows) = (self.map.map.cols, self.map.map.rows);
+        let touches = |cell: usize| {
+            let (col, row) = (cell % cols, cell / cols);
+            let mut around = (row.saturating_sub(1)..=(row + 1).min(rows - 1)).flat_map(|y| {
+                let columns = col.saturating_sub(1)..=(col + 1).min(cols - 1);
+                columns.map(move |x| y * cols + x)
+            });
+            around.any(|cell| ground[cell])
+        };
+        let blocked = &self.map.map.blocked;
+        let solid = (0..blocked.len()).filter(|&cell| blocked[cell]);
+        solid.filter(|&cell| touches(cell)).collect()
+    }
+
+    /// Boxes of solid cells that cover every one beside `ground`.
+    fn boxes(&self, ground: &[bool]) -> Vec<Box2> {
+        let (cols, rows) = (self.map.map.cols, self.map.map.rows);
+        let blocked = &self.map.map.blocked;
+        let mut wanted = vec![false; blocked.len()];
+        let beside = self.beside(ground);
+        for &cell in &beside {
+            wanted[cell] = true;
+        }
+        let mut boxes = Vec::new();
+        for first in beside {
+            if !wanted[first] {
+                continue;
+            }
+            let (col, row) = (first % cols, first / cols);
+            // To the right as far as cells are solid, and down while that helps.
+            let run = (first..(row + 1) * cols).take_while(|&cell| blocked[cell]);
+            let width = run
+                .filter(|&cell| wanted[cell])
+                .last()
+                .map_or(1, |last| last - first + 1);
+            let line = |row: usize| row * cols + col..row * cols + col + width;
+            let height = (row..rows)
+                .take_while(|&row| {
+                    line(row).all(|cell| blocked[cell]) && line(row).any(|cell| wanted[cell])
+                })
+                .count();
+            for row in row..row + height {
+                wanted[line(row)].fill(false);
+            }
+            let least = self.place(col as f64, (row + height) as f64);
+            let size_m = DVec2::new(width as f64, height as f64) * self.map.cell_m;
+            boxes.push(Box2 {
+                at: least + size_m / 2.0,
+                size_m,
+                ..Box2::default()
+            });
+        }
+        boxes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The floor of a drawing: `#` is solid, cells of half a metre, the lower left corner at (-1, 2).
+    fn floor(rows: &[&str]) -> Floor {
+        let folder = tempfile::tempdir().unwrap();
+        let (cols, number) = (rows[0].len(), rows.len());
+        let mut image = format!("P5 {cols} {number} 255\n").into_bytes();
+        image.extend(rows.concat().bytes().map(|byte| match byte {
+            b'#' => 0,
+            b'?' => 205,
+            _ => 254,
+        }));
+        std::fs::write(folder.path().join("a.pgm"), image).unwrap();
+        let file = folder.path().join("a.yaml");
+        std::fs::write(
+            &file,
+            "image: a.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]",
+        )
+        .unwrap();
+        Floor::load(&file).unwrap()
+    }
+
+    #[test]
+    fn every_solid_cell_beside_the_ground_is_in_a_box_and_no_free_one_is() {
+        let floor = floor(&[
+            "##########",
+            "#...#..???",
+            "#.#.#..###",
+            "#...#....#",
+            "#.##...#.#",
+            "#....#...#",
+            "##########",
+        ]);
+        let start = floor.centre(11);
+        assert_eq!(start, DVec2::new(-0.25, 4.75));
+        let shapes = floor.shapes(Path::new("a.yaml"), start).unwrap();
+        let inside = |cell| shapes.clearance(floor.centre(cell)) < 0.0;
+        let free: Vec<bool> = floor.map.map.blocked.iter().map(|it| !it).collect();
+        assert!((0..free.len()).all(|cell| !free[cell] || !inside(cell)));
+        assert!(floor.beside(&free).into_iter().all(inside));
+        assert!(shapes.boxes.len() < 14, "{}", shapes.boxes.len());
+    }
+
+    #[test]
+    fn what_no_robot_can_come_near_is_left_out() {
+        let floor = floor(&["#######", "#.###.#", "#######"]);
+        let shapes = floor.shapes(Path::new("a.yaml"), floor.centre(8)).unwrap();
+        let greatest = shapes
+            .pieces()
+            .map(|piece| piece.bounds().1.x)
+            .fold(f64::MIN, f64::max);
+        assert_eq!(greatest, 0.5);
+        assert!(
+            floor
+                .shapes(Path::new("a.yaml"), DVec2::ZERO)
+                .unwrap()
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn drawn_ends_are_connected_for_the_body_and_follow_from_the_seed() {
+        let long = [".".repeat(16), "#".repeat(16)];
+        let rows: Vec<String> = [1, 0, 0, 0, 1, 0, 1]
+            .map(|solid: usize| format!("#{}#", long[solid]))
+            .to_vec();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let floor = floor(&rows);
+        let draw = |seed| floor.draw([Random::new(seed, 7, 0)].into_iter(), 0.24)[0];
+        assert_eq!(draw(1), draw(1));
+        assert_ne!(draw(1), draw(2));
+        for seed in 0..20 {
+            let Ends { start, target, .. } = draw(seed);
+            assert!((3.0..=15.0).contains(&start.distance(target)));
+            // That of the row in the middle of the upper corridor.
+            let middle = 4.25;
+            assert_eq!(
+                (start.y, target.y),
+                (middle, middle),
+                "the lower one is too narrow"
+            );
+        }
+    }
+
+    #[test]
+    fn a_map_of_a_town_is_refused_with_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = [b"P5 200 2 255\n".as_slice(), &[254; 400]].concat();
+        std::fs::write(folder.path().join("a.pgm"), image).unwrap();
+        let file = folder.path().join("a.yaml");
+        std::fs::write(&file, "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]").unwrap();
+        let refused = Floor::load(&file).unwrap_err().to_string();
+        assert!(
+            refused.contains("a.yaml") && refused.contains("200 m"),
+            "{refused}"
+        );
+    }
+}

@@ -1,0 +1,53 @@
+//! What a search for worlds gathers.
+
+use common::mission::MissionError;
+
+use crate::trial::{BodySize, Rules, Scene, Trial};
+
+/// Trials, and what was left out on the way to them.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// Each solvable.
+    pub trials: Vec<Trial>,
+    /// Worlds that the body could not cross.
+    pub unsolvable: usize,
+}
+
+impl Found {
+    /// Add the trial `world` in `scene` and give it back; count it as left out where the body cannot cross it.
+    pub(super) fn add(
+        &mut self,
+        world: String,
+        scene: &Scene,
+        rules: Rules,
+        body: &BodySize,
+    ) -> Result<Option<&mut Trial>, MissionError> {
+        let trial = Trial::new(world, scene, rules, body)?;
+        Ok(self.add_solvable(trial))
+    }
+
+    /// Add `trial`, or count one that was left out.
+    pub(super) fn add_solvable(&mut self, trial: Option<Trial>) -> Option<&mut Trial> {
+        match trial {
+            Some(trial) => self.trials.push(trial),
+            None => {
+                self.unsolvable += 1;
+                return None;
+            }
+        }
+        self.trials.last_mut()
+    }
+
+    /// Keep `count` of the trials, evenly spread over them.
+    pub(super) fn spread(&mut self, count: usize) {
+        let all = self.trials.len();
+        if count < all {
+            let mut index = 0;
+            self.trials.retain(|_| {
+                let before = index * count / all;
+                index += 1;
+                index * count / all > before
+            });
+        }
+    }
+}
