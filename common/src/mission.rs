@@ -15,7 +15,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use error::MissionError;
-pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig};
+pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig, Steering};
 pub use simulation::{
     BatteryPhysics, Heights, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
     SonarPhysics, Thing, WheelPhysics,

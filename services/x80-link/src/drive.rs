@@ -1,15 +1,19 @@
-//! The two wheels on the wire: their channels and signs, counts in, timed commands out.
+//! The two wheels on the wire, or a car's driven wheel and steering: channels and signs, counts in, timed commands out.
 
 use std::time::Duration;
 
 use common::{
     mission::{Body, Channel, Mission, RobotConfig},
-    samples::WheelSample,
+    samples::{CommandSample, WheelSample},
     wire::{
         Addressing, COUNT_CYCLE, Command, Encoder, Feedback, Mode, MotorSensors, Parameter,
-        Request, Stream,
+        Request, Stream, counts_between,
     },
 };
+
+/// Steering rate for each angle that is left, over the ticks of a second: below 1, so that the delay of a speed loop does
+/// not make the steering swing.
+const STEERING_GAIN: f64 = 0.6;
 
 /// The drive of one robot.
 #[derive(Clone, Debug)]
@@ -89,14 +93,29 @@ impl Drive {
         }
     }
 
-    /// rad/s to counts/s, limited to what the wheel can do; what is no number stands.
+    /// What `command` asks of the two channels, counts/s, at `share` of its speed, where the encoders stand at `wheels`. A
+    /// car's steering is a channel with a speed loop like that of a wheel: it is driven towards its angle, so a timed
+    /// command ends its motion, too.
     #[must_use]
-    pub fn counts_per_second(&self, speed: f64) -> i16 {
+    pub fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
+        let driven = self.counts_per_second(share * command.left_rad_s);
+        let Some(steering) = self.body.steering else {
+            return [driven, self.counts_per_second(share * command.right_rad_s)];
+        };
+        let angle = command
+            .right_rad_s
+            .clamp(-steering.limit_rad, steering.limit_rad);
+        let left = steering.counts(angle) - f64::from(counts_between(0, wheels.right_counts));
+        let top = steering.counts(steering.rate_rad_s);
+        let rate = (left * STEERING_GAIN * self.robot.rate_hz).clamp(-top, top);
+        [driven, on_the_wire(rate)]
+    }
+
+    /// rad/s to counts/s, limited to what the wheel can do; what is no number stands.
+    fn counts_per_second(&self, speed: f64) -> i16 {
         let per_radian = self.body.counts_per_turn / std::f64::consts::TAU;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
-        let counts = (speed * per_radian).clamp(-top, top).round();
-        // -32768 and -32767 mean "leave alone".
-        counts.clamp(-32_766.0, 32_766.0) as i16
+        on_the_wire((speed * per_radian).clamp(-top, top))
     }
 
     /// A timed velocity command: a robot that obeys the time stops by itself when we fall silent.
@@ -116,6 +135,12 @@ impl Drive {
     pub fn stop(&self) -> Vec<u8> {
         self.velocity([0, 0], self.limit)
     }
+}
+
+/// Counts/s as a command carries them; what is no number is 0.
+fn on_the_wire(counts: f64) -> i16 {
+    // -32768 and -32767 mean "leave alone".
+    counts.round().clamp(-32_766.0, 32_766.0) as i16
 }
 
 /// The frame of a command.
