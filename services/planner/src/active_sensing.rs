@@ -141,7 +141,7 @@ impl View<'_> {
         byte.map_or(CellState::Perimeter, CellState::from_byte)
     }
 
-    fn is_hazard(&self, at: DVec2) -> bool {
+    pub(crate) fn is_hazard(&self, at: DVec2) -> bool {
         self.frame
             .cell_at(at)
             .is_none_or(|cell| self.state(cell).is_hazard())

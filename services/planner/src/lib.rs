@@ -7,6 +7,7 @@
 //! - [`background_solver`]: the thread of full solves beside the live field.
 
 mod active_sensing;
+mod arcs;
 pub mod background_solver;
 mod fault;
 pub mod shell;

@@ -19,6 +19,7 @@ use harmonic::{
 };
 
 use crate::active_sensing::{ActiveSensing, Advice, View};
+use crate::arcs::Arcs;
 use crate::fault::lead_astray;
 
 pub use input::{Input, Job, Outcome, Solved, Work};
@@ -37,6 +38,8 @@ enum Advisor {
     Follow,
     /// The evidential method: whether the sonar looked there.
     LookFirst(ActiveSensing),
+    /// The same of a car, which cannot look around on the spot: what it can steer.
+    Steer(Arcs),
 }
 
 /// The planner of (11).
@@ -89,11 +92,12 @@ impl Step for Planner {
         Self {
             target: mission.target,
             screening: screening(mission),
-            advisor: match mission.method {
-                Method::Evidential if mission.sensing => {
+            advisor: match (mission.method, Arcs::new(mission)) {
+                (Method::Evidential, Some(arcs)) => Advisor::Steer(arcs),
+                (Method::Evidential, None) if mission.sensing => {
                     Advisor::LookFirst(ActiveSensing::new(mission))
                 }
-                Method::Paper | Method::Evidential => Advisor::Follow,
+                (Method::Paper | Method::Evidential, _) => Advisor::Follow,
             },
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
@@ -336,13 +340,22 @@ impl Planner {
         status: GuidanceStatus,
         direction: DVec2,
     ) -> (GuidanceStatus, DVec2, f64) {
-        let (Advisor::LookFirst(sensing), Some(live)) = (&self.advisor, &self.live) else {
+        let Some(live) = &self.live else {
             return (status, direction, f64::INFINITY);
         };
         let view = View {
             frame: live.frame,
             cells: self.grid.cells(),
             field: &live.field,
+        };
+        let sensing = match &self.advisor {
+            Advisor::LookFirst(sensing) => sensing,
+            Advisor::Steer(arcs) if status != GuidanceStatus::Unreachable => {
+                let distance = pose.position.distance(self.target);
+                let (direction, limit) = arcs.advise(&view, pose, distance);
+                return (status, direction, limit);
+            }
+            Advisor::Follow | Advisor::Steer(_) => return (status, direction, f64::INFINITY),
         };
         match status {
             GuidanceStatus::Along => match sensing.advise(&view, pose, direction) {

@@ -33,6 +33,3 @@ impl Controller {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;
