@@ -83,7 +83,8 @@ pub struct Mission {
     /// How the simulated robot behaves.
     #[serde(default)]
     pub simulation: Simulation,
-    /// What its reader should know of a file that is valid, a line each: keys or values that go by another name now.
+    /// What its reader should know of a file that is valid, a line each: keys or values that go by another name now, what
+    /// the robot cannot do.
     #[serde(skip)]
     pub remarks: Vec<String>,
 }

@@ -13,7 +13,7 @@ use std::{
 use glam::DVec2;
 use toml::de::{DeTable, DeValue};
 
-use super::{Mission, error::MissionError};
+use super::{Method, Mission, error::MissionError};
 use crate::grid::MAX_CELLS;
 
 /// A mission is a page or two; a file without end is no mission.
@@ -70,7 +70,7 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
             .file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     }
-    mission.remarks = remarks(text, origin, tree.get_ref());
+    mission.remarks = remarks(text, origin, tree.get_ref(), &mission);
     match Checker::default().run(&mission) {
         Ok(()) => Ok(mission),
         Err(Objection {
@@ -87,19 +87,27 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     }
 }
 
-/// What goes by another name now.
-fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>) -> Vec<String> {
+/// What goes by another name now, and what this robot does not do.
+fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> Vec<String> {
     let method = tree
         .get("method")
         .and_then(|value| value.get_ref().as_str());
+    let file = origin.display();
+    let line = |key| line_of(text, span_of(tree, key));
     let renamed = method.filter(|name| *name == "careful").map(|_| {
-        let line = line_of(text, span_of(tree, "method"));
-        let file = origin.display();
+        let line = line("method");
         format!(
             "{file}:{line}: method: \"careful\" is called \"evidential\" now; both are accepted"
         )
     });
-    renamed.into_iter().collect()
+    let looks = mission.method == Method::Evidential && mission.sensing;
+    let car = mission.body().ackermann().filter(|_| looks).map(|car| {
+        let (line, radius) = (line("robot.model"), car.least_turning_radius());
+        format!(
+            "{file}:{line}: robot.model: a car turns in no less than {radius:.2} m, so it does not turn on the spot to look before it drives"
+        )
+    });
+    renamed.into_iter().chain(car).collect()
 }
 
 /// 1-based line of byte `offset`.

@@ -122,3 +122,6 @@ impl View<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -348,14 +348,14 @@ impl Planner {
             cells: self.grid.cells(),
             field: &live.field,
         };
-        let sensing = match &self.advisor {
-            Advisor::LookFirst(sensing) => sensing,
-            Advisor::Steer(arcs) if status != GuidanceStatus::Unreachable => {
+        let sensing = match (&self.advisor, status) {
+            (Advisor::LookFirst(sensing), _) => sensing,
+            (Advisor::Steer(arcs), GuidanceStatus::Along | GuidanceStatus::WayOut) => {
                 let distance = pose.position.distance(self.target);
                 let (direction, limit) = arcs.advise(&view, pose, distance);
                 return (status, direction, limit);
             }
-            Advisor::Follow | Advisor::Steer(_) => return (status, direction, f64::INFINITY),
+            (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
         };
         match status {
             GuidanceStatus::Along => match sensing.advise(&view, pose, direction) {
