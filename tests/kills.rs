@@ -44,6 +44,23 @@ fn each_stage_killed_or_frozen_once_the_robot_arrives_and_knows_where_it_is() {
 }
 
 #[test]
+fn each_stage_of_a_car_killed_once_it_arrives_untouched() {
+    let car = ["--set", "robot.model=\"car\"", "--pace", PACE];
+    let mut run = Run::start("car-kills", "obstacle-course", &car);
+    run.wait_until_under_way(2.0);
+    for stage in STAGES {
+        run.kill_and_await_successor(stage, Signal::KILL);
+    }
+    let (_, summary) = run.finish();
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    for stage in STAGES {
+        assert_eq!(summary["restarts"][stage], 1, "{summary}");
+    }
+    assert_nothing_left("car-kills");
+}
+
+#[test]
 fn a_stage_killed_on_a_clock_of_ticks_does_not_hang_the_mission() {
     // At this speed the mission has tens of thousands of ticks: seconds to be killed in.
     let slow = ["--set", "controller.speed_m_s=0.002", "--timeout", "20000"];

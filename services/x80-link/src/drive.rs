@@ -150,3 +150,51 @@ pub fn encoded(command: Command) -> Vec<u8> {
     command.encode(Addressing::default(), &mut bytes);
     bytes
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// What a car's channels are asked for when its steering stands at `counts`: at 7 Hz, 3600 counts a turn.
+    fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
+        let text = "target = [3, 0]\nrobot.model = 'car'";
+        let drive = Drive::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let command = CommandSample {
+            left_rad_s,
+            right_rad_s: angle,
+            ..CommandSample::default()
+        };
+        let wheels = WheelSample {
+            right_counts: counts,
+            ..WheelSample::default()
+        };
+        drive.counts(&command, share, &wheels)
+    }
+
+    #[test]
+    fn a_cars_steering_is_driven_towards_its_angle() {
+        // 5 degrees are 50 counts; 0.6 of what is left in a tick.
+        let five = 5_f64.to_radians();
+        assert_eq!(counts(0.0, five, 1.0, 0), [0, 210]);
+        assert_eq!(counts(0.0, five, 1.0, 50), [0, 0]);
+        assert_eq!(counts(0.0, -five, 1.0, COUNT_CYCLE - 25), [0, -105]);
+    }
+
+    #[test]
+    fn a_cars_steering_is_limited_in_angle_and_rate_and_no_number_holds_it() {
+        // 1200 counts a second at most; 30 degrees are 300 counts.
+        assert_eq!(counts(0.0, 1.5, 1.0, 0), [0, 1200]);
+        assert_eq!(counts(0.0, 1.5, 1.0, 300), [0, 0]);
+        assert_eq!(counts(f64::NAN, f64::NAN, 1.0, 7), [0, 0]);
+    }
+
+    #[test]
+    fn a_slowed_car_keeps_its_curve() {
+        let five = 5_f64.to_radians();
+        let tau = std::f64::consts::TAU;
+        assert_eq!(counts(tau, five, 1.0, 0), [600, 210]);
+        assert_eq!(counts(tau, five, 0.5, 0), [300, 210]);
+    }
+}

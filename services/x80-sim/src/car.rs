@@ -130,3 +130,85 @@ impl Car {
         motor.turn(stopped - motor.turned());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use common::{
+        ground_truth::GroundTruthTick,
+        mission::Mission,
+        wire::{Addressing, Command, Decoder, counts_between},
+    };
+
+    use crate::robot::Robot;
+
+    fn car(extra: &str) -> Robot {
+        let text = format!("target = [3, 0]\nrobot.model = 'car'\n{extra}");
+        Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+    }
+
+    /// The car after `ticks` more with these counts per second: of the wheel forward, of the steering to the left.
+    fn drive(robot: &mut Robot, wheel: i16, steering: i16, ticks: u32) -> GroundTruthTick {
+        let mut bytes = Vec::new();
+        Command::velocity([Some(-wheel), Some(steering)], None)
+            .encode(Addressing::default(), &mut bytes);
+        let mut decoder = Decoder::default();
+        decoder.push(&bytes);
+        robot.on_frame(&decoder.next_frame().unwrap(), &mut Vec::new());
+        for _ in 0..ticks {
+            robot.advance_to_next_tick();
+        }
+        robot.ground_truth()
+    }
+
+    fn steering_counts(truth: &GroundTruthTick) -> i32 {
+        counts_between(0, truth.right_counts)
+    }
+
+    #[test]
+    fn a_car_does_not_turn_on_the_spot() {
+        let truth = drive(&mut car(""), 0, 1000, 14);
+        assert_eq!((truth.x, truth.y, truth.heading), (0.0, 0.0, 0.0));
+        assert!(steering_counts(&truth) > 0);
+    }
+
+    #[test]
+    fn the_steering_takes_its_time_and_ends_at_its_stop() {
+        let mut robot = car("[simulation.wheels]\nlag_s = 0");
+        // 120 degrees a second are 1200 counts a second, however much is asked for; 30 degrees are 300 counts.
+        let truth = drive(&mut robot, 0, 5000, 1);
+        assert!((steering_counts(&truth) - 171).abs() <= 1, "{truth:?}");
+        let truth = drive(&mut robot, 0, 5000, 14);
+        assert_eq!(steering_counts(&truth), 300);
+        let truth = drive(&mut robot, 0, -5000, 14);
+        assert_eq!(steering_counts(&truth), -300);
+    }
+
+    #[test]
+    fn at_the_stop_it_drives_its_tightest_circle() {
+        let mut robot = car("");
+        let start = drive(&mut robot, 0, 5000, 14);
+        let end = drive(&mut robot, 600, 0, 14);
+        let counts = f64::from(counts_between(start.left_counts, end.left_counts));
+        let arc = counts * std::f64::consts::TAU * 0.04 / 600.0;
+        let radius = 0.18 / 30_f64.to_radians().tan();
+        assert!((end.heading - arc / radius).abs() < 0.01, "{end:?}");
+        assert!((end.omega - end.v / radius).abs() < 1e-9, "{end:?}");
+    }
+
+    #[test]
+    fn a_longer_wheelbase_turns_less_and_a_wall_holds_the_car() {
+        let heading = |extra: &str| {
+            let mut robot = car(extra);
+            drive(&mut robot, 0, 1000, 7);
+            drive(&mut robot, 300, 0, 7).heading
+        };
+        let ratio = heading("") / heading("simulation.wheels.track_scale = 1.1");
+        assert!((ratio - 1.1).abs() < 1e-9, "{ratio}");
+        let mut robot = car("world.wall = [{ points = [[1, -2], [1, 2]] }]");
+        let truth = drive(&mut robot, 1200, 0, 28);
+        assert!((truth.x - 0.76).abs() < 1e-6, "{truth:?}");
+        assert_eq!(truth.contacts, 1);
+    }
+}

@@ -57,7 +57,7 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
         || cause.to_owned(),
         |car| {
             let radius = car.least_turning_radius();
-            format!("{cause}; this car turns in no less than {radius:.2} m, only forward: set robot.wheelbase_m, robot.steering_limit_deg")
+            format!("{cause}; this car turns in no less than {radius:.2} m and does not reverse: it needs more room")
         },
     )
 }
