@@ -1,5 +1,6 @@
 //! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
 
+mod objection;
 mod robot;
 mod shapes;
 mod simulation;
@@ -13,6 +14,7 @@ use std::{
 use glam::DVec2;
 use toml::de::{DeTable, DeValue};
 
+use self::objection::{Objection, objection, within};
 use super::{Method, Mission, error::MissionError};
 use crate::grid::MAX_CELLS;
 
@@ -131,42 +133,6 @@ fn span_of(tree: &DeTable<'_>, key: &str) -> usize {
         }
     }
     start
-}
-
-/// A value that cannot be, before it is given a line.
-struct Objection {
-    key: &'static str,
-    problem: String,
-    remedy: String,
-}
-
-fn objection(
-    key: &'static str,
-    problem: impl Into<String>,
-    remedy: impl Into<String>,
-) -> Objection {
-    Objection {
-        key,
-        problem: problem.into(),
-        remedy: remedy.into(),
-    }
-}
-
-/// `value` must lie in `range`; NaN lies in none.
-fn within(
-    key: &'static str,
-    value: f64,
-    range: std::ops::RangeInclusive<f64>,
-    unit: &str,
-) -> Result<(), Objection> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(objection(
-        key,
-        format!("{value} {unit} is out of range"),
-        format!("give {} to {} {unit}", range.start(), range.end()),
-    ))
 }
 
 #[derive(Default)]

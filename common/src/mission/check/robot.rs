@@ -1,6 +1,6 @@
 //! The robot's part of a mission.
 
-use super::{Objection, objection, within};
+use super::objection::{Objection, objection, within};
 use crate::{
     address::{Address, AddressError, FORMS},
     mission::Mission,
