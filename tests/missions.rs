@@ -75,6 +75,39 @@ fn the_trap_is_left_from_every_heading_by_either_method() {
     }
 }
 
+const CAR: [&str; 2] = ["--set", "robot.model=\"car\""];
+
+#[test]
+fn a_car_crosses_the_course_untouched_for_seeds_1_to_5() {
+    for seed in 1..=5 {
+        let seed = seed.to_string();
+        arrives_untouched(
+            "car",
+            "obstacle-course",
+            &[&CAR[..], &["--seed", &seed]].concat(),
+        );
+    }
+    assert_nothing_left("car");
+}
+
+#[test]
+fn a_car_that_faces_a_wall_too_near_to_turn_ends_with_its_turning_radius() {
+    // A pocket open behind: a robot that turns on the spot leaves it.
+    let wall = "world.wall=[{points=[[0.5,0.6],[0.5,-0.6]]},{points=[[0.5,0.6],[-0.3,0.6]]},\
+                {points=[[0.5,-0.6],[-0.3,-0.6]]}]";
+    let arguments = ["--set", wall, "--timeout", "600"];
+    arrives_untouched("pocket", "open-room", &arguments);
+    let (code, summary) = run("pocket", "open-room", &[&CAR[..], &arguments].concat());
+    assert_eq!(
+        (code, &summary["outcome"], &summary["collisions"]),
+        (Some(3), &"unreachable".into(), &0.into()),
+        "{summary}"
+    );
+    let reason = summary["reason"].as_str().unwrap();
+    assert!(reason.contains("turns in no less than 0.31 m"), "{reason}");
+    assert_nothing_left("pocket");
+}
+
 #[test]
 fn an_empty_room_is_crossed_without_a_safety_event() {
     let (_, summary) = run("room", "open-room", &[]);

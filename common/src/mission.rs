@@ -15,7 +15,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use error::MissionError;
-pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig};
+pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig, Steering};
 pub use simulation::{
     BatteryPhysics, Heights, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
     SonarPhysics, Thing, WheelPhysics,
@@ -87,7 +87,8 @@ pub struct Mission {
     /// How the simulated robot behaves.
     #[serde(default)]
     pub simulation: Simulation,
-    /// What its reader should know of a file that is valid, a line each: keys or values that go by another name now.
+    /// What its reader should know of a file that is valid, a line each: keys or values that go by another name now, what
+    /// the robot cannot do.
     #[serde(skip)]
     pub remarks: Vec<String>,
 }
@@ -120,8 +121,8 @@ pub struct Start {
 pub struct Perimeter {
     /// D: side of the square, metres.
     pub width_m: f64,
-    /// N: cells along each side. Without it cells have 0.05 m with the evidential method, a quarter of the X80's body,
-    /// and 0.1 m with the paper's: [`Mission::grid_frame`].
+    /// N: cells along each side. Without it cells have 0.05 m for a robot that looks first ([`Mission::looks_first`]),
+    /// a quarter of the X80's body, else 0.1 m: [`Mission::grid_frame`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cells: Option<u32>,
     /// Centre of the square, metres.
@@ -264,10 +265,7 @@ impl Mission {
             width_m, centre, ..
         } = self.perimeter;
         let cells = self.perimeter.cells.unwrap_or_else(|| {
-            let side_m = match self.method {
-                Method::Evidential => 0.05,
-                Method::Paper => 0.1,
-            };
+            let side_m = if self.looks_first() { 0.05 } else { 0.1 };
             let cells = (width_m / side_m).round();
             cells.clamp(f64::from(MIN_CELLS), Perimeter::DEFAULT_MOST_CELLS) as u32
         });
@@ -287,25 +285,25 @@ impl Mission {
         (cells - 1e-6).ceil().max(0.0) as u32
     }
 
-    /// vd, m/s: `controller.speed_m_s`, or what the method takes where the mission does not say. The evidential method
-    /// stops within what it has seen, the paper's has no such rule.
+    /// Whether the robot turns to look before it goes somewhere: by the evidential method, if it can turn on the spot. Then
+    /// it stops within what it has seen, and defaults are bolder.
+    #[must_use]
+    pub fn looks_first(&self) -> bool {
+        self.method == Method::Evidential && self.body().ackermann().is_none()
+    }
+
+    /// vd, m/s: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, else the paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
-        let default = match self.method {
-            Method::Evidential => 0.5,
-            Method::Paper => 0.25,
-        };
+        let default = if self.looks_first() { 0.5 } else { 0.25 };
         self.controller.speed_m_s.unwrap_or(default)
     }
 
-    /// How far hits are mapped, metres: `mapper.map_within_m`, or what the method takes where the mission does not say.
+    /// How far hits are mapped, metres: `mapper.map_within_m`, or by default 0.6 for a robot that looks first, else 1.0.
     /// Farther out the arc of an echo is wider than the gaps it would close.
     #[must_use]
     pub fn map_within_m(&self) -> f64 {
-        let default = match self.method {
-            Method::Evidential => 0.6,
-            Method::Paper => 1.0,
-        };
+        let default = if self.looks_first() { 0.6 } else { 1.0 };
         self.mapper.map_within_m.unwrap_or(default)
     }
 

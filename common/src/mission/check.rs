@@ -1,5 +1,7 @@
 //! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
 
+mod objection;
+mod robot;
 mod shapes;
 mod simulation;
 
@@ -12,12 +14,9 @@ use std::{
 use glam::DVec2;
 use toml::de::{DeTable, DeValue};
 
-use super::{Mission, error::MissionError};
-use crate::{
-    address::{Address, AddressError, FORMS},
-    grid::{MAX_CELLS, MIN_CELLS},
-    wire::MOTOR_SCALE_V,
-};
+use self::objection::{Objection, objection, within};
+use super::{Method, Mission, error::MissionError};
+use crate::grid::{MAX_CELLS, MIN_CELLS};
 
 /// A mission is a page or two; a file without end is no mission.
 const MAX_BYTES: u64 = 8 << 20;
@@ -71,7 +70,7 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
             .file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     }
-    mission.remarks = remarks(text, origin, tree.get_ref());
+    mission.remarks = remarks(text, origin, tree.get_ref(), &mission);
     match Checker::default().run(&mission) {
         Ok(()) => Ok(mission),
         Err(Objection {
@@ -88,19 +87,27 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     }
 }
 
-/// What goes by another name now.
-fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>) -> Vec<String> {
+/// What goes by another name now, and what this robot does not do.
+fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> Vec<String> {
     let method = tree
         .get("method")
         .and_then(|value| value.get_ref().as_str());
+    let file = origin.display();
+    let line = |key| line_of(text, span_of(tree, key));
     let renamed = method.filter(|name| *name == "careful").map(|_| {
-        let line = line_of(text, span_of(tree, "method"));
-        let file = origin.display();
+        let line = line("method");
         format!(
             "{file}:{line}: method: \"careful\" is called \"evidential\" now; both are accepted"
         )
     });
-    renamed.into_iter().collect()
+    let looks = mission.method == Method::Evidential && mission.sensing;
+    let car = mission.body().ackermann().filter(|_| looks).map(|car| {
+        let (line, radius) = (line("robot.model"), car.least_turning_radius());
+        format!(
+            "{file}:{line}: robot.model: a car turns in no less than {radius:.2} m, so it does not turn on the spot to look before it drives"
+        )
+    });
+    renamed.into_iter().chain(car).collect()
 }
 
 /// 1-based line of byte `offset`.
@@ -124,42 +131,6 @@ fn span_of(tree: &DeTable<'_>, key: &str) -> usize {
         }
     }
     start
-}
-
-/// A value that cannot be, before it is given a line.
-struct Objection {
-    key: &'static str,
-    problem: String,
-    remedy: String,
-}
-
-fn objection(
-    key: &'static str,
-    problem: impl Into<String>,
-    remedy: impl Into<String>,
-) -> Objection {
-    Objection {
-        key,
-        problem: problem.into(),
-        remedy: remedy.into(),
-    }
-}
-
-/// `value` must lie in `range`; NaN lies in none.
-fn within(
-    key: &'static str,
-    value: f64,
-    range: std::ops::RangeInclusive<f64>,
-    unit: &str,
-) -> Result<(), Objection> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(objection(
-        key,
-        format!("{value} {unit} is out of range"),
-        format!("give {} to {} {unit}", range.start(), range.end()),
-    ))
 }
 
 #[derive(Default)]
@@ -186,7 +157,7 @@ impl Checker {
             -360.0..=360.0,
             "degrees",
         )?;
-        robot(mission)?;
+        robot::check(mission)?;
         stages(mission)?;
         self.shapes("known", &mission.known)?;
         self.shapes("world", &mission.world)?;
@@ -255,95 +226,6 @@ impl Checker {
             "give two finite numbers, metres",
         ))
     }
-}
-
-fn robot(mission: &Mission) -> Result<(), Objection> {
-    let body = mission.body();
-    let robot = &mission.robot;
-    if let Some(Err(error)) = robot.address.as_deref().map(str::parse::<Address<String>>) {
-        let problem = match error {
-            AddressError::Form { address, problem } => format!("{address:?} {problem}"),
-            AddressError::Host { .. } => error.to_string(),
-        };
-        return Err(objection("robot.address", problem, FORMS));
-    }
-    within("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz")?;
-    within(
-        "robot.wheel_radius_m",
-        body.wheel_radius_m,
-        0.005..=2.0,
-        "m",
-    )?;
-    within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
-    within(
-        "robot.counts_per_turn",
-        body.counts_per_turn,
-        1.0..=100_000.0,
-        "counts",
-    )?;
-    within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
-    within(
-        "robot.top_speed_m_s",
-        body.top_speed_m_s,
-        0.01..=10.0,
-        "m/s",
-    )?;
-    within(
-        "robot.command_limit_s",
-        robot.command_limit_s,
-        0.02..=5.0,
-        "s",
-    )?;
-    let limits = robot.low_battery_v;
-    for limit in [limits.board, limits.motor, limits.servo] {
-        within("robot.low_battery_v", limit, 0.0..=MOTOR_SCALE_V, "V")?;
-    }
-    if robot.command_limit_s * robot.rate_hz <= 1.0 {
-        return Err(objection(
-            "robot.command_limit_s",
-            format!(
-                "a command would go stale before the next tick: {} s at {} Hz",
-                robot.command_limit_s, robot.rate_hz
-            ),
-            "raise robot.command_limit_s or robot.rate_hz",
-        ));
-    }
-    let (left, right) = (robot.left.channel, robot.right.channel);
-    if left > 1 || right > 1 || left == right {
-        return Err(objection(
-            "robot.left",
-            format!("wheels on channels {left} and {right}"),
-            "put one on channel 0 and one on channel 1",
-        ));
-    }
-    // A third of the counter's cycle a tick keeps wrap-around unambiguous with a tick to spare.
-    let counts = body.top_speed_m_s / body.metres_per_count() / robot.rate_hz;
-    if counts > 32_768.0 / 6.0 {
-        return Err(objection(
-            "robot.rate_hz",
-            format!(
-                "at top speed a wheel makes {counts:.0} counts a tick, and the counter wraps at 32768"
-            ),
-            "raise robot.rate_hz or lower robot.top_speed_m_s",
-        ));
-    }
-    if mission.sonar.index > 5 {
-        return Err(objection(
-            "sonar.index",
-            format!(
-                "the standard frame has sonars 0 to 5, not {}",
-                mission.sonar.index
-            ),
-            "give 1 for the front one of an X80",
-        ));
-    }
-    within("sonar.forward_m", mission.sonar.forward_m, -5.0..=5.0, "m")?;
-    within(
-        "sonar.bearing_deg",
-        mission.sonar.bearing_deg,
-        -180.0..=180.0,
-        "degrees",
-    )
 }
 
 fn stages(mission: &Mission) -> Result<(), Objection> {

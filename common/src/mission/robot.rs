@@ -1,8 +1,9 @@
-//! The robot's body: presets of the X80 family and what a mission overrides.
+//! The robot's body: presets and what a mission overrides.
 
+use crate::kinematics::{Ackermann, DifferentialDrive, Drive};
 use serde::{Deserialize, Serialize};
 
-/// A member of the X80 family.
+/// Kind of robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
@@ -11,9 +12,11 @@ pub enum Model {
     X80,
     /// The X80SV and X80Pro: 756 counts a wheel turn.
     X80sv,
+    /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
+    Car,
 }
 
-/// One wheel's channel on the motor board.
+/// One wheel's channel on the motor board, or that of a car's steering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
@@ -38,9 +41,21 @@ pub struct RobotConfig {
     /// r of (2), metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheel_radius_m: Option<f64>,
-    /// W of (2): the track, metres.
+    /// W of (2): the track, metres; a car does not use it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub track_m: Option<f64>,
+    /// L of (3), metres; of a car only, like the other keys of its steering.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wheelbase_m: Option<f64>,
+    /// The most it steers to either side, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steering_limit_deg: Option<f64>,
+    /// How fast it steers, degrees a second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steering_rate_deg_s: Option<f64>,
+    /// Encoder counts of a whole turn of the steering; 0 counts are straight ahead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steering_counts_per_turn: Option<f64>,
     /// Encoder counts of one wheel turn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counts_per_turn: Option<f64>,
@@ -50,9 +65,9 @@ pub struct RobotConfig {
     /// The most either wheel's rim can do, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_speed_m_s: Option<f64>,
-    /// The left wheel's channel.
+    /// The left wheel's channel; that of a car's driven axle.
     pub left: Channel,
-    /// The right wheel's channel.
+    /// The right wheel's channel; that of a car's steering, positive to the left.
     pub right: Channel,
     /// Age at which a command no longer moves the robot, seconds.
     pub command_limit_s: f64,
@@ -93,6 +108,10 @@ impl Default for RobotConfig {
             rate_hz: 7.0,
             wheel_radius_m: None,
             track_m: None,
+            wheelbase_m: None,
+            steering_limit_deg: None,
+            steering_rate_deg_s: None,
+            steering_counts_per_turn: None,
             counts_per_turn: None,
             radius_m: None,
             top_speed_m_s: None,
@@ -123,9 +142,68 @@ pub struct Body {
     pub radius_m: f64,
     /// The most either wheel's rim can do, m/s.
     pub top_speed_m_s: f64,
+    /// Of a car; none of a robot with two driven wheels.
+    pub steering: Option<Steering>,
 }
 
+/// How a car steers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steering {
+    /// L, metres.
+    pub wheelbase_m: f64,
+    /// The most it steers to either side, radians.
+    pub limit_rad: f64,
+    /// How fast, rad/s.
+    pub rate_rad_s: f64,
+    /// Encoder counts of a whole turn of the steering.
+    pub counts_per_turn: f64,
+}
+
+impl Steering {
+    /// The steering angle at an encoder that stands at `counts`, radians.
+    #[must_use]
+    pub fn angle(&self, counts: f64) -> f64 {
+        counts * std::f64::consts::TAU / self.counts_per_turn
+    }
+
+    /// The encoder's counts at the steering `angle`, radians; per second where it is a rate.
+    #[must_use]
+    pub fn counts(&self, angle: f64) -> f64 {
+        angle * self.counts_per_turn / std::f64::consts::TAU
+    }
+}
+
+/// Where a car is asked to turn without the speed for it, it drives at this speed, m/s.
+const CREEP_M_S: f64 = 0.1;
+
 impl Body {
+    /// G of (2) or (3).
+    #[must_use]
+    pub fn drive(&self) -> Drive {
+        let top = self.top_speed_m_s / self.wheel_radius_m;
+        match self.ackermann() {
+            Some(ackermann) => Drive::Ackermann(ackermann),
+            None => Drive::Differential(DifferentialDrive::new(
+                self.wheel_radius_m,
+                self.track_m,
+                top,
+            )),
+        }
+    }
+
+    /// G of (3); none of a robot with two driven wheels.
+    #[must_use]
+    pub fn ackermann(&self) -> Option<Ackermann> {
+        let steering = self.steering?;
+        Some(Ackermann::new(
+            self.wheel_radius_m,
+            steering.wheelbase_m,
+            steering.limit_rad,
+            self.top_speed_m_s / self.wheel_radius_m,
+            CREEP_M_S,
+        ))
+    }
+
     /// Metres the rim moves per encoder count.
     #[must_use]
     pub fn metres_per_count(&self) -> f64 {
@@ -134,7 +212,7 @@ impl Body {
 }
 
 impl Model {
-    /// The family's published and measured dimensions.
+    /// Published and measured dimensions of the X80s, nominal ones of the car.
     #[must_use]
     pub const fn body(self) -> Body {
         match self {
@@ -144,6 +222,7 @@ impl Model {
                 counts_per_turn: 1200.0,
                 radius_m: 0.19,
                 top_speed_m_s: 1.0,
+                steering: None,
             },
             Self::X80sv => Body {
                 wheel_radius_m: 0.085,
@@ -151,6 +230,22 @@ impl Model {
                 counts_per_turn: 756.0,
                 radius_m: 0.19,
                 top_speed_m_s: 0.76,
+                steering: None,
+            },
+            // Nominal. The pose is the middle of the rear axle: the disc around it covers a body that reaches 0.22 m ahead of
+            // it and 0.09 m to either side. It turns in 0.31 m.
+            Self::Car => Body {
+                wheel_radius_m: 0.04,
+                track_m: 0.16,
+                counts_per_turn: 600.0,
+                radius_m: 0.24,
+                top_speed_m_s: 1.0,
+                steering: Some(Steering {
+                    wheelbase_m: 0.18,
+                    limit_rad: std::f64::consts::FRAC_PI_6,
+                    rate_rad_s: std::f64::consts::TAU / 3.0,
+                    counts_per_turn: 3600.0,
+                }),
             },
         }
     }
@@ -167,6 +262,18 @@ impl RobotConfig {
             counts_per_turn: self.counts_per_turn.unwrap_or(preset.counts_per_turn),
             radius_m: self.radius_m.unwrap_or(preset.radius_m),
             top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
+            steering: preset.steering.map(|steering| Steering {
+                wheelbase_m: self.wheelbase_m.unwrap_or(steering.wheelbase_m),
+                limit_rad: self
+                    .steering_limit_deg
+                    .map_or(steering.limit_rad, f64::to_radians),
+                rate_rad_s: self
+                    .steering_rate_deg_s
+                    .map_or(steering.rate_rad_s, f64::to_radians),
+                counts_per_turn: self
+                    .steering_counts_per_turn
+                    .unwrap_or(steering.counts_per_turn),
+            }),
         }
     }
 }

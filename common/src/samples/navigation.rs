@@ -237,9 +237,9 @@ wire_enum! {
 pub struct CommandSample {
     /// Which sample.
     pub stamp: Stamp,
-    /// omega_L, rad/s.
+    /// omega_L, rad/s; omega_h of a car's driven wheel.
     pub left_rad_s: f64,
-    /// omega_R, rad/s.
+    /// omega_R, rad/s; of a car the steering angle phi, radians, positive to the left: `robot.model` decides.
     pub right_rad_s: f64,
     /// vc of (16), m/s.
     pub v_m_s: f64,

@@ -38,7 +38,8 @@ pub struct RangeSample {
     pub raw_cm: u8,
 }
 
-/// Topic `wheels`: the encoders.
+/// Topic `wheels`: the encoders. Of a car the left one is that of the driven wheel, the right one that of the steering, 0
+/// straight ahead and growing to the left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Wheels")]
 #[repr(C)]

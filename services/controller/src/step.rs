@@ -1,8 +1,10 @@
 //! Align the robot with the guidance, and let alignment set the speed.
 
+mod car;
+
 use common::{
     clock::MissionTime,
-    kinematics::{DifferentialDrive, Twist},
+    kinematics::{Drive, Twist},
     mission::{Method, Mission},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
     step::{ForeignState, Step},
@@ -69,12 +71,17 @@ enum SpeedLaw {
     },
     /// The evidential method's: it turns on the spot until it faces its way, then drives no faster than guidance allows.
     Evidential,
+    /// A car's, by either method: the paper's, no faster than guidance allows. A car does not turn on the spot.
+    Car {
+        /// Whether alignment slows it at all.
+        modulated: bool,
+    },
 }
 
 /// The controller of (15)-(17).
 #[derive(Clone, Debug)]
 pub struct Controller {
-    drive: DifferentialDrive,
+    drive: Drive,
     target: DVec2,
     tolerance: f64,
     speed: f64,
@@ -96,9 +103,8 @@ impl Step for Controller {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let settings = &mission.controller;
-        let top = body.top_speed_m_s / body.wheel_radius_m;
         Self {
-            drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, top),
+            drive: body.drive(),
             target: mission.target,
             tolerance: mission.arrival_tolerance_m,
             speed: mission.speed_m_s(),
@@ -107,6 +113,9 @@ impl Step for Controller {
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
             law: match mission.method {
+                _ if body.steering.is_some() => SpeedLaw::Car {
+                    modulated: settings.modulated,
+                },
                 Method::Paper => SpeedLaw::Paper {
                     modulated: settings.modulated,
                 },
@@ -162,10 +171,10 @@ impl Step for Controller {
                 ..command
             };
         };
-        let wheels = self.drive.wheels(twist);
+        let [left_rad_s, right_rad_s] = self.drive.inputs(twist);
         CommandSample {
-            left_rad_s: wheels.left,
-            right_rad_s: wheels.right,
+            left_rad_s,
+            right_rad_s,
             v_m_s: twist.v,
             omega_rad_s: twist.omega,
             state: CommandState::Driving.into(),
@@ -188,6 +197,9 @@ impl Controller {
             omega: controller.turn_to(alignment),
         };
         match (status, self.law) {
+            (_, SpeedLaw::Car { modulated }) => {
+                self.car_motion(modulated, status, alignment, distance, limit)
+            }
             // The paper's method gives no direction where the target is unreachable.
             (GuidanceStatus::Look, _) | (GuidanceStatus::Unreachable, SpeedLaw::Evidential) => {
                 Some(on_the_spot(self))

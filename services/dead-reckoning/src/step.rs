@@ -1,8 +1,8 @@
-//! Counts to pose. Nothing can recompute an integral, so its state is what the checkpoint keeps.
+//! Counts to pose: of two wheels, (20), or of a car's driven wheel and steering, (3). Nothing can recompute an integral, so its state is what the checkpoint keeps.
 
 use common::{
     clock::MissionTime,
-    kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
+    kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
     mission::{Body, Integration, Mission},
     samples::{PoseSample, WheelSample},
     step::{ForeignState, Step},
@@ -63,7 +63,7 @@ pub struct Reckoned {
 /// The integrator of (20) and (21).
 #[derive(Clone, Debug)]
 pub struct DeadReckoning {
-    drive: DifferentialDrive,
+    drive: Drive,
     body: Body,
     integration: Integration,
     state: State,
@@ -78,7 +78,7 @@ impl Step for DeadReckoning {
         let body = mission.body();
         let start = mission.start_pose();
         Self {
-            drive: DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY),
+            drive: body.drive(),
             body,
             integration: mission.dead_reckoning.integration,
             state: State {
@@ -112,10 +112,9 @@ impl Step for DeadReckoning {
                 };
             }
             let elapsed = now.since(last.time).as_secs_f64();
-            let turned = self.turned(last, wheels, elapsed);
-            rejected = turned.is_none();
-            // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.
-            let motion = self.drive.twist(turned.unwrap_or_default());
+            let moved = self.moved(last, wheels, elapsed);
+            rejected = moved.is_none();
+            let motion = moved.unwrap_or_default();
             let pose = Pose2 {
                 position: self.state.position,
                 heading: self.state.heading,
@@ -149,8 +148,8 @@ impl Step for DeadReckoning {
 }
 
 impl DeadReckoning {
-    /// Wheel angles since `last`, radians; none if the counts cannot have come from turning wheels.
-    fn turned(&self, last: Last, wheels: &WheelSample, elapsed: f64) -> Option<WheelSpeeds> {
+    /// Arc and turn since `last`, metres and radians; none if the counts cannot have come from turning wheels.
+    fn moved(&self, last: Last, wheels: &WheelSample, elapsed: f64) -> Option<Twist> {
         let (left, right) = (
             counts_between(last.left, wheels.left_counts),
             counts_between(last.right, wheels.right_counts),
@@ -161,9 +160,22 @@ impl DeadReckoning {
         if f64::from(left.abs().max(right.abs())) > limit || restarted(last, wheels, elapsed) {
             return None;
         }
-        Some(WheelSpeeds {
-            left: f64::from(left) * per_count,
-            right: f64::from(right) * per_count,
+        // (20) is linear in the wheels: their angles give arc and turn as their speeds give v and omega.
+        let wheel = f64::from(left) * per_count;
+        Some(match &self.drive {
+            Drive::Differential(drive) => drive.twist(WheelSpeeds {
+                left: wheel,
+                right: f64::from(right) * per_count,
+            }),
+            Drive::Ackermann(drive) => {
+                // On the way it steered by the mean of the two angles.
+                let middle = f64::from(counts_between(0, last.right)) + f64::from(right) / 2.0;
+                let angle = self.body.steering.map(|steering| steering.angle(middle));
+                drive.twist(SteeredWheel {
+                    wheel,
+                    steering: angle.unwrap_or_default(),
+                })
+            }
         })
     }
 

@@ -72,11 +72,6 @@ impl ActiveSensing {
         }
     }
 
-    /// The body's, metres.
-    pub(crate) const fn radius(&self) -> f64 {
-        self.radius
-    }
-
     /// Advice for a robot at `pose` that is to go along `direction`, a unit vector.
     pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Advice {
         let way = view.way(pose.position, direction);
@@ -158,7 +153,7 @@ impl View<'_> {
         byte.map_or(CellState::Perimeter, CellState::from_byte)
     }
 
-    fn is_hazard(&self, at: DVec2) -> bool {
+    pub(crate) fn is_hazard(&self, at: DVec2) -> bool {
         self.frame
             .cell_at(at)
             .is_none_or(|cell| self.state(cell).is_hazard())

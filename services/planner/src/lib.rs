@@ -8,6 +8,7 @@
 
 mod active_sensing;
 mod aim;
+mod arcs;
 pub mod background_solver;
 mod fault;
 pub mod shell;

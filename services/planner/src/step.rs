@@ -20,6 +20,7 @@ use harmonic::{
 
 use crate::active_sensing::{ActiveSensing, Advice, View};
 use crate::aim;
+use crate::arcs::Arcs;
 use crate::fault::lead_astray;
 use crate::unheard_faces::UnheardFaces;
 
@@ -39,12 +40,16 @@ enum Advisor {
     Follow,
     /// The evidential method: whether the sonar looked there.
     LookFirst(ActiveSensing),
+    /// The same of a car, which cannot look around on the spot: what it can steer.
+    Steer(Arcs),
 }
 
 /// The planner of (11).
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
+    /// The body's, metres.
+    radius: f64,
     screening: Screening,
     advisor: Advisor,
     solver: Solver,
@@ -102,12 +107,14 @@ impl Step for Planner {
     fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
+            radius: mission.body().radius_m,
             screening: screening(mission),
-            advisor: match mission.method {
-                Method::Evidential if mission.sensing => {
+            advisor: match (mission.method, Arcs::new(mission)) {
+                (Method::Evidential, Some(arcs)) => Advisor::Steer(arcs),
+                (Method::Evidential, None) if mission.sensing => {
                     Advisor::LookFirst(ActiveSensing::new(mission))
                 }
-                Method::Paper | Method::Evidential => Advisor::Follow,
+                (Method::Paper | Method::Evidential, _) => Advisor::Follow,
             },
             solver: Solver::new(Settings::default()),
             grid: Replica::default(),
@@ -194,7 +201,9 @@ impl Planner {
     fn aim(&self, frame: &GridFrame) -> Option<grid::Cell> {
         match self.advisor {
             Advisor::Follow => frame.cell_at(self.target),
-            Advisor::LookFirst(_) => aim::cell(frame, self.grid.cells(), self.target),
+            Advisor::LookFirst(_) | Advisor::Steer(_) => {
+                aim::cell(frame, self.grid.cells(), self.target)
+            }
         }
     }
 
@@ -368,14 +377,23 @@ impl Planner {
         status: GuidanceStatus,
         direction: DVec2,
     ) -> (GuidanceStatus, DVec2, f64) {
-        let (Advisor::LookFirst(sensing), Some(live)) = (&self.advisor, &self.live) else {
+        let Some(live) = &self.live else {
             return (status, direction, f64::INFINITY);
         };
         let view = View {
             frame: live.frame,
             cells: self.grid.cells(),
             field: &live.field,
-            faces: UnheardFaces::new(self.belief.clear_beams(), sensing.radius()),
+            faces: UnheardFaces::new(self.belief.clear_beams(), self.radius),
+        };
+        let sensing = match (&self.advisor, status) {
+            (Advisor::LookFirst(sensing), _) => sensing,
+            (Advisor::Steer(arcs), GuidanceStatus::Along | GuidanceStatus::WayOut) => {
+                let distance = pose.position.distance(self.target);
+                let (direction, limit) = arcs.advise(&view, pose, distance);
+                return (status, direction, limit);
+            }
+            (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
         };
         match status {
             GuidanceStatus::Along => match sensing.advise(&view, pose, direction) {

@@ -1,15 +1,19 @@
-//! The two wheels on the wire: their channels and signs, counts in, timed commands out.
+//! The two wheels on the wire, or a car's driven wheel and steering: channels and signs, counts in, timed commands out.
 
 use std::time::Duration;
 
 use common::{
     mission::{Body, Channel, Mission, RobotConfig},
-    samples::WheelSample,
+    samples::{CommandSample, WheelSample},
     wire::{
         Addressing, COUNT_CYCLE, Command, Encoder, Feedback, Mode, MotorSensors, Parameter,
-        Request, Stream,
+        Request, Stream, counts_between,
     },
 };
+
+/// Steering rate for each angle that is left, over the ticks of a second: below 1, so that the delay of a speed loop does
+/// not make the steering swing.
+const STEERING_GAIN: f64 = 0.6;
 
 /// The drive of one robot.
 #[derive(Clone, Debug)]
@@ -89,14 +93,29 @@ impl Drive {
         }
     }
 
-    /// rad/s to counts/s, limited to what the wheel can do; what is no number stands.
+    /// What `command` asks of the two channels, counts/s, at `share` of its speed, where the encoders stand at `wheels`. A
+    /// car's steering is a channel with a speed loop like that of a wheel: it is driven towards its angle, so a timed
+    /// command ends its motion, too.
     #[must_use]
-    pub fn counts_per_second(&self, speed: f64) -> i16 {
+    pub fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
+        let driven = self.counts_per_second(share * command.left_rad_s);
+        let Some(steering) = self.body.steering else {
+            return [driven, self.counts_per_second(share * command.right_rad_s)];
+        };
+        let angle = command
+            .right_rad_s
+            .clamp(-steering.limit_rad, steering.limit_rad);
+        let left = steering.counts(angle) - f64::from(counts_between(0, wheels.right_counts));
+        let top = steering.counts(steering.rate_rad_s);
+        let rate = (left * STEERING_GAIN * self.robot.rate_hz).clamp(-top, top);
+        [driven, on_the_wire(rate)]
+    }
+
+    /// rad/s to counts/s, limited to what the wheel can do; what is no number stands.
+    fn counts_per_second(&self, speed: f64) -> i16 {
         let per_radian = self.body.counts_per_turn / std::f64::consts::TAU;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
-        let counts = (speed * per_radian).clamp(-top, top).round();
-        // -32768 and -32767 mean "leave alone".
-        counts.clamp(-32_766.0, 32_766.0) as i16
+        on_the_wire((speed * per_radian).clamp(-top, top))
     }
 
     /// A timed velocity command: a robot that obeys the time stops by itself when we fall silent.
@@ -118,10 +137,64 @@ impl Drive {
     }
 }
 
+/// Counts/s as a command carries them; what is no number is 0.
+fn on_the_wire(counts: f64) -> i16 {
+    // -32768 and -32767 mean "leave alone".
+    counts.round().clamp(-32_766.0, 32_766.0) as i16
+}
+
 /// The frame of a command.
 #[must_use]
 pub fn encoded(command: Command) -> Vec<u8> {
     let mut bytes = Vec::new();
     command.encode(Addressing::default(), &mut bytes);
     bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// What a car's channels are asked for when its steering stands at `counts`: at 7 Hz, 3600 counts a turn.
+    fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
+        let text = "target = [3, 0]\nrobot.model = 'car'";
+        let drive = Drive::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let command = CommandSample {
+            left_rad_s,
+            right_rad_s: angle,
+            ..CommandSample::default()
+        };
+        let wheels = WheelSample {
+            right_counts: counts,
+            ..WheelSample::default()
+        };
+        drive.counts(&command, share, &wheels)
+    }
+
+    #[test]
+    fn a_cars_steering_is_driven_towards_its_angle() {
+        // 5 degrees are 50 counts; 0.6 of what is left in a tick.
+        let five = 5_f64.to_radians();
+        assert_eq!(counts(0.0, five, 1.0, 0), [0, 210]);
+        assert_eq!(counts(0.0, five, 1.0, 50), [0, 0]);
+        assert_eq!(counts(0.0, -five, 1.0, COUNT_CYCLE - 25), [0, -105]);
+    }
+
+    #[test]
+    fn a_cars_steering_is_limited_in_angle_and_rate_and_no_number_holds_it() {
+        // 1200 counts a second at most; 30 degrees are 300 counts.
+        assert_eq!(counts(0.0, 1.5, 1.0, 0), [0, 1200]);
+        assert_eq!(counts(0.0, 1.5, 1.0, 300), [0, 0]);
+        assert_eq!(counts(f64::NAN, f64::NAN, 1.0, 7), [0, 0]);
+    }
+
+    #[test]
+    fn a_slowed_car_keeps_its_curve() {
+        let five = 5_f64.to_radians();
+        let tau = std::f64::consts::TAU;
+        assert_eq!(counts(tau, five, 1.0, 0), [600, 210]);
+        assert_eq!(counts(tau, five, 0.5, 0), [300, 210]);
+    }
 }

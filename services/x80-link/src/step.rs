@@ -87,6 +87,8 @@ pub struct Link {
     restart: RestartWatch,
     telemetry: Telemetry,
     sonar: Option<u8>,
+    /// The encoders of the newest tick.
+    wheels: WheelSample,
     /// Mission time of the newest tick.
     time: MissionTime,
     open: Option<OpenTick>,
@@ -119,6 +121,7 @@ impl Step for Link {
             restart: RestartWatch::new(mission),
             telemetry: Telemetry::new(mission.robot.low_battery_v),
             sonar: None,
+            wheels: WheelSample::default(),
             time: MissionTime::default(),
             open: None,
             newest_command: None,
@@ -251,6 +254,7 @@ impl Link {
             restarts: self.restart.restarts(),
             ..self.drive.wheels(sensors)
         };
+        self.wheels = wheels;
         let open = OpenTick {
             range: reading(self.sonar.take()),
             wheels,
@@ -298,11 +302,10 @@ impl Link {
             Action::Slow => SLOW_SHARE,
             _ => 1.0,
         };
-        let wheels = match CommandState::from_byte(command.state) {
-            CommandState::Driving => [command.left_rad_s, command.right_rad_s],
-            CommandState::Halt | CommandState::Arrived => [0.0, 0.0],
+        let counts = match CommandState::from_byte(command.state) {
+            CommandState::Driving => self.drive.counts(command, share, &self.wheels),
+            CommandState::Halt | CommandState::Arrived => [0, 0],
         };
-        let counts = wheels.map(|speed| self.drive.counts_per_second(share * speed));
         effects.push(Effect::Send(
             self.drive.velocity(counts, self.drive.limit()),
         ));

@@ -1,7 +1,7 @@
-//! The body: a disc on two driven wheels that cannot go through things.
+//! The body: a disc that cannot go through things, on two driven wheels or on a car's.
 
 use common::{
-    kinematics::{DifferentialDrive, Pose2, WheelSpeeds},
+    kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
     mission::Mission,
 };
 use glam::DVec2;
@@ -112,22 +112,27 @@ impl Body {
             right: turned.right,
             left: turned.left,
         });
+        let Some(arc) = self.go(step, world) else {
+            return asked;
+        };
+        let half_turn = step.omega * self.track / 2.0;
+        Wheels {
+            left: arc - half_turn,
+            right: arc + half_turn,
+        }
+    }
+
+    /// Move by the arc and turn of `step` (metres, radians), and no farther than `world` lets it. Where it touched something,
+    /// returns how far ahead it has really come, metres.
+    pub fn go(&mut self, step: Twist, world: &World) -> Option<f64> {
         let before = self.pose;
         self.pose = before.along_arc(step.v, step.omega);
         let touched = self.leave_things(before.position, world);
         let clear = self.clearance > RELEASE_M;
         self.contacts += u64::from(touched && !self.touching);
         self.touching = touched || (self.touching && !clear);
-        if !touched {
-            return asked;
-        }
         let middle = DVec2::from_angle(before.heading + step.omega / 2.0);
-        let arc = (self.pose.position - before.position).dot(middle);
-        let half_turn = step.omega * self.track / 2.0;
-        Wheels {
-            left: arc - half_turn,
-            right: arc + half_turn,
-        }
+        touched.then(|| (self.pose.position - before.position).dot(middle))
     }
 
     /// Push the body out of everything it penetrates, or put it back to `before` where that fails.

@@ -2,11 +2,27 @@
 //! wheel really is.
 
 use common::{
-    mission::Mission,
+    mission::{Mission, WheelPhysics},
     wire::{COUNT_CYCLE, Encoder},
 };
 
 use crate::{body::Wheels, motor::Motor, noise::Noise};
+
+/// How far the ground goes by when a rim goes `metres` and slips.
+pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) -> f64 {
+    let lost = noise.normal(physics.slip_noise * metres.abs().sqrt());
+    metres * (1.0 - physics.slip_share) + lost
+}
+
+/// The share by which wheels go with the ground. A wheel that slips turns all the same; one whose body is `held` turns as
+/// far as it slips at the contact.
+pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> f64 {
+    if held {
+        1.0 - physics.contact_slip
+    } else {
+        0.0
+    }
+}
 
 /// How the wheels hang on the motors.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`world`] | what stands around the robot, and what comes and goes |
-//! | [`body`] | a disc on two wheels, and what it touches |
+//! | [`body`] | a disc on two wheels or on a car's, and what it touches |
 //! | [`wheel_errors`] | how far its wheels are from what the mission says |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
 //! | [`sonar`], [`infrared`], [`sensors`] | what is heard and seen, as the frames carry it |
@@ -37,6 +37,7 @@
 //! ```
 
 pub mod body;
+mod car;
 mod drivetrain;
 mod error;
 pub mod infrared;

@@ -2,6 +2,7 @@
 
 use common::{
     ground_truth::GroundTruthTick,
+    kinematics::Twist,
     mission::{Mission, Physics},
     wire::{
         Addressing, Command, CustomSensors, Frame, Motion, MotorSensors, Report, StandardSensors,
@@ -11,7 +12,8 @@ use common::{
 
 use crate::{
     body::{Body, Wheels},
-    drivetrain::Drivetrain,
+    car::Car,
+    drivetrain::{self, Drivetrain},
     motor::Motor,
     noise::{Noise, Source},
     saved_state::SavedState,
@@ -50,6 +52,8 @@ pub struct Robot {
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     drivetrain: Drivetrain,
+    /// None of a robot with two driven wheels.
+    car: Option<Car>,
     longest_step: f64,
 
     world: World,
@@ -88,6 +92,11 @@ impl Robot {
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
         let world = World::new(mission);
         let wheel_errors = WheelErrors::of(mission);
+        let car = Car::new(mission, &wheel_errors);
+        let top_counts = |channel| match &car {
+            Some(car) if car.steers_by(channel) => car.top_steering_counts(),
+            _ => top_counts,
+        };
         let mut robot = Self {
             physics,
             ignores_time: mission.simulation.ignores_time,
@@ -97,7 +106,8 @@ impl Robot {
             longest_step,
             body: Body::new(mission, &world, wheel_errors.track),
             world,
-            motors: std::array::from_fn(|_| Motor::new(physics.wheels, top_counts)),
+            motors: std::array::from_fn(|channel| Motor::new(physics.wheels, top_counts(channel))),
+            car,
             streams: Streams::default(),
             ranging: Ranging::new(mission, seed),
             wheel_noise: Noise::new(seed, Source::Wheels),
@@ -303,20 +313,26 @@ impl Robot {
 
         let (now, noise) = (self.time, &mut self.wheel_noise);
         let drivetrain = self.drivetrain;
-        let asked = drivetrain.step(&mut self.motors, now, dt, noise);
         let wheels = self.physics.wheels;
-        let ground = drivetrain.rims(asked).map(|metres| {
-            let lost = noise.normal(wheels.slip_noise * metres.abs().sqrt());
-            metres * (1.0 - wheels.slip_share) + lost
-        });
-        let went = self.body.roll(ground, &self.world);
-        // A wheel that slips turns all the same; one whose body is held turns as far as it slips at the contact.
-        let grip = if went == ground {
-            0.0
+        if let Some(car) = &self.car {
+            let world = &self.world;
+            car.step(
+                &mut self.motors,
+                &mut self.body,
+                world,
+                &wheels,
+                (now, dt),
+                noise,
+            );
         } else {
-            1.0 - wheels.contact_slip
-        };
-        drivetrain.turn(&mut self.motors, asked, went, grip, dt);
+            let asked = drivetrain.step(&mut self.motors, now, dt, noise);
+            let ground = drivetrain
+                .rims(asked)
+                .map(|metres| drivetrain::slipped(metres, &wheels, noise));
+            let went = self.body.roll(ground, &self.world);
+            let grip = drivetrain::grip(went != ground, &wheels);
+            drivetrain.turn(&mut self.motors, asked, went, grip, dt);
+        }
         self.least_clearance = self.least_clearance.min(self.body.clearance());
         let rims = self.rims();
         if rims.left.abs().max(rims.right.abs()) > GroundTruthTick::AT_REST_M_S {
@@ -326,7 +342,28 @@ impl Robot {
 
     /// Speeds of the rims, m/s, forward positive.
     fn rims(&self) -> Wheels<f64> {
-        self.drivetrain.rim_speeds(&self.motors)
+        match &self.car {
+            Some(car) => {
+                let driven = car.twist(&self.motors).v;
+                Wheels {
+                    left: driven,
+                    right: driven,
+                }
+            }
+            None => self.drivetrain.rim_speeds(&self.motors),
+        }
+    }
+
+    /// How it moves by what its motors do.
+    fn twist(&self) -> Twist {
+        if let Some(car) = &self.car {
+            return car.twist(&self.motors);
+        }
+        let Wheels { left, right } = self.rims();
+        Twist {
+            v: (left + right) / 2.0,
+            omega: (right - left) / self.body.track(),
+        }
     }
 
     /// Let mission time pass until the next tick and measure there.
@@ -376,7 +413,7 @@ impl Robot {
     /// What is true at this tick. The least clearance begins anew.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
-        let Wheels { left, right } = self.rims();
+        let Twist { v, omega } = self.twist();
         let counts = self.drivetrain.counts(&self.motor.encoders);
         let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
         self.least_clearance = self.body.clearance();
@@ -386,8 +423,8 @@ impl Robot {
             x: pose.position.x,
             y: pose.position.y,
             heading: pose.heading,
-            v: (left + right) / 2.0,
-            omega: (right - left) / self.body.track(),
+            v,
+            omega,
             clearance_m,
             contacts: self.body.contacts(),
             left_counts: counts.left,

@@ -125,7 +125,10 @@ impl Summary {
             looks: looks.looks,
             look_s: looks.ticks as f64 / mission.robot.rate_hz,
             sonar_unavailable_share: sonar_unavailable_share(truth),
-            wheel_range_rad_s: last_tick.and_then(|tick| record.wheels.at(tick).range_rad_s()),
+            // Of a car one of the two is a steering angle.
+            wheel_range_rad_s: last_tick
+                .filter(|_| mission.body().steering.is_none())
+                .and_then(|tick| record.wheels.at(tick).range_rad_s()),
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: finished.restarts.clone(),
             resumes: *resumes,

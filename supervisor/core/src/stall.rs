@@ -14,7 +14,7 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     clock::MissionTime,
-    mission::{Method, Mission},
+    mission::{Body, Mission},
     samples::{GuidanceSample, GuidanceStatus, PoseSample, RecoveryStep, StallCause, StallSample},
 };
 use glam::DVec2;
@@ -45,14 +45,21 @@ const MOST_REPLANS: u32 = 2;
 /// Beliefs forgotten before the target is called unreachable.
 const MOST_RESETS: u64 = 3;
 
-/// The cause of a stall in words.
-pub(crate) const fn words(cause: StallCause) -> &'static str {
-    match cause {
+/// The cause of a stall of `body` in words.
+pub(crate) fn words(cause: StallCause, body: &Body) -> String {
+    let cause = match cause {
         StallCause::Still => "the robot neither drives nor turns, whatever is planned",
         StallCause::Pinned => "the robot moves and does not get away, whatever is planned",
         StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
         StallCause::CutOff => "the belief isolates the robot from the target, again and again",
-    }
+    };
+    body.ackermann().map_or_else(
+        || cause.to_owned(),
+        |car| {
+            let radius = car.least_turning_radius();
+            format!("{cause}; this car turns in no less than {radius:.2} m and does not reverse: it needs more room")
+        },
+    )
 }
 
 /// Log it.
@@ -125,21 +132,25 @@ impl StallWatch {
         let controller = &mission.controller;
         let slowest_turn = TAU / controller.turn_rad_s.min(controller.look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
+        let car = mission.body().ackermann();
+        // It turns on the spot, else as it drives.
+        let on_the_spot = mission.looks_first();
+        let tightest = car.map_or(0.0, |car| car.least_turning_radius());
+        let circle = tightest.max(mission.speed_m_s() / controller.turn_rad_s);
         Self {
             moved_m: MOVED_M.min(mission.speed_m_s() * seconds * SHARE),
             turned_rad: TURNED_RAD.min(controller.turn_rad_s * seconds * SHARE),
-            place_m: match mission.method {
-                Method::Evidential => PLACE_M.min(mission.speed_m_s() * at_a_place * SHARE),
-                // It turns as it drives.
-                Method::Paper => CIRCLES * 2.0 * mission.speed_m_s() / controller.turn_rad_s,
+            place_m: if on_the_spot {
+                PLACE_M.min(mission.speed_m_s() * at_a_place * SHARE)
+            } else {
+                CIRCLES * 2.0 * circle
             },
             pinned_after: STALLED_AFTER + Duration::from_secs_f64(at_a_place),
-            cut_off_after: match mission.method {
-                Method::Evidential => {
-                    let turn = SCAN_TURNS * TAU / controller.look_rad_s;
-                    CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
-                }
-                Method::Paper => CUT_OFF_AFTER,
+            cut_off_after: if on_the_spot {
+                let turn = SCAN_TURNS * TAU / controller.look_rad_s;
+                CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
+            } else {
+                CUT_OFF_AFTER
             },
             anchor: None,
             place: None,

@@ -325,7 +325,8 @@ impl<'a> Supervisor<'a> {
             // The new epoch is in the directive.
             RecoveryStep::Forget => self.publish_state()?,
             RecoveryStep::GiveUp => {
-                let reason = format!("target unreachable: {}", stall::words(stall.cause()));
+                let words = stall::words(stall.cause(), &self.options.mission.body());
+                let reason = format!("target unreachable: {words}");
                 return Ok(Some(Ending::failed(Outcome::Unreachable, reason)));
             }
         }

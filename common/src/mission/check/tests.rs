@@ -60,6 +60,14 @@ fn every_refusal_names_line_and_key() {
             "m.toml:3: robot.address: ",
         ),
         (
+            "target = [3, 0]\n[robot]\nwheelbase_m = 0.2",
+            "m.toml:3: robot.wheelbase_m: this robot has two driven wheels",
+        ),
+        (
+            "target = [3, 0]\n[robot]\nmodel = 'car'\nsteering_limit_deg = 90",
+            "m.toml:4: robot.steering_limit_deg: ",
+        ),
+        (
             "description = 'no target'",
             "m.toml:1: missing field `target`",
         ),
@@ -82,4 +90,36 @@ fn the_former_name_of_a_method_is_accepted_with_a_remark() {
     )
     .unwrap();
     assert_eq!((today.method, today.remarks), (former.method, vec![]));
+}
+
+#[test]
+fn a_car_has_the_presets_of_its_model_and_what_the_mission_overrides() {
+    let text =
+        "target = [3, 0]\n[robot]\nmodel = 'car'\nsteering_limit_deg = 45\nwheelbase_m = 0.3";
+    let mission = parse(text, Path::new("m.toml")).unwrap();
+    let car = mission.body().ackermann().unwrap();
+    assert!((car.least_turning_radius() - 0.3).abs() < 1e-12);
+    assert_eq!(
+        mission.body().steering.unwrap().counts_per_turn,
+        3600.0,
+        "the preset's"
+    );
+    let written = toml::to_string(&mission).unwrap();
+    assert_eq!(
+        parse(&written, Path::new("m.toml")).unwrap().robot,
+        mission.robot
+    );
+}
+
+#[test]
+fn a_car_that_is_to_look_first_is_remarked_on_with_its_turning_radius() {
+    let car = "target = [3, 0]\nrobot.model = 'car'";
+    let remarks = |text: &str| parse(text, Path::new("m.toml")).unwrap().remarks;
+    let remark = &remarks(car)[0];
+    assert!(
+        remark.starts_with("m.toml:2: robot.model: a car turns in no less than 0.31 m"),
+        "{remark}"
+    );
+    assert!(remarks(&format!("{car}\nmethod = 'paper'")).is_empty());
+    assert!(remarks("target = [3, 0]").is_empty());
 }

@@ -173,3 +173,24 @@ fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_t
     assert!(!reckoning.rejects(&back));
     close(reckoning.take(&back).heading_rad, 5.0 * 2e-4 * PI / 0.4);
 }
+
+#[test]
+fn equation_3_of_a_car_by_hand() {
+    // r = 0.1 m, 1000 counts a turn; L = 0.5 m; 45 degrees of steering are 450 of 3600 counts.
+    let car = "model = 'car'\nwheelbase_m = 0.5\nsteering_limit_deg = 60";
+    let mut steered = reckoning(car);
+    steered.take(&wheels(0, 100, 450));
+    // Half a turn of the wheel is 0.1 pi metres, on a circle of radius 0.5 m to the left.
+    let pose = steered.take(&wheels(1, 600, 450));
+    let turn = 0.1 * PI / 0.5;
+    close(pose.heading_rad, turn);
+    close(pose.x_m, 0.5 * turn.sin());
+    close(pose.y_m, 0.5 * (1.0 - turn.cos()));
+    close(pose.travelled_m, 0.1 * PI);
+    // On the way from 45 degrees to the left to as much to the right it is straight on the mean.
+    let mut swung = reckoning(car);
+    swung.take(&wheels(0, 100, 450));
+    let pose = swung.take(&wheels(1, 600, COUNT_CYCLE - 450));
+    close(pose.heading_rad, 0.0);
+    close(pose.x_m, 0.1 * PI);
+}

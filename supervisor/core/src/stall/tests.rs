@@ -245,3 +245,29 @@ fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
     watch.step(&out, &guidance(GuidanceStatus::Along, 0), false);
     assert_eq!(drive(&mut watch, 9..17), None);
 }
+
+#[test]
+fn a_car_that_circles_on_its_tightest_circle_is_pinned_and_the_reason_names_the_radius() {
+    let path = std::path::Path::new("test.toml");
+    let mission = Mission::parse("target = [3, 0]\nrobot.model = 'car'", path).unwrap();
+    let mut watch = StallWatch::new(&mission);
+    let radius = mission.body().ackermann().unwrap().least_turning_radius();
+    let along = guidance(GuidanceStatus::Along, 0);
+    let stall = (0..600).map(f64::from).find_map(|tick| {
+        let (seconds, travelled) = (tick / 7.0, tick / 7.0 * 0.125);
+        let turned = travelled / radius;
+        let circling = PoseSample {
+            x_m: radius * turned.sin(),
+            y_m: radius * (1.0 - turned.cos()),
+            heading_rad: turned,
+            ..pose(seconds, travelled)
+        };
+        watch.step(&circling, &along, false)
+    });
+    let cause = stall.map(|stall| stall.cause());
+    assert_eq!(cause, Some(StallCause::Pinned));
+    let reason = words(StallCause::Pinned, &mission.body());
+    assert!(reason.contains("turns in no less than 0.31 m"), "{reason}");
+    let x80 = Mission::parse("target = [3, 0]", path).unwrap();
+    assert!(!words(StallCause::Pinned, &x80.body()).contains("turns in no less"));
+}

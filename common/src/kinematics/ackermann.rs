@@ -1,0 +1,183 @@
+//! The car-like robot, (3), and its inverse, (17).
+
+use super::pose::Twist;
+
+/// G of (3): a car-like robot, driven by the wheels of one axle and steered by those of the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ackermann {
+    wheel_radius: f64,
+    wheelbase: f64,
+    steering_limit: f64,
+    top_wheel_speed: f64,
+    creep: f64,
+}
+
+/// U of a car-like robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SteeredWheel {
+    /// omega_h: speed of the driven wheel, rad/s.
+    pub wheel: f64,
+    /// phi: steering angle, radians, positive to the left.
+    pub steering: f64,
+}
+
+impl Ackermann {
+    /// The drive of a car whose driven wheels of `wheel_radius` r (metres) turn at most at `top_wheel_speed` rad/s, with
+    /// a `wheelbase` L (metres) from the driven axle to the steered one, that steers at most by `steering_limit` radians,
+    /// below pi/2. All positive. It creeps at `creep` m/s at most where a turn is asked for without the speed for it.
+    #[must_use]
+    pub const fn new(
+        wheel_radius: f64,
+        wheelbase: f64,
+        steering_limit: f64,
+        top_wheel_speed: f64,
+        creep: f64,
+    ) -> Self {
+        Self {
+            wheel_radius,
+            wheelbase,
+            steering_limit,
+            top_wheel_speed,
+            creep,
+        }
+    }
+
+    /// Radius of the tightest circle that the middle of the driven axle can go, metres.
+    #[must_use]
+    pub fn least_turning_radius(&self) -> f64 {
+        self.wheelbase / self.steering_limit.tan()
+    }
+
+    /// (3): driven wheel and steering to the body's twist.
+    #[must_use]
+    pub fn twist(&self, input: SteeredWheel) -> Twist {
+        let v = self.wheel_radius * input.wheel;
+        Twist {
+            v,
+            omega: input.steering.tan() / self.wheelbase * v,
+        }
+    }
+
+    /// (17): omega_h = v/r, phi = atan(L omega / v), clipped to the limit. A car cannot turn on the spot: it creeps
+    /// forward where v would leave the turn impossible. A wheel at its limit keeps the steering, and so the curvature.
+    #[must_use]
+    pub fn wheel(&self, twist: Twist) -> SteeredWheel {
+        let needed = twist.omega.abs() * self.least_turning_radius();
+        let v = if twist.v.abs() < needed {
+            let direction = if twist.v < 0.0 { -1.0 } else { 1.0 };
+            direction * twist.v.abs().max(needed.min(self.creep))
+        } else {
+            twist.v
+        };
+        let steering = if v == 0.0 {
+            0.0
+        } else {
+            (self.wheelbase * twist.omega / v).atan()
+        };
+        let top = self.top_wheel_speed;
+        SteeredWheel {
+            wheel: (v / self.wheel_radius).clamp(-top, top),
+            steering: steering.clamp(-self.steering_limit, self.steering_limit),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_4;
+
+    /// r = 0.1 m, L = 0.5 m.
+    fn car(steering_limit: f64) -> Ackermann {
+        Ackermann::new(0.1, 0.5, steering_limit, 10.0, 0.05)
+    }
+
+    fn close(got: f64, want: f64) {
+        assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
+    }
+
+    /// Twists forward and backward, to either side, slow and faster than the wheels.
+    fn twists() -> impl Iterator<Item = Twist> {
+        let speeds = (-30..=30).map(|v| f64::from(v) * 0.05);
+        speeds.flat_map(|v| {
+            let turns = (-30..=30).map(|omega| f64::from(omega) * 0.1);
+            turns.map(move |omega| Twist { v, omega })
+        })
+    }
+
+    #[test]
+    fn equation_3_by_hand_and_back() {
+        // phi = 45 degrees, 4 rad/s: v = 0.4, omega = 0.4 / 0.5 = 0.8.
+        let input = SteeredWheel {
+            wheel: 4.0,
+            steering: FRAC_PI_4,
+        };
+        let twist = car(1.0).twist(input);
+        close(twist.v, 0.4);
+        close(twist.omega, 0.8);
+        let back = car(1.0).wheel(twist);
+        close(back.wheel, 4.0);
+        close(back.steering, FRAC_PI_4);
+    }
+
+    #[test]
+    fn the_least_turning_radius_by_hand() {
+        // 45 degrees: as long as the wheelbase.
+        close(car(FRAC_PI_4).least_turning_radius(), 0.5);
+    }
+
+    #[test]
+    fn a_car_asked_to_turn_at_rest_creeps_forward_at_full_steering() {
+        let input = car(0.5).wheel(Twist {
+            v: 0.0,
+            omega: -1.0,
+        });
+        close(input.wheel, 0.5);
+        close(input.steering, -0.5);
+        assert_eq!(car(0.5).wheel(Twist::default()), SteeredWheel::default());
+    }
+
+    #[test]
+    fn a_wheel_at_its_limit_keeps_the_curvature() {
+        // 20 rad/s asked for, 10 can be had: half of both.
+        let twist = car(1.0).twist(car(1.0).wheel(Twist { v: 2.0, omega: 0.8 }));
+        close(twist.v, 1.0);
+        close(twist.omega, 0.4);
+    }
+
+    #[test]
+    fn what_the_inverse_asks_for_is_always_within_the_limits() {
+        for twist in twists() {
+            let input = car(0.5).wheel(twist);
+            assert!(input.wheel.abs() <= 10.0, "{twist:?} gave {input:?}");
+            assert!(input.steering.abs() <= 0.5, "{twist:?} gave {input:?}");
+        }
+    }
+
+    #[test]
+    fn the_inverse_is_exact_wherever_the_twist_is_feasible() {
+        let car = car(0.5);
+        let mut feasible = 0;
+        for twist in twists() {
+            let slow = twist.v.abs() <= 1.0;
+            if slow && twist.v.abs() > twist.omega.abs() * car.least_turning_radius() {
+                let back = car.twist(car.wheel(twist));
+                close(back.v, twist.v);
+                close(back.omega, twist.omega);
+                feasible += 1;
+            }
+        }
+        assert!(feasible > 100, "{feasible}");
+    }
+
+    #[test]
+    fn an_infeasible_turn_is_made_to_the_side_that_was_asked_for() {
+        for twist in twists().filter(|twist| twist.v >= 0.0 && twist.omega != 0.0) {
+            let got = car(0.5).twist(car(0.5).wheel(twist));
+            assert!(
+                got.omega * twist.omega > 0.0 && got.v > 0.0,
+                "{twist:?}: {got:?}"
+            );
+        }
+    }
+}

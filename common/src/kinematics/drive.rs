@@ -1,0 +1,34 @@
+//! The drive of either kind of robot.
+
+use super::{
+    ackermann::{Ackermann, SteeredWheel},
+    differential::{DifferentialDrive, WheelSpeeds},
+    pose::Twist,
+};
+
+/// G of (2) or of (3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drive {
+    /// (2): two driven wheels.
+    Differential(DifferentialDrive),
+    /// (3): a driven wheel and a steering angle.
+    Ackermann(Ackermann),
+}
+
+impl Drive {
+    /// (17): what gives `twist`, as far as the drive can do it. Left and right wheel, rad/s; of a car the driven wheel,
+    /// rad/s, and the steering angle, radians, positive to the left.
+    #[must_use]
+    pub fn inputs(&self, twist: Twist) -> [f64; 2] {
+        match self {
+            Self::Differential(drive) => {
+                let WheelSpeeds { right, left } = drive.wheels(twist);
+                [left, right]
+            }
+            Self::Ackermann(drive) => {
+                let SteeredWheel { wheel, steering } = drive.wheel(twist);
+                [wheel, steering]
+            }
+        }
+    }
+}

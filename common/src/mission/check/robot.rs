@@ -1,0 +1,141 @@
+//! The robot's part of a mission.
+
+use super::objection::{Objection, objection, within};
+use crate::{
+    address::{Address, AddressError, FORMS},
+    mission::Mission,
+    wire::MOTOR_SCALE_V,
+};
+
+pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+    let body = mission.body();
+    let robot = &mission.robot;
+    if let Some(Err(error)) = robot.address.as_deref().map(str::parse::<Address<String>>) {
+        let problem = match error {
+            AddressError::Form { address, problem } => format!("{address:?} {problem}"),
+            AddressError::Host { .. } => error.to_string(),
+        };
+        return Err(objection("robot.address", problem, FORMS));
+    }
+    within("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz")?;
+    within(
+        "robot.wheel_radius_m",
+        body.wheel_radius_m,
+        0.005..=2.0,
+        "m",
+    )?;
+    within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
+    within(
+        "robot.counts_per_turn",
+        body.counts_per_turn,
+        1.0..=100_000.0,
+        "counts",
+    )?;
+    steering(mission)?;
+    within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
+    within(
+        "robot.top_speed_m_s",
+        body.top_speed_m_s,
+        0.01..=10.0,
+        "m/s",
+    )?;
+    within(
+        "robot.command_limit_s",
+        robot.command_limit_s,
+        0.02..=5.0,
+        "s",
+    )?;
+    let limits = robot.low_battery_v;
+    for limit in [limits.board, limits.motor, limits.servo] {
+        within("robot.low_battery_v", limit, 0.0..=MOTOR_SCALE_V, "V")?;
+    }
+    if robot.command_limit_s * robot.rate_hz <= 1.0 {
+        return Err(objection(
+            "robot.command_limit_s",
+            format!(
+                "a command would go stale before the next tick: {} s at {} Hz",
+                robot.command_limit_s, robot.rate_hz
+            ),
+            "raise robot.command_limit_s or robot.rate_hz",
+        ));
+    }
+    let (left, right) = (robot.left.channel, robot.right.channel);
+    if left > 1 || right > 1 || left == right {
+        return Err(objection(
+            "robot.left",
+            format!("wheels on channels {left} and {right}"),
+            "put one on channel 0 and one on channel 1",
+        ));
+    }
+    // A third of the counter's cycle a tick keeps wrap-around unambiguous with a tick to spare.
+    let counts = body.top_speed_m_s / body.metres_per_count() / robot.rate_hz;
+    if counts > 32_768.0 / 6.0 {
+        return Err(objection(
+            "robot.rate_hz",
+            format!(
+                "at top speed a wheel makes {counts:.0} counts a tick, and the counter wraps at 32768"
+            ),
+            "raise robot.rate_hz or lower robot.top_speed_m_s",
+        ));
+    }
+    if mission.sonar.index > 5 {
+        return Err(objection(
+            "sonar.index",
+            format!(
+                "the standard frame has sonars 0 to 5, not {}",
+                mission.sonar.index
+            ),
+            "give 1 for the front one of an X80",
+        ));
+    }
+    within("sonar.forward_m", mission.sonar.forward_m, -5.0..=5.0, "m")?;
+    within(
+        "sonar.bearing_deg",
+        mission.sonar.bearing_deg,
+        -180.0..=180.0,
+        "degrees",
+    )
+}
+
+fn steering(mission: &Mission) -> Result<(), Objection> {
+    let robot = &mission.robot;
+    let Some(steering) = mission.body().steering else {
+        let written = [
+            ("robot.wheelbase_m", robot.wheelbase_m),
+            ("robot.steering_limit_deg", robot.steering_limit_deg),
+            ("robot.steering_rate_deg_s", robot.steering_rate_deg_s),
+            (
+                "robot.steering_counts_per_turn",
+                robot.steering_counts_per_turn,
+            ),
+        ];
+        let unread = written.into_iter().find(|(_, value)| value.is_some());
+        return unread.map_or(Ok(()), |(key, _)| {
+            Err(objection(
+                key,
+                "this robot has two driven wheels and no steering",
+                "remove the key, or set robot.model = \"car\"",
+            ))
+        });
+    };
+    within("robot.wheelbase_m", steering.wheelbase_m, 0.01..=5.0, "m")?;
+    within(
+        "robot.steering_limit_deg",
+        steering.limit_rad.to_degrees(),
+        1.0..=80.0,
+        "degrees",
+    )?;
+    within(
+        "robot.steering_rate_deg_s",
+        steering.rate_rad_s.to_degrees(),
+        1.0..=3600.0,
+        "degrees/s",
+    )?;
+    // A whole turn fits twice into the counter's cycle, so an angle is never ambiguous.
+    within(
+        "robot.steering_counts_per_turn",
+        steering.counts_per_turn,
+        36.0..=16_384.0,
+        "counts",
+    )
+}

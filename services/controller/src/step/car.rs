@@ -1,0 +1,130 @@
+//! A car under guidance: (15), (16), limited in speed, and never on the spot.
+
+use common::{kinematics::Twist, samples::GuidanceStatus};
+
+use super::{Alignment, Controller, LEAST_SPEED_M_S};
+
+impl Controller {
+    /// How a car moves under guidance of that status; none to stand, which it does where it would have to turn on the
+    /// spot.
+    pub(super) fn car_motion(
+        &mut self,
+        modulated: bool,
+        status: GuidanceStatus,
+        alignment: Alignment,
+        distance: f64,
+        limit: f64,
+    ) -> Option<Twist> {
+        if !matches!(status, GuidanceStatus::Along | GuidanceStatus::WayOut) {
+            return None;
+        }
+        let least = LEAST_SPEED_M_S.min(self.speed);
+        let omega = self.angular(alignment);
+        let wanted = self.tangential(modulated, alignment, omega, distance);
+        let wanted = wanted.max(least);
+        // Written so that a limit that is no number stands.
+        if limit >= least {
+            let v = wanted.min(limit);
+            // It goes slower along the same curve.
+            let omega = omega * v / wanted;
+            Some(Twist { v, omega })
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use common::{
+        clock::MissionTime,
+        kinematics::SteeredWheel,
+        mission::Mission,
+        samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
+        step::Step as _,
+    };
+
+    use crate::step::Controller;
+
+    fn car(extra: &str) -> Mission {
+        let text = format!("target = [3, 0]\nrobot.model = 'car'\n{extra}");
+        Mission::parse(&text, Path::new("m.toml")).unwrap()
+    }
+
+    /// The command of a car at the origin, facing x, under guidance at `angle` radians.
+    fn command(
+        mission: &Mission,
+        status: GuidanceStatus,
+        angle: f64,
+        speed_limit_m_s: f64,
+    ) -> CommandSample {
+        let guidance = GuidanceSample {
+            ex: angle.cos(),
+            ey: angle.sin(),
+            speed_limit_m_s,
+            status: status.into(),
+            ..GuidanceSample::default()
+        };
+        Controller::new(mission).step(&guidance, MissionTime(0))
+    }
+
+    fn drives(command: &CommandSample) -> bool {
+        CommandState::from_byte(command.state) == CommandState::Driving
+    }
+
+    #[test]
+    fn a_car_is_never_asked_for_what_its_wheels_cannot_do() {
+        for method in ["paper", "evidential"] {
+            let mission = car(&format!("method = '{method}'"));
+            let body = mission.body();
+            let (limit, top) = (
+                body.steering.unwrap().limit_rad,
+                body.top_speed_m_s / body.wheel_radius_m,
+            );
+            for degrees in -180..=180 {
+                let angle = f64::from(degrees).to_radians();
+                let command = command(&mission, GuidanceStatus::Along, angle, f64::INFINITY);
+                assert!(drives(&command), "{degrees}");
+                assert!(command.right_rad_s.abs() <= limit, "{degrees}");
+                let wheel = command.left_rad_s;
+                assert!(wheel > 0.0 && wheel <= top, "{degrees}: {wheel}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_car_stands_where_it_would_have_to_turn_on_the_spot() {
+        let mission = car("");
+        for status in [GuidanceStatus::Look, GuidanceStatus::Unreachable] {
+            assert!(!drives(&command(&mission, status, 1.0, 0.0)), "{status:?}");
+        }
+    }
+
+    #[test]
+    fn a_car_goes_no_faster_than_guidance_allows_along_the_same_curve() {
+        let mission = car("");
+        let drive = mission.body().ackermann().unwrap();
+        let twist = |limit| {
+            let command = command(&mission, GuidanceStatus::Along, 0.3, limit);
+            assert!(drives(&command));
+            drive.twist(SteeredWheel {
+                wheel: command.left_rad_s,
+                steering: command.right_rad_s,
+            })
+        };
+        let (free, limited) = (twist(f64::INFINITY), twist(0.1));
+        assert!((limited.v - 0.1).abs() < 1e-12, "{limited:?}");
+        let curvature = free.omega / free.v;
+        assert!((limited.omega / limited.v - curvature).abs() < 1e-12);
+        for limit in [0.0, f64::NAN] {
+            assert!(!drives(&command(
+                &mission,
+                GuidanceStatus::Along,
+                0.3,
+                limit
+            )));
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What the evidential method makes of a direction for a car: the arc that it can drive and that gets farthest along the
+//! field.
+//!
+//! The field turns sharper than a car does. So arcs of several curvatures are followed over the belief, as far as the
+//! car looks ahead. Those that a hazard cuts off before the car would stand are out; of the others the one with the greatest
+//! progress is given, that is the line integral of the field's direction along it. Where all are out the car has to
+//! stand: there is no way on that it can steer.
+
+use std::f64::consts::FRAC_PI_2;
+
+use common::{kinematics::Pose2, mission::Mission};
+use glam::DVec2;
+use harmonic::Guidance;
+
+use crate::active_sensing::View;
+
+/// Arcs to either side of straight ahead.
+const ARCS_A_SIDE: i32 = 8;
+/// From point to point along an arc, metres.
+const STEP_M: f64 = 0.05;
+/// So far an arc is followed, metres.
+const AHEAD_M: f64 = 0.8;
+/// In this time the car must be able to stop: the sonar's period, the radio's, the wheels' lag.
+const STOPS_WITHIN_S: f64 = 0.6;
+/// No arc that is cut off before this is driven, metres.
+const LEAST_FREE_M: f64 = 0.1;
+
+/// The car as the arcs see it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arcs {
+    /// Of the tightest circle, 1/m.
+    most_curvature: f64,
+    speed: f64,
+    turn: f64,
+    slow_radius: f64,
+}
+
+/// An arc that was followed.
+#[derive(Clone, Copy, Debug)]
+struct Followed {
+    curvature: f64,
+    /// How much of it no hazard cuts off, metres.
+    free_m: f64,
+    /// How far along the field it gets, metres.
+    progress_m: f64,
+}
+
+impl Arcs {
+    /// For a mission's robot; none if it can turn on the spot.
+    pub(crate) fn new(mission: &Mission) -> Option<Self> {
+        let car = mission.body().ackermann()?;
+        Some(Self {
+            most_curvature: 1.0 / car.least_turning_radius(),
+            speed: mission.speed_m_s(),
+            turn: mission.controller.turn_rad_s,
+            slow_radius: mission.controller.slow_radius_m,
+        })
+    }
+
+    /// The direction, a unit vector, by which the controller drives the best arc from `pose`, `distance` metres from the
+    /// target, and the most speed on it, m/s. No speed where there is no way on.
+    pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, distance: f64) -> (DVec2, f64) {
+        let arcs = (-ARCS_A_SIDE..=ARCS_A_SIDE).map(|number| {
+            let share = f64::from(number) / f64::from(ARCS_A_SIDE);
+            Self::follow(view, pose, share * self.most_curvature, distance)
+        });
+        let best = arcs
+            .filter(|arc| arc.free_m >= LEAST_FREE_M.min(distance))
+            .max_by(|a, b| a.progress_m.total_cmp(&b.progress_m));
+        best.map_or((pose.axis(), 0.0), |arc| {
+            (
+                self.direction(pose, arc.curvature, distance),
+                arc.free_m / STOPS_WITHIN_S,
+            )
+        })
+    }
+
+    fn follow(view: &View<'_>, pose: &Pose2, curvature: f64, distance: f64) -> Followed {
+        let mut arc = Followed {
+            curvature,
+            free_m: 0.0,
+            progress_m: 0.0,
+        };
+        // A car that a new hazard was put around drives out of it.
+        let mut inside = view.is_hazard(pose.position);
+        let steps = (AHEAD_M.min(distance) / STEP_M).ceil().max(1.0) as usize;
+        for step in 1..=steps {
+            let way = step as f64 * STEP_M;
+            let at = pose.along_arc(way, way * curvature);
+            let hazard = view.is_hazard(at.position);
+            if hazard && !inside {
+                break;
+            }
+            inside = hazard;
+            arc.free_m = way;
+            arc.progress_m += STEP_M * view.along(at.position).dot(at.axis());
+        }
+        arc
+    }
+
+    /// Where to point so that (15) and (16) give `curvature`.
+    fn direction(&self, pose: &Pose2, curvature: f64, distance: f64) -> DVec2 {
+        // With s the sine to the direction, the turn rate is wd s, the speed vd (1 - s/2), less near the target.
+        let speed = self.speed * (distance / self.slow_radius).min(1.0);
+        let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
+        let angle = if sine.abs() < 1.0 {
+            sine.asin()
+        } else {
+            FRAC_PI_2.copysign(sine)
+        };
+        DVec2::from_angle(angle).rotate(pose.axis())
+    }
+}
+
+impl View<'_> {
+    /// The field's direction at `at`, a unit vector; zero where it gives none.
+    fn along(&self, at: DVec2) -> DVec2 {
+        let cells = self.frame.to_cells(at);
+        match self.field.guidance(cells.x, cells.y) {
+            Guidance::Along(direction) | Guidance::WayOut(direction) => direction.into(),
+            _ => DVec2::ZERO,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,214 @@
+//! A car between the channels of the motor board and the ground: one channel drives it, another steers.
+
+use common::{
+    kinematics::{Ackermann, SteeredWheel, Twist},
+    mission::{Channel, Mission, Steering, WheelPhysics},
+};
+
+use crate::{
+    body::Body,
+    drivetrain::{grip, slipped},
+    motor::Motor,
+    noise::Noise,
+    wheel_errors::WheelErrors,
+    world::World,
+};
+
+/// How a car hangs on its motors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Car {
+    /// With the true diameter and the true wheelbase.
+    drive: Ackermann,
+    steering: Steering,
+    driven: OnChannel,
+    steered: OnChannel,
+    /// Of the true wheel.
+    wheel_radius_m: f64,
+    counts_per_radian: f64,
+}
+
+/// The motor that does something, and which way.
+#[derive(Clone, Copy, Debug)]
+struct OnChannel {
+    channel: usize,
+    sign: f64,
+}
+
+impl From<Channel> for OnChannel {
+    fn from(channel: Channel) -> Self {
+        Self {
+            // A mission is checked: channels are 0 and 1.
+            channel: usize::from(channel.channel.min(1)),
+            sign: if channel.reversed { -1.0 } else { 1.0 },
+        }
+    }
+}
+
+impl Car {
+    /// That of `mission`'s robot, with the driven wheel and the wheelbase as far off as `errors` says of a left wheel and of
+    /// a track; none if the robot is no car.
+    pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
+        let body = mission.body();
+        let steering = body.steering?;
+        let wheel_radius_m = body.wheel_radius_m * errors.diameter.left;
+        Some(Self {
+            drive: Ackermann::new(
+                wheel_radius_m,
+                steering.wheelbase_m * errors.track,
+                steering.limit_rad,
+                f64::INFINITY,
+                0.0,
+            ),
+            steering,
+            driven: mission.robot.left.into(),
+            steered: mission.robot.right.into(),
+            wheel_radius_m,
+            counts_per_radian: body.counts_per_turn / std::f64::consts::TAU,
+        })
+    }
+
+    /// Whether the motor of `channel` steers.
+    pub(crate) const fn steers_by(&self, channel: usize) -> bool {
+        self.steered.channel == channel
+    }
+
+    /// The most that motor can do, counts per second.
+    pub(crate) fn top_steering_counts(&self) -> f64 {
+        self.steering.counts(self.steering.rate_rad_s)
+    }
+
+    /// Where the steering stands, radians.
+    fn angle(&self, motors: &[Motor; 6]) -> f64 {
+        let OnChannel { channel, sign } = self.steered;
+        self.steering.angle(sign * motors[channel].turned())
+    }
+
+    /// How it moves by what its motors do.
+    pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
+        let OnChannel { channel, sign } = self.driven;
+        self.drive.twist(SteeredWheel {
+            wheel: sign * motors[channel].speed() / self.counts_per_radian,
+            steering: self.angle(motors),
+        })
+    }
+
+    /// Move `body` as its motors ask from mission time `now` for `dt` seconds, and no farther than `world` lets it.
+    pub(crate) fn step(
+        &self,
+        motors: &mut [Motor; 6],
+        body: &mut Body,
+        world: &World,
+        physics: &WheelPhysics,
+        (now, dt): (f64, f64),
+        noise: &mut Noise,
+    ) {
+        let OnChannel { channel, sign } = self.driven;
+        let asked = motors[channel].step(now, dt, noise);
+        self.steer(&mut motors[self.steered.channel], now, dt, noise);
+        let rim = sign * asked / self.counts_per_radian * self.wheel_radius_m;
+        let ground = slipped(rim, physics, noise);
+        // (3) is linear in the wheel: its angle gives arc and turn as its speed gives v and omega.
+        let step = self.drive.twist(SteeredWheel {
+            wheel: ground / self.wheel_radius_m,
+            steering: self.angle(motors),
+        });
+        let held_at = body.go(step, world);
+        let grip = grip(held_at.is_some(), physics);
+        let went = held_at.unwrap_or(ground) / self.wheel_radius_m * self.counts_per_radian * sign;
+        let motor = &mut motors[channel];
+        motor.turn(went * grip + asked * (1.0 - grip));
+        if grip > 0.0 {
+            motor.hold(went / dt, grip);
+        }
+    }
+
+    /// Turn the steering as its motor asks, up to the stop.
+    fn steer(&self, motor: &mut Motor, now: f64, dt: f64, noise: &mut Noise) {
+        let limit = self.steering.counts(self.steering.limit_rad);
+        let asked = motor.step(now, dt, noise);
+        let stopped = (motor.turned() + asked).clamp(-limit, limit);
+        motor.turn(stopped - motor.turned());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use common::{
+        ground_truth::GroundTruthTick,
+        mission::Mission,
+        wire::{Addressing, Command, Decoder, counts_between},
+    };
+
+    use crate::robot::Robot;
+
+    fn car(extra: &str) -> Robot {
+        let text = format!("target = [3, 0]\nrobot.model = 'car'\n{extra}");
+        Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+    }
+
+    /// The car after `ticks` more with these counts per second: of the wheel forward, of the steering to the left.
+    fn drive(robot: &mut Robot, wheel: i16, steering: i16, ticks: u32) -> GroundTruthTick {
+        let mut bytes = Vec::new();
+        Command::velocity([Some(-wheel), Some(steering)], None)
+            .encode(Addressing::default(), &mut bytes);
+        let mut decoder = Decoder::default();
+        decoder.push(&bytes);
+        robot.on_frame(&decoder.next_frame().unwrap(), &mut Vec::new());
+        for _ in 0..ticks {
+            robot.advance_to_next_tick();
+        }
+        robot.ground_truth()
+    }
+
+    fn steering_counts(truth: &GroundTruthTick) -> i32 {
+        counts_between(0, truth.right_counts)
+    }
+
+    #[test]
+    fn a_car_does_not_turn_on_the_spot() {
+        let truth = drive(&mut car(""), 0, 1000, 14);
+        assert_eq!((truth.x, truth.y, truth.heading), (0.0, 0.0, 0.0));
+        assert!(steering_counts(&truth) > 0);
+    }
+
+    #[test]
+    fn the_steering_takes_its_time_and_ends_at_its_stop() {
+        let mut robot = car("[simulation.wheels]\nlag_s = 0");
+        // 120 degrees a second are 1200 counts a second, however much is asked for; 30 degrees are 300 counts.
+        let truth = drive(&mut robot, 0, 5000, 1);
+        assert!((steering_counts(&truth) - 171).abs() <= 1, "{truth:?}");
+        let truth = drive(&mut robot, 0, 5000, 14);
+        assert_eq!(steering_counts(&truth), 300);
+        let truth = drive(&mut robot, 0, -5000, 14);
+        assert_eq!(steering_counts(&truth), -300);
+    }
+
+    #[test]
+    fn at_the_stop_it_drives_its_tightest_circle() {
+        let mut robot = car("");
+        let start = drive(&mut robot, 0, 5000, 14);
+        let end = drive(&mut robot, 600, 0, 14);
+        let counts = f64::from(counts_between(start.left_counts, end.left_counts));
+        let arc = counts * std::f64::consts::TAU * 0.04 / 600.0;
+        let radius = 0.18 / 30_f64.to_radians().tan();
+        assert!((end.heading - arc / radius).abs() < 0.01, "{end:?}");
+        assert!((end.omega - end.v / radius).abs() < 1e-9, "{end:?}");
+    }
+
+    #[test]
+    fn a_longer_wheelbase_turns_less_and_a_wall_holds_the_car() {
+        let heading = |extra: &str| {
+            let mut robot = car(extra);
+            drive(&mut robot, 0, 1000, 7);
+            drive(&mut robot, 300, 0, 7).heading
+        };
+        let ratio = heading("") / heading("simulation.wheels.track_scale = 1.1");
+        assert!((ratio - 1.1).abs() < 1e-9, "{ratio}");
+        let mut robot = car("world.wall = [{ points = [[1, -2], [1, 2]] }]");
+        let truth = drive(&mut robot, 1200, 0, 28);
+        assert!((truth.x - 0.76).abs() < 1e-6, "{truth:?}");
+        assert_eq!(truth.contacts, 1);
+    }
+}
