@@ -13,8 +13,12 @@ use glam::DVec2;
 const WIDEST_DEG: f64 = 75.0;
 /// From normal to normal: less than a beam is wide.
 const STEP_DEG: f64 = 15.0;
-/// A face answers a beam within this of its normal: the cone, and what the normals lie apart.
+/// A face answers a beam within this of its normal: the cone, and a little more.
 const ANSWERS_WITHIN_DEG: f64 = 17.0;
+/// A face that is near answers beams farther off its normal: ...
+const NEAR_ANSWERS_WITHIN_DEG: f64 = 20.0;
+/// ... up to here, metres.
+const NEAR_M: f64 = 1.2;
 /// How far from where the body would touch it a face is supposed to reach along itself, metres. One that ends before
 /// could only be heard from nearer; its end is an edge, which answers a beam ahead.
 const REACHES_M: f64 = 1.0;
@@ -67,14 +71,16 @@ impl UnheardFaces {
 
     /// Whether the readings speak against a face that touches a body at `at` on the side of `normal`.
     fn is_refuted(&self, at: DVec2, normal: DVec2) -> bool {
-        let answers = ANSWERS_WITHIN_DEG.to_radians().cos();
+        let [far, near] =
+            [ANSWERS_WITHIN_DEG, NEAR_ANSWERS_WITHIN_DEG].map(|deg| deg.to_radians().cos());
         let (mut silences, mut echoes) = (0, 0);
         for beam in &self.beams {
             let offset = at - beam.origin;
+            let distance = offset.dot(normal) + self.reach;
+            let answers = if distance <= NEAR_M { near } else { far };
             if beam.axis.dot(normal) < answers || offset.perp_dot(normal).abs() > REACHES_M {
                 continue;
             }
-            let distance = offset.dot(normal) + self.reach;
             if distance <= beam.clear {
                 silences += 1;
             } else if distance <= beam.clear + NEAR_ECHO_M {
