@@ -285,11 +285,14 @@ impl Mission {
         (cells - 1e-6).ceil().max(0.0) as u32
     }
 
-    /// Whether the robot turns to look before it goes somewhere: by the evidential method, if it can turn on the spot. Then
-    /// it stops within what it has seen, and defaults are bolder.
+    /// Whether the robot turns to look before it goes somewhere: by the evidential method, if it senses,
+    /// can turn on the spot, and no other planner leads it. Then it stops within what it has seen, and defaults are bolder.
     #[must_use]
     pub fn looks_first(&self) -> bool {
-        self.method == Method::Evidential && self.body().ackermann().is_none()
+        self.method == Method::Evidential
+            && self.sensing
+            && self.planner.executable.is_none()
+            && self.body().ackermann().is_none()
     }
 
     /// vd, m/s: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, else the paper's 0.25.

@@ -14,7 +14,7 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     clock::MissionTime,
-    mission::{Body, Mission},
+    mission::{Body, Method, Mission},
     samples::{GuidanceSample, GuidanceStatus, PoseSample, RecoveryStep, StallCause, StallSample},
 };
 use glam::DVec2;
@@ -134,7 +134,7 @@ impl StallWatch {
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         let car = mission.body().ackermann();
         // It turns on the spot, else as it drives.
-        let on_the_spot = mission.looks_first();
+        let on_the_spot = mission.method == Method::Evidential && car.is_none();
         let tightest = car.map_or(0.0, |car| car.least_turning_radius());
         let circle = tightest.max(mission.speed_m_s() / controller.turn_rad_s);
         Self {

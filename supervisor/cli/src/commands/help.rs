@@ -40,6 +40,7 @@ static GUIDE: &[Page] = guide! {
     "break-it",
     "field-tool",
     "evaluate-worlds",
+    "evaluation-results",
     "the-papers-experiments",
     "figures",
     "capabilities",
