@@ -34,10 +34,11 @@ fn each_stage_killed_or_frozen_once_the_robot_arrives_and_knows_where_it_is() {
             let restarts = 1 + replans.unwrap_or_default();
             assert_eq!(summary["restarts"][stage], restarts, "{summary}");
         }
-        // A count of the encoders is half a millimetre; a lost pose is metres.
+        // Another way round reads the wheels at other fractions of a count: a count between them is 9 mm across at the
+        // target, 6 m away. A lost pose is metres.
         let error = |summary: &serde_json::Value| summary["pose_error_m"].as_f64().unwrap();
         assert!(
-            error(&summary) <= error(&undisturbed) + 0.005,
+            error(&summary) <= error(&undisturbed) + 0.015,
             "{summary} against {undisturbed}"
         );
     }
