@@ -133,6 +133,9 @@ fn a_mission_arrives_over_a_serial_line() {
     arrives_over("pty", "serial://");
 }
 
+/// The most that a robot went after the last tick that was heard of it, metres.
+const UNHEARD_M: f64 = 0.12;
+
 /// The robot is killed halfway and comes back where it listened before, as one that was switched off and
 /// on: its counts begin at zero, and so does the place it takes for its start.
 fn goes_away_and_comes_back(transport: &str) {
@@ -166,8 +169,12 @@ fn goes_away_and_comes_back(transport: &str) {
     // Both robots began at their own start: what they went together is what the run believes.
     let went = first_part + robot.kill();
     let believed = summary["path_length_m"].as_f64().unwrap();
-    assert!((went - believed).abs() < 0.06, "{went} m: {summary}");
-    assert!((went - TARGET_M).abs() < TOLERANCE_M + 0.06, "{went} m");
+    // But for what the first one went unheard: up to two ticks at 0.5 m/s.
+    assert!((went - believed).abs() < UNHEARD_M, "{went} m: {summary}");
+    assert!(
+        (went - TARGET_M).abs() < TOLERANCE_M + UNHEARD_M,
+        "{went} m"
+    );
     let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
     for words in ["robot lost", "robot answers", "the robot restarted"] {
         assert!(log.contains(words), "no {words:?} in {log}");

@@ -26,9 +26,9 @@ use crate::unheard_faces::UnheardFaces;
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 
-/// Maps of at most this many cells are solved in full at once where a local update is not enough: that takes less
-/// than a thread takes to begin.
-const SMALL: usize = 1 << 14;
+/// Maps of at most this many cells (362 a side) are solved in full at once where a local update is not enough: that takes
+/// some milliseconds, and a run is the same each time. When the background solver is done depends on the machine.
+const SMALL: usize = 1 << 17;
 
 /// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
