@@ -243,7 +243,7 @@ fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
 
 /// A room of 200 x 200 cells with a wall across it and a gap in the wall.
 fn large_room(version: u64, gap_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
-    let mission = mission_of(200);
+    let mission = mission_of(400);
     let hazard = |at: DVec2| {
         let wall = (at.x - 0.8).abs() < 0.03;
         let far_gap = (1.0..1.4).contains(&at.y);
