@@ -174,6 +174,20 @@ pub struct GuidanceSample {
 }
 
 impl GuidanceSample {
+    /// No direction yet, for the pose `pose` by the belief `belief`.
+    #[must_use]
+    pub fn for_pose(pose: &PoseSample, belief: &GridHeader) -> Self {
+        Self {
+            pose_ns: pose.stamp.stamp_ns,
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            heading_rad: pose.heading_rad,
+            safety_events: belief.safety_events,
+            epoch: belief.epoch,
+            ..Self::default()
+        }
+    }
+
     /// The pose it was computed for.
     #[must_use]
     pub const fn pose(&self) -> Pose2 {

@@ -12,6 +12,7 @@ use common::{
     grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
     mission::Mission,
+    samples::ClearBeam,
 };
 use glam::DVec2;
 use harmonic::{Field, Guidance};
@@ -39,7 +40,7 @@ pub(crate) enum Advice {
 }
 
 /// The belief the advice is given on.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'a> {
     /// How the cells lie.
     pub(crate) frame: GridFrame,
@@ -47,8 +48,6 @@ pub(crate) struct View<'a> {
     pub(crate) cells: &'a [u8],
     /// The field over them.
     pub(crate) field: &'a Field,
-    /// What the newest readings say of faces.
-    pub(crate) faces: UnheardFaces,
 }
 
 /// The robot as the advice sees it.
@@ -72,8 +71,15 @@ impl ActiveSensing {
         }
     }
 
-    /// Advice for a robot at `pose` that is to go along `direction`, a unit vector.
-    pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Advice {
+    /// Advice for a robot at `pose` that is to go along `direction`, a unit vector, after the readings `beams`.
+    pub(crate) fn advise(
+        &self,
+        view: &View<'_>,
+        beams: &[ClearBeam],
+        pose: &Pose2,
+        direction: DVec2,
+    ) -> Advice {
+        let unheard = UnheardFaces::new(beams, self.radius);
         let way = view.way(pose.position, direction);
         let steps = (SWEPT_AHEAD_M / STEP_M) as usize;
         let ahead = &way[..steps.min(way.len())];
@@ -84,18 +90,24 @@ impl ActiveSensing {
         let before = std::iter::once(&pose.position).chain(ahead);
         let faces = before.zip(ahead).flat_map(|(&from, &to)| {
             let along = (to - from).normalize_or(direction);
-            view.faces.normals(to, along)
+            unheard.normals(to, along)
         });
         let unseen = ground.chain(faces);
         match scan(self.bearing.rotate(pose.axis()), unseen) {
             // The robot turns until its sonar faces it.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
-            None => Advice::Go(self.limit(view, pose, direction)),
+            None => Advice::Go(self.limit(view, &unheard, pose, direction)),
         }
     }
 
     /// The speed that the arc allows on which the controller brings the robot into `direction`, m/s.
-    fn limit(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> f64 {
+    fn limit(
+        &self,
+        view: &View<'_>,
+        unheard: &UnheardFaces,
+        pose: &Pose2,
+        direction: DVec2,
+    ) -> f64 {
         let curvature = self.turn * pose.axis().perp_dot(direction) / self.speed;
         let steps = (AHEAD_M / STEP_M) as usize;
         let open = |step: &usize| {
@@ -104,7 +116,7 @@ impl ActiveSensing {
             let at = ahead.position;
             !view.is_hazard(at)
                 && view.unswept(at, self.radius).next().is_none()
-                && view.faces.normals(at, ahead.axis()).next().is_none()
+                && unheard.normals(at, ahead.axis()).next().is_none()
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         free as f64 * STEP_M / STOPS_WITHIN_S

@@ -22,7 +22,6 @@ use crate::active_sensing::{ActiveSensing, Advice, View};
 use crate::aim;
 use crate::arcs::Arcs;
 use crate::fault::lead_astray;
-use crate::unheard_faces::UnheardFaces;
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 
@@ -48,8 +47,6 @@ enum Advisor {
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
-    /// The body's, metres.
-    radius: f64,
     screening: Screening,
     advisor: Advisor,
     solver: Solver,
@@ -107,7 +104,6 @@ impl Step for Planner {
     fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
-            radius: mission.body().radius_m,
             screening: screening(mission),
             advisor: match (mission.method, Arcs::new(mission)) {
                 (Method::Evidential, Some(arcs)) => Advisor::Steer(arcs),
@@ -357,16 +353,10 @@ impl Planner {
             distance_m: to_target.length(),
             speed_limit_m_s: limit,
             status: status.into(),
-            pose_ns: sample.stamp.stamp_ns,
-            x_m: sample.x_m,
-            y_m: sample.y_m,
-            heading_rad: sample.heading_rad,
             grid_version: self.grid.version(),
-            safety_events: self.belief.safety_events,
-            epoch: self.belief.epoch,
             full_solves: self.full_solves,
             local_updates: self.local_updates,
-            ..GuidanceSample::default()
+            ..GuidanceSample::for_pose(sample, &self.belief)
         }
     }
 
@@ -384,7 +374,6 @@ impl Planner {
             frame: live.frame,
             cells: self.grid.cells(),
             field: &live.field,
-            faces: UnheardFaces::new(self.belief.clear_beams(), self.radius),
         };
         let sensing = match (&self.advisor, status) {
             (Advisor::LookFirst(sensing), _) => sensing,
@@ -396,10 +385,12 @@ impl Planner {
             (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
         };
         match status {
-            GuidanceStatus::Along => match sensing.advise(&view, pose, direction) {
-                Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
-                Advice::Go(limit) => (status, direction, limit),
-            },
+            GuidanceStatus::Along => {
+                match sensing.advise(&view, self.belief.clear_beams(), pose, direction) {
+                    Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
+                    Advice::Go(limit) => (status, direction, limit),
+                }
+            }
             GuidanceStatus::WayOut => (status, direction, WAY_OUT_M_S),
             // It may be an echo that was none: one look around before the belief is blamed.
             GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),

@@ -99,14 +99,8 @@ impl Guide {
             distance_m: to_target.length(),
             speed_limit_m_s: limit,
             status: status.into(),
-            pose_ns: sample.stamp.stamp_ns,
-            x_m: sample.x_m,
-            y_m: sample.y_m,
-            heading_rad: sample.heading_rad,
             grid_version: belief.part.version,
-            safety_events: belief.safety_events,
-            epoch: belief.epoch,
-            ..GuidanceSample::default()
+            ..GuidanceSample::for_pose(sample, belief)
         }
     }
 }

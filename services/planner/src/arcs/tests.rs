@@ -1,4 +1,3 @@
-use crate::unheard_faces::UnheardFaces;
 use std::path::Path;
 
 use common::grid::{Cell, CellState};
@@ -37,7 +36,6 @@ fn advice(heading: f64, hazard: impl Fn(DVec2) -> bool) -> (f64, f64) {
         .solve(&domain, &Cancellation::default())
         .unwrap();
     let view = View {
-        faces: UnheardFaces::new(&[], 0.0),
         frame,
         cells: &cells,
         field: &field,
