@@ -136,11 +136,30 @@ impl Perimeter {
 }
 
 /// How wheel counts become a pose.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeadReckoning {
     /// The integration rule.
     pub integration: Integration,
+    /// Standard deviation of the way that a wheel is taken to lose or win by slip, metres per square root of a metre.
+    pub slip_noise: f64,
+    /// Greatest share by which the ratio of the wheels' diameters is taken to be off.
+    pub diameter_spread: f64,
+    /// Greatest share by which the track is taken to be off.
+    pub track_spread: f64,
+}
+
+impl Default for DeadReckoning {
+    /// What the simulation gives a robot in `measured` realism.
+    fn default() -> Self {
+        let wheels = simulation::WheelKeys::default().over(Realism::Measured);
+        Self {
+            integration: Integration::default(),
+            slip_noise: wheels.slip_noise,
+            diameter_spread: wheels.diameter_spread,
+            track_spread: wheels.track_spread,
+        }
+    }
 }
 
 /// The rule that integrates (20) into (21).

@@ -275,6 +275,18 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
         0.0..=1.0,
         "m",
     )?;
+    let wheels = &mission.dead_reckoning;
+    for (key, value, most) in [
+        ("dead_reckoning.slip_noise", wheels.slip_noise, 0.5),
+        (
+            "dead_reckoning.diameter_spread",
+            wheels.diameter_spread,
+            0.1,
+        ),
+        ("dead_reckoning.track_spread", wheels.track_spread, 0.1),
+    ] {
+        within(key, value, 0.0..=most, "")?;
+    }
     if let Some(executable) = &mission.planner.executable
         && executable.as_os_str().is_empty()
     {

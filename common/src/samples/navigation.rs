@@ -28,6 +28,9 @@ pub struct PoseSample {
     pub omega_rad_s: f64,
     /// Length of the way so far, metres.
     pub travelled_m: f64,
+    /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. As far as
+    /// the wheels go: `[dead_reckoning]` of the mission says how they are taken to err.
+    pub covariance: [f64; 6],
     /// The encoder counts it was computed at.
     pub left_counts: u16,
     /// The encoder counts it was computed at.
@@ -42,6 +45,13 @@ impl PoseSample {
             position: DVec2::new(self.x_m, self.y_m),
             heading: self.heading_rad,
         }
+    }
+
+    /// Root of the mean square of the position's error, as the covariance has it, metres.
+    #[must_use]
+    pub fn position_rms_m(&self) -> f64 {
+        let [xx, _, _, yy, ..] = self.covariance;
+        (xx + yy).max(0.0).sqrt()
     }
 
     /// Speeds over the last tick.

@@ -3,7 +3,9 @@
 //! | module | holds |
 //! |---|---|
 //! | [`step`] | the whole of it, pure: one `wheels` sample to one `pose` |
+//! | [`covariance`] | how far the pose may be off |
 //! | [`shell`] | wires it to the topics, saves its state |
 
+pub mod covariance;
 pub mod shell;
 pub mod step;

@@ -14,8 +14,8 @@ use common::{
 
 use crate::step::{DeadReckoning, Reckoned, State};
 
-/// Room for the encoded state, bytes: it is under 100.
-const CHECKPOINT_CAPACITY: usize = 256;
+/// Room for the encoded state, bytes: it is under 300.
+const CHECKPOINT_CAPACITY: usize = 512;
 
 /// The state that the process of the run in `directory` saved; none before its first tick.
 ///

@@ -11,6 +11,8 @@ use common::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
+use crate::covariance::{Covariance, ErrorModel};
+
 /// How much faster than its top speed a wheel may seem to turn before the counts are rejected: a
 /// robot that slides or is pushed does not reach it, a counter that restarted nearly always does.
 const PLAUSIBLE: f64 = 2.0;
@@ -26,6 +28,7 @@ pub struct State {
     position: DVec2,
     heading: f64,
     travelled: f64,
+    covariance: Covariance,
     last: Option<Last>,
 }
 
@@ -66,6 +69,7 @@ pub struct DeadReckoning {
     drive: Drive,
     body: Body,
     integration: Integration,
+    errors: ErrorModel,
     state: State,
 }
 
@@ -77,14 +81,17 @@ impl Step for DeadReckoning {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let start = mission.start_pose();
+        let errors = ErrorModel::new(&mission.dead_reckoning, &body);
         Self {
             drive: body.drive(),
             body,
             integration: mission.dead_reckoning.integration,
+            errors,
             state: State {
                 position: start.position,
                 heading: start.heading,
                 travelled: 0.0,
+                covariance: errors.start(),
                 last: None,
             },
         }
@@ -123,6 +130,7 @@ impl Step for DeadReckoning {
                 Integration::Arc => pose.along_arc(motion.v, motion.omega),
                 Integration::Euler => pose.along_euler(motion.v, motion.omega),
             };
+            self.state.covariance = self.errors.after(&self.state.covariance, pose, motion);
             self.state.position = moved.position;
             self.state.heading = moved.heading;
             self.state.travelled += motion.v.abs();
@@ -184,6 +192,7 @@ impl DeadReckoning {
             position,
             heading,
             travelled,
+            covariance,
             last,
         } = self.state;
         let (left_counts, right_counts, v, omega) = last.map_or((0, 0, 0.0, 0.0), |last| {
@@ -196,6 +205,7 @@ impl DeadReckoning {
             v_m_s: v,
             omega_rad_s: omega,
             travelled_m: travelled,
+            covariance: covariance.of_pose(),
             left_counts,
             right_counts,
             ..PoseSample::default()

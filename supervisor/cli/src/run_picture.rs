@@ -27,6 +27,10 @@ pub(crate) fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> 
             .frame()
             .map(|frame| (frame, record.field.cells())),
         believed: &believed,
+        covariance: record.poses.last().map(|pose| {
+            let [xx, xy, _, yy, ..] = pose.covariance;
+            [xx, xy, yy]
+        }),
         truth: &true_poses(&finished.truth),
         facts: Facts {
             outcome: summary.outcome.as_str(),

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, fmt};
 
 use common::{
     clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
+    samples::PoseSample,
 };
 use serde::Serialize;
 
@@ -39,6 +40,8 @@ pub(crate) struct Summary {
     pub(crate) min_clearance_m: Option<f64>,
     pub(crate) collisions: Option<u64>,
     pub(crate) pose_error_m: Option<f64>,
+    /// Root mean square of that, by the covariance of the last pose.
+    pub(crate) pose_error_expected_m: Option<f64>,
     /// From where the robot ended to the target, by the ground truth.
     pub(crate) true_distance_m: Option<f64>,
     /// When the robot had moved 0.1 m, by the ground truth.
@@ -111,6 +114,7 @@ impl Summary {
                 let its = truth.iter().rev().find(|tick| tick.is_of(pose));
                 Some(its.or(truth.last())?.pose_error_m(pose))
             }),
+            pose_error_expected_m: pose.map(PoseSample::position_rms_m),
             true_distance_m: truth
                 .last()
                 .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
@@ -153,9 +157,10 @@ impl Summary {
         });
         let numbers = [
             format!(
-                "Least true clearance {} · pose error at the end {} · {} full solves, {} local updates",
+                "Least true clearance {} · pose error at the end {} (expected {}) · {} full solves, {} local updates",
                 metres(self.min_clearance_m),
                 metres(self.pose_error_m),
+                metres(self.pose_error_expected_m),
                 self.full_solves,
                 self.local_updates,
             ),

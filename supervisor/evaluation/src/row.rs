@@ -86,6 +86,8 @@ pub struct Row {
     pub min_clearance_m: Option<f64>,
     /// Believed against true position at the end.
     pub pose_error_m: Option<f64>,
+    /// Root mean square of that, by the covariance of the last pose.
+    pub pose_error_expected_m: Option<f64>,
     /// True distance to the target at the end.
     pub true_distance_m: Option<f64>,
     /// Echoes that were mapped.
@@ -150,6 +152,7 @@ impl Row {
             barn_score,
             min_clearance_m: summary.min_clearance_m,
             pose_error_m: summary.pose_error_m,
+            pose_error_expected_m: summary.pose_error_expected_m,
             true_distance_m: summary.true_distance_m,
             safety_events: summary.safety_events,
             sonar_unavailable_share: summary.sonar_unavailable_share,
@@ -173,6 +176,7 @@ impl Row {
             path_length_m: 0.0,
             min_clearance_m: None,
             pose_error_m: None,
+            pose_error_expected_m: None,
             true_distance_m: None,
             departed_s: None,
             safety_events: 0,
@@ -254,7 +258,7 @@ mod tests {
     fn summary(outcome: &str, true_distance_m: f64) -> Summary {
         let text = format!(
             r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
-            "pose_error_m": 0.1, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
+            "pose_error_m": 0.1, "pose_error_expected_m": 0.2, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
             "sonar_unavailable_share": 0.5, "wheel_range_rad_s": 2.0, "looks": 1,
             "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1,
             "tick_latency_us": {{"p50": 300.0, "p99": 900.5, "max": null}}, "full_solve_us": {{}}, "local_update_us": {{}}}}"#

@@ -19,6 +19,7 @@ pub struct Summary {
     pub(crate) path_length_m: f64,
     pub(crate) min_clearance_m: Option<f64>,
     pub(crate) pose_error_m: Option<f64>,
+    pub(crate) pose_error_expected_m: Option<f64>,
     pub(crate) true_distance_m: Option<f64>,
     /// Mission time at which the robot had moved 0.1 m in truth.
     pub(crate) departed_s: Option<f64>,

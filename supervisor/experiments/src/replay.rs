@@ -119,6 +119,7 @@ impl Replay {
             grid: Some((mission.grid_frame(), &self.cells)),
             field: field.map(|(frame, cells)| (*frame, &cells[..])),
             believed: &self.path,
+            covariance: None,
             truth: &[],
             facts: Facts {
                 outcome: "replayed",

@@ -245,6 +245,13 @@ impl Legend<'_> {
         if self.motion.has_truth() || self.motion.has_belief() {
             column.row("robot at the end", body(motion::final_body()));
         }
+        if self.motion.has_covariance() {
+            column.row("95 % of the believed end", |at: DVec2| {
+                let mut path = Path::default();
+                path.circle(at, 9.0);
+                path.element(&motion::region_style())
+            });
+        }
         column.row("start", motion::start_mark);
         column.row("target, tolerance", |at| motion::target(at, 9.5));
     }

@@ -12,6 +12,8 @@ use super::{
 const MOST_POSES: usize = 4000;
 /// About as many bodies along the way.
 const BODIES: f64 = 16.0;
+/// In a plane 95 % of a normal distribution are within so many standard deviations: the root of -2 ln 0.05.
+const WITHIN_95: f64 = 2.4477;
 /// Never more, whatever the times say.
 const MOST_BODIES: usize = 200;
 
@@ -19,6 +21,7 @@ const MOST_BODIES: usize = 200;
 pub(super) struct Motion<'a> {
     mission: &'a Mission,
     believed: &'a [Pose2],
+    covariance: Option<[f64; 3]>,
     truth: &'a [Pose2],
     /// Mission time between two bodies, seconds, and the poses from one to the next.
     every: Option<(f64, f64)>,
@@ -30,6 +33,7 @@ impl<'a> Motion<'a> {
         let mut motion = Self {
             mission: scene.mission,
             believed: scene.believed,
+            covariance: scene.covariance,
             truth: scene.truth,
             every: None,
         };
@@ -61,6 +65,11 @@ impl<'a> Motion<'a> {
         !self.believed.is_empty()
     }
 
+    /// Whether the covariance of the believed end is known.
+    pub(super) const fn has_covariance(&self) -> bool {
+        self.covariance.is_some() && self.has_belief()
+    }
+
     /// Mission time between two bodies, seconds, where any are drawn.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.every.map(|(seconds, _)| seconds)
@@ -82,6 +91,7 @@ impl<'a> Motion<'a> {
             trajectory(view, self.believed).element(&believed_line()),
             start_mark(view.place(start.position)),
             self.end(view, radius),
+            self.region(view),
         ]
         .concat()
     }
@@ -101,6 +111,33 @@ impl<'a> Motion<'a> {
             add_body(&mut outlines, at, radius, pose.heading);
         }
         outlines.element(BODY)
+    }
+
+    /// The ellipse in which its centre is with 95 %, about where it was believed at the end.
+    fn region(&self, view: &View) -> String {
+        let (Some([xx, xy, yy]), Some(end)) = (self.covariance, self.believed.last()) else {
+            return String::new();
+        };
+        // The axes of the ellipse are the eigenvectors of the covariance.
+        let (mean, half) = ((xx + yy) / 2.0, (xx - yy) / 2.0);
+        let root = half.hypot(xy);
+        let [long, short] = [mean + root, mean - root].map(|variance| variance.max(0.0).sqrt());
+        let axes = [long, short].map(|sigma| Px(view.px(WITHIN_95 * sigma)));
+        let drawn = is_shown(view, end) && long.is_finite() && view.px(long) > 0.5;
+        if !drawn {
+            return String::new();
+        }
+        let at = view.place(end.position);
+        // On the sheet y grows downwards.
+        let angle = Px(-xy.atan2(half).to_degrees() / 2.0);
+        format!(
+            "<ellipse rx=\"{}\" ry=\"{}\" transform=\"translate({} {}) rotate({angle})\" {}/>\n",
+            axes[0],
+            axes[1],
+            Px(at.x),
+            Px(at.y),
+            region_style()
+        )
     }
 
     /// Where it ended: the true body filled, the believed one dashed.
@@ -137,6 +174,14 @@ pub(super) fn final_body() -> String {
 fn believed_end() -> String {
     format!(
         "fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-dasharray=\"3 2.4\"",
+        ink::BELIEVED
+    )
+}
+
+/// Attributes of the region about the believed end.
+pub(super) fn region_style() -> String {
+    format!(
+        "fill=\"{0}\" fill-opacity=\"0.08\" stroke=\"{0}\" stroke-width=\"1.1\" stroke-dasharray=\"1.5 2.5\"",
         ink::BELIEVED
     )
 }

@@ -12,6 +12,8 @@ pub struct Scene<'a> {
     pub field: Option<(GridFrame, &'a [FieldCell])>,
     /// Where dead reckoning put the robot, at equal steps of mission time from its beginning.
     pub believed: &'a [Pose2],
+    /// Covariance of its position at the end, xx, xy, yy, m^2; none if nobody knows.
+    pub covariance: Option<[f64; 3]>,
     /// Where the robot really was, likewise; empty with a real robot.
     pub truth: &'a [Pose2],
     /// How the run went.

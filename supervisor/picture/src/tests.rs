@@ -36,6 +36,7 @@ impl Run {
             grid: Some((frame, &self.grid)),
             field: Some((frame, &self.field)),
             believed: &self.believed,
+            covariance: Some([0.04, 0.03, 0.09]),
             truth: &self.truth,
             facts: Facts {
                 outcome: "reached",
@@ -373,4 +374,26 @@ fn what_is_low_is_dashed_what_is_soft_dotted_and_the_legend_says_so() {
     assert_eq!(drawn(", top_m = 0.1"), [false, true, false]);
     assert_eq!(drawn(", bottom_m = 0.2"), [false, true, false]);
     assert_eq!(drawn(", echo = 0.2"), [false, false, true]);
+}
+
+#[test]
+fn the_region_of_the_believed_end_is_the_covariances_ellipse_of_95_percent() {
+    let run = three_drums();
+    let mut scene = run.scene();
+    // Standard deviations of 0.2 and 0.1 m: the half axes are 2.45 times as long.
+    let per_metre = 800.0 / run.mission.perimeter.width_m;
+    let [long, short] = [0.2, 0.1].map(|sigma| 2.4477 * sigma * per_metre);
+    let axes = format!("<ellipse rx=\"{long:.1}\" ry=\"{short:.1}\"");
+    scene.covariance = Some([0.04, 0.0, 0.01]);
+    let along_x = svg(&scene);
+    assert!(
+        along_x.contains(&axes) && along_x.contains("rotate(0)"),
+        "{axes}"
+    );
+    // Up the sheet is against its y.
+    scene.covariance = Some([0.025, 0.015, 0.025]);
+    let diagonal = svg(&scene);
+    assert!(diagonal.contains(&axes) && diagonal.contains("rotate(-45)"));
+    scene.covariance = None;
+    assert!(!svg(&scene).contains("<ellipse"));
 }
