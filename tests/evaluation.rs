@@ -65,6 +65,20 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
 }
 
 #[test]
+fn with_infrared_the_same_seed_gives_the_same_rows_twice_and_their_setting_names_the_sensors() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = |name: &str| {
+        let out = directory.path().join(name);
+        let sensors = ["--seed", "5", "--sensors", "front+infrared"];
+        evaluate(out.to_str().unwrap(), &sensors).unwrap();
+        std::fs::read_to_string(out.join("rows.csv")).unwrap()
+    };
+    let first = rows("first");
+    assert!(first.contains("evidential front+infrared"), "{first}");
+    assert_eq!(first, rows("second"));
+}
+
+#[test]
 fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
     let folder = tempfile::tempdir().unwrap();
     // A hall of 6 m by 3 m with a wall across its lower half, its corner at (-10, 20).

@@ -7,6 +7,7 @@
 //! | [`clock`] | mission time, pace, the monotonic clock |
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
 //! | [`kinematics`] | equations (1)-(3) and their inverses |
+//! | [`infrared`] | THE mounting of the infrared rangers |
 //! | [`latency`] | a histogram that fits in a sample |
 //! | [`address`] | where a robot answers, and over which transport |
 //! | [`wire`] | the X80's protocol: frames and messages |
@@ -38,6 +39,7 @@ pub mod faults;
 pub mod geometry;
 pub mod grid;
 pub mod ground_truth;
+pub mod infrared;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;

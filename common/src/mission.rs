@@ -45,6 +45,9 @@ pub struct Mission {
     /// Whether what the sonar gives is mapped. Without it the robot goes by [`Mission::known`] alone.
     #[serde(default = "defaults::sensing")]
     pub sensing: bool,
+    /// Which sensors are mapped.
+    #[serde(default)]
+    pub sensors: Sensors,
     /// How near the target counts as reached, metres.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
@@ -105,6 +108,18 @@ pub enum Method {
     /// As printed: every hit is a hazard with its margin, (19), the map only grows, (10), the robot goes
     /// where the field points, (15), (16).
     Paper,
+}
+
+/// Which sensors the mapper takes into the evidence. The paper's method has the front sonar alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sensors {
+    /// The front sonar.
+    #[default]
+    #[serde(rename = "front")]
+    Front,
+    /// The front sonar and the ring of infrared rangers, mounted as [`crate::infrared`] says.
+    #[serde(rename = "front+infrared")]
+    FrontInfrared,
 }
 
 /// How the robot stands at the start.
@@ -314,10 +329,15 @@ impl Mission {
             && self.body().ackermann().is_none()
     }
 
-    /// vd, m/s: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, else the paper's 0.25.
+    /// vd, m/s: `controller.speed_m_s`, or by default for a robot that looks first 0.5, with infrared rangers 0.7; else the
+    /// paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
-        let default = if self.looks_first() { 0.5 } else { 0.25 };
+        let default = match self.sensors {
+            _ if !self.looks_first() => 0.25,
+            Sensors::Front => 0.5,
+            Sensors::FrontInfrared => 0.7,
+        };
         self.controller.speed_m_s.unwrap_or(default)
     }
 

@@ -57,7 +57,7 @@ macro_rules! topics {
 }
 
 topics! {
-    /// Front sonar: distance to the nearest thing ahead.
+    /// Front sonar: distance to the nearest thing ahead; the infrared rangers of the same tick.
     RANGE: Topic<RangeSample> {
         name: "range", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL,
     }

@@ -15,7 +15,7 @@ use glam::DVec2;
 use toml::de::{DeTable, DeValue};
 
 use self::objection::{Objection, objection, within};
-use super::{Method, Mission, error::MissionError};
+use super::{Method, Mission, Sensors, error::MissionError};
 use crate::grid::{MAX_CELLS, MIN_CELLS};
 
 /// A mission is a page or two; a file without end is no mission.
@@ -146,6 +146,13 @@ impl Checker {
                 "name",
                 format!("{:?} would not do as the name of a directory", mission.name),
                 "use letters, digits, '-' and '_'",
+            ));
+        }
+        if mission.method == Method::Paper && mission.sensors != Sensors::Front {
+            return Err(objection(
+                "sensors",
+                "the paper's method has the front sonar alone",
+                "give \"front\", or method = \"evidential\"",
             ));
         }
         self.perimeter(mission)?;

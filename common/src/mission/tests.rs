@@ -29,3 +29,22 @@ fn the_papers_method_has_no_screening_unless_the_mission_says_so() {
         Some(Planner::EVIDENTIAL_SCREENING_M)
     );
 }
+
+#[test]
+fn the_sensors_are_the_front_sonar_unless_the_mission_adds_the_infrared_ring() {
+    let parse = |text: &str| Mission::parse(text, Path::new("test.toml"));
+    assert_eq!(parse("target = [1, 0]").unwrap().sensors, Sensors::Front);
+    let both = parse("target = [1, 0]\nsensors = 'front+infrared'").unwrap();
+    assert_eq!(both.sensors, Sensors::FrontInfrared);
+    let error = parse("target = [1, 0]\nsensors = 'infrared'").unwrap_err();
+    assert!(error.to_string().contains("front+infrared"), "{error}");
+}
+
+#[test]
+fn the_papers_method_with_infrared_is_refused_with_line_and_remedy() {
+    let text = "target = [1, 0]\nmethod = 'paper'\nsensors = 'front+infrared'";
+    let error = Mission::parse(text, Path::new("test.toml")).unwrap_err();
+    let error = error.to_string();
+    assert!(error.starts_with("test.toml:3: sensors: "), "{error}");
+    assert!(error.contains("evidential"), "{error}");
+}

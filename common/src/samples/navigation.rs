@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bus::{Stamp, ZeroCopySend},
     grid::Part,
+    infrared,
     kinematics::{Pose2, Twist},
 };
 
@@ -67,7 +68,7 @@ impl PoseSample {
 /// How many readings a `grid` sample carries at most.
 pub const CLEAR_BEAMS: usize = 128;
 
-/// One reading of the sonar as evidence of free ground: nothing that is square to the beam stands nearer than `clear_m`.
+/// One reading as evidence of free ground. Of the sonar: nothing that is square to the beam stands nearer than `clear_m`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.ClearBeam")]
 #[repr(C)]
@@ -81,6 +82,9 @@ pub struct ClearBeam {
     /// So far nothing answered, metres.
     pub clear_m: f32,
 }
+
+/// How many rays of infrared rangers a `grid` sample carries at most: those of 32 ticks.
+pub const CLEAR_RAYS: usize = 32 * infrared::RANGERS;
 
 /// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
@@ -99,15 +103,24 @@ pub struct GridHeader {
     pub clear_beam_count: u64,
     /// The newest readings, oldest first.
     pub clear_beams: [ClearBeam; CLEAR_BEAMS],
+    /// How many of `clear_rays` are readings; none without infrared rangers in the evidence.
+    pub clear_ray_count: u64,
+    /// The newest readings of the infrared rangers, oldest first: nothing stands on the ray nearer than `clear_m`, at whatever
+    /// angle.
+    pub clear_rays: [ClearBeam; CLEAR_RAYS],
 }
 
 impl GridHeader {
     /// The newest readings, oldest first.
     #[must_use]
     pub fn clear_beams(&self) -> &[ClearBeam] {
-        // Shared memory is outside: the count may be anything.
-        let count = usize::try_from(self.clear_beam_count).unwrap_or(CLEAR_BEAMS);
-        &self.clear_beams[..count.min(CLEAR_BEAMS)]
+        counted(&self.clear_beams, self.clear_beam_count)
+    }
+
+    /// The newest readings of the infrared rangers, oldest first.
+    #[must_use]
+    pub fn clear_rays(&self) -> &[ClearBeam] {
+        counted(&self.clear_rays, self.clear_ray_count)
     }
 }
 
@@ -120,8 +133,16 @@ impl Default for GridHeader {
             epoch: 0,
             clear_beam_count: 0,
             clear_beams: [ClearBeam::default(); CLEAR_BEAMS],
+            clear_ray_count: 0,
+            clear_rays: [ClearBeam::default(); CLEAR_RAYS],
         }
     }
+}
+
+/// The first `count` of `beams`. Shared memory is outside: the count may be anything.
+fn counted(beams: &[ClearBeam], count: u64) -> &[ClearBeam] {
+    let count = usize::try_from(count).unwrap_or(beams.len());
+    &beams[..count.min(beams.len())]
 }
 
 wire_enum! {

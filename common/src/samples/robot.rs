@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::{Stamp, ZeroCopySend},
-    latency,
+    infrared, latency,
 };
 
 wire_enum! {
@@ -23,7 +23,7 @@ wire_enum! {
     }
 }
 
-/// Topic `range`: the front sonar.
+/// Topic `range`: the rangers of a tick: the front sonar, and the ring of infrared rangers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.Range")]
 #[repr(C)]
@@ -36,6 +36,9 @@ pub struct RangeSample {
     pub status: u8,
     /// The byte as the robot sent it, cm.
     pub raw_cm: u8,
+    /// The infrared rangers in the order of [`infrared::rangers`], AD counts; all 0, as of rangers that are dead, where none
+    /// came since the last tick.
+    pub infrared_ad: [u16; infrared::RANGERS],
 }
 
 /// Topic `wheels`: the encoders. Of a car the left one is that of the driven wheel, the right one that of the steering, 0
@@ -195,8 +198,7 @@ impl LinkSample {
     }
 }
 
-/// Topic `infrared`: the seven infrared rangers. Where each is mounted differs from robot to robot; no source
-/// numbers them.
+/// Topic `infrared`: the seven infrared rangers, in the order of [`infrared::rangers`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Infrared")]
 #[repr(C)]
@@ -204,9 +206,9 @@ pub struct InfraredSample {
     /// Which sample.
     pub stamp: Stamp,
     /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
-    pub range_m: [f64; 7],
+    pub range_m: [f64; infrared::RANGERS],
     /// As the robot sent them, AD counts.
-    pub raw_ad: [u16; 7],
+    pub raw_ad: [u16; infrared::RANGERS],
 }
 
 /// Topic `power`: voltages of the batteries, currents of the motors.

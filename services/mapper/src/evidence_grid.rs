@@ -9,6 +9,9 @@
 //! mapped as that: weight for every cell of the arc, more in its middle; weight off every cell before it
 //! along the axis. Where the arc meets a cell that is well known to be occupied, that explains the echo
 //! and the rest of the arc learns nothing, or every wall would grow at each end.
+//!
+//! The ray of an infrared ranger is as thin as a cell, sweeps little more, and ends at a face of any angle: what it passed is free,
+//! where it ends something stands, and no silence of the sonar is evidence against that.
 
 use std::f64::consts::TAU;
 
@@ -19,10 +22,19 @@ use common::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::sonar_model::SonarModel;
+use crate::{
+    infrared_model::{SWEPT_ASIDE_M, Seen},
+    reading::Ray,
+    sonar_model::SonarModel,
+};
 
 /// A cell that was swept just now: it falls by one for every [`step_m`] that the wheels roll.
 const SWEPT: u8 = u8::MAX;
+
+/// Something stands in the cell.
+const OCCUPIED: u8 = 1;
+/// An infrared ranger saw it there.
+const SEEN: u8 = 2;
 
 /// How far the wheels roll until swept ground is one step less sure, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
@@ -63,7 +75,7 @@ pub(crate) struct EvidenceGrid {
     /// From [`SWEPT`] down to [`SonarModel::pointed_enough`]: swept; below, how often the sonar was pointed here in vain.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
-    /// 1: occupied.
+    /// [`OCCUPIED`], [`SEEN`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
 }
@@ -107,7 +119,7 @@ impl EvidenceGrid {
 
     /// Whether something stands in a cell.
     pub(crate) fn is_occupied(&self, index: usize) -> bool {
-        self.occupied[index] == 1
+        self.occupied[index] & OCCUPIED != 0
     }
 
     /// The wheels have rolled on: what was swept is a little less sure, by `steps`. The window in which
@@ -203,7 +215,7 @@ impl EvidenceGrid {
                 };
                 let weight = self.weight_of(index);
                 let same = apart(self.side[index], came_from) <= sonar.same_side;
-                if weight <= 0 || same {
+                if weight <= 0 || same && self.occupied[index] & SEEN == 0 {
                     self.set(sonar, lattice, cell, weight.saturating_sub(pass), flips);
                     window = window.including(cell);
                 }
@@ -248,6 +260,53 @@ impl EvidenceGrid {
         window
     }
 
+    /// Take one reading of an infrared ranger; otherwise as [`EvidenceGrid::take`].
+    pub(crate) fn take_ray(
+        &mut self,
+        sonar: &SonarModel,
+        lattice: &GridFrame,
+        ray: &Ray,
+        (robot, radius): (DVec2, f64),
+        flips: &mut Vec<Flip>,
+    ) -> Window {
+        let mut window = Window::default();
+        let half_cell = lattice.resolution_m / 2.0;
+        let Seen { clear_m, hit_m } = ray.seen;
+        let far = clear_m.max(hit_m.unwrap_or(0.0)) + half_cell;
+        let came_from = side_of(ray.axis);
+        for cell in around(lattice, ray.origin, far) {
+            let centre = lattice.centre_of(cell);
+            let offset = centre - ray.origin;
+            let (across, along) = (ray.axis.perp_dot(offset), ray.axis.dot(offset));
+            let on_ray = across.abs() <= half_cell;
+            if across.abs() > half_cell.max(SWEPT_ASIDE_M) || along < -half_cell {
+                continue;
+            }
+            let index = lattice.index(cell);
+            let weight = self.weight_of(index);
+            let at_hit = hit_m.is_some_and(|hit| (hit - along).abs() <= half_cell);
+            if on_ray && at_hit {
+                if centre.distance(robot) <= radius {
+                    continue;
+                }
+                self.side[index] = came_from;
+                self.occupied[index] |= SEEN;
+                let weight = weight.max(-sonar.pass) + sonar.hit as i8;
+                self.set(sonar, lattice, cell, weight, flips);
+            } else if along <= clear_m {
+                self.looks[index] = SWEPT;
+                if on_ray {
+                    let weight = weight.saturating_sub(sonar.pass);
+                    self.set(sonar, lattice, cell, weight, flips);
+                }
+            } else {
+                continue;
+            }
+            window = window.including(cell);
+        }
+        window
+    }
+
     /// Forget everything but what was heard within `keep` metres of `robot`.
     pub(crate) fn forget(
         &mut self,
@@ -286,8 +345,11 @@ impl EvidenceGrid {
         let was = self.is_occupied(index);
         let occupied = weight >= sonar.occupied || was && weight > sonar.released;
         if occupied != was {
-            self.occupied[index] = occupied.into();
+            self.occupied[index] ^= OCCUPIED;
             flips.push(Flip { cell, occupied });
+        }
+        if !occupied {
+            self.occupied[index] &= !SEEN;
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::{
     clear_beams::ClearBeams,
     evidence_grid::{Beam, EvidenceGrid, Flip, lattice, step_m},
     inflation::{Geometry, Inflation},
-    reading::Reading,
+    reading::{Ray, Reading},
     sonar_model::SonarModel,
 };
 
@@ -109,31 +109,41 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take what was heard, if the sonar gave a reading at all, by a robot at `robot` whose wheels have rolled `rolled_m`
-    /// metres.
+    /// Take what was heard, if the sonar gave a reading at all, and what the infrared rangers saw, by a robot at `robot`
+    /// whose wheels have rolled `rolled_m` metres.
     pub(crate) fn take(
         &self,
         map: &mut EvidenceMap,
         robot: DVec2,
         reading: Option<Reading>,
+        rays: &[Ray],
         rolled_m: f64,
     ) -> News {
-        let Some(reading) = reading else {
-            return News::default();
-        };
-        map.beams.take(&self.sonar, &reading, rolled_m);
-        let beam = Beam {
-            origin: reading.origin,
-            axis: reading.axis,
-            echo: reading.echo,
-            reach: self.map_within,
-        };
         let mut flips = Vec::new();
         let lattice = &self.geometry.lattice;
         let body = (robot, self.radius);
-        let touched = map
-            .evidence
-            .take(&self.sonar, lattice, &beam, body, &mut flips);
+        let mut touched = Window::default();
+        // What is seen first: it explains echoes.
+        for ray in rays {
+            map.beams.take_ray(&self.sonar, ray, rolled_m);
+            let seen = map
+                .evidence
+                .take_ray(&self.sonar, lattice, ray, body, &mut flips);
+            touched = touched.union(seen);
+        }
+        if let Some(reading) = reading {
+            map.beams.take(&self.sonar, &reading, rolled_m);
+            let beam = Beam {
+                origin: reading.origin,
+                axis: reading.axis,
+                echo: reading.echo,
+                reach: self.map_within,
+            };
+            let heard = map
+                .evidence
+                .take(&self.sonar, lattice, &beam, body, &mut flips);
+            touched = touched.union(heard);
+        }
         let mut window = self.on_grid(touched);
         for flip in &flips {
             window = window.union(map.inflation.follow(&self.geometry, *flip));

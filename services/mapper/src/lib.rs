@@ -4,8 +4,9 @@
 //! |---|---|
 //! | [`step`] | the mapper itself, pure: poses with ranges in, the window of the grid that changed out |
 //! | `sonar_model` | THE numbers of what an echo, and its absence, mean for the cells around |
+//! | `infrared_model` | THE numbers of what an infrared ranger's voltage means for the cells along its ray |
 //! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
-//! | `reading` | a reading of the sonar, where it was taken |
+//! | `reading` | readings of the sonar and of an infrared ranger, where they were taken |
 //! | `clear_beams` | the newest readings as evidence of free ground, for the planner |
 //! | `inflation` | occupied cells grown by the robot's body |
 //! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
@@ -17,6 +18,7 @@ mod evidence_grid;
 mod evidential;
 mod fault;
 mod inflation;
+mod infrared_model;
 mod reading;
 pub mod shell;
 mod sonar_model;

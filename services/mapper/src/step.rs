@@ -7,7 +7,7 @@
 use common::{
     clock::MissionTime,
     grid::{Cell, CellState, GridFrame, Part, Window},
-    mission::{Method, Mission},
+    mission::{Method, Mission, Sensors},
     samples::{FaultKind, GridHeader, PoseSample, RangeSample, RangeStatus},
     step::{ForeignState, Step},
 };
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     evidential::{EvidenceMap, Evidential},
     fault,
-    reading::Reading,
+    reading::{Ray, Reading},
 };
 
 /// "4 cm or nearer" is mapped at 4 cm.
@@ -26,11 +26,11 @@ const CONTACT_M: f64 = 0.04;
 /// What the mapper takes. The belief is the fold of its inputs, so they are what its journal holds, too.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
-    /// The pose of a tick, and what the sonar gave in it.
+    /// The pose of a tick, and what the rangers gave in it.
     Tick {
         /// Where the robot was.
         pose: PoseSample,
-        /// The reading; none if it did not come.
+        /// The readings; none if they did not come.
         range: Option<RangeSample>,
     },
     /// The supervisor's reset of the sensed belief.
@@ -118,6 +118,7 @@ pub struct Mapper {
     margin: i64,
     evidential: Evidential,
     sensing: bool,
+    infrared: bool,
     map_within: f64,
     sensor_forward: f64,
     sensor_bearing: f64,
@@ -148,6 +149,7 @@ impl Step for Mapper {
             margin: i64::from(margin),
             evidential,
             sensing: mission.sensing,
+            infrared: mission.sensors == Sensors::FrontInfrared,
             map_within: mission.map_within_m(),
             sensor_forward: mission.sonar.forward_m,
             sensor_bearing: mission.sonar.bearing_deg.to_radians(),
@@ -312,10 +314,13 @@ impl Mapper {
             axis: DVec2::from_angle(robot.heading + self.sensor_bearing),
             echo,
         });
+        let rays = range
+            .filter(|_| self.infrared)
+            .map_or_else(Vec::new, |range| Ray::all(robot, self.footprint, range));
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
         let news = self
             .evidential
-            .take(map, robot.position, reading, self.belief.rolled);
+            .take(map, robot.position, reading, &rays, self.belief.rolled);
         let changed = self.redraw(stale.union(news.window));
         self.belief.safety_events += u64::from(news.safety_event);
         changed

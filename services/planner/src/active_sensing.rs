@@ -12,7 +12,7 @@ use common::{
     grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
     mission::Mission,
-    samples::ClearBeam,
+    samples::GridHeader,
 };
 use glam::DVec2;
 use harmonic::{Field, Guidance};
@@ -24,7 +24,7 @@ const STEP_M: f64 = 0.05;
 /// The ground under so much of the way ahead must have been swept, and no face could be touched there unheard, metres.
 const SWEPT_AHEAD_M: f64 = 0.25;
 /// So far ahead it is looked at at all, metres.
-const AHEAD_M: f64 = 0.4;
+const AHEAD_M: f64 = 0.6;
 /// In this time the robot must be able to stop: the sonar's period, the radio's, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
 /// Cells of a fine grid are looked at no closer than this, metres.
@@ -71,15 +71,15 @@ impl ActiveSensing {
         }
     }
 
-    /// Advice for a robot at `pose` that is to go along `direction`, a unit vector, after the readings `beams`.
+    /// Advice for a robot at `pose` that is to go along `direction`, a unit vector, by the readings in `belief`.
     pub(crate) fn advise(
         &self,
         view: &View<'_>,
-        beams: &[ClearBeam],
+        belief: &GridHeader,
         pose: &Pose2,
         direction: DVec2,
     ) -> Advice {
-        let unheard = UnheardFaces::new(beams, self.radius);
+        let unheard = UnheardFaces::new(belief, self.radius);
         let way = view.way(pose.position, direction);
         let steps = (SWEPT_AHEAD_M / STEP_M) as usize;
         let ahead = &way[..steps.min(way.len())];

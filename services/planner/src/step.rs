@@ -385,12 +385,10 @@ impl Planner {
             (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
         };
         match status {
-            GuidanceStatus::Along => {
-                match sensing.advise(&view, self.belief.clear_beams(), pose, direction) {
-                    Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
-                    Advice::Go(limit) => (status, direction, limit),
-                }
-            }
+            GuidanceStatus::Along => match sensing.advise(&view, &self.belief, pose, direction) {
+                Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
+                Advice::Go(limit) => (status, direction, limit),
+            },
             GuidanceStatus::WayOut => (status, direction, WAY_OUT_M_S),
             // It may be an echo that was none: one look around before the belief is blamed.
             GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),

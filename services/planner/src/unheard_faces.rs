@@ -4,9 +4,10 @@
 //! (Kuc and Siegel 1987: what is hit at a slant throws the sound away). So that a beam ahead was silent says nothing of
 //! a wall at 45 degrees to the way. What would the robot touch? Whatever the body touches at a point has its normal
 //! there, within a right angle of the motion. So for each point of the way and each normal, a face tangent to the body
-//! there is supposed, and the readings are asked whether one of them would have heard it.
+//! there is supposed, and the readings are asked whether one of them would have heard it. An infrared ranger sees a face at
+//! any angle, but only where its ray meets it.
 
-use common::samples::ClearBeam;
+use common::samples::{ClearBeam, GridHeader};
 use glam::DVec2;
 
 /// Half the angle between the way and the normals that are asked about. A face at more than this is passed, not met.
@@ -22,6 +23,11 @@ const NEAR_M: f64 = 1.2;
 /// How far from where the body would touch it a face is supposed to reach along itself, metres. One that ends before
 /// could only be heard from nearer; its end is an edge, which answers a beam ahead.
 const REACHES_M: f64 = 1.0;
+/// Least cosine of the angle between a ray and the normal of a face that it meets, which is 70 degrees: nearer to the face's
+/// own direction it is passed.
+const LEAST_SLANT: f64 = 0.34;
+/// The same for a face that a ray of an infrared ranger would have met, metres: what is met is near.
+const MET_WITHIN_M: f64 = 0.35;
 /// Free ground that is asked for between body and face, metres.
 const MARGIN_M: f64 = 0.02;
 /// An echo from so little before the supposed face may be the face's own, metres.
@@ -33,10 +39,11 @@ const ECHOES_FOR_A_SILENCE: usize = 2;
 #[derive(Clone, Debug)]
 pub(crate) struct UnheardFaces {
     beams: Vec<Beam>,
+    rays: Vec<Beam>,
     reach: f64,
 }
 
-/// A reading of the sonar.
+/// A reading.
 #[derive(Clone, Copy, Debug)]
 struct Beam {
     origin: DVec2,
@@ -45,15 +52,16 @@ struct Beam {
 }
 
 impl UnheardFaces {
-    /// From readings, for a body of `radius` metres.
-    pub(crate) fn new(beams: &[ClearBeam], radius: f64) -> Self {
-        let beams = beams.iter().map(|beam| Beam {
+    /// From the readings in `belief`, for a body of `radius` metres.
+    pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
+        let beam = |beam: &ClearBeam| Beam {
             origin: DVec2::new(beam.x_m.into(), beam.y_m.into()),
             axis: DVec2::from_angle(beam.bearing_rad.into()),
             clear: beam.clear_m.into(),
-        });
+        };
         Self {
-            beams: beams.collect(),
+            beams: belief.clear_beams().iter().map(beam).collect(),
+            rays: belief.clear_rays().iter().map(beam).collect(),
             reach: radius + MARGIN_M,
         }
     }
@@ -87,6 +95,20 @@ impl UnheardFaces {
                 echoes += 1;
             }
         }
+        for ray in &self.rays {
+            let offset = at - ray.origin;
+            let slant = ray.axis.dot(normal);
+            let meets = (offset.dot(normal) + self.reach) / slant;
+            let along_face = (meets * ray.axis - offset).perp_dot(normal).abs();
+            if slant < LEAST_SLANT || meets < 0.0 || along_face > MET_WITHIN_M {
+                continue;
+            }
+            if meets <= ray.clear {
+                silences += 1;
+            } else if meets <= ray.clear + NEAR_ECHO_M {
+                echoes += 1;
+            }
+        }
         silences * ECHOES_FOR_A_SILENCE > echoes
     }
 }
@@ -106,9 +128,25 @@ mod tests {
         }
     }
 
+    /// What a mapper says that has these readings of the sonar and of infrared rangers.
+    fn belief(beams: &[ClearBeam], rays: &[ClearBeam]) -> GridHeader {
+        let mut header = GridHeader {
+            clear_beam_count: beams.len() as u64,
+            clear_ray_count: rays.len() as u64,
+            ..GridHeader::default()
+        };
+        header.clear_beams[..beams.len()].copy_from_slice(beams);
+        header.clear_rays[..rays.len()].copy_from_slice(rays);
+        header
+    }
+
     /// Angles of the normals nothing speaks against, degrees, for a body at the origin on its way along x.
     fn unheard(beams: &[ClearBeam]) -> Vec<i32> {
-        let faces = UnheardFaces::new(beams, BODY_M);
+        unheard_and_unseen(beams, &[])
+    }
+
+    fn unheard_and_unseen(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
+        let faces = UnheardFaces::new(&belief(beams, rays), BODY_M);
         let normals = faces.normals(DVec2::ZERO, DVec2::X);
         normals
             .map(|normal| normal.to_angle().to_degrees().round() as i32)
@@ -147,6 +185,35 @@ mod tests {
     fn a_face_is_not_supposed_to_reach_farther_than_a_metre_along_itself() {
         assert!(!unheard(&[beam(-0.9, 75.0, 2.0)]).contains(&75));
         assert!(unheard(&[beam(-1.1, 75.0, 2.0)]).contains(&75));
+    }
+
+    /// The front four of the ring, free so far, on a robot `behind` the origin.
+    fn ring(behind: f64, clear_m: f64) -> [ClearBeam; 4] {
+        [33.75, 11.25, -11.25, -33.75].map(|bearing_deg: f64| {
+            let (sin, cos) = bearing_deg.to_radians().sin_cos();
+            ClearBeam {
+                y_m: (BODY_M * sin) as f32,
+                ..beam(BODY_M * cos - behind, bearing_deg, clear_m)
+            }
+        })
+    }
+
+    #[test]
+    fn infrared_rays_speak_against_faces_at_any_angle_as_far_as_they_are_free() {
+        assert_eq!(unheard_and_unseen(&[], &ring(0.25, 0.7)), [0; 0]);
+        // Square ahead the ray at 11.25 degrees meets a face after 0.28 m.
+        let unseen = unheard_and_unseen(&[], &ring(0.25, 0.25));
+        assert!(unseen.contains(&0), "{unseen:?}");
+    }
+
+    #[test]
+    fn a_ray_says_nothing_of_a_face_that_it_meets_far_from_the_body() {
+        // Along the way, 0.5 m beside it: the face would be met 0.5 m from where the body touches it.
+        let ray = ClearBeam {
+            y_m: 0.5,
+            ..beam(0.0, 0.0, 0.7)
+        };
+        assert!(unheard_and_unseen(&[], &[ray]).contains(&0));
     }
 
     #[test]

@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
+    infrared,
     mission::Mission,
     samples::{
         Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, RangeStatus,
@@ -86,7 +87,9 @@ pub struct Link {
     pinged_ns: Option<u64>,
     restart: RestartWatch,
     telemetry: Telemetry,
+    /// The front sonar's byte and the infrared rangers' counts, for the next tick.
     sonar: Option<u8>,
+    infrared: Option<[u16; infrared::RANGERS]>,
     /// The encoders of the newest tick.
     wheels: WheelSample,
     /// Mission time of the newest tick.
@@ -121,6 +124,7 @@ impl Step for Link {
             restart: RestartWatch::new(mission),
             telemetry: Telemetry::new(mission.robot.low_battery_v),
             sonar: None,
+            infrared: None,
             wheels: WheelSample::default(),
             time: MissionTime::default(),
             open: None,
@@ -256,7 +260,10 @@ impl Link {
         };
         self.wheels = wheels;
         let open = OpenTick {
-            range: reading(self.sonar.take()),
+            range: RangeSample {
+                infrared_ad: self.infrared.take().unwrap_or_default(),
+                ..reading(self.sonar.take())
+            },
             wheels,
             began_ns: now_ns,
             given_ns: now_ns,

@@ -1,29 +1,26 @@
 //! The infrared ring: seven rangers that look straight ahead of themselves.
 
-use common::{kinematics::Pose2, mission::InfraredPhysics, wire::infrared_ad};
+use common::{
+    infrared::{RANGERS, rangers},
+    kinematics::Pose2,
+    mission::InfraredPhysics,
+    wire::infrared_ad,
+};
 
-use crate::{noise::Noise, sonar::Mount, world::World};
+use crate::{noise::Noise, world::World};
 
-/// Bearings of rangers 1 to 7, degrees counter-clockwise: left to right around the front, then the rear.
-/// The bearings are the vendor's, their numbering is ours: no source gives it.
-const BEARINGS_DEG: [f64; 7] = [90.0, 33.75, 11.25, -11.25, -33.75, -90.0, 180.0];
 /// Beyond its reach a ranger reads as if something stood here, metres.
 const NOTHING_M: f64 = 0.81;
 
-/// What the seven rangers read on a robot of `radius` at `pose`, AD counts.
+/// What the rangers read on a robot of `radius` at `pose`, AD counts.
 pub fn read(
     world: &World,
     pose: Pose2,
     radius: f64,
     physics: &InfraredPhysics,
     noise: &mut Noise,
-) -> [u16; 7] {
-    BEARINGS_DEG.map(|bearing| {
-        let mount = Mount {
-            forward: radius,
-            bearing: bearing.to_radians(),
-        };
-        let ranger = mount.on(pose);
+) -> [u16; RANGERS] {
+    rangers(pose, radius).map(|ranger| {
         let range = world
             .first_hit(ranger.position, ranger.axis(), world.heights().infrared_m)
             .map_or(NOTHING_M, |(range, _)| range);
@@ -50,9 +47,9 @@ mod tests {
         let mut noise = Noise::new(1, Source::Infrared);
         let world = World::new(&mission);
         let read = read(&world, Pose2::default(), 0.2, &physics, &mut noise).map(infrared_m);
-        // The left one is 0.4 m from the upper wall, the one at 33.75 degrees 0.6 / sin - 0.2 m, out of
-        // reach; the rear one is 0.3 m from the wall behind.
-        let want = [0.4, 0.81, 0.81, 0.81, 0.81, 0.81, 0.3];
+        // The left one, 0.127 m from the centre, is 0.473 m from the upper wall, the one at 33.75 degrees 0.6 / sin - 0.2 m,
+        // out of reach; the rear one is 0.3 m from the wall behind.
+        let want = [0.81, 0.81, 0.81, 0.81, 0.81, 0.3, 0.473];
         for (read, want) in read.iter().zip(want) {
             assert!((read - want).abs() < 0.005, "{read} m instead of {want} m");
         }

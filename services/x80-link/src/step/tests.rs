@@ -300,6 +300,27 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
 }
 
 #[test]
+fn a_tick_has_the_infrared_counts_that_came_with_it_and_the_next_without_any_has_none() {
+    let mut link = driving(on_the_wall());
+    let mut bytes = Vec::new();
+    let custom = CustomSensors {
+        ad: [0, 0, 602, 603, 604, 605, 606, 607],
+        io: 0,
+    };
+    Report::Custom(custom).encode(Addressing::default(), &mut bytes);
+    let standard = StandardSensors {
+        infrared: 601,
+        ..StandardSensors::default()
+    };
+    Report::Standard(standard).encode(Addressing::default(), &mut bytes);
+    Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
+    let given = ticks(&link.at(Event::Datagram(&bytes), 10 * MS));
+    assert_eq!(given[0].1.infrared_ad, [601, 602, 603, 604, 605, 606, 607]);
+    let given = ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS));
+    assert_eq!(given[0].1.infrared_ad, [0; 7]);
+}
+
+#[test]
 fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
     // The link before this one died; the robot ignores the time limit of its last command.
     let mut link = on_the_wall();

@@ -91,8 +91,10 @@ impl Link {
             effects.push(Effect::Surroundings(surroundings));
             effects.extend(changes.into_iter().map(Effect::Battery));
         }
-        let infrared = custom.and_then(|custom| self.telemetry.take_custom(custom));
-        effects.extend(infrared.map(Effect::Infrared));
+        if let Some(infrared) = custom.and_then(|custom| self.telemetry.take_custom(custom)) {
+            self.infrared = Some(infrared.raw_ad);
+            effects.push(Effect::Infrared(infrared));
+        }
     }
 
     pub(super) fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {

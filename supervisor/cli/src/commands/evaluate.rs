@@ -59,6 +59,10 @@ pub(crate) struct Arguments {
     /// commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,
+    /// front (the sonar alone) or front+infrared: what the evidential method senses; the paper's has the sonar alone.
+    /// Several, with commas, are compared on the same worlds.
+    #[arg(long, value_delimiter = ',')]
+    sensors: Vec<String>,
     /// laboratory or measured.
     #[arg(long, default_value = "measured")]
     realism: String,
@@ -183,6 +187,29 @@ fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     )
 }
 
+/// A method with sensors, as a setting's name says it, and what is set for it: each method with each of the sensors, the
+/// paper's once, for it has the sonar alone.
+fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
+    let methods = match &arguments.method[..] {
+        [] => vec!["evidential".to_owned()],
+        methods => methods.to_vec(),
+    };
+    let with_sensors = |method: String| {
+        let set = format!("method='{method}'");
+        if arguments.sensors.is_empty() || method == "paper" {
+            return vec![(method, vec![set])];
+        }
+        let sensors = arguments.sensors.iter();
+        sensors
+            .map(|sensors| {
+                let sensed = format!("sensors='{sensors}'");
+                (format!("{method} {sensors}"), vec![set.clone(), sensed])
+            })
+            .collect()
+    };
+    methods.into_iter().flat_map(with_sensors).collect()
+}
+
 /// The settings to compare, each planner by each method; the first is what the others are compared with.
 fn settings(arguments: &Arguments) -> Result<Vec<Setting>, Failure> {
     let mut set = vec![
@@ -190,15 +217,12 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>, Failure> {
         format!("robot.model='{}'", arguments.robot),
     ];
     set.extend(arguments.set.iter().cloned());
-    let methods = match &arguments.method[..] {
-        [] => vec!["evidential".to_owned()],
-        methods => methods.to_vec(),
-    };
+    let methods = methods(arguments);
     let mut settings = Vec::new();
     for planner in &arguments.planner {
         let executable = executable(planner)?;
-        for method in &methods {
-            let mut set = [&set[..], &[format!("method='{method}'")]].concat();
+        for (method, chosen) in &methods {
+            let mut set = [&set[..], chosen].concat();
             set.extend(executable.clone());
             settings.push(Setting {
                 name: match (&arguments.planner[..], &methods[..]) {

@@ -1,6 +1,7 @@
 //! The evidential method, reading by reading.
 
 use super::*;
+use common::wire::infrared_ad;
 
 /// Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead, the body's radius 0.19 m.
 fn mapper(extra: &str) -> Mapper {
@@ -47,6 +48,94 @@ fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept(
     assert_eq!(state(&mapper, 0.5, 0.0), CellState::Swept);
     assert_eq!(state(&mapper, 0.5, 0.5), CellState::Free);
     assert_eq!(mapper.state().safety_events(), 1);
+}
+
+/// A robot at the origin facing along x whose infrared rangers give these counts, and whose sonar gives nothing.
+fn see(mapper: &mut Mapper, tick: u64, infrared_ad: [u16; 7]) {
+    let stamp = Stamp {
+        tick,
+        ..Stamp::default()
+    };
+    let pose = PoseSample {
+        stamp,
+        ..PoseSample::default()
+    };
+    let range = RangeSample {
+        stamp,
+        infrared_ad,
+        ..RangeSample::default()
+    };
+    mapper.hear(&pose, Some(&range));
+}
+
+const INFRARED: &str = "sensors = 'front+infrared'";
+
+/// The rear ranger, which looks along -x from (-0.19, 0), sees something so far away; the others are dead.
+fn rear(range_m: f64) -> [u16; 7] {
+    let mut counts = [0; 7];
+    counts[5] = infrared_ad(range_m);
+    counts
+}
+
+#[test]
+fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
+    let mut mapper = mapper(INFRARED);
+    see(&mut mapper, 0, rear(0.6));
+    // What it sees is at -0.79; the body and its clearance reach 0.22 m and half a cell around.
+    assert_eq!(state(&mapper, -0.4, 0.0), CellState::Swept);
+    assert!(state(&mapper, -0.8, 0.0).is_hazard());
+    assert!(!state(&mapper, -0.5, 0.0).is_hazard());
+    assert_eq!(state(&mapper, -1.2, 0.0), CellState::Free);
+    assert_eq!(state(&mapper, -0.4, 0.3), CellState::Free, "it is thin");
+    assert_eq!(mapper.state().safety_events(), 1);
+}
+
+#[test]
+fn an_infrared_ranger_that_sees_nothing_frees_ground_only_if_it_is_live() {
+    let mut live = mapper(INFRARED);
+    see(&mut live, 0, rear(0.81));
+    assert_eq!(state(&live, -0.8, 0.0), CellState::Swept);
+    assert_eq!(live.state().safety_events(), 0);
+    let mut dead = mapper(INFRARED);
+    see(&mut dead, 0, [0; 7]);
+    let mut saturated = mapper(INFRARED);
+    see(&mut saturated, 0, [4095; 7]);
+    for mapper in [dead, saturated] {
+        assert_eq!(state(&mapper, -0.4, 0.0), CellState::Free);
+        assert_eq!(mapper.state().safety_events(), 0);
+    }
+}
+
+#[test]
+fn an_infrared_reading_nearer_than_10_cm_frees_nothing() {
+    let mut near = mapper(INFRARED);
+    see(&mut near, 0, rear(0.81));
+    assert_eq!(state(&near, -0.5, 0.0), CellState::Swept);
+    let mut nearer = mapper(INFRARED);
+    see(&mut nearer, 0, rear(0.09));
+    assert!(state(&nearer, -0.3, 0.0).is_hazard());
+    assert_eq!(state(&nearer, -0.5, 0.0), CellState::Sensed);
+}
+
+#[test]
+fn silence_of_the_sonar_does_not_take_back_what_infrared_saw() {
+    let mut mapper = mapper(INFRARED);
+    // Ahead to the left, from (0.19, 0) turned by 11.25 degrees.
+    let mut counts = [0; 7];
+    counts[1] = infrared_ad(0.5);
+    see(&mut mapper, 0, counts);
+    for tick in 1..9 {
+        hear(&mut mapper, tick, 0.0, 11.25_f64.to_radians(), None);
+    }
+    assert!(state(&mapper, 0.7, 0.15).is_hazard());
+}
+
+#[test]
+fn without_infrared_among_the_sensors_its_readings_are_not_mapped() {
+    let mut mapper = mapper("");
+    see(&mut mapper, 0, rear(0.6));
+    assert_eq!(state(&mapper, -0.4, 0.0), CellState::Free);
+    assert_eq!(mapper.state().safety_events(), 0);
 }
 
 #[test]
