@@ -28,12 +28,33 @@ pub(crate) struct Decided {
     pub truth_ticks: usize,
 }
 
+/// When a mission runs out of time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timeout {
+    /// After so many seconds.
+    pub seconds: f64,
+    /// By the simulated robot's own clock, which also counts the ticks that nobody heard: on a clock of ticks.
+    pub by_robot: bool,
+}
+
+impl Timeout {
+    /// The first tick that was too late.
+    fn tick(self, poses: &[PoseSample], truth: &[GroundTruthTick]) -> Option<u64> {
+        if self.by_robot {
+            let late = truth.partition_point(|tick| tick.time_s < self.seconds);
+            return truth.get(late).map(|tick| tick_of(tick, poses));
+        }
+        let late = poses.partition_point(|pose| pose.stamp.time().seconds() < self.seconds);
+        poses.get(late).map(|pose| pose.stamp.tick)
+    }
+}
+
 /// Of a run that was seen to end with `ending`. `stall` is the tick of the newest stall.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
     truth: &[GroundTruthTick],
-    timeout_s: f64,
+    timeout: Timeout,
     stall: Option<u64>,
 ) -> Decided {
     let undecided = |ending| Decided {
@@ -50,14 +71,12 @@ pub(crate) fn first(
     let arrival = record
         .arrival
         .map(|command| (command.stamp.tick, reached(command.distance_m)));
-    let late = poses.partition_point(|pose| pose.stamp.time().seconds() < timeout_s);
-    let timeout = poses
-        .get(late)
-        .map(|pose| (pose.stamp.tick, timed_out(timeout_s)));
+    let late = timeout.tick(poses, truth);
+    let late = late.map(|tick| (tick, timed_out(timeout.seconds)));
     let stall = stall.filter(|_| ending.outcome == Outcome::Unreachable);
     let stall = stall.map(|tick| (tick, ending.clone()));
     // Of two at one tick the one named first.
-    let events = [contact, arrival, timeout, stall];
+    let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         return undecided(ending);
     };
@@ -68,6 +87,9 @@ pub(crate) fn first(
     };
     let truth_ticks = match ending.outcome {
         Outcome::Collision => truth.partition_point(|tick| tick.contacts == 0) + 1,
+        Outcome::Timeout if timeout.by_robot => {
+            truth.partition_point(|tick| tick.time_s < timeout.seconds)
+        }
         _ => record
             .pose_at(last_tick)
             .and_then(|pose| truth_of(pose, truth))
@@ -80,24 +102,24 @@ pub(crate) fn first(
     }
 }
 
-/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks,
-/// and the two number theirs alike where nothing was lost on the way.
+/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks;
+/// of these it is the one whose number is nearest.
 fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown
-        .min_by_key(|(_, it)| it.tick.abs_diff(pose.stamp.tick))
+        .min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick))
         .map(|(index, _)| index)
 }
 
-/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none yet, the robot's number
-/// of it.
+/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none, the number that it
+/// would have.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()
         .filter(|pose| truth.is_of(pose))
         .map(|pose| pose.stamp.tick)
-        .min_by_key(|tick| tick.abs_diff(truth.tick))
-        .unwrap_or(truth.tick)
+        .min_by_key(|tick| tick.abs_diff(truth.heard_tick()))
+        .unwrap_or(truth.heard_tick())
 }
 
 #[cfg(test)]
@@ -106,7 +128,10 @@ mod tests {
 
     use super::*;
 
-    const TIMEOUT_S: f64 = 20.0;
+    const TIMEOUT: Timeout = Timeout {
+        seconds: 20.0,
+        by_robot: true,
+    };
 
     fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
         GroundTruthTick {
@@ -172,13 +197,7 @@ mod tests {
         ];
         for (what, ticks, arrival, contact, seen, want) in rows {
             let (record, truth) = run(ticks, arrival, contact);
-            let decided = first(
-                Ending::failed(seen, ""),
-                &record,
-                &truth,
-                TIMEOUT_S,
-                Some(15),
-            );
+            let decided = first(Ending::failed(seen, ""), &record, &truth, TIMEOUT, Some(15));
             let Decided {
                 ending,
                 last_tick,

@@ -9,7 +9,7 @@ use common::{
 };
 
 use crate::{
-    decisive,
+    decisive::{self, Timeout},
     domain::DomainLock,
     error::{SupervisorError, system},
     observer::Record,
@@ -26,6 +26,9 @@ pub struct Finished {
     /// The last complete tick before that was decided; none where no tick decided. What came after it does not count: how
     /// much that is depends on how fast the stop was.
     pub last_tick: Option<u64>,
+    /// From the first motion order to the end, seconds of the robot's clock; of a run that was resumed in wall-clock time,
+    /// from the start of the run.
+    pub duration_s: f64,
     /// What was read from the bus.
     pub record: Record,
     /// What really happened until then, of a simulated robot.
@@ -68,11 +71,17 @@ pub fn run(
         ending,
         &record,
         &truth,
-        options.mission.timeout_s,
+        Timeout {
+            seconds: options.mission.timeout_s,
+            by_robot: supervisor.clock.in_ticks(),
+        },
         supervisor.stall_watch.tick(),
     );
     truth.truncate(decided.truth_ticks);
     Ok(Finished {
+        duration_s: supervisor
+            .clock
+            .duration_s(decided.last_tick, &record, &truth),
         ending: decided.ending,
         last_tick: decided.last_tick,
         record,

@@ -90,7 +90,7 @@ pub(crate) struct Supervisor<'a> {
     pub robot: Robot,
     pub bus: BusEndpoints,
     pub state_file: StateFile,
-    clock: RunClock,
+    pub clock: RunClock,
     pub decision: Decision,
     pub tick_progress: TickProgress,
     pub stall_watch: StallWatch,
@@ -275,7 +275,8 @@ impl<'a> Supervisor<'a> {
         let now = Instant::now();
         let record = &self.bus.observer.record;
         let simulator = self.robot.simulator.as_ref();
-        let collision = simulator.and_then(|simulator| decisive::first_contact(simulator.truth()));
+        let truth = simulator.map_or(&[][..], Simulator::truth);
+        let collision = decisive::first_contact(truth);
         judge::judge(
             &judge::Snapshot {
                 arrived_m: record.arrival.map(|command| command.distance_m),
@@ -283,7 +284,7 @@ impl<'a> Supervisor<'a> {
                 simulated: simulator.is_some(),
                 simulator_ended,
                 collision_m: collision.map(|truth| [truth.x, truth.y]),
-                time: self.clock.now(record.pose.as_ref()),
+                time: self.clock.now(record.pose.as_ref(), truth.last()),
                 timeout_s: self.options.mission.timeout_s,
                 in_ticks: self.clock.in_ticks(),
                 progress: self.tick_progress.update(record.newest_tick(), now),
