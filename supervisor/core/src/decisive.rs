@@ -49,13 +49,14 @@ impl Timeout {
     }
 }
 
-/// Of a run that was seen to end with `ending`. `stall` is the tick of the newest stall.
+/// Of a run that was seen to end with `ending`. `stall` is the tick and the ending of the stall at
+/// which no recovery step was left.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
     truth: &[GroundTruthTick],
     timeout: Timeout,
-    stall: Option<u64>,
+    stall: Option<(u64, Ending)>,
 ) -> Decided {
     let undecided = |ending| Decided {
         ending,
@@ -73,8 +74,6 @@ pub(crate) fn first(
         .map(|command| (command.stamp.tick, reached(command.distance_m)));
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timed_out(timeout.seconds)));
-    let stall = stall.filter(|_| ending.outcome == Outcome::Unreachable);
-    let stall = stall.map(|tick| (tick, ending.clone()));
     // Of two at one tick the one named first.
     let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
@@ -192,12 +191,19 @@ mod tests {
             ("a touch seen some ticks later", 15, None, Some(6), Collision, (Collision, Some(5), 7)),
             ("the timeout seen some ticks later", 25, None, None, Timeout, (Timeout, Some(19), 20)),
             ("a stall", 18, None, None, Unreachable, (Unreachable, Some(14), 15)),
+            ("a stall before a touch, which was read first", 18, None, Some(16), Collision, (Unreachable, Some(14), 15)),
             ("a touch before a stall", 18, None, Some(3), Unreachable, (Collision, Some(2), 4)),
             ("what no tick decided", 18, None, Some(3), Aborted, (Aborted, None, 18)),
         ];
         for (what, ticks, arrival, contact, seen, want) in rows {
             let (record, truth) = run(ticks, arrival, contact);
-            let decided = first(Ending::failed(seen, ""), &record, &truth, TIMEOUT, Some(15));
+            let decided = first(
+                Ending::failed(seen, ""),
+                &record,
+                &truth,
+                TIMEOUT,
+                (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
+            );
             let Decided {
                 ending,
                 last_tick,

@@ -64,6 +64,7 @@ pub fn run(
     let stopped = shutdown::stop(&mut supervisor);
     let ending = ending?;
     stopped?;
+    let end_by_stall = supervisor.end_by_stall();
     let simulator = supervisor.robot.simulator;
     let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
     let record = supervisor.bus.observer.record;
@@ -75,8 +76,9 @@ pub fn run(
             seconds: options.mission.timeout_s,
             by_robot: supervisor.clock.in_ticks(),
         },
-        supervisor.stall_watch.tick(),
+        end_by_stall,
     );
+    let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
     Ok(Finished {
         duration_s: supervisor
@@ -88,7 +90,7 @@ pub fn run(
         truth,
         restarts: supervisor.stages.restarts().collect(),
         resumes: supervisor.state_file.state.resumes,
-        replans: supervisor.stall_watch.replans(),
-        resets: supervisor.stall_watch.resets(),
+        replans,
+        resets,
     })
 }
