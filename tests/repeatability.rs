@@ -150,6 +150,22 @@ fn a_mission_that_ends_by_a_touch_or_its_timeout_gives_the_same_summary_to_the_b
 }
 
 #[test]
+fn a_mission_that_stalls_replans_and_forgets_gives_the_same_summary_to_the_bit() {
+    let closed = [
+        "--set",
+        "world.wall=[{points=[[1.5,-2],[1.5,2],[-1.5,2],[-1.5,-2],[1.5,-2]]}]",
+    ];
+    let summary = || numbers(support::run("stalls", "open-room", &closed).1);
+    let one = summary();
+    let recoveries = one["replans"].as_u64().unwrap() + one["resets"].as_u64().unwrap();
+    assert!(recoveries > 0, "{one}");
+    for _ in 0..4 {
+        assert_eq!(summary(), one);
+    }
+    assert_nothing_left("stalls");
+}
+
+#[test]
 fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
     // At this speed the mission has tens of thousands of ticks: seconds to be stopped in.
     let slow = ["--set", "controller.speed_m_s=0.002", "--timeout", "20000"];
