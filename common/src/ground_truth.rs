@@ -61,6 +61,9 @@ pub struct GroundTruthRadio {
     pub lost: u64,
     /// The longest outage, seconds.
     pub longest_outage_s: f64,
+    /// Ticks before this one whose frames nobody heard, on a clock of ticks.
+    #[serde(default)]
+    pub unheard_ticks: u64,
 }
 
 impl GroundTruthTick {
@@ -68,6 +71,16 @@ impl GroundTruthTick {
     pub const AT_REST_M_S: f64 = 0.01;
     /// Clearance where nothing stands, metres: JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
+
+    /// The number of this tick where ticks are counted that were heard: that of its pose, on a clock of ticks. Of a tick that
+    /// was not heard itself, that of the next one.
+    #[must_use]
+    pub const fn heard_tick(&self) -> u64 {
+        match self.radio {
+            Some(radio) => self.tick.saturating_sub(radio.unheard_ticks),
+            None => self.tick,
+        }
+    }
 
     /// Whether it is of the tick of `pose`: wheel counts are what both know.
     #[must_use]

@@ -72,6 +72,7 @@ stamped!(
     PowerSample,
     SurroundingsSample,
     DirectiveSample,
+    TickLimitSample,
     RosterHeader,
     DeathSample,
     StallSample,

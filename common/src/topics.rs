@@ -9,7 +9,8 @@ use std::time::Duration;
 use crate::samples::{
     CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader, GridHeader,
     GuidanceSample, HealthSample, InfraredSample, LinkSample, PoseSample, PowerSample, RangeSample,
-    RequestSample, RosterEntry, RosterHeader, StallSample, SurroundingsSample, WheelSample,
+    RequestSample, RosterEntry, RosterHeader, StallSample, SurroundingsSample, TickLimitSample,
+    WheelSample,
 };
 
 pub use crate::bus::{
@@ -108,6 +109,10 @@ topics! {
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {
         name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
+    }
+    /// How far the robot may go on a clock of ticks, and since which tick the newest recovery step holds.
+    TICK_LIMIT: Topic<TickLimitSample> {
+        name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
     }
     /// The stages' processes, as the supervisor sees them.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {

@@ -49,11 +49,18 @@ impl Mission {
     /// # Errors
     /// Also when the file cannot be read.
     pub fn load(path: &Path) -> Result<Self, MissionError> {
-        let text = read_bounded(path).map_err(|source| MissionError::Unreadable {
+        Self::parse(&Self::read(path)?, path)
+    }
+
+    /// The text of a mission file, not parsed yet.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is far too long for a mission.
+    pub fn read(path: &Path) -> Result<String, MissionError> {
+        read_bounded(path).map_err(|source| MissionError::Unreadable {
             file: PathBuf::from(path),
             source,
-        })?;
-        Self::parse(&text, path)
+        })
     }
 }
 

@@ -42,3 +42,22 @@ pub enum MissionError {
         remedy: String,
     },
 }
+
+impl MissionError {
+    /// Whether `other` is the same fault, perhaps on another line.
+    #[must_use]
+    pub fn is_same_fault(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Syntax { problem, .. }, Self::Syntax { problem: its, .. }) => problem == its,
+            (
+                Self::Value { key, problem, .. },
+                Self::Value {
+                    key: its_key,
+                    problem: its,
+                    ..
+                },
+            ) => (key, problem) == (its_key, its),
+            _ => false,
+        }
+    }
+}

@@ -84,6 +84,22 @@ pub struct DirectiveSample {
     pub reason: u8,
 }
 
+/// Topic `tick_limit`: on a clock of ticks, how far the link may go ahead of the supervisor, so that what the supervisor
+/// does about a stall holds from a tick that does not depend on the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.TickLimit")]
+#[repr(C)]
+pub struct TickLimitSample {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The last tick that the link may begin.
+    pub last_tick: u64,
+    /// The first tick in which the newest recovery step holds; 0 for none.
+    pub holds_from_tick: u64,
+    /// The belief's epoch since then.
+    pub epoch: u64,
+}
+
 wire_enum! {
     /// The state of a stage, as the supervisor sees it.
     StageState, unknown = Down {

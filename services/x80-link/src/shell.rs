@@ -1,4 +1,4 @@
-//! The wire, `command` and `directive` in; `range`, `wheels`, `link`, telemetry and the wire out.
+//! The wire, `command`, `directive` and `tick_limit` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
 use common::{
     bus::{Reader, Writer},
@@ -6,7 +6,7 @@ use common::{
     latency::Histogram,
     samples::{
         CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order, PowerSample,
-        RangeSample, SurroundingsSample, WheelSample,
+        RangeSample, SurroundingsSample, TickLimitSample, WheelSample,
     },
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -42,6 +42,7 @@ pub struct Shell {
     transport: Transport,
     command: Reader<CommandSample>,
     directive: Reader<DirectiveSample>,
+    tick_limit: Reader<TickLimitSample>,
     range: Writer<RangeSample>,
     wheels: Writer<WheelSample>,
     state: Writer<LinkSample>,
@@ -63,6 +64,7 @@ impl Process for Shell {
         context.waiter.on_readable(&transport)?;
         context.waiter.on(context.bus.wakeup(&topics::COMMAND)?);
         context.waiter.on(context.bus.wakeup(&topics::DIRECTIVE)?);
+        context.waiter.on(context.bus.wakeup(&topics::TICK_LIMIT)?);
         let generation = context.generation.number;
         let run = &context.run;
         let mut link = Link::new(&run.mission);
@@ -79,6 +81,7 @@ impl Process for Shell {
             transport,
             command: context.bus.reader(&topics::COMMAND)?,
             directive: context.bus.reader(&topics::DIRECTIVE)?,
+            tick_limit: context.bus.reader(&topics::TICK_LIMIT)?,
             range: context.bus.writer(&topics::RANGE, generation)?,
             wheels: context.bus.writer(&topics::WHEELS, generation)?,
             state: context.bus.writer(&topics::LINK, generation)?,
@@ -99,6 +102,10 @@ impl Process for Shell {
             let order = Order::from_byte(directive.order);
             let reason = HoldReason::from_byte(directive.reason);
             self.take(Event::Order(order, reason), monotonic_ns())?;
+        }
+        // After the order: the first limit was published before it.
+        if let Some(limit) = self.tick_limit.newest()? {
+            self.take(Event::TickLimit(limit.last_tick), monotonic_ns())?;
         }
         while let Some(command) = self.command.take()? {
             self.take(Event::Command(&command), monotonic_ns())?;
@@ -232,6 +239,12 @@ impl Shell {
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);
                     self.latency.record(self.latency_ns);
                     self.state()?;
+                }
+                Effect::Unlimited { tick } => {
+                    tracing::warn!(
+                        tick,
+                        "the supervisor does not say that the tick may begin; it begins"
+                    );
                 }
                 Effect::Decided { before, now } => {
                     log_decision(before, now);

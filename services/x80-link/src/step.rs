@@ -37,6 +37,9 @@ pub use event::{Effect, Event, Input, State, Tally};
 const PING_EVERY: Duration = Duration::from_millis(200);
 /// An open tick without a command is given again after this: ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
+/// On a clock of ticks the supervisor's word that the next one may begin is waited for so long: longer than a stalled robot's
+/// planner may take to start anew. A supervisor that is silent stops the robot before.
+const LIMIT_WAITED: Duration = Duration::from_secs(5);
 /// The wire knows whole milliseconds, and to most robots none means no limit.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
 /// A stop is sent so often: one datagram may be lost.
@@ -51,7 +54,8 @@ struct OpenTick {
     range: RangeSample,
     wheels: WheelSample,
     began_ns: u64,
-    given_ns: u64,
+    /// None while it waits for the supervisor's word that it may begin.
+    given_ns: Option<u64>,
 }
 
 /// A command that passed, to be sent once more: a datagram may be lost.
@@ -95,6 +99,8 @@ pub struct Link {
     /// Mission time of the newest tick.
     time: MissionTime,
     open: Option<OpenTick>,
+    /// On a clock of ticks: the last tick that may begin; none if nobody limits them.
+    last_tick: Option<u64>,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
@@ -128,6 +134,7 @@ impl Step for Link {
             wheels: WheelSample::default(),
             time: MissionTime::default(),
             open: None,
+            last_tick: None,
             newest_command: None,
             repeat: None,
             // Nothing has moved yet: what holds it needs no stop of its own.
@@ -163,10 +170,11 @@ impl Step for Link {
             Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
             Event::Command(command) => self.take_command(command, now_ns, &mut effects),
             Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
+            Event::TickLimit(last_tick) => self.last_tick = Some(last_tick),
             Event::Quiet => {}
         }
         self.keep_connected(now_ns, &mut effects);
-        self.repeat_tick(now_ns, &mut effects);
+        self.give_tick(now_ns, &mut effects);
         self.repeat_command(now_ns, &mut effects);
         self.guard(now_ns, &mut effects);
         effects
@@ -248,7 +256,6 @@ impl Link {
                 return;
             }
         }
-        let tick = self.state.next_tick;
         self.time = self.now;
         if !self.in_ticks() {
             // The number is taken whether the tick is answered or not.
@@ -259,17 +266,16 @@ impl Link {
             ..self.drive.wheels(sensors)
         };
         self.wheels = wheels;
-        let open = OpenTick {
+        self.open = Some(OpenTick {
             range: RangeSample {
                 infrared_ad: self.infrared.take().unwrap_or_default(),
                 ..reading(self.sonar.take())
             },
             wheels,
             began_ns: now_ns,
-            given_ns: now_ns,
-        };
-        self.open = Some(open);
-        effects.push(self.tick_effect(tick, &open));
+            given_ns: None,
+        });
+        self.give_tick(now_ns, effects);
     }
 
     fn tick_effect(&self, tick: u64, open: &OpenTick) -> Effect {
@@ -353,18 +359,30 @@ impl Link {
         }
     }
 
-    fn repeat_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        if !self.in_ticks() {
+    /// Give the open tick to the pipeline when it may begin; on a clock of ticks, again when it has no answer for long.
+    fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+        let Some(mut open) = self.open else {
             return;
+        };
+        let tick = self.open_number();
+        match open.given_ns {
+            None if self.in_ticks() && self.last_tick.is_some_and(|last| tick > last) => {
+                if !passed(Some(open.began_ns), now_ns, LIMIT_WAITED) {
+                    return;
+                }
+                self.last_tick = None;
+                effects.push(Effect::Unlimited { tick });
+                open.began_ns = now_ns;
+            }
+            None => open.began_ns = now_ns,
+            Some(given) if self.in_ticks() && passed(Some(given), now_ns, REPEAT_AFTER) => {
+                self.tally.repeated_ticks += 1;
+            }
+            Some(_) => return,
         }
-        if let Some(mut open) = self.open
-            && passed(Some(open.given_ns), now_ns, REPEAT_AFTER)
-        {
-            open.given_ns = now_ns;
-            self.open = Some(open);
-            self.tally.repeated_ticks += 1;
-            effects.push(self.tick_effect(self.state.next_tick, &open));
-        }
+        open.given_ns = Some(now_ns);
+        self.open = Some(open);
+        effects.push(self.tick_effect(tick, &open));
     }
 
     /// Send the newest command once more, halfway to the next tick and with what remains of its time: the

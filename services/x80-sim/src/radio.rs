@@ -104,6 +104,7 @@ pub struct Radio<W> {
     in_flight: VecDeque<Flight<W>>,
     sent: u64,
     lost: u64,
+    unheard_ticks: u64,
 }
 
 impl<W: Copy + PartialEq> Radio<W> {
@@ -118,6 +119,7 @@ impl<W: Copy + PartialEq> Radio<W> {
             in_flight: VecDeque::new(),
             sent: 0,
             lost: 0,
+            unheard_ticks: 0,
         }
     }
 
@@ -145,6 +147,13 @@ impl<W: Copy + PartialEq> Radio<W> {
         let out = self.fading.is_out(now, &mut self.noise);
         let lost = self.noise.chance(self.settings.loss_share) || out;
         self.lost += u64::from(lost);
+        lost
+    }
+
+    /// Whether the frames of a tick, sent at mission time `now`, are lost: then nobody hears of the tick.
+    pub fn loses_tick(&mut self, now: f64) -> bool {
+        let lost = self.loses(now);
+        self.unheard_ticks += u64::from(lost);
         lost
     }
 
@@ -251,6 +260,7 @@ impl<W: Copy + PartialEq> Radio<W> {
             sent: self.sent,
             lost: self.lost,
             longest_outage_s: self.fading.longest_seen,
+            unheard_ticks: self.unheard_ticks,
         }
     }
 }

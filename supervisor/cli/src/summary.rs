@@ -3,8 +3,7 @@
 use std::{collections::BTreeMap, fmt};
 
 use common::{
-    clock::MissionTime, ground_truth::GroundTruthTick, latency::Histogram, mission::Mission,
-    samples::PoseSample,
+    ground_truth::GroundTruthTick, latency::Histogram, mission::Mission, samples::PoseSample,
 };
 use serde::Serialize;
 
@@ -34,6 +33,7 @@ impl From<&Histogram> for Quantiles {
 pub(crate) struct Summary {
     pub(crate) outcome: Outcome,
     pub(crate) reason: String,
+    /// From the first motion order to the end by the robot's clock, which counts the time when nobody heard it.
     pub(crate) mission_time_s: f64,
     pub(crate) path_length_m: f64,
     pub(crate) straight_m: f64,
@@ -93,7 +93,6 @@ impl Summary {
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
         let truth = &finished.truth[..];
         let (full_solves, local_updates) = record.solves(guidance);
-        let time = pose.map_or(MissionTime::default(), |pose| pose.stamp.time());
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
         let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
         let collisions = truth.last().map(|tick| tick.contacts);
@@ -101,7 +100,7 @@ impl Summary {
         Self {
             outcome: ending.outcome,
             reason: ending.reason.clone(),
-            mission_time_s: time.seconds(),
+            mission_time_s: finished.duration_s,
             path_length_m: match ended {
                 Some(_) if *resumes == 0 => path_length(truth),
                 _ => pose.map_or(0.0, |pose| pose.travelled_m),

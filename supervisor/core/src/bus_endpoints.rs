@@ -11,7 +11,7 @@ use common::{
     clock::MissionTime,
     samples::{
         DeathSample, DirectiveSample, PoseSample, RequestSample, RosterEntry, RosterHeader,
-        StallSample,
+        StallSample, TickLimitSample,
     },
     topics,
     waiter::Waiter,
@@ -31,6 +31,7 @@ pub(crate) struct BusEndpoints {
     /// Wakes for heartbeats, ends of ticks and requests.
     pub waiter: Waiter,
     directive: Writer<DirectiveSample>,
+    tick_limit: Writer<TickLimitSample>,
     roster: SliceWriter<RosterHeader, RosterEntry>,
     deaths: Writer<DeathSample>,
     stalls: Writer<StallSample>,
@@ -63,6 +64,7 @@ impl BusEndpoints {
             observer,
             waiter,
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
+            tick_limit: bus.writer(&topics::TICK_LIMIT, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
             deaths: bus.writer(&topics::DEATHS, 1)?,
             stalls: bus.writer(&topics::STALLS, 1)?,
@@ -120,6 +122,16 @@ impl BusEndpoints {
             ..header
         };
         self.roster.publish(tick, time, header, entries.into_iter())
+    }
+
+    /// Publish how far the link may go, as of `tick`.
+    pub(crate) fn publish_tick_limit(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        limit: TickLimitSample,
+    ) -> Result<(), BusError> {
+        self.tick_limit.publish(tick, time, limit)
     }
 
     /// Publish a death. It only reports: a failure is a warning in the log.

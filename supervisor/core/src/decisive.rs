@@ -28,13 +28,35 @@ pub(crate) struct Decided {
     pub truth_ticks: usize,
 }
 
-/// Of a run that was seen to end with `ending`. `stall` is the tick of the newest stall.
+/// When a mission runs out of time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timeout {
+    /// After so many seconds.
+    pub seconds: f64,
+    /// By the simulated robot's own clock, which also counts the ticks that nobody heard: on a clock of ticks.
+    pub by_robot: bool,
+}
+
+impl Timeout {
+    /// The first tick that was too late.
+    fn tick(self, poses: &[PoseSample], truth: &[GroundTruthTick]) -> Option<u64> {
+        if self.by_robot {
+            let late = truth.partition_point(|tick| tick.time_s < self.seconds);
+            return truth.get(late).map(|tick| tick_of(tick, poses));
+        }
+        let late = poses.partition_point(|pose| pose.stamp.time().seconds() < self.seconds);
+        poses.get(late).map(|pose| pose.stamp.tick)
+    }
+}
+
+/// Of a run that was seen to end with `ending`. `stall` is the tick and the ending of the stall at
+/// which no recovery step was left.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
     truth: &[GroundTruthTick],
-    timeout_s: f64,
-    stall: Option<u64>,
+    timeout: Timeout,
+    stall: Option<(u64, Ending)>,
 ) -> Decided {
     let undecided = |ending| Decided {
         ending,
@@ -50,14 +72,10 @@ pub(crate) fn first(
     let arrival = record
         .arrival
         .map(|command| (command.stamp.tick, reached(command.distance_m)));
-    let late = poses.partition_point(|pose| pose.stamp.time().seconds() < timeout_s);
-    let timeout = poses
-        .get(late)
-        .map(|pose| (pose.stamp.tick, timed_out(timeout_s)));
-    let stall = stall.filter(|_| ending.outcome == Outcome::Unreachable);
-    let stall = stall.map(|tick| (tick, ending.clone()));
+    let late = timeout.tick(poses, truth);
+    let late = late.map(|tick| (tick, timed_out(timeout.seconds)));
     // Of two at one tick the one named first.
-    let events = [contact, arrival, timeout, stall];
+    let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         return undecided(ending);
     };
@@ -68,6 +86,9 @@ pub(crate) fn first(
     };
     let truth_ticks = match ending.outcome {
         Outcome::Collision => truth.partition_point(|tick| tick.contacts == 0) + 1,
+        Outcome::Timeout if timeout.by_robot => {
+            truth.partition_point(|tick| tick.time_s < timeout.seconds)
+        }
         _ => record
             .pose_at(last_tick)
             .and_then(|pose| truth_of(pose, truth))
@@ -80,24 +101,24 @@ pub(crate) fn first(
     }
 }
 
-/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks,
-/// and the two number theirs alike where nothing was lost on the way.
+/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks;
+/// of these it is the one whose number is nearest.
 fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown
-        .min_by_key(|(_, it)| it.tick.abs_diff(pose.stamp.tick))
+        .min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick))
         .map(|(index, _)| index)
 }
 
-/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none yet, the robot's number
-/// of it.
+/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none, the number that it
+/// would have.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()
         .filter(|pose| truth.is_of(pose))
         .map(|pose| pose.stamp.tick)
-        .min_by_key(|tick| tick.abs_diff(truth.tick))
-        .unwrap_or(truth.tick)
+        .min_by_key(|tick| tick.abs_diff(truth.heard_tick()))
+        .unwrap_or(truth.heard_tick())
 }
 
 #[cfg(test)]
@@ -106,7 +127,10 @@ mod tests {
 
     use super::*;
 
-    const TIMEOUT_S: f64 = 20.0;
+    const TIMEOUT: Timeout = Timeout {
+        seconds: 20.0,
+        by_robot: true,
+    };
 
     fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
         GroundTruthTick {
@@ -167,6 +191,7 @@ mod tests {
             ("a touch seen some ticks later", 15, None, Some(6), Collision, (Collision, Some(5), 7)),
             ("the timeout seen some ticks later", 25, None, None, Timeout, (Timeout, Some(19), 20)),
             ("a stall", 18, None, None, Unreachable, (Unreachable, Some(14), 15)),
+            ("a stall before a touch, which was read first", 18, None, Some(16), Collision, (Unreachable, Some(14), 15)),
             ("a touch before a stall", 18, None, Some(3), Unreachable, (Collision, Some(2), 4)),
             ("what no tick decided", 18, None, Some(3), Aborted, (Aborted, None, 18)),
         ];
@@ -176,8 +201,8 @@ mod tests {
                 Ending::failed(seen, ""),
                 &record,
                 &truth,
-                TIMEOUT_S,
-                Some(15),
+                TIMEOUT,
+                (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
             );
             let Decided {
                 ending,

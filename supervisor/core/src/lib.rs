@@ -57,6 +57,7 @@ pub mod domain;
 mod domain_error;
 mod error;
 mod judge;
+mod lead;
 pub mod observer;
 mod order;
 mod orphans;

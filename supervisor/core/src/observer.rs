@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use common::{
     bus::{Bus, BusError, Reader, SliceReader},
-    grid::Replica,
+    grid::{Applied, Replica},
     latency::Histogram,
     samples::{
         CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
@@ -15,6 +15,7 @@ use common::{
 };
 
 use crate::{
+    lead::Published,
     stage_processes::StageProcesses,
     totals::{LookTotals, Totals, WheelTotals},
 };
@@ -48,6 +49,11 @@ pub struct Record {
     guidance: VecDeque<GuidanceSample>,
     /// The newest command.
     pub command: Option<CommandSample>,
+    /// Commands so far.
+    commands: u64,
+    /// The epoch of the newest grid, and whether the grid changed when it began.
+    grid_epoch: u64,
+    grid_changed: bool,
     /// The first command that said arrived.
     pub arrival: Option<CommandSample>,
     /// The newest state of the link.
@@ -99,6 +105,7 @@ impl Observer {
         while let Some(command) = self.command.take()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
+            record.commands += 1;
             let tick = command.stamp.tick;
             record.wheels.add(tick, |totals| totals.with(&command));
             if CommandState::from_byte(command.state) == CommandState::Arrived {
@@ -111,7 +118,12 @@ impl Observer {
         }
         while let Some(grid) = self.grid.take()? {
             stages.on_output(topics::GRID.spec().writer, grid.header().stamp.tick);
-            record.grid.apply(&grid.header().part, &grid);
+            let epoch = grid.header().epoch;
+            let applied = record.grid.apply(&grid.header().part, &grid);
+            if epoch > record.grid_epoch {
+                let same = matches!(applied, Applied::Window(window) if window.area() == 0);
+                (record.grid_epoch, record.grid_changed) = (epoch, !same);
+            }
         }
         while let Some(field) = self.field.take()? {
             record.field.apply(&field.header().part, &field);
@@ -201,10 +213,23 @@ impl Record {
         ticks.into_iter().flatten().max()
     }
 
-    /// Full solves and local updates of every generation of the planner, the last one's as of `last`.
+    /// What the stages have published so far.
+    pub(crate) fn published(&self) -> Published {
+        let guidance = self.newest_guidance();
+        Published {
+            tick: self.command.map(|command| command.stamp.tick),
+            commands: self.commands,
+            guidance: guidance.map_or((0, 0), |it| (it.stamp.generation, it.epoch)),
+            grid_epoch: self.grid_epoch,
+            grid_changed: self.grid_changed,
+        }
+    }
+
+    /// Full solves and local updates of every generation of the planner until `last`, the last one's as of then.
     pub fn solves(&self, last: Option<&GuidanceSample>) -> (u64, u64) {
         let mut sum = (0, 0);
-        for (&generation, &counts) in &self.planners {
+        let newest = last.map_or(u32::MAX, |last| last.stamp.generation);
+        for (&generation, &counts) in self.planners.range(..=newest) {
             let (full, local) = match last {
                 Some(last) if last.stamp.generation == generation => {
                     (last.full_solves, last.local_updates)

@@ -9,7 +9,7 @@ use common::{
 };
 
 use crate::{
-    decisive,
+    decisive::{self, Timeout},
     domain::DomainLock,
     error::{SupervisorError, system},
     observer::Record,
@@ -26,6 +26,9 @@ pub struct Finished {
     /// The last complete tick before that was decided; none where no tick decided. What came after it does not count: how
     /// much that is depends on how fast the stop was.
     pub last_tick: Option<u64>,
+    /// From the first motion order to the end, seconds of the robot's clock; of a run that was resumed in wall-clock time,
+    /// from the start of the run.
+    pub duration_s: f64,
     /// What was read from the bus.
     pub record: Record,
     /// What really happened until then, of a simulated robot.
@@ -61,6 +64,7 @@ pub fn run(
     let stopped = shutdown::stop(&mut supervisor);
     let ending = ending?;
     stopped?;
+    let end_by_stall = supervisor.end_by_stall();
     let simulator = supervisor.robot.simulator;
     let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
     let record = supervisor.bus.observer.record;
@@ -68,18 +72,25 @@ pub fn run(
         ending,
         &record,
         &truth,
-        options.mission.timeout_s,
-        supervisor.stall_watch.tick(),
+        Timeout {
+            seconds: options.mission.timeout_s,
+            by_robot: supervisor.clock.in_ticks(),
+        },
+        end_by_stall,
     );
+    let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
     Ok(Finished {
+        duration_s: supervisor
+            .clock
+            .duration_s(decided.last_tick, &record, &truth),
         ending: decided.ending,
         last_tick: decided.last_tick,
         record,
         truth,
         restarts: supervisor.stages.restarts().collect(),
         resumes: supervisor.state_file.state.resumes,
-        replans: supervisor.stall_watch.replans(),
-        resets: supervisor.stall_watch.resets(),
+        replans,
+        resets,
     })
 }

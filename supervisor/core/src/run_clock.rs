@@ -2,10 +2,11 @@
 
 use common::{
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    ground_truth::GroundTruthTick,
     samples::PoseSample,
 };
 
-use crate::recovery::RecoveredRun;
+use crate::{observer::Record, recovery::RecoveredRun};
 
 /// The clock of a run, from the start of this supervisor on.
 pub(crate) struct RunClock {
@@ -65,10 +66,36 @@ impl RunClock {
         pose.map_or(self.start, |pose| pose.stamp.time())
     }
 
-    /// Mission time now.
-    pub(crate) fn now(&self, pose: Option<&PoseSample>) -> MissionTime {
+    /// From the first motion order until `last_tick`, or else the newest one, seconds. On a clock of ticks the `truth` until
+    /// then says it: the time of the simulated robot begins with that order, and passes also while nobody hears it.
+    pub(crate) fn duration_s(
+        &self,
+        last_tick: Option<u64>,
+        record: &Record,
+        truth: &[GroundTruthTick],
+    ) -> f64 {
+        if let (true, Some(last)) = (self.in_ticks(), truth.last()) {
+            return last.time_s;
+        }
+        let pose_at = |tick| record.pose_at(tick).map(|pose| pose.stamp.time());
+        // The first command follows from tick 0.
+        let first = record.poses.first().filter(|pose| pose.stamp.tick == 0);
+        let first = first.map_or(MissionTime::default(), |pose| pose.stamp.time());
+        let last = last_tick.or(record.newest_tick()).and_then(pose_at);
+        last.map_or(0.0, |last| last.since(first).as_secs_f64())
+    }
+
+    /// Mission time now, where `truth` is the newest ground truth of a simulated robot.
+    pub(crate) fn now(
+        &self,
+        pose: Option<&PoseSample>,
+        truth: Option<&GroundTruthTick>,
+    ) -> MissionTime {
         match self.clock {
-            MissionClock::Ticks { .. } => pose.map_or(MissionTime::default(), |it| it.stamp.time()),
+            MissionClock::Ticks { .. } => truth.map_or_else(
+                || self.pose_time(pose),
+                |truth| MissionTime::from_seconds(truth.time_s),
+            ),
             // It passes without a robot or a pose, too.
             MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
         }

@@ -10,7 +10,7 @@ use common::{
     start::{StageError, Start},
     topics::{
         AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
-        SURROUNDINGS, WHEELS,
+        SURROUNDINGS, TICK_LIMIT, WHEELS,
     },
 };
 
@@ -97,7 +97,7 @@ pub const PLANNER: &str = "planner";
 pub static TABLE: [Stage; 5] = [
     Stage {
         name: "x80-link",
-        inputs: &[&DIRECTIVE],
+        inputs: &[&DIRECTIVE, &TICK_LIMIT],
         feedback: &[&COMMAND],
         outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
         deadlines: DEADLINES,

@@ -106,6 +106,8 @@ pub(crate) struct StallWatch {
     epoch: u64,
     /// The tick that was looked at last.
     tick: Option<u64>,
+    /// Every stall so far.
+    stalls: Vec<StallSample>,
 }
 
 /// Where the robot last was seen to move.
@@ -160,6 +162,7 @@ impl StallWatch {
             replans: 0,
             epoch: 0,
             tick: None,
+            stalls: Vec::new(),
         }
     }
 
@@ -168,17 +171,26 @@ impl StallWatch {
         self.epoch
     }
 
-    /// Replans so far in this mission.
-    pub(crate) const fn replans(&self) -> u32 {
-        self.replans
+    /// Replans and beliefs forgotten in this mission up to `tick`, or in all of it.
+    pub(crate) fn recoveries(&self, tick: Option<u64>) -> (u32, u64) {
+        let Some(tick) = tick else {
+            return (self.replans, self.epoch);
+        };
+        let after = self.stalls.iter().find(|stall| stall.stamp.tick > tick);
+        after.map_or((self.replans, self.epoch), |stall| match stall.recovery() {
+            RecoveryStep::Replan => (stall.replans - 1, stall.resets),
+            RecoveryStep::Forget => (stall.replans, stall.resets - 1),
+            RecoveryStep::GiveUp => (stall.replans, stall.resets),
+        })
     }
 
-    /// Beliefs forgotten so far in this mission.
-    pub(crate) const fn resets(&self) -> u64 {
-        self.epoch
+    /// The stall at which no recovery step was left.
+    pub(crate) fn gave_up(&self) -> Option<&StallSample> {
+        let is_last = |stall: &&StallSample| stall.recovery() == RecoveryStep::GiveUp;
+        self.stalls.iter().find(is_last)
     }
 
-    /// The tick that was looked at last: the one of the stall, when the last step found one.
+    /// The tick that was looked at last.
     pub(crate) const fn tick(&self) -> Option<u64> {
         self.tick
     }
@@ -222,7 +234,7 @@ impl StallWatch {
             (anchor.time, place.since) = (now, now);
         }
         (self.cut_off_since, self.inside_hazard_since) = (None, None);
-        Some(StallSample {
+        let stall = StallSample {
             stamp: pose.stamp,
             x_m: pose.x_m,
             y_m: pose.y_m,
@@ -231,7 +243,9 @@ impl StallWatch {
             resets: self.epoch,
             cause: cause.into(),
             recovery: recovery.into(),
-        })
+        };
+        self.stalls.push(stall);
+        Some(stall)
     }
 
     /// Whether u = 0 where the robot stands, in the field of the current belief, for longer than a robot needs to get

@@ -4,11 +4,14 @@ use std::{os::unix::fs::symlink, path::PathBuf, time::Instant};
 
 use common::{
     address::Address,
-    clock::Pace,
+    clock::{MissionTime, Pace},
     domain::{Domain, RobotName},
     mission::Mission,
     run::Run,
-    samples::{DirectiveSample, Order, RecoveryStep, RequestKind, RosterHeader, name_str},
+    samples::{
+        DirectiveSample, Order, RecoveryStep, RequestKind, RosterHeader, StallSample,
+        TickLimitSample, name_str,
+    },
     signals::Signals,
     topics,
 };
@@ -20,6 +23,7 @@ use crate::{
     domain::DomainLock,
     error::{SupervisorError, system},
     judge::{self, TickProgress},
+    lead::{Lead, Next},
     order::{self, Decision},
     outcome::{Ending, Outcome},
     progress::Progress,
@@ -90,10 +94,12 @@ pub(crate) struct Supervisor<'a> {
     pub robot: Robot,
     pub bus: BusEndpoints,
     pub state_file: StateFile,
-    clock: RunClock,
+    pub clock: RunClock,
     pub decision: Decision,
     pub tick_progress: TickProgress,
     pub stall_watch: StallWatch,
+    lead: Lead,
+    published_limit: Option<TickLimitSample>,
     cleanup: Cleanup,
     pub service: ServiceManager,
 }
@@ -125,6 +131,7 @@ impl<'a> Supervisor<'a> {
             mission: mission.clone(),
         };
         run.save(directory)?;
+        let lead = Lead::new(clock.first_tick(None));
         let mut supervisor = Self {
             options,
             stages: StageProcesses::new(directory.clone(), options.starter, mission),
@@ -135,6 +142,8 @@ impl<'a> Supervisor<'a> {
             decision: Decision::STARTING,
             tick_progress: TickProgress::new(Instant::now()),
             stall_watch: StallWatch::new(mission),
+            lead,
+            published_limit: None,
             cleanup: Cleanup::new(),
             service: ServiceManager::of_environment(),
         };
@@ -275,7 +284,8 @@ impl<'a> Supervisor<'a> {
         let now = Instant::now();
         let record = &self.bus.observer.record;
         let simulator = self.robot.simulator.as_ref();
-        let collision = simulator.and_then(|simulator| decisive::first_contact(simulator.truth()));
+        let truth = simulator.map_or(&[][..], Simulator::truth);
+        let collision = decisive::first_contact(truth);
         judge::judge(
             &judge::Snapshot {
                 arrived_m: record.arrival.map(|command| command.distance_m),
@@ -283,7 +293,7 @@ impl<'a> Supervisor<'a> {
                 simulated: simulator.is_some(),
                 simulator_ended,
                 collision_m: collision.map(|truth| [truth.x, truth.y]),
-                time: self.clock.now(record.pose.as_ref()),
+                time: self.clock.now(record.pose.as_ref(), truth.last()),
                 timeout_s: self.options.mission.timeout_s,
                 in_ticks: self.clock.in_ticks(),
                 progress: self.tick_progress.update(record.newest_tick(), now),
@@ -298,39 +308,106 @@ impl<'a> Supervisor<'a> {
         )
     }
 
-    /// Look for a stall, and take the next recovery step. The last one ends the mission.
+    /// Look for stalls, and take the next recovery step. The last one ends the mission.
     fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
         if self.decision.order() != Order::Drive {
             return Ok(None);
         }
+        if !self.clock.in_ticks() {
+            let Some(stall) = self.next_stall() else {
+                return Ok(None);
+            };
+            self.carry_out(stall.recovery())?;
+            return Ok(self.given_up());
+        }
+        loop {
+            let published = self.bus.observer.record.published();
+            match self.lead.next(published, Instant::now()) {
+                Next::Wait => break,
+                Next::Begin(step) => self.carry_out(step)?,
+                Next::Look => match self.next_stall() {
+                    Some(stall) => self.lead.stalled(stall),
+                    None => {
+                        if let Some(tick) = published.tick {
+                            self.lead.looked_at(tick);
+                        }
+                        break;
+                    }
+                },
+            }
+            if let Some(ending) = self.given_up() {
+                return Ok(Some(ending));
+            }
+        }
+        self.publish_tick_limit()?;
+        Ok(None)
+    }
+
+    /// Look at the ticks that were not looked at, up to the next at which the robot stalls.
+    fn next_stall(&mut self) -> Option<StallSample> {
         let record = &self.bus.observer.record;
+        let in_ticks = self.clock.in_ticks();
         let stopped = record.link.is_none_or(|link| link.stopped());
-        let held = stopped || !self.stages.all_running();
+        // On a clock of ticks no time passes while something holds the robot.
+        let held = !in_ticks && (stopped || !self.stages.all_running());
+        // Of a tick without its command not all may be here yet.
+        let newest = record.published().tick.filter(|_| in_ticks);
         // Several may have passed since the last look: a stall is one whether each was seen alone or not.
         let mut found = None;
         for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
+            if newest.is_some_and(|newest| pose.stamp.tick > newest) {
+                break;
+            }
             if let Some(stall) = self.stall_watch.step(pose, guidance, held) {
                 found = Some((*pose, stall));
                 break;
             }
         }
-        let Some((pose, stall)) = found else {
-            return Ok(None);
-        };
+        let (pose, stall) = found?;
         stall::log(&stall);
         self.bus.publish_stall(&pose, stall);
         records::append(&self.options.directory, records::STALLS, &stall);
-        match stall.recovery() {
+        Some(stall)
+    }
+
+    /// Carry out a recovery step.
+    fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {
+        match step {
             RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
             // The new epoch is in the directive.
             RecoveryStep::Forget => self.publish_state()?,
-            RecoveryStep::GiveUp => {
-                let words = stall::words(stall.cause(), &self.options.mission.body());
-                let reason = format!("target unreachable: {words}");
-                return Ok(Some(Ending::failed(Outcome::Unreachable, reason)));
-            }
+            RecoveryStep::GiveUp => {}
         }
-        Ok(None)
+        Ok(())
+    }
+
+    /// The end of a mission that has no recovery step left.
+    fn given_up(&self) -> Option<Ending> {
+        let stall = self.stall_watch.gave_up()?;
+        let words = stall::words(stall.cause(), &self.options.mission.body());
+        let reason = format!("target unreachable: {words}");
+        Some(Ending::failed(Outcome::Unreachable, reason))
+    }
+
+    /// After the run: the tick at which there was no recovery step left, and what that ends the mission with. On a clock of
+    /// ticks how many ticks were looked at before the end was seen depends on the machine, so the others are now.
+    pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
+        while self.clock.in_ticks()
+            && self.stall_watch.gave_up().is_none()
+            && self.next_stall().is_some()
+        {}
+        let tick = self.stall_watch.gave_up()?.stamp.tick;
+        Some((tick, self.given_up()?))
+    }
+
+    /// Tell the link how far it may go, if that is news.
+    fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
+        let limit = self.lead.limit();
+        if self.published_limit.replace(limit) != Some(limit) {
+            let (tick, time) = self.published_as_of();
+            self.bus.publish_tick_limit(tick, time, limit)?;
+        }
+        Ok(())
     }
 
     /// The tick that a new generation of a stage starts from.
@@ -339,17 +416,34 @@ impl<'a> Supervisor<'a> {
             .first_tick(self.bus.observer.record.newest_tick())
     }
 
-    /// Save the state, then publish the order and the roster: what an operator asked is confirmed by the roster.
-    pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
-        self.state_file.save()?;
+    /// The epoch that holds.
+    fn epoch(&self) -> u64 {
+        let epoch = self.stall_watch.epoch();
+        epoch - u64::from(self.lead.withholds(epoch))
+    }
+
+    /// The tick and the time that the supervisor's samples are published as of.
+    fn published_as_of(&self) -> (u64, MissionTime) {
         // An external stage takes its first tick from here: it must not be one that was made.
         let tick = self.first_tick().saturating_sub(1);
         let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
+        (tick, time)
+    }
+
+    /// Save the state, then publish the order and the roster: what an operator asked is confirmed by the roster.
+    pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
+        self.state_file.save()?;
+        let (tick, time) = self.published_as_of();
+        if self.clock.in_ticks() {
+            // Before the order that starts the first tick.
+            self.published_limit = None;
+            self.publish_tick_limit()?;
+        }
         let (order, reason) = (self.decision.order(), self.decision.reason);
         let directive = DirectiveSample {
             order: order.into(),
             reason: reason.into(),
-            epoch: self.stall_watch.epoch(),
+            epoch: self.epoch(),
             ..DirectiveSample::default()
         };
         let header = RosterHeader {

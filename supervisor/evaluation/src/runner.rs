@@ -31,18 +31,47 @@ pub struct Plan {
     pub trials: Vec<Trial>,
     /// Every one of them on every world.
     pub settings: Vec<Setting>,
-    /// Noise seeds on every world.
+    /// Missions on every world, each with noise of its own.
     pub repeats: u64,
-    /// The first noise seed.
-    pub seed: u64,
-    /// Whether every world has the same noise seeds; else they are counted on from one world to the next.
-    pub same_seeds: bool,
+    /// Which noise they have.
+    pub noise: NoiseSeeds,
     /// Besides those of failures, the pictures of missions with this noise seed are kept.
     pub pictured_seed: Option<u64>,
     /// Missions at once.
     pub jobs: usize,
     /// Where worlds, rows and pictures of failures go; exists.
     pub directory: PathBuf,
+}
+
+/// Where the noise seeds of the missions come from.
+#[derive(Clone, Copy, Debug)]
+pub enum NoiseSeeds {
+    /// Every world has the same: this one and those that follow it.
+    Counted(u64),
+    /// Every mission has one of its own, derived from the seed of the set.
+    Derived(u64),
+}
+
+impl NoiseSeeds {
+    /// The noise seed of mission `repeat` of `repeats` on world `number`.
+    fn seed(self, number: u64, repeats: u64, repeat: u64) -> u64 {
+        match self {
+            Self::Counted(first) => first.wrapping_add(repeat),
+            Self::Derived(set) => {
+                let mission = number.wrapping_mul(repeats).wrapping_add(repeat);
+                let set = mixed(mixed(set as u32) ^ (set >> 32) as u32);
+                mixed(set.wrapping_add(mission as u32)).into()
+            }
+        }
+    }
+}
+
+/// `bits` so that each of them changes about half of the result, and no two numbers give the same: multiplications by odd
+/// numbers and shifts, as in the finaliser of MurmurHash3 (A. Appleby, 2011).
+const fn mixed(bits: u32) -> u32 {
+    let bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);
+    let bits = (bits ^ (bits >> 13)).wrapping_mul(0xc2b2_ae35);
+    bits ^ (bits >> 16)
 }
 
 /// Why an evaluation ended early.
@@ -104,12 +133,8 @@ impl Plan {
     fn jobs(&self) -> impl Iterator<Item = Job<'_>> {
         let worlds = (0..).zip(&self.trials);
         worlds.flat_map(move |(number, trial)| {
-            let first = if self.same_seeds {
-                self.seed
-            } else {
-                self.seed + number * self.repeats
-            };
-            (first..first + self.repeats).flat_map(move |seed| {
+            (0..self.repeats).flat_map(move |repeat| {
+                let seed = self.noise.seed(number, self.repeats, repeat);
                 let settings = self.settings.iter();
                 settings.map(move |setting| Job {
                     trial,
@@ -247,4 +272,26 @@ fn mission(
     }
     let _ = fs::remove_dir_all(&directory);
     Ok((row, latency))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn no_two_missions_of_a_set_have_the_same_noise_nor_do_those_of_neighbouring_sets() {
+        let repeats = 10;
+        let of = |set: u64| {
+            let noise = NoiseSeeds::Derived(set);
+            let missions = (0..300).flat_map(move |world| (0..repeats).map(move |it| (world, it)));
+            missions.map(move |(world, repeat)| noise.seed(world, repeats, repeat))
+        };
+        let sets = [21, 22, 23, 24];
+        let seeds: HashSet<u64> = sets.into_iter().flat_map(of).collect();
+        assert_eq!(seeds.len(), sets.len() * 300 * 10);
+        let counted = NoiseSeeds::Counted(5);
+        assert_eq!((counted.seed(0, 3, 2), counted.seed(9, 3, 2)), (7, 7));
+    }
 }

@@ -52,6 +52,8 @@ pub enum Event<'a> {
     Command(&'a CommandSample),
     /// The supervisor's directive: what it orders, and why that is not drive.
     Order(Order, HoldReason),
+    /// The last tick that may begin, by the supervisor's word; on a clock of ticks.
+    TickLimit(u64),
     /// Nothing; time passed.
     Quiet,
 }
@@ -76,6 +78,11 @@ pub enum Effect {
     Answered {
         /// Nanoseconds.
         began_ns: u64,
+    },
+    /// A tick begins without the supervisor's word, which was waited for too long.
+    Unlimited {
+        /// Its number.
+        tick: u64,
     },
     /// The failsafe decides otherwise than before; what follows from that comes as effects of its own.
     Decided {

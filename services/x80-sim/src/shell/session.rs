@@ -167,8 +167,8 @@ impl Session {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;
             let now = self.robot.time_s();
-            let lost = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
-            if !lost {
+            let radio = self.radio.as_mut();
+            if !radio.is_some_and(|radio| radio.loses_tick(now)) {
                 let (first, second) = match &mut self.radio {
                     Some(radio) => radio.split(frames),
                     None => (frames, Vec::new()),

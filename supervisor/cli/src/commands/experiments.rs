@@ -7,7 +7,7 @@ use common::mission::Realism;
 use evaluation::{
     directory::{self, PAGE_FILE},
     results::Results,
-    runner::{self, Plan},
+    runner::{self, NoiseSeeds, Plan},
     trial::Trial,
 };
 use experiments::{
@@ -72,8 +72,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             trials,
             settings: vec![method.setting(arguments.realism)],
             repeats: arguments.seeds,
-            seed: FIRST_SEED,
-            same_seeds: true,
+            noise: NoiseSeeds::Counted(FIRST_SEED),
             pictured_seed: Some(FIRST_SEED),
             jobs: jobs(arguments.jobs),
             directory: directory.clone(),

@@ -60,12 +60,7 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
     let (text, origin) = match shipped(name) {
         Some(text) => (text.to_owned(), format!("{name}.toml")),
         None if file.extension().is_some() || file.exists() => {
-            let mission = Mission::load(file)?;
-            if assignments.is_empty() {
-                return Ok(mission);
-            }
-            let text = std::fs::read_to_string(file).unwrap_or_default();
-            (text, name.to_owned())
+            (Mission::read(file)?, name.to_owned())
         }
         None => {
             return Err(LookupError::Neither {
@@ -73,16 +68,22 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
             });
         }
     };
-    if assignments.is_empty() {
-        return Ok(Mission::parse(&text, Path::new(&origin))?);
-    }
-    let text = assign(&text, assignments)?;
-    Ok(Mission::parse(&text, Path::new(&origin))?)
+    let as_written = Mission::parse(&text, Path::new(&origin));
+    // Values are judged after all assignments: one may mend what is refused without it.
+    let table = text.parse::<toml::Table>();
+    let (false, Ok(table)) = (assignments.is_empty(), table) else {
+        return Ok(as_written?);
+    };
+    let assigned = assign(table, assignments)?;
+    Mission::parse(&assigned, Path::new(&origin)).map_err(|error| match as_written {
+        // It knows the line.
+        Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
+        _ => error.into(),
+    })
 }
 
-/// `text` with every assignment made. It was parsed before, or ships with the program.
-fn assign(text: &str, assignments: &[String]) -> Result<String, LookupError> {
-    let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
+/// `table` with every assignment made, as text.
+fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
     for assignment in assignments {
         let failed = |problem: &str| LookupError::Assignment {
             assignment: assignment.clone(),
@@ -172,6 +173,27 @@ mod tests {
             mission.perimeter.width_m, 9.0,
             "the rest of the table stays"
         );
+    }
+
+    #[test]
+    fn values_are_judged_after_all_assignments_and_what_remains_wrong_is_told_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("far.toml");
+        std::fs::write(&file, "\n\ntarget = [20, 0]").unwrap();
+        let name = file.to_str().unwrap();
+        let load = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
+            load(name, &set)
+        };
+        let refused = |set: &[&str]| load(set).unwrap_err().to_string();
+        assert!(refused(&[]).contains("far.toml:3: target"));
+        assert!(refused(&["seed=3"]).contains("far.toml:3: target"));
+        let mended = load(&["perimeter.width_m=12", "perimeter.centre=[10, 0]"]);
+        assert!(refused(&["perimeter.width_m=-1"]).contains("perimeter.width_m"));
+        let too_far = mended.unwrap_err().to_string();
+        assert!(too_far.contains("perimeter.centre"), "{too_far}");
+        let mended = load(&["perimeter.width_m=24", "perimeter.centre=[10, 0]"]).unwrap();
+        assert_eq!(mended.target, glam::DVec2::new(20.0, 0.0));
     }
 
     #[test]

@@ -220,7 +220,7 @@ fn a_place_that_was_left_does_not_count() {
         .map(StallSample::recovery)
         .collect();
     assert_eq!(recoveries, [RecoveryStep::Replan, RecoveryStep::Replan]);
-    assert_eq!(watch.replans(), 4);
+    assert_eq!(watch.recoveries(None).0, 4);
 }
 
 #[test]

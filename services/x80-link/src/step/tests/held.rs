@@ -180,3 +180,29 @@ fn the_cause_of_a_hold_is_the_supervisors() {
     let effects = link.at(over, 20 * MS);
     assert_eq!(decided(&effects), [(Action::End, Cause::MissionOver)]);
 }
+
+#[test]
+fn on_a_clock_of_ticks_none_begins_beyond_the_supervisors_limit_until_it_was_waited_for_too_long() {
+    let given = |effects: &[Effect]| effects.iter().any(|it| matches!(it, Effect::Tick { .. }));
+    let frames = datagram(255, 0, 0);
+    let limited = || {
+        let mut link = from_tick(3);
+        link.at(Event::TickLimit(2), 0);
+        let mut link = driving(link);
+        assert!(!given(&link.at(Event::Datagram(&frames), MS)));
+        link
+    };
+    let mut link = limited();
+    assert!(!given(&link.at(Event::Quiet, 200 * MS)));
+    assert!(given(&link.at(Event::TickLimit(3), 201 * MS)));
+    let late = LIMIT_WAITED.as_nanos() as u64 + 2 * MS;
+    assert!(given(&limited().at(Event::Quiet, late)));
+    let mut on_the_wall = on_the_wall();
+    on_the_wall.at(Event::TickLimit(0), 0);
+    let mut on_the_wall = driving(on_the_wall);
+    for tick in 1..3 {
+        assert!(given(
+            &on_the_wall.at(Event::Datagram(&frames), tick * PERIOD_NS)
+        ));
+    }
+}

@@ -1,0 +1,213 @@
+//! On a clock of ticks: how far the link may go ahead of the supervisor, and the tick from which a recovery step holds.
+//! Pure.
+//!
+//! The link begins no tick later than the newest [`TickLimitSample`] says, which is [`LEAD`] ticks after the last one that
+//! was looked at for a stall. So a stall of tick T leaves the pipeline at rest after tick T + [`LEAD`], on any machine. There
+//! the recovery step is carried out, and the limit rises once the planner and the controller have answered to it.
+//! At the pace of the wall nothing waits, and a recovery step is carried out at once.
+
+use std::time::{Duration, Instant};
+
+use common::samples::{RecoveryStep, StallSample, TickLimitSample};
+
+/// Ticks that the link may be ahead: so many that it seldom waits, and little time for a robot that has not moved for
+/// seconds.
+const LEAD: u64 = 4;
+/// A recovery step that was not answered by then is not waited for: less than the link waits for the limit, and as long as
+/// a planner may take to start.
+const ANSWERED: Duration = Duration::from_secs(3);
+
+/// What the stages have published so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Published {
+    /// The tick of the newest command.
+    pub tick: Option<u64>,
+    /// Commands.
+    pub commands: u64,
+    /// The planner's generation that gave the newest guidance, and the epoch it knew.
+    pub guidance: (u32, u64),
+    /// The epoch of the newest grid.
+    pub grid_epoch: u64,
+    /// Whether the grid changed when that epoch began: the planner does not answer to one that did not.
+    pub grid_changed: bool,
+}
+
+/// What to do about the recovery step under way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Next {
+    /// There is none: look at further ticks.
+    Look,
+    /// Wait for the stages.
+    Wait,
+    /// Carry it out now.
+    Begin(RecoveryStep),
+}
+
+/// A recovery step, from the stall until it was answered.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    stall: StallSample,
+    /// When it was carried out, and what was published by then.
+    begun: Option<(Instant, Published)>,
+}
+
+/// How far the link may go.
+#[derive(Debug)]
+pub(crate) struct Lead {
+    limit: TickLimitSample,
+    step: Option<Step>,
+}
+
+impl Lead {
+    /// No tick from `first_tick` on was looked at.
+    pub(crate) fn new(first_tick: u64) -> Self {
+        let limit = TickLimitSample {
+            last_tick: first_tick + LEAD,
+            ..TickLimitSample::default()
+        };
+        Self { limit, step: None }
+    }
+
+    /// What the link is told.
+    pub(crate) const fn limit(&self) -> TickLimitSample {
+        self.limit
+    }
+
+    /// All ticks up to `tick` were looked at, and what they call for was done.
+    pub(crate) fn looked_at(&mut self, tick: u64) {
+        self.limit.last_tick = self.limit.last_tick.max(tick + LEAD);
+    }
+
+    /// The robot stalled at a tick; the ones after it are not looked at before the recovery step holds.
+    pub(crate) fn stalled(&mut self, stall: StallSample) {
+        self.looked_at(stall.stamp.tick);
+        self.step = Some(Step { stall, begun: None });
+    }
+
+    /// Whether `epoch` of the newest stall is not to be published yet.
+    pub(crate) fn withholds(&self, epoch: u64) -> bool {
+        self.step.is_some_and(|step| {
+            let forgets = step.stall.recovery() == RecoveryStep::Forget;
+            forgets && step.stall.epoch == epoch && step.begun.is_none()
+        })
+    }
+
+    /// What is to be done where `published` is what the stages have published by `now`.
+    pub(crate) fn next(&mut self, published: Published, now: Instant) -> Next {
+        let Some(step) = &mut self.step else {
+            return Next::Look;
+        };
+        let Some((since, before)) = step.begun else {
+            let last = step.stall.stamp.tick + LEAD;
+            if published.tick.is_none_or(|tick| tick < last) {
+                return Next::Wait;
+            }
+            step.begun = Some((now, published));
+            return Next::Begin(step.stall.recovery());
+        };
+        let late = now.saturating_duration_since(since) >= ANSWERED;
+        if !late && !is_answered(&step.stall, &before, &published) {
+            return Next::Wait;
+        }
+        self.limit.holds_from_tick = published.tick.map_or(0, |tick| tick + 1);
+        self.limit.epoch = step.stall.epoch;
+        self.step = None;
+        Next::Look
+    }
+}
+
+/// Whether planner and controller have answered to the recovery step of `stall`.
+fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
+    let commanded = now.commands > before.commands;
+    match stall.recovery() {
+        RecoveryStep::Replan => commanded && now.guidance.0 != before.guidance.0,
+        RecoveryStep::Forget => {
+            let guided = commanded && now.guidance.1 >= stall.epoch;
+            now.grid_epoch >= stall.epoch && (guided || !now.grid_changed)
+        }
+        RecoveryStep::GiveUp => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::samples::Stamp;
+
+    use super::*;
+
+    fn stall(recovery: RecoveryStep) -> StallSample {
+        StallSample {
+            stamp: Stamp {
+                tick: 10,
+                ..Stamp::default()
+            },
+            epoch: 1,
+            recovery: recovery.into(),
+            ..StallSample::default()
+        }
+    }
+
+    #[test]
+    fn a_recovery_step_begins_after_a_determined_tick_and_holds_from_the_next_once_it_was_answered()
+    {
+        let now = Instant::now();
+        let at_rest = Published {
+            tick: Some(14),
+            commands: 15,
+            guidance: (1, 0),
+            ..Published::default()
+        };
+        let replanned = Published {
+            commands: 16,
+            guidance: (2, 0),
+            ..at_rest
+        };
+        let reset = Published {
+            grid_epoch: 1,
+            grid_changed: true,
+            ..at_rest
+        };
+        let steered = Published {
+            commands: 16,
+            guidance: (1, 1),
+            ..reset
+        };
+        let unchanged = Published {
+            grid_changed: false,
+            ..reset
+        };
+        use RecoveryStep::{Forget, Replan};
+        #[rustfmt::skip]
+        let rows = [
+            (Replan, at_rest, false), (Replan, Published { commands: 15, ..replanned }, false), (Replan, replanned, true),
+            (Forget, at_rest, false), (Forget, reset, false), (Forget, steered, true), (Forget, unchanged, true),
+        ];
+        for (recovery, published, answered) in rows {
+            let mut lead = Lead::new(0);
+            assert_eq!(lead.limit().last_tick, 4);
+            lead.stalled(stall(recovery));
+            assert_eq!(lead.limit().last_tick, 14);
+            assert_eq!(lead.withholds(1), recovery == Forget);
+            let early = Published {
+                tick: Some(13),
+                ..at_rest
+            };
+            assert_eq!(lead.next(early, now), Next::Wait);
+            assert_eq!(lead.next(at_rest, now), Next::Begin(recovery));
+            assert!(!lead.withholds(1));
+            let next = if answered { Next::Look } else { Next::Wait };
+            assert_eq!(
+                lead.next(published, now),
+                next,
+                "{recovery:?} {published:?}"
+            );
+            assert_eq!(lead.next(published, now + ANSWERED), Next::Look);
+            let TickLimitSample {
+                holds_from_tick,
+                epoch,
+                ..
+            } = lead.limit();
+            assert_eq!((holds_from_tick, epoch), (15, 1));
+        }
+    }
+}
