@@ -89,7 +89,11 @@ impl Obedience {
     /// The wheels were told these counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         if counts == [0, 0] {
-            self.told_to_stand.get_or_insert(now);
+            if self.told_to_stand.is_none() {
+                // Rest before a command that was just sent shows in the wheels is none.
+                self.resting = Duration::ZERO;
+                self.told_to_stand = Some(now);
+            }
         } else {
             self.told_to_stand = None;
             self.moving = Duration::ZERO;

@@ -5,7 +5,8 @@
 //! before, at [`LEAST_M_S`] or more: 0.07 s of delay and 0.08 s of lag have passed then, and a dead band of 20 counts/s
 //! (9 mm/s) is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for;
 //! real ones give 0.75 to 0.8. Intervals that speak against a wheel add up, those that speak for it count down twice as
-//! fast, up to a limit. At [`DOUBTED_AFTER`] the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it
+//! fast, up to a limit. A wheel that turns the other way speaks against itself twice as much, and from [`TURNS_AFTER`]
+//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`DOUBTED_AFTER`] the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it
 //! is at rest 0.2 s later. Intervals longer than two periods tell nothing, since commands may have been lost as well.
 //!
 //! Counts that jump farther than wheels turn are disbelieved one by one ([`crate::restart`]); [`MOST_JUMPS`] of them
@@ -17,6 +18,8 @@ use common::{clock::MissionTime, mission::Mission, wire::counts_between};
 
 /// A command says nothing of the counts before it has held so long.
 const SETTLE: Duration = Duration::from_millis(250);
+/// A wheel of such a robot has changed direction after this, though not come to its speed: 0.6 of it at 7 Hz.
+const TURNS_AFTER: Duration = Duration::from_millis(100);
 /// The slowest motion that is judged, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
 /// The least difference of the wheels that is judged, m/s, and as a share of their mean speed: motors of two wheels
@@ -106,11 +109,17 @@ impl Evidence {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());
         let told_s = now.since(self.since).as_secs_f64() - gap_s;
-        if asked < least || gap_s <= 0.0 || told_s < SETTLE.as_secs_f64() {
+        if asked < least || gap_s <= 0.0 {
             return;
         }
         let share = counts * newest.signum() / (gap_s * asked);
-        let against = (1.0 - share / LEAST_SHARE).clamp(-2.0, 1.0);
+        let opposite = share <= -LEAST_SHARE;
+        let settled = if opposite { TURNS_AFTER } else { SETTLE };
+        if told_s < settled.as_secs_f64() {
+            return;
+        }
+        let most = if opposite { 2.0 } else { 1.0 };
+        let against = (1.0 - share / LEAST_SHARE).clamp(-2.0, most);
         self.against_s = (self.against_s + gap_s * against).max(0.0);
     }
 }

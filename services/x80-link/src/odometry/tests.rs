@@ -184,6 +184,9 @@ fn one_dead_encoder_is_doubted_in_time_and_named() {
 fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
     in_time(drive(40, |_| [TURN, TURN], never, reversed), Doubt::Left);
+    // As a controller does whose robot turns away from the target.
+    let chatter = |tick: u32| [if tick / 2 % 2 == 0 { 584 } else { -584 }; 2];
+    in_time(drive(40, chatter, never, reversed), Doubt::Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
     in_time(drive(40, |_| [-TURN, TURN], never, swapped), Doubt::Left);
     // In a curve both roll forward as told, but the robot turns the other way.
