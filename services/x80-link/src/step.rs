@@ -26,7 +26,6 @@ use common::{
 use crate::{
     drive::Drive,
     failsafe::{Decision, SLOW_SHARE},
-    obedience::Means,
     presence::{Absence, Presence},
     senses::Senses,
     telemetry::Telemetry,
@@ -302,16 +301,6 @@ impl Link {
             range: open.range,
             wheels: open.wheels,
         }
-    }
-
-    /// Tell the wheels these counts/s.
-    fn tell(&mut self, counts: [i16; 2], limit: Duration, effects: &mut Vec<Effect>) {
-        if self.senses.means() != Means::Velocity && counts != [0, 0] {
-            // It was made to stand by other means than those it drives by.
-            effects.push(Effect::Send(self.drive.greeting()));
-        }
-        self.senses.commanded(counts, self.now);
-        effects.push(Effect::Send(self.drive.velocity(counts, limit)));
     }
 
     /// The number of the open tick.

@@ -98,7 +98,7 @@ fn an_honest_robot_is_believed_whatever_it_is_told() {
     let turning = |_| [-TURN / 2, TURN / 2];
     let slow = |_| [70, 70];
     let reversing = |tick: u32| {
-        if tick / 2 % 2 == 0 {
+        if (tick / 2).is_multiple_of(2) {
             [TURN, -TURN]
         } else {
             [-TURN, TURN]
@@ -185,7 +185,13 @@ fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
     in_time(drive(40, |_| [TURN, TURN], never, reversed), Doubt::Left);
     // As a controller does whose robot turns away from the target.
-    let chatter = |tick: u32| [if tick / 2 % 2 == 0 { 584 } else { -584 }; 2];
+    let chatter = |tick: u32| {
+        [if (tick / 2).is_multiple_of(2) {
+            584
+        } else {
+            -584
+        }; 2]
+    };
     in_time(drive(40, chatter, never, reversed), Doubt::Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
     in_time(drive(40, |_| [-TURN, TURN], never, swapped), Doubt::Left);

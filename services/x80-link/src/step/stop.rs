@@ -10,6 +10,7 @@ use common::{
 use super::{Effect, Link, NewestDirective, STOP_AGAIN, passed};
 use crate::{
     failsafe::{self, Ages, Decision, Directive, Flags},
+    obedience::Means,
     odometry::Belief,
 };
 
@@ -77,6 +78,16 @@ impl Link {
         if now != before {
             effects.push(Effect::Decided { before, now });
         }
+    }
+
+    /// Tell the wheels these counts/s.
+    pub(super) fn tell(&mut self, counts: [i16; 2], limit: Duration, effects: &mut Vec<Effect>) {
+        if self.senses.means() != Means::Velocity && counts != [0, 0] {
+            // It was made to stand by other means than those it drives by.
+            effects.push(Effect::Send(self.drive.greeting()));
+        }
+        self.senses.commanded(counts, self.now);
+        effects.push(Effect::Send(self.drive.velocity(counts, limit)));
     }
 
     /// Several times when the stop is new, then again now and then.
