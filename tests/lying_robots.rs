@@ -85,7 +85,7 @@ impl Liar {
                 pass(&host, &over, |bytes, from| {
                     *peer.lock().unwrap() = Some(from);
                     decoder.push(bytes);
-                    let _ = wire.send(&shared.lock().unwrap().to_robot(&mut decoder));
+                    let _ = wire.send(&shared.lock().unwrap().pass_to_robot(&mut decoder));
                 });
             })
         };
@@ -95,7 +95,7 @@ impl Liar {
             std::thread::spawn(move || {
                 pass(&wire, &over, |bytes, _| {
                     decoder.push(bytes);
-                    let said = shared.lock().unwrap().to_host(&mut decoder);
+                    let said = shared.lock().unwrap().pass_to_host(&mut decoder);
                     if let Some(peer) = *peer.lock().unwrap() {
                         let _ = host.send_to(&said, peer);
                     }
@@ -139,7 +139,7 @@ impl Drop for Liar {
 }
 
 impl Shared {
-    fn to_robot(&mut self, decoder: &mut Decoder) -> Vec<u8> {
+    fn pass_to_robot(&mut self, decoder: &mut Decoder) -> Vec<u8> {
         let mut bytes = Vec::new();
         for command in self.inject.drain(..) {
             command.encode(Addressing::default(), &mut bytes);
@@ -167,7 +167,7 @@ impl Shared {
         bytes
     }
 
-    fn to_host(&mut self, decoder: &mut Decoder) -> Vec<u8> {
+    fn pass_to_host(&mut self, decoder: &mut Decoder) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some(frame) = decoder.next_frame() {
             let Ok(mut report) = Report::parse(&frame) else {
