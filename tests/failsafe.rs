@@ -24,13 +24,13 @@ const LIMIT: Duration = Duration::from_millis(250);
 const PERIOD: Duration = Duration::from_millis(143);
 
 /// A simulated robot on its own.
-struct Robot {
+pub(crate) struct Robot {
     process: Child,
-    listening: String,
+    pub(crate) listening: String,
 }
 
 impl Robot {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         let mut process = firsthand(&["sim", "obstacle-course", "--ground-truth"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -165,7 +165,7 @@ impl Tap {
 }
 
 /// Whatever comes on `socket`, until all is over.
-fn pass(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
+pub(crate) fn pass(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
     socket
         .set_read_timeout(Some(Duration::from_millis(50)))
         .unwrap();

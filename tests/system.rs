@@ -15,6 +15,7 @@ mod faults;
 mod field;
 mod foreign_payload;
 mod kills;
+mod lying_robots;
 mod missions;
 mod operators;
 mod planners;

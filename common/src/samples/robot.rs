@@ -104,6 +104,18 @@ wire_enum! {
         GuidanceStale = 10,
         /// A battery that the robot drives on is low.
         BatteryLow = 11,
+        /// What was commanded and what the encoders say disagree.
+        OdometryImplausible = 12,
+        /// They have disagreed for so long that the mission ends.
+        OdometryGivenUp = 13,
+        /// The robot was told to stand, and its encoders say that it moves.
+        RobotDisobeys = 14,
+        /// The robot answers and sends no motor frames.
+        FramesSilent = 15,
+        /// Motor frames come less often than commands last.
+        FramesSlow = 16,
+        /// The front sonar of a mission that senses gives no readings.
+        RangeSilent = 17,
     }
 }
 
@@ -120,6 +132,8 @@ pub struct LinkSample {
     pub action: u8,
     /// Why: a [`Cause`].
     pub cause: u8,
+    /// 1: the encoders say that no wheel turns; 0: one does, or nobody knows.
+    pub at_rest: u8,
     /// Frames received whole.
     pub frames_in: u64,
     /// Bytes that belonged to no frame.
@@ -159,6 +173,7 @@ impl Default for LinkSample {
             connected: 0,
             action: Action::Stop.into(),
             cause: Cause::NotOrdered.into(),
+            at_rest: 0,
             frames_in: 0,
             bytes_dropped: 0,
             foreign_datagrams: 0,

@@ -6,14 +6,19 @@ use common::{
     mission::{Body, Channel, Mission, RobotConfig},
     samples::{CommandSample, WheelSample},
     wire::{
-        Addressing, COUNT_CYCLE, Command, Encoder, Feedback, Mode, MotorSensors, Parameter,
-        Request, Stream, counts_between,
+        Addressing, CHANNELS, COUNT_CYCLE, Command, Encoder, Feedback, Mode, Motion, MotorSensors,
+        Parameter, Quantity, Request, Stream, Targets, counts_between,
     },
 };
+
+use crate::obedience::Means;
 
 /// Steering rate for each angle that is left, over the ticks of a second: below 1, so that the delay of a speed loop does
 /// not make the steering swing.
 const STEERING_GAIN: f64 = 0.6;
+
+/// The pulse width at which a wheel stands.
+const PWM_STANDS: i16 = 16_384;
 
 /// The drive of one robot.
 #[derive(Clone, Debug)]
@@ -57,11 +62,17 @@ impl Drive {
                 channel: Some(channel),
             });
         }
+        bytes.extend(self.streams());
+        bytes
+    }
+
+    /// Sensors streaming.
+    #[must_use]
+    pub fn streams(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
         for stream in [Stream::Motor, Stream::Custom, Stream::Standard] {
-            say(Command::Stream {
-                stream,
-                request: Request::Start,
-            });
+            let request = Request::Start;
+            Command::Stream { stream, request }.encode(Addressing::default(), &mut bytes);
         }
         bytes
     }
@@ -134,6 +145,29 @@ impl Drive {
     #[must_use]
     pub fn stop(&self) -> Vec<u8> {
         self.velocity([0, 0], self.limit)
+    }
+
+    /// The wheels to rest by these means.
+    #[must_use]
+    pub fn stop_by(&self, means: Means) -> Vec<u8> {
+        let wheels = [self.robot.left.channel, self.robot.right.channel];
+        let disable = |channel: Option<u8>| encoded(Command::Enable { on: false, channel });
+        match means {
+            Means::Velocity => self.stop(),
+            Means::Disable => wheels.map(|wheel| disable(Some(wheel))).concat(),
+            Means::Pwm => {
+                let mut targets = [None; CHANNELS];
+                for wheel in wheels {
+                    targets[usize::from(wheel.min(1))] = Some(PWM_STANDS);
+                }
+                encoded(Command::Motion(Motion {
+                    quantity: Quantity::Pwm,
+                    targets: Targets::All(targets),
+                    limit_ms: None,
+                }))
+            }
+            Means::Suspend => disable(None),
+        }
     }
 }
 

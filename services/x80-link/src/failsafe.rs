@@ -7,6 +7,8 @@ use std::time::Duration;
 
 use common::samples::{Action, Cause, HoldReason, Order};
 
+use crate::{odometry::Belief, streams::Motor};
+
 /// A supervisor that has published nothing for so long watches nobody: ten times the interval of its directives,
 /// so that a loaded machine does not stop the robot, and a second before systemd's watchdog would kill it.
 pub const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
@@ -26,6 +28,21 @@ pub struct Flags {
     pub command: Option<Ages>,
     /// The worst of the batteries that the robot drives on.
     pub battery: Charge,
+    /// What the robot's frames say of it.
+    pub senses: Senses,
+}
+
+/// What is known of a robot by its frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Senses {
+    /// It was told to stand and moves.
+    pub disobeys: bool,
+    /// Whether its wheels turn as told.
+    pub odometry: Belief,
+    /// How its motor frames come.
+    pub motor: Motor,
+    /// A mission that senses gets no readings of the front sonar.
+    pub range_silent: bool,
 }
 
 /// What the supervisor ordered last.
@@ -121,6 +138,22 @@ pub static TABLE: &[Rule] = &[
         applies: |flags, _| flags.battery == Charge::Empty,
     },
     Rule {
+        cause: Cause::OdometryGivenUp,
+        name: "odometry implausible for long",
+        when: "commands and encoders have disagreed for 10 s; `x80-link.log` says how",
+        action: Action::End,
+        until: "it is mended and a mission started",
+        applies: |flags, _| flags.senses.odometry == Belief::GivenUp,
+    },
+    Rule {
+        cause: Cause::RobotDisobeys,
+        name: "robot does not obey",
+        when: "it was told to stand, and 0.6 s later its encoders say for 0.5 s that it moves",
+        action: Action::Stop,
+        until: "they have said for 0.5 s that it rests; till then other means are tried in turn: disable, pulse width 0, suspend",
+        applies: |flags, _| flags.senses.disobeys,
+    },
+    Rule {
         cause: Cause::OperatorStop,
         name: "stopped by an operator",
         when: "`firsthand stop`",
@@ -165,6 +198,38 @@ pub static TABLE: &[Rule] = &[
         action: Action::Stop,
         until: "its next frame",
         applies: |flags, _| !flags.connected,
+    },
+    Rule {
+        cause: Cause::FramesSilent,
+        name: "motor frames missing",
+        when: "it answers, and no motor frame has come for three times `robot.command_limit_s`; they are asked for",
+        action: Action::Stop,
+        until: "the next one",
+        applies: |flags, _| flags.senses.motor == Motor::Silent,
+    },
+    Rule {
+        cause: Cause::FramesSlow,
+        name: "motor frames too slow",
+        when: "they come less often than every `robot.command_limit_s`, which commands last for: let the robot send faster, or raise it",
+        action: Action::Stop,
+        until: "they come often enough",
+        applies: |flags, _| matches!(flags.senses.motor, Motor::Slow(_)),
+    },
+    Rule {
+        cause: Cause::OdometryImplausible,
+        name: "odometry implausible",
+        when: "0.55 s of commanded motion with less than a quarter of it in the encoders, or 3 jumps within 2 s; `x80-link.log` says which",
+        action: Action::Stop,
+        until: "the robot restarts, or `firsthand stop` and `resume`, or 2 s without jumps",
+        applies: |flags, _| flags.senses.odometry != Belief::Believed,
+    },
+    Rule {
+        cause: Cause::RangeSilent,
+        name: "front sonar silent",
+        when: "a mission that senses has had no reading of it for three times `robot.command_limit_s`: none came, or 0",
+        action: Action::Stop,
+        until: "the next reading; 255 is one",
+        applies: |flags, _| flags.senses.range_silent,
     },
     Rule {
         cause: Cause::CommandStale,

@@ -7,7 +7,11 @@
 //! | [`failsafe`] | THE table of what slows, stops or ends, and why |
 //! | [`transport`] | datagrams, a connection or a serial line |
 //! | [`presence`] | whether the robot answers, and how it is looked for |
-//! | [`restart`] | whether the robot restarted its counts |
+//! | [`restart`] | whether counts can follow those before, or began anew |
+//! | [`odometry`] | whether the wheels turn as told, by their encoders |
+//! | [`obedience`] | whether the robot comes to rest when told, and what else it is told |
+//! | [`senses`] | these together: what the robot says of itself, held against what it was told |
+//! | [`streams`] | whether what the robot streams comes, and often enough |
 //! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
 //! | [`shell`] | wires them to the topics |
@@ -15,9 +19,13 @@
 pub mod backoff;
 pub mod drive;
 pub mod failsafe;
+pub mod obedience;
+pub mod odometry;
 pub mod presence;
 pub mod restart;
+pub mod senses;
 pub mod shell;
 pub mod step;
+pub mod streams;
 pub mod telemetry;
 pub mod transport;

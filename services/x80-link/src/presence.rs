@@ -73,6 +73,12 @@ impl Presence {
         self.connected
     }
 
+    /// How long it may say nothing, by the machine's clock.
+    #[must_use]
+    pub const fn silence(&self) -> Duration {
+        self.silence
+    }
+
     /// Times it was lost.
     #[must_use]
     pub const fn losses(&self) -> u64 {

@@ -1,5 +1,8 @@
-//! Notices a robot that restarted its encoder counts: it was switched off and on, or its battery was
-//! changed. What it counted before is gone, and the step in the counts is no motion.
+//! Whether the counts of a frame can follow those before.
+//!
+//! A robot that was switched off and on, or got another battery, begins its counts anew. What it counted before is gone, and
+//! the step in the counts is no motion. Other counts that lie farther off than wheels turn are disbelieved, and those
+//! after them are held against the last that was believed: one old frame between good ones costs nothing.
 
 use common::{
     clock::MissionTime,
@@ -7,10 +10,30 @@ use common::{
     wire::{counts_between, counts_restarted},
 };
 
-/// The counts of the frame before, and whether the robot was away since.
+/// Counts are disbelieved when they are this many times as far as the wheels get at their top speed.
+const BEYOND_BELIEF: f64 = 1.5;
+/// Counts that follow each other in so many frames are where the robot counts now.
+const FOLLOW_EACH_OTHER: u32 = 3;
+
+/// What the counts of a frame are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Counts {
+    /// Those of wheels that turned since the frame before.
+    Follow,
+    /// The first after the robot restarted: what lies between is no motion.
+    Restarted,
+    /// Nothing that wheels can have done, but those after them follow: what lies between is no motion.
+    Elsewhere,
+    /// Nothing that wheels can have done.
+    Disbelieved,
+}
+
+/// The counts that were believed last, and whether the robot was away since.
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
+    /// The newest that are disbelieved, and how many of them follow each other.
+    doubted: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
     restarts: u32,
     /// The most a wheel turns in a second.
@@ -26,6 +49,7 @@ impl RestartWatch {
         let body = mission.body();
         Self {
             last: None,
+            doubted: None,
             away: false,
             restarts: 0,
             top_counts: body.top_speed_m_s / body.metres_per_count(),
@@ -38,24 +62,52 @@ impl RestartWatch {
         self.away = true;
     }
 
-    /// Whether the counts of channels 0 and 1 began anew since the frame before. After an absence it is
-    /// enough that both stand where a robot begins; otherwise they must also have come there faster than
-    /// wheels turn.
-    pub fn step(&mut self, counts: [u16; 2], now: MissionTime) -> bool {
+    /// What the counts of channels 0 and 1 are. After an absence it is enough for a restart that both stand where a robot
+    /// begins; otherwise they must also have come there faster than wheels turn.
+    pub fn step(&mut self, counts: [u16; 2], now: MissionTime) -> Counts {
         let away = std::mem::take(&mut self.away);
-        let Some((before, then)) = self.last.replace((counts, now)) else {
-            return false;
+        let Some((before, then)) = self.last else {
+            self.last = Some((counts, now));
+            return Counts::Follow;
         };
+        let share = self.share_of_reach(before, then, counts, now);
+        if counts_restarted(before, counts) && (away || share > 1.0) {
+            self.begin_at(counts, now);
+            return Counts::Restarted;
+        }
+        if share <= BEYOND_BELIEF {
+            (self.last, self.doubted) = (Some((counts, now)), None);
+            return Counts::Follow;
+        }
+        let following = self.doubted.map_or(1, |(doubted, at, following)| {
+            let follows = self.share_of_reach(doubted, at, counts, now) <= BEYOND_BELIEF;
+            if follows { following + 1 } else { 1 }
+        });
+        if following >= FOLLOW_EACH_OTHER {
+            self.begin_at(counts, now);
+            return Counts::Elsewhere;
+        }
+        self.doubted = Some((counts, now, following));
+        Counts::Disbelieved
+    }
+
+    fn begin_at(&mut self, counts: [u16; 2], now: MissionTime) {
+        (self.last, self.doubted) = (Some((counts, now)), None);
+        self.restarts += 1;
+    }
+
+    /// How far the counts went, over what wheels reach in that time.
+    fn share_of_reach(
+        &self,
+        before: [u16; 2],
+        then: MissionTime,
+        counts: [u16; 2],
+        now: MissionTime,
+    ) -> f64 {
         let reach = self.top_counts * (now.since(then).as_secs_f64() + self.jitter_s);
-        let farthest = before
-            .iter()
-            .zip(counts)
-            .map(|(&old, new)| counts_between(old, new).abs())
-            .max()
-            .unwrap_or_default();
-        let restarted = counts_restarted(before, counts) && (away || f64::from(farthest) > reach);
-        self.restarts += u32::from(restarted);
-        restarted
+        let ways = before.iter().zip(counts);
+        let farthest = ways.map(|(&old, new)| counts_between(old, new).abs()).max();
+        f64::from(farthest.unwrap_or_default()) / reach
     }
 
     /// How often that happened.
@@ -82,10 +134,18 @@ mod tests {
     #[test]
     fn counts_that_begin_anew_after_an_absence_are_a_restart() {
         let mut watch = watch();
-        assert!(!watch.step([32_168, 600], at(0.0)), "the first frame");
+        assert_eq!(
+            watch.step([32_168, 600], at(0.0)),
+            Counts::Follow,
+            "the first frame"
+        );
         watch.lost();
-        assert!(watch.step([0, 1], at(3.0)));
-        assert!(!watch.step([32_700, 68], at(3.1)), "it drives on");
+        assert_eq!(watch.step([0, 1], at(3.0)), Counts::Restarted);
+        assert_eq!(
+            watch.step([32_700, 68], at(3.1)),
+            Counts::Follow,
+            "it drives on"
+        );
         assert_eq!(watch.restarts(), 1);
     }
 
@@ -94,20 +154,58 @@ mod tests {
         let mut watch = watch();
         watch.step([32_168, 600], at(0.0));
         watch.lost();
-        assert!(!watch.step([32_000, 768], at(3.0)));
+        assert_eq!(watch.step([32_000, 768], at(3.0)), Counts::Follow);
         watch.lost();
         // It stood at its start all the time.
         watch.step([3, 32_765], at(6.0));
         watch.lost();
-        assert!(!watch.step([0, 0], at(9.0)));
+        assert_eq!(watch.step([0, 0], at(9.0)), Counts::Follow);
     }
 
     #[test]
     fn a_robot_that_turns_back_through_its_start_is_no_restart() {
         let mut watch = watch();
         watch.step([300, 300], at(0.0));
-        assert!(!watch.step([2, 1], at(0.143)));
+        assert_eq!(watch.step([2, 1], at(0.143)), Counts::Follow);
         watch.step([800, 900], at(0.5));
-        assert!(watch.step([0, 0], at(0.643)), "nothing turns so fast");
+        assert_eq!(
+            watch.step([0, 0], at(0.643)),
+            Counts::Restarted,
+            "nothing turns so fast"
+        );
+    }
+
+    #[test]
+    fn an_old_frame_between_good_ones_is_disbelieved_and_is_not_what_the_next_are_held_against() {
+        let mut watch = watch();
+        for tick in 0..7 {
+            let now = at(0.143 * f64::from(tick));
+            watch.step([1000 + 112 * tick as u16, 5000], now);
+        }
+        assert_eq!(watch.step([31_000, 2000], at(0.95)), Counts::Disbelieved);
+        assert_eq!(watch.step([1784, 5000], at(1.0)), Counts::Follow);
+        assert_eq!(watch.restarts(), 0);
+    }
+
+    #[test]
+    fn counts_that_go_on_elsewhere_are_believed_from_the_third_on() {
+        let mut watch = watch();
+        watch.step([1000, 1000], at(0.0));
+        assert_eq!(watch.step([9000, 17_000], at(0.143)), Counts::Disbelieved);
+        assert_eq!(watch.step([9100, 17_100], at(0.286)), Counts::Disbelieved);
+        assert_eq!(watch.step([9200, 17_200], at(0.429)), Counts::Elsewhere);
+        assert_eq!(watch.step([9300, 17_300], at(0.571)), Counts::Follow);
+        assert_eq!(watch.restarts(), 1, "what lies between is no motion");
+    }
+
+    #[test]
+    fn counts_that_jump_about_are_disbelieved_one_by_one() {
+        let mut watch = watch();
+        watch.step([0, 0], at(0.0));
+        for tick in 1..5_u16 {
+            let jump = tick.wrapping_mul(9973) % 32_768;
+            let are = watch.step([jump, 32_767 - jump], at(0.143 * f64::from(tick)));
+            assert_eq!(are, Counts::Disbelieved, "{tick}");
+        }
     }
 }

@@ -248,6 +248,11 @@ impl Shell {
                 }
                 Effect::Decided { before, now } => {
                     log_decision(before, now);
+                    if now.action >= before.action
+                        && let Some(explanation) = self.link.explain(now.cause, monotonic_ns())
+                    {
+                        tracing::warn!("{explanation}");
+                    }
                     self.state()?;
                 }
                 Effect::Connected(true) => {
@@ -261,6 +266,15 @@ impl Shell {
                 Effect::Restarted => {
                     let restarts = self.link.restarts();
                     tracing::warn!(restarts, "the robot restarted: its counts begin anew");
+                }
+                Effect::CountsElsewhere => tracing::warn!(
+                    "the counts jumped farther than wheels turn and go on from there; the pose stays"
+                ),
+                Effect::StopBy(means) => {
+                    tracing::warn!(by = means.as_str(), "the robot does not stand; told again");
+                }
+                Effect::AskedForStreams => {
+                    tracing::info!("the robot is asked for its streams again");
                 }
                 Effect::Infrared(sample) => self.pending.infrared = Some(sample),
                 Effect::Power(sample) => self.pending.power = Some(sample),
@@ -288,6 +302,7 @@ impl Shell {
             connected: self.link.connected().into(),
             action: self.link.decision().action.into(),
             cause: self.link.decision().cause.into(),
+            at_rest: self.link.is_at_rest().into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
             foreign_datagrams: carried.foreign_datagrams,

@@ -27,7 +27,7 @@ use crate::{
     drive::Drive,
     failsafe::{Decision, SLOW_SHARE},
     presence::{Absence, Presence},
-    restart::RestartWatch,
+    senses::Senses,
     telemetry::Telemetry,
 };
 
@@ -89,7 +89,7 @@ pub struct Link {
     directive: Option<NewestDirective>,
     presence: Presence,
     pinged_ns: Option<u64>,
-    restart: RestartWatch,
+    senses: Senses,
     telemetry: Telemetry,
     /// The front sonar's byte and the infrared rangers' counts, for the next tick.
     sonar: Option<u8>,
@@ -127,7 +127,7 @@ impl Step for Link {
             directive: None,
             presence: Presence::new(mission),
             pinged_ns: None,
-            restart: RestartWatch::new(mission),
+            senses: Senses::new(mission),
             telemetry: Telemetry::new(mission.robot.low_battery_v),
             sonar: None,
             infrared: None,
@@ -209,7 +209,23 @@ impl Link {
     /// Times the robot was seen to have restarted its counts.
     #[must_use]
     pub const fn restarts(&self) -> u32 {
-        self.restart.restarts()
+        self.senses.restarts()
+    }
+
+    /// Whether the encoders say that no wheel turns. On a clock of ticks a robot that is held is given no time.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        if self.in_ticks() {
+            self.decision.stops()
+        } else {
+            self.presence.connected() && self.senses.is_at_rest()
+        }
+    }
+
+    /// What was seen of `cause`, and what to do about it.
+    #[must_use]
+    pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
+        self.senses.explain(cause, now_ns, self.presence.silence())
     }
 
     /// How long the robot has been away, at `now_ns` of the monotonic clock.
@@ -262,7 +278,7 @@ impl Link {
             self.state.next_tick += 1;
         }
         let wheels = WheelSample {
-            restarts: self.restart.restarts(),
+            restarts: self.senses.restarts(),
             ..self.drive.wheels(sensors)
         };
         self.wheels = wheels;
@@ -319,9 +335,7 @@ impl Link {
             CommandState::Driving => self.drive.counts(command, share, &self.wheels),
             CommandState::Halt | CommandState::Arrived => [0, 0],
         };
-        effects.push(Effect::Send(
-            self.drive.velocity(counts, self.drive.limit()),
-        ));
+        self.tell(counts, self.drive.limit(), effects);
         let stamp = command.stamp.time();
         self.repeat = Some(Repeat {
             counts,
@@ -348,6 +362,10 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         let drives = order == Order::Drive && !self.ordered_to_drive();
+        let operator = |newest: NewestDirective| newest.reason == HoldReason::Operator;
+        if drives && self.directive.is_some_and(operator) {
+            self.senses.forget();
+        }
         self.directive = Some(NewestDirective {
             order,
             reason,
@@ -402,7 +420,7 @@ impl Link {
         if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
             return;
         }
-        effects.push(Effect::Send(self.drive.velocity(repeat.counts, left)));
+        self.tell(repeat.counts, left, effects);
         self.tally.repeated_commands += 1;
     }
 }

@@ -8,6 +8,13 @@ const GO: Flags = Flags {
     connected: true,
     command: Some(AGES),
     battery: Charge::Well,
+    senses: WELL,
+};
+const WELL: Senses = Senses {
+    disobeys: false,
+    odometry: Belief::Believed,
+    motor: Motor::Regular,
+    range_silent: false,
 };
 const DRIVE: Directive = Directive {
     order: Order::Drive,
@@ -37,6 +44,17 @@ fn cases() -> Vec<(Flags, Action, Cause)> {
     let command = |command| Flags { command, ..GO };
     let ordered = |order| directive(Some(Directive { order, ..DRIVE }));
     let battery = |battery| Flags { battery, ..GO };
+    let senses = |senses| Flags { senses, ..GO };
+    let odometry = |odometry| senses(Senses { odometry, ..WELL });
+    let motor = |motor| senses(Senses { motor, ..WELL });
+    let disobeys = Senses {
+        disobeys: true,
+        ..WELL
+    };
+    let range_silent = Senses {
+        range_silent: true,
+        ..WELL
+    };
     let silent = Directive {
         age: SUPERVISOR_SILENT + MOMENT,
         ..DRIVE
@@ -91,6 +109,20 @@ fn cases() -> Vec<(Flags, Action, Cause)> {
             Action::Stop,
             Cause::GuidanceStale,
         ),
+        (
+            odometry(Belief::GivenUp),
+            Action::End,
+            Cause::OdometryGivenUp,
+        ),
+        (senses(disobeys), Action::Stop, Cause::RobotDisobeys),
+        (motor(Motor::Silent), Action::Stop, Cause::FramesSilent),
+        (motor(Motor::Slow(3.0)), Action::Stop, Cause::FramesSlow),
+        (
+            odometry(Belief::Doubted),
+            Action::Stop,
+            Cause::OdometryImplausible,
+        ),
+        (senses(range_silent), Action::Stop, Cause::RangeSilent),
         (battery(Charge::Low), Action::Slow, Cause::BatteryLow),
     ]
 }
@@ -165,13 +197,36 @@ fn combinations() -> Vec<Flags> {
         for &command in &commands {
             for connected in [true, false] {
                 for battery in [Charge::Well, Charge::Low, Charge::Empty] {
-                    all.push(Flags {
-                        directive,
-                        connected,
-                        command,
-                        battery,
-                    });
+                    for senses in sensed() {
+                        all.push(Flags {
+                            directive,
+                            connected,
+                            command,
+                            battery,
+                            senses,
+                        });
+                    }
                 }
+            }
+        }
+    }
+    all
+}
+
+/// Every combination of what frames can say.
+fn sensed() -> Vec<Senses> {
+    let mut all = Vec::new();
+    for odometry in [Belief::Believed, Belief::Doubted, Belief::GivenUp] {
+        for motor in [Motor::Regular, Motor::Silent, Motor::Slow(3.0)] {
+            for (disobeys, range_silent) in
+                [(false, false), (false, true), (true, false), (true, true)]
+            {
+                all.push(Senses {
+                    disobeys,
+                    odometry,
+                    motor,
+                    range_silent,
+                });
             }
         }
     }
@@ -220,5 +275,13 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
     assert!((crate::telemetry::EMPTY_SHARE - 10.0 / 11.0).abs() < 1e-9);
     let recovered = format!("{} V", crate::telemetry::RECOVERED_V);
     says(Cause::BatteryLow, &recovered);
+    use crate::odometry::{DOUBTED_AFTER, GIVEN_UP_AFTER, JUMPS_WITHIN, MOST_JUMPS};
+    says(Cause::OdometryGivenUp, &seconds(GIVEN_UP_AFTER));
+    let doubted = format!("{} s", DOUBTED_AFTER.as_secs_f64());
+    says(Cause::OdometryImplausible, &doubted);
+    let jumps = format!("{MOST_JUMPS} jumps within {}", seconds(JUMPS_WITHIN));
+    says(Cause::OdometryImplausible, &jumps);
+    let disobeys = format!("{} s", crate::obedience::DISOBEYS_AFTER.as_secs_f64());
+    says(Cause::RobotDisobeys, &disobeys);
     assert!((SLOW_SHARE - 0.5).abs() < 1e-9 && effect(Action::Slow).contains("half"));
 }

@@ -10,7 +10,7 @@ use common::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{failsafe::Decision, telemetry::BatteryChange};
+use crate::{failsafe::Decision, obedience::Means, telemetry::BatteryChange};
 
 /// How mission time passes, and where the ticks of this link begin. The run says the one, and the supervisor the other:
 /// it hears the ticks, so the link writes no checkpoint.
@@ -95,6 +95,12 @@ pub enum Effect {
     Connected(bool),
     /// The robot restarted its encoder counts.
     Restarted,
+    /// The counts jumped farther than wheels turn, and now follow each other where they are.
+    CountsElsewhere,
+    /// The robot does not stand, and was told to by these means.
+    StopBy(Means),
+    /// The robot was asked for its streams again.
+    AskedForStreams,
     /// Publish what an infrared frame said.
     Infrared(InfraredSample),
     /// Publish what the batteries and motors said.

@@ -2,10 +2,17 @@
 
 use std::time::Duration;
 
-use common::{clock::MissionTime, samples::CommandSample};
+use common::{
+    clock::MissionTime,
+    samples::{Cause, CommandSample},
+};
 
 use super::{Effect, Link, NewestDirective, STOP_AGAIN, passed};
-use crate::failsafe::{self, Ages, Decision, Directive, Flags};
+use crate::{
+    failsafe::{self, Ages, Decision, Directive, Flags},
+    obedience::Means,
+    odometry::Belief,
+};
 
 impl Link {
     pub(super) fn decide(&self, now_ns: u64) -> Decision {
@@ -19,8 +26,23 @@ impl Link {
             connected: self.presence.connected(),
             command: self.newest_command.map(|command| self.ages(&command)),
             battery: self.telemetry.charge(),
+            senses: self.senses_say(now_ns),
         };
         failsafe::decide(&flags, self.drive.limit())
+    }
+
+    /// What the failsafe decides by. A robot that does not answer says nothing.
+    fn senses_say(&self, now_ns: u64) -> failsafe::Senses {
+        if self.in_ticks() || !self.presence.connected() {
+            return failsafe::Senses::default();
+        }
+        let said = self.senses.flags(self.now, now_ns, self.presence.silence());
+        let odometry = match said.odometry {
+            // Nobody waits for a robot that is not to drive.
+            Belief::GivenUp if !self.ordered_to_drive() => Belief::Doubted,
+            odometry => odometry,
+        };
+        failsafe::Senses { odometry, ..said }
     }
 
     pub(super) fn ages(&self, command: &CommandSample) -> Ages {
@@ -58,15 +80,32 @@ impl Link {
         }
     }
 
+    /// Tell the wheels these counts/s.
+    pub(super) fn tell(&mut self, counts: [i16; 2], limit: Duration, effects: &mut Vec<Effect>) {
+        if self.senses.means() != Means::Velocity && counts != [0, 0] {
+            // It was made to stand by other means than those it drives by.
+            effects.push(Effect::Send(self.drive.greeting()));
+        }
+        self.senses.commanded(counts, self.now);
+        effects.push(Effect::Send(self.drive.velocity(counts, limit)));
+    }
+
     /// Several times when the stop is new, then again now and then.
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
             effects.extend(self.final_stops().into_iter().map(Effect::Send));
+        } else if let Some(means) = self.senses.next_means(self.now) {
+            effects.push(Effect::Send(self.drive.stop_by(means)));
+            effects.push(Effect::StopBy(means));
+        } else if self.decision.cause == Cause::RobotDisobeys {
+            // What was tried is given time.
+            return;
         } else if self.presence.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
-            effects.push(Effect::Send(self.drive.stop()));
+            effects.push(Effect::Send(self.drive.stop_by(self.senses.means())));
         } else {
             return;
         }
+        self.senses.commanded([0, 0], self.now);
         self.stop_sent_ns = Some(now_ns);
     }
 }

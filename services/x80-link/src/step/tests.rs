@@ -189,7 +189,7 @@ fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
 #[test]
 fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
     let mut link = driving(on_the_wall());
-    let effects = link.at(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
+    let effects = link.at(Event::Datagram(&datagram(255, 32_368, 400)), 10 * MS);
     assert_eq!(ticks(&effects)[0].2.restarts, 0);
     link.at(Event::Quiet, 1000 * MS);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3000 * MS);
@@ -553,3 +553,4 @@ fn a_successor_numbers_its_ticks_after_its_predecessors() {
 }
 
 mod held;
+mod senses;

@@ -3,7 +3,7 @@
 use common::wire::{Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal};
 
 use super::{Effect, Link, PING_EVERY, passed};
-use crate::drive::encoded;
+use crate::{drive::encoded, restart::Counts};
 
 impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -35,17 +35,23 @@ impl Link {
         if ping {
             effects.push(Effect::Send(encoded(Command::System(SystemSignal::Ack))));
         }
-        if let Some(sensors) = &motor
-            && self.notice_restart(sensors)
-        {
+        let counts = motor.map(|sensors| self.judge_counts(&sensors, now_ns));
+        if counts == Some(Counts::Elsewhere) {
+            effects.push(Effect::CountsElsewhere);
+        }
+        if counts == Some(Counts::Restarted) {
             effects.push(Effect::Restarted);
             if self.presence.connected() {
                 // It is as it was when it booted.
                 effects.push(Effect::Send(self.drive.greeting()));
             }
         }
+        if let (Some(_), Some(byte)) = (standard, self.sonar) {
+            self.senses.range(byte, now_ns);
+        }
         self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
         if heard && self.presence.heard(now_ns) {
+            self.senses.found(now_ns);
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
             // It may be driving still by a command of an earlier link.
@@ -62,16 +68,24 @@ impl Link {
                 return;
             }
         }
-        if let Some(sensors) = motor {
+        // Nothing is computed from counts that cannot be true.
+        if let Some(sensors) = motor
+            && counts != Some(Counts::Disbelieved)
+        {
             self.begin_tick(&sensors, now_ns, effects);
         }
     }
 
-    /// Whether the counts began anew. On a clock of ticks the robot is a simulated one that runs as long as
-    /// its mission, and no time passes by which to notice.
-    pub(super) fn notice_restart(&mut self, sensors: &MotorSensors) -> bool {
-        let counts = sensors.encoders.map(|encoder| encoder.position);
-        !self.in_ticks() && self.restart.step(counts, self.now)
+    /// What the counts are. On a clock of ticks the robot is a simulated one that runs as long as its mission, and no
+    /// time passes by which to judge.
+    pub(super) fn judge_counts(&mut self, sensors: &MotorSensors, now_ns: u64) -> Counts {
+        if self.in_ticks() {
+            return Counts::Follow;
+        }
+        let wheels = self.drive.wheels(sensors);
+        let counts = [wheels.left_counts, wheels.right_counts];
+        let was_away = !self.presence.connected();
+        self.senses.motor(counts, was_away, self.now, now_ns)
     }
 
     /// What the frames carry besides the tick.
@@ -113,6 +127,13 @@ impl Link {
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
         }
+        if !self.in_ticks()
+            && self.presence.connected()
+            && self.senses.wants_streams(now_ns, self.presence.silence())
+        {
+            effects.push(Effect::Send(self.drive.streams()));
+            effects.push(Effect::AskedForStreams);
+        }
         let owing = self.in_ticks() && owes && silent && self.presence.connected();
         if self.presence.wants_ping(now_ns) {
             self.ping(now_ns, effects);
@@ -127,7 +148,7 @@ impl Link {
         if !self.presence.lose(now_ns) {
             return;
         }
-        self.restart.lost();
+        self.senses.lost();
         effects.push(Effect::Connected(false));
     }
 }

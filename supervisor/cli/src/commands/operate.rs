@@ -1,6 +1,9 @@
 //! `firsthand stop`, `resume`, `restart`, `kill`, `freeze`, `thaw`: what an operator does to a robot that runs.
 
-use std::{process::ExitCode, time::Duration};
+use std::{
+    process::ExitCode,
+    time::{Duration, Instant},
+};
 
 use clap::Args;
 use common::{
@@ -8,10 +11,15 @@ use common::{
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     roster::Roster,
-    samples::{RequestKind, RequestSample, RosterEntry, RosterHeader, name, name_str},
-    topics,
+    samples::{
+        Action, Cause, LinkSample, RequestKind, RequestSample, RosterEntry, RosterHeader, name,
+        name_str,
+    },
+    topics::{self, AnyTopic as _},
+    waiter::Waiter,
 };
 use rustix::process::{Pid, Signal, kill_process};
+use x80_link::failsafe;
 
 use super::Failure;
 use supervisor::stages;
@@ -29,7 +37,7 @@ pub(crate) struct Robot {
     name: RobotName,
 }
 
-/// Let the robot stand until `firsthand resume`; the mission goes on then.
+/// Let the robot stand until `firsthand resume`; the mission goes on then. Fails until the encoders say that it rests.
 #[derive(Debug, Args)]
 pub(crate) struct Stop {
     #[command(flatten)]
@@ -85,8 +93,45 @@ pub(crate) struct Thaw {
 /// The roster comes five times a second; a frozen supervisor publishes none.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
 
+/// A stop that is obeyed is seen within a second; the link sends it five times a second, and tries other means after one.
+const REST_PATIENCE: Duration = Duration::from_secs(5);
+
 pub(crate) fn stop(arguments: &Stop) -> Result<ExitCode, Failure> {
-    ask(&arguments.robot.name, RequestKind::Stop, "")
+    let robot = &arguments.robot.name;
+    ask(robot, RequestKind::Stop, "")?;
+    await_rest(robot)
+}
+
+/// Wait until the link says that it stopped the robot, and the robot's encoders that it rests.
+fn await_rest(robot: &RobotName) -> Result<ExitCode, Failure> {
+    let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
+    let mut links = bus.reader(&topics::LINK)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::LINK)?);
+    let began = Instant::now();
+    let mut newest = None;
+    while began.elapsed() < REST_PATIENCE {
+        newest = links.newest()?.or(newest);
+        if newest.as_ref().is_some_and(rests) {
+            return Ok(ExitCode::SUCCESS);
+        }
+        waiter.wait(topics::LINK.restated_every())?;
+    }
+    let seen = match newest {
+        None => "its link says nothing; the robot's timed command has ended".to_owned(),
+        Some(link) if link.connected == 0 => {
+            "it does not answer, so its rest is not seen; it is told to stand when it does"
+                .to_owned()
+        }
+        Some(link) => format!("{}: it moves", failsafe::name(link.cause())),
+    };
+    Err(format!("robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`", REST_PATIENCE.as_secs()).into())
+}
+
+/// Whether the link has obeyed the operator, or ends the mission, and the robot obeys the link.
+fn rests(link: &LinkSample) -> bool {
+    let obeys = link.cause() == Cause::OperatorStop || link.action() == Action::End;
+    obeys && link.at_rest == 1
 }
 
 pub(crate) fn resume(arguments: &Resume) -> Result<ExitCode, Failure> {

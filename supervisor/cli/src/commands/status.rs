@@ -58,6 +58,8 @@ struct LinkStatus {
     robot: &'static str,
     /// Why; none while it goes.
     cause: Option<&'static str>,
+    /// Whether its encoders say that no wheel turns.
+    at_rest: bool,
     /// For how long it has not answered; none while it does.
     lost_s: Option<f64>,
     attempts: u64,
@@ -168,6 +170,7 @@ fn link_status(link: &LinkSample) -> LinkStatus {
         stopped: link.stopped(),
         robot: failsafe::effect(link.action()),
         cause: (link.action() != Action::Go).then(|| failsafe::name(link.cause())),
+        at_rest: link.at_rest == 1,
         lost_s: while_lost(link.lost_ns),
         attempts: link.attempts,
         next_attempt_s: while_lost(link.next_attempt_ns),
@@ -266,6 +269,9 @@ impl fmt::Display for LinkStatus {
         }
         match self.cause {
             None => Ok(()),
+            Some(cause) if self.stopped && !self.at_rest => {
+                write!(f, "; NOT SEEN AT REST; it {}: {cause}", self.robot)
+            }
             Some(cause) => write!(f, "; it {}: {cause}", self.robot),
         }
     }

@@ -6,12 +6,13 @@ const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
 /// A turn a second is 1200 counts/s.
 const TURN: f64 = std::f64::consts::TAU;
 
-/// A tick and its command.
+/// A tick and its command, of a robot whose wheels have turned as told since 0.
 fn tick(link: &mut Link, number: u64, now_ns: u64) -> Vec<Effect> {
+    let rolled = (now_ns / MS * 12 / 10) as u16;
     tick_by(
         link,
         now_ns,
-        &datagram(255, 0, 0),
+        &datagram(255, (32_768 - rolled) % 32_768, rolled),
         &command(number, now_ns, TURN, TURN),
     )
 }
@@ -104,7 +105,7 @@ fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
         let mut link = driving(on_the_wall());
         tick(&mut link, 0, 0);
         tick(&mut link, 1, 150 * MS);
-        let effects = tick_by(&mut link, 300 * MS, &datagram(255, 0, 0), &command);
+        let effects = tick_by(&mut link, 300 * MS, &datagram(255, 32_408, 360), &command);
         assert_eq!(velocities(&effects), [STAND; 3], "{cause:?}");
         assert_eq!(decided(&effects), [(Action::Stop, cause)]);
         let effects = tick(&mut link, 3, 443 * MS);

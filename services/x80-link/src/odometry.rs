@@ -1,0 +1,277 @@
+//! Whether the wheels turn as they were told, by their own encoders.
+//!
+//! What is compared: each wheel, and the difference of both, which a robot whose wheels are swapped turns the wrong way.
+//! An interval between two frames tells something of a wheel when it has been told the same direction for [`SETTLE`]
+//! before, at [`LEAST_M_S`] or more: 0.07 s of delay and 0.08 s of lag have passed then, and a dead band of 20 counts/s
+//! (9 mm/s) is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for;
+//! real ones give 0.75 to 0.8. Intervals that speak against a wheel add up, those that speak for it count down twice as
+//! fast, up to a limit. A wheel that turns the other way speaks against itself twice as much, and from [`TURNS_AFTER`]
+//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`DOUBTED_AFTER`] the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it
+//! is at rest 0.2 s later. Intervals longer than two periods tell nothing, since commands may have been lost as well.
+//!
+//! Counts that jump farther than wheels turn are disbelieved one by one ([`crate::restart`]); [`MOST_JUMPS`] of them
+//! within [`JUMPS_WITHIN`] are doubted, too.
+
+use std::{collections::VecDeque, time::Duration};
+
+use common::{clock::MissionTime, mission::Mission, wire::counts_between};
+
+/// A command says nothing of the counts before it has held so long.
+const SETTLE: Duration = Duration::from_millis(250);
+/// A wheel of such a robot has changed direction after this, though not come to its speed: 0.6 of it at 7 Hz.
+const TURNS_AFTER: Duration = Duration::from_millis(100);
+/// The slowest motion that is judged, m/s at the rim.
+const LEAST_M_S: f64 = 0.03;
+/// The least difference of the wheels that is judged, m/s, and as a share of their mean speed: motors of two wheels
+/// differ by some hundredths.
+const LEAST_TURN_M_S: f64 = 0.1;
+const LEAST_TURN_SHARE: f64 = 0.25;
+/// The least share of what it was told that a wheel turns.
+const LEAST_SHARE: f64 = 0.25;
+/// So much evidence is enough: longer than a radio's commands are lost while its frames are heard.
+pub(crate) const DOUBTED_AFTER: Duration = Duration::from_millis(550);
+/// So many counts that cannot be are too many.
+pub(crate) const MOST_JUMPS: usize = 3;
+/// Within this time.
+pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
+/// Jumps are over after so long without any.
+const CALM: Duration = Duration::from_secs(2);
+/// So often jumps may be over by themselves: a robot whose counts jump when it moves stands still each time.
+const MOST_MENDED: u32 = 2;
+/// A mission whose robot is doubted for so long ends.
+pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
+
+/// What is doubted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// The left wheel, or that of a car, does not turn as told.
+    Left,
+    /// The right wheel does not turn as told.
+    Right,
+    /// The robot does not turn as told although both wheels roll: they are swapped, or one is read wrongly.
+    Turn,
+    /// The counts jump farther than wheels turn.
+    Jumps,
+}
+
+impl Doubt {
+    /// For logs.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Left => {
+                "the left wheel was told to turn and its counts do not go along: look at its encoder, its motor, and robot.left"
+            }
+            Self::Right => {
+                "the right wheel was told to turn and its counts do not go along: look at its encoder, its motor, and robot.right"
+            }
+            Self::Turn => {
+                "the robot was told to turn and its counts do not: are robot.left and robot.right swapped?"
+            }
+            Self::Jumps => "the counts jump farther than wheels turn",
+        }
+    }
+}
+
+/// What is known of the odometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Belief {
+    /// Nothing speaks against it.
+    #[default]
+    Believed,
+    /// It cannot be true.
+    Doubted,
+    /// It has not been true for [`GIVEN_UP_AFTER`].
+    GivenUp,
+}
+
+/// What speaks against one wheel, or against the difference of both.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evidence {
+    /// What the two newest commands ask for, counts/s.
+    asked: [f64; 2],
+    /// Since when in the same direction.
+    since: MissionTime,
+    against_s: f64,
+}
+
+impl Evidence {
+    fn ask(&mut self, counts_s: f64, now: MissionTime) {
+        let [_, before] = self.asked;
+        if counts_s * before <= 0.0 {
+            self.since = now;
+        }
+        self.asked = [before, counts_s];
+    }
+
+    /// The wheel rolled `counts` in `gap_s` until `now`; commands below `least` counts/s tell nothing.
+    fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, now: MissionTime) {
+        let [before, newest] = self.asked;
+        let asked = before.abs().min(newest.abs());
+        let told_s = now.since(self.since).as_secs_f64() - gap_s;
+        if asked < least || gap_s <= 0.0 {
+            return;
+        }
+        let share = counts * newest.signum() / (gap_s * asked);
+        let opposite = share <= -LEAST_SHARE;
+        let settled = if opposite { TURNS_AFTER } else { SETTLE };
+        if told_s < settled.as_secs_f64() {
+            return;
+        }
+        let most = if opposite { 2.0 } else { 1.0 };
+        let against = (1.0 - share / LEAST_SHARE).clamp(-2.0, most);
+        self.against_s = (self.against_s + gap_s * against).max(0.0);
+    }
+}
+
+/// The odometry of one robot, judged.
+#[derive(Clone, Debug)]
+pub struct Odometry {
+    counts_per_m: f64,
+    steers: bool,
+    /// Of two periods of the robot.
+    longest_gap: Duration,
+    /// How long a command holds.
+    limit: Duration,
+    commanded: Option<MissionTime>,
+    frame: Option<([u16; 2], MissionTime)>,
+    left: Evidence,
+    right: Evidence,
+    turn: Evidence,
+    jumps: VecDeque<MissionTime>,
+    mended: u32,
+    doubt: Option<(Doubt, MissionTime)>,
+}
+
+impl Odometry {
+    /// Of the robot of `mission`, of which nothing is known.
+    #[must_use]
+    pub fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        Self {
+            counts_per_m: 1.0 / body.metres_per_count(),
+            steers: body.steering.is_some(),
+            longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
+            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
+            commanded: None,
+            frame: None,
+            left: Evidence::default(),
+            right: Evidence::default(),
+            turn: Evidence::default(),
+            jumps: VecDeque::new(),
+            mended: 0,
+            doubt: None,
+        }
+    }
+
+    /// The wheels were told these counts/s, forward positive.
+    pub fn commanded(&mut self, [left, right]: [i16; 2], now: MissionTime) {
+        let lapsed = |then| now.since(then) > self.limit;
+        if self.commanded.is_none_or(lapsed) {
+            self.begin_anew(now);
+        }
+        self.commanded = Some(now);
+        let (left, right) = (f64::from(left), f64::from(right));
+        self.left.ask(left, now);
+        if self.steers {
+            return;
+        }
+        self.right.ask(right, now);
+        let mean = (left.abs() + right.abs()) / 2.0;
+        let turn = right - left;
+        let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
+        self.turn.ask(if tells { turn } else { 0.0 }, now);
+    }
+
+    /// Counts that may be true.
+    pub fn believed(&mut self, counts: [u16; 2], now: MissionTime) {
+        let newest_jump = self.jumps.back().copied();
+        let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
+        if calm && self.mended < MOST_MENDED && matches!(self.doubt, Some((Doubt::Jumps, _))) {
+            self.mended += 1;
+            self.doubt = None;
+            self.begin_anew(now);
+        }
+        let Some((before, then)) = self.frame.replace((counts, now)) else {
+            return;
+        };
+        let gap = now.since(then);
+        let lapsed = |at| now.since(at) > self.limit;
+        if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
+            // What was commanded meanwhile may have been lost, or no longer holds.
+            self.begin_anew(now);
+            return;
+        }
+        let [left, right] =
+            [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])));
+        let gap_s = gap.as_secs_f64();
+        let least = LEAST_M_S * self.counts_per_m;
+        self.left.weigh(left, gap_s, least, now);
+        self.right.weigh(right, gap_s, least, now);
+        let least = LEAST_TURN_M_S * self.counts_per_m;
+        self.turn.weigh(right - left, gap_s, least, now);
+        let doubted = |evidence: &Evidence| evidence.against_s >= DOUBTED_AFTER.as_secs_f64();
+        let all = [
+            (&self.left, Doubt::Left),
+            (&self.right, Doubt::Right),
+            (&self.turn, Doubt::Turn),
+        ];
+        if let Some((_, doubt)) = all.into_iter().find(|(evidence, _)| doubted(evidence)) {
+            self.doubt.get_or_insert((doubt, now));
+        }
+    }
+
+    /// Counts that cannot be true.
+    pub fn disbelieved(&mut self, now: MissionTime) {
+        self.jumps.push_back(now);
+        if self.jumps.len() > MOST_JUMPS {
+            self.jumps.pop_front();
+        }
+        let first = self.jumps.front().copied().unwrap_or(now);
+        if self.jumps.len() == MOST_JUMPS && now.since(first) <= JUMPS_WITHIN {
+            self.doubt.get_or_insert((Doubt::Jumps, now));
+        }
+    }
+
+    /// The counts of the next frame do not follow those before.
+    pub const fn forget_counts(&mut self) {
+        self.frame = None;
+    }
+
+    /// The robot was switched off and on, or an operator has looked at it: nothing is known of it.
+    pub fn forget(&mut self) {
+        self.commanded = None;
+        self.forget_counts();
+        self.left = Evidence::default();
+        self.right = Evidence::default();
+        self.turn = Evidence::default();
+        self.jumps.clear();
+        self.mended = 0;
+        self.doubt = None;
+    }
+
+    /// What is doubted.
+    #[must_use]
+    pub fn doubt(&self) -> Option<Doubt> {
+        self.doubt.map(|(doubt, _)| doubt)
+    }
+
+    /// What is known of it at `now`.
+    #[must_use]
+    pub fn belief(&self, now: MissionTime) -> Belief {
+        match self.doubt {
+            None => Belief::Believed,
+            Some((_, since)) if now.since(since) >= GIVEN_UP_AFTER => Belief::GivenUp,
+            Some(_) => Belief::Doubted,
+        }
+    }
+
+    fn begin_anew(&mut self, now: MissionTime) {
+        for evidence in [&mut self.left, &mut self.right, &mut self.turn] {
+            evidence.since = now;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,257 @@
+use super::*;
+use std::path::Path;
+
+/// From frame to frame, seconds: 7 Hz.
+const PERIOD: f64 = 1.0 / 7.0;
+/// A turn a second: 0.53 m/s.
+const TURN: i16 = 1200;
+
+fn odometry() -> Odometry {
+    // 1 m/s is 2247 counts a second.
+    Odometry::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
+}
+
+/// Wheels as measured on a real robot: 0.07 s of delay, 0.08 s of lag, 0.78 of the speed, a dead band of 20 counts/s.
+#[derive(Default)]
+struct Wheels {
+    speed: [f64; 2],
+    rolled: [f64; 2],
+    told: Vec<(f64, [i16; 2])>,
+    now: f64,
+}
+
+impl Wheels {
+    fn tell(&mut self, counts: [i16; 2]) {
+        self.told.push((self.now, counts));
+    }
+
+    fn roll_to(&mut self, end: f64) {
+        const STEP: f64 = 0.005;
+        while self.now < end - STEP / 2.0 {
+            let heard = |&&(at, _): &&(f64, [i16; 2])| at + 0.07 <= self.now;
+            let target = self.told.iter().rev().find(heard);
+            for wheel in [0, 1] {
+                // A command lasts 0.25 s.
+                let asked = target
+                    .filter(|(at, _)| at + 0.07 + 0.25 > self.now)
+                    .map_or(0.0, |(_, counts)| 0.78 * f64::from(counts[wheel]));
+                let asked = if asked.abs() < 20.0 { 0.0 } else { asked };
+                self.speed[wheel] += (asked - self.speed[wheel]) * STEP / 0.08;
+                self.rolled[wheel] += self.speed[wheel] * STEP;
+            }
+            self.now += STEP;
+        }
+    }
+
+    fn counts(&self) -> [u16; 2] {
+        self.rolled
+            .map(|rolled| rolled.rem_euclid(f64::from(COUNTS)) as u16)
+    }
+}
+
+const COUNTS: u16 = common::wire::COUNT_CYCLE;
+
+/// Ticks of a robot that is told `tells(tick)`, is out of reach where `out` says so, and whose frames say `says` of what
+/// its wheels count. When it is doubted, seconds after the first command, and why.
+fn drive(
+    ticks: u32,
+    tells: impl Fn(u32) -> [i16; 2],
+    mut out: impl FnMut(u32) -> bool,
+    mut says: impl FnMut(u32, [u16; 2]) -> [u16; 2],
+) -> Option<(f64, Doubt)> {
+    let mut odometry = odometry();
+    let mut wheels = Wheels::default();
+    for tick in 0..ticks {
+        let time = f64::from(tick) * PERIOD;
+        wheels.roll_to(time);
+        if out(tick) {
+            continue;
+        }
+        let now = MissionTime::from_seconds(time);
+        odometry.believed(says(tick, wheels.counts()), now);
+        if let Some(doubt) = odometry.doubt() {
+            return Some((time, doubt));
+        }
+        odometry.commanded(tells(tick), now);
+        wheels.tell(tells(tick));
+    }
+    None
+}
+
+fn never(_: u32) -> bool {
+    false
+}
+
+fn honest(_: u32, counts: [u16; 2]) -> [u16; 2] {
+    counts
+}
+
+/// At rest within 1.5 s of the first motion: 0.2 s are left for the wheels to come to rest, and a frame's jitter.
+fn in_time(doubted: Option<(f64, Doubt)>, why: Doubt) {
+    let (after, doubt) = doubted.unwrap();
+    assert!(after <= 1.15 && doubt == why, "{doubt:?} after {after} s");
+}
+
+#[test]
+fn an_honest_robot_is_believed_whatever_it_is_told() {
+    let straight = |_| [TURN, TURN];
+    let turning = |_| [-TURN / 2, TURN / 2];
+    let slow = |_| [70, 70];
+    let reversing = |tick: u32| {
+        if (tick / 2).is_multiple_of(2) {
+            [TURN, -TURN]
+        } else {
+            [-TURN, TURN]
+        }
+    };
+    let curves = |tick: u32| {
+        [
+            900 + 300 * (tick % 3) as i16,
+            1200 - 300 * (tick % 4) as i16,
+        ]
+    };
+    let stop_and_go = |tick: u32| if tick % 7 < 3 { [0, 0] } else { [TURN, 80] };
+    for tells in [
+        &straight as &dyn Fn(u32) -> [i16; 2],
+        &turning,
+        &slow,
+        &reversing,
+        &curves,
+        &stop_and_go,
+    ] {
+        assert_eq!(drive(400, tells, never, honest), None);
+    }
+}
+
+#[test]
+fn an_honest_robot_is_believed_with_its_radio_out_a_fifth_or_half_of_the_time() {
+    // Bursts of 1 to 8 frames.
+    for share in [5, 2] {
+        for seed in 1..60_u32 {
+            let mut state = seed;
+            let mut left = 0_i32;
+            let out = |_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let drawn = (state >> 16) as i32;
+                if left == 0 {
+                    let burst = 1 + drawn % 8;
+                    let goes_out = drawn / 8 % share == 0;
+                    left = if goes_out { burst } else { -burst };
+                }
+                let is_out = left > 0;
+                left -= left.signum();
+                is_out
+            };
+            assert_eq!(
+                drive(200, |_| [TURN, TURN / 2], out, honest),
+                None,
+                "{seed}"
+            );
+        }
+    }
+}
+
+#[test]
+fn wheels_held_for_half_a_second_are_believed() {
+    // Frames of a robot that something holds repeat; then it goes on from there.
+    let mut held = 0;
+    let says = |tick: u32, counts: [u16; 2]| {
+        if tick == 21 {
+            held = counts[0];
+        }
+        match tick {
+            21..=24 => [held; 2],
+            _ => counts,
+        }
+    };
+    assert_eq!(drive(60, |_| [TURN, TURN], never, says), None);
+}
+
+#[test]
+fn the_same_frame_for_ever_is_doubted_in_time() {
+    let same = |_, _| [32_767; 2];
+    in_time(drive(40, |_| [TURN, TURN], never, same), Doubt::Left);
+    in_time(drive(40, |_| [-80, 80], never, same), Doubt::Left);
+}
+
+#[test]
+fn one_dead_encoder_is_doubted_in_time_and_named() {
+    let dead = |_, [left, _]: [u16; 2]| [left, 0];
+    in_time(drive(40, |_| [TURN, TURN], never, dead), Doubt::Right);
+}
+
+#[test]
+fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
+    let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
+    in_time(drive(40, |_| [TURN, TURN], never, reversed), Doubt::Left);
+    // As a controller does whose robot turns away from the target.
+    let chatter = |tick: u32| {
+        [if (tick / 2).is_multiple_of(2) {
+            584
+        } else {
+            -584
+        }; 2]
+    };
+    in_time(drive(40, chatter, never, reversed), Doubt::Left);
+    let swapped = |_, [left, right]: [u16; 2]| [right, left];
+    in_time(drive(40, |_| [-TURN, TURN], never, swapped), Doubt::Left);
+    // In a curve both roll forward as told, but the robot turns the other way.
+    let curve = drive(40, |_| [TURN / 2, TURN], never, swapped);
+    in_time(curve, Doubt::Turn);
+}
+
+#[test]
+fn frames_that_are_two_seconds_late_are_doubted_in_time() {
+    let mut said = VecDeque::from([[0; 2]; 14]);
+    let late = move |_, counts| {
+        said.push_back(counts);
+        said.pop_front().unwrap()
+    };
+    in_time(drive(40, |_| [TURN, TURN], never, late), Doubt::Left);
+}
+
+#[test]
+fn a_robot_that_is_doubted_is_given_up_after_10_s_or_believed_again_when_an_operator_has_looked() {
+    let at = MissionTime::from_seconds;
+    let mut odometry = odometry();
+    for tick in 0..8 {
+        let now = at(f64::from(tick) * PERIOD);
+        odometry.believed([5, 5], now);
+        odometry.commanded([TURN, TURN], now);
+    }
+    assert_eq!(odometry.belief(at(1.0)), Belief::Doubted);
+    for tick in 8..80 {
+        odometry.believed([5, 5], at(f64::from(tick) * PERIOD));
+    }
+    assert_eq!(odometry.belief(at(10.8)), Belief::Doubted);
+    assert_eq!(odometry.belief(at(11.0)), Belief::GivenUp);
+    odometry.forget();
+    assert_eq!(odometry.belief(at(11.0)), Belief::Believed);
+}
+
+#[test]
+fn three_jumps_within_two_seconds_are_doubted_until_two_seconds_without_twice_at_most() {
+    let at = MissionTime::from_seconds;
+    let mut odometry = odometry();
+    for round in 0..3 {
+        let start = 10.0 * f64::from(round);
+        for jump in 0..3 {
+            assert_eq!(odometry.doubt(), None);
+            odometry.disbelieved(at(start + 0.143 * f64::from(jump)));
+        }
+        assert_eq!(odometry.doubt(), Some(Doubt::Jumps));
+        odometry.believed([5, 5], at(start + 2.2));
+        assert_eq!(odometry.doubt(), Some(Doubt::Jumps));
+        odometry.believed([5, 5], at(start + 2.3));
+    }
+    assert_eq!(odometry.doubt(), Some(Doubt::Jumps), "the third time");
+}
+
+#[test]
+fn an_old_frame_now_and_then_is_no_doubt() {
+    let mut odometry = odometry();
+    for frame in 0..20 {
+        odometry.disbelieved(MissionTime::from_seconds(2.0 * f64::from(frame)));
+        assert_eq!(odometry.doubt(), None);
+    }
+}

@@ -1,0 +1,201 @@
+//! What the link does about a robot whose frames cannot be true, or do not come.
+
+use super::*;
+use common::wire::Quantity;
+
+const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
+/// A turn a second is 1200 counts/s.
+const TURN: f64 = std::f64::consts::TAU;
+
+/// Ticks of a robot on the wall clock that is always told to drive and whose frames are `frames(tick)`. What was decided,
+/// with the mission time in milliseconds.
+fn drive(
+    link: &mut Link,
+    numbers: std::ops::Range<u64>,
+    frames: impl Fn(u64) -> Vec<u8>,
+) -> Vec<(u64, Action, Cause)> {
+    let mut all = Vec::new();
+    for number in numbers {
+        let now = number * PERIOD_NS;
+        let mut effects = link.at(Event::Order(Order::Drive, HoldReason::None), now);
+        effects.extend(link.at(Event::Datagram(&frames(number)), now));
+        effects.extend(link.at(Event::Command(&command(number, now, TURN, TURN)), now + MS));
+        let decisions = decided(&effects).into_iter();
+        all.extend(decisions.map(|(action, cause)| (now / MS, action, cause)));
+    }
+    all
+}
+
+fn ack() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    Report::System(SystemSignal::Ack).encode(Addressing::default(), &mut bytes);
+    bytes
+}
+
+#[test]
+fn a_robot_whose_counts_stay_while_it_is_told_to_drive_stands_in_time_and_its_mission_ends() {
+    let mut link = driving(on_the_wall());
+    let decisions = drive(&mut link, 0..90, |_| datagram(255, 0, 0));
+    let doubted = (Action::Stop, Cause::OdometryImplausible);
+    let given_up = (Action::End, Cause::OdometryGivenUp);
+    let what: Vec<_> = decisions
+        .iter()
+        .map(|&(_, action, cause)| (action, cause))
+        .collect();
+    assert_eq!(what[what.len() - 2..], [doubted, given_up]);
+    let [(stood, ..), (ended, ..)] = decisions[what.len() - 2..] else {
+        panic!();
+    };
+    assert!(
+        stood < 1200 && (10_000..10_200).contains(&(ended - stood)),
+        "{decisions:?}"
+    );
+    assert!(
+        link.explain(Cause::OdometryGivenUp, 0)
+            .unwrap()
+            .contains("left wheel")
+    );
+}
+
+#[test]
+fn an_operators_stop_and_resume_let_a_doubted_robot_go_on_and_its_wait_is_no_end() {
+    let mut link = driving(on_the_wall());
+    drive(&mut link, 0..10, |_| datagram(255, 0, 0));
+    assert_eq!(link.decision().cause, Cause::OdometryImplausible);
+    let stop = Event::Order(Order::Hold, HoldReason::Operator);
+    for number in 10..100 {
+        link.at(stop, number * PERIOD_NS);
+        link.at(Event::Datagram(&datagram(255, 0, 0)), number * PERIOD_NS);
+    }
+    assert_eq!(link.decision().cause, Cause::OperatorStop);
+    assert!(link.is_at_rest());
+    drive(&mut link, 100..101, |_| datagram(255, 0, 0));
+    assert_eq!(link.decision(), Decision::GO);
+}
+
+#[test]
+fn counts_that_cannot_be_true_give_no_tick() {
+    let mut link = driving(on_the_wall());
+    assert_eq!(
+        ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS)).len(),
+        1
+    );
+    let old = link.at(Event::Datagram(&datagram(255, 9000, 9000)), 150 * MS);
+    assert_eq!(ticks(&old), []);
+    let good = ticks(&link.at(Event::Datagram(&datagram(255, 0, 10)), 290 * MS));
+    assert_eq!((good[0].2.right_counts, good[0].2.restarts), (10, 0));
+}
+
+#[test]
+fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_means_in_turn() {
+    let mut link = driving(on_the_wall());
+    let (mut tried, mut seen) = (Vec::new(), None);
+    for number in 0..30 {
+        let now = number * PERIOD_NS;
+        let rolled = (80 * number) as u16;
+        let frames = datagram(255, rolled, 32_000 - rolled);
+        let mut effects = link.at(Event::Order(Order::Hold, HoldReason::Operator), now);
+        effects.extend(link.at(Event::Datagram(&frames), now));
+        effects.extend(link.at(Event::Quiet, now + 70 * MS));
+        if decided(&effects).contains(&(Action::Stop, Cause::RobotDisobeys)) {
+            seen.get_or_insert(now / MS);
+        }
+        for command in sent(&effects) {
+            match command {
+                Command::Enable { on: false, channel } => tried.push(channel),
+                Command::Motion(motion) if motion.quantity == Quantity::Pwm => {
+                    assert_eq!(
+                        [motion.targets.of(0), motion.targets.of(1)],
+                        [Some(16_384); 2]
+                    );
+                    tried.push(Some(99));
+                }
+                Command::Motion(motion) => assert_eq!(motion.targets.of(1), Some(0)),
+                _ => {}
+            }
+        }
+        assert!(!link.is_at_rest());
+    }
+    assert!(seen.unwrap() < 1500, "{seen:?}");
+    assert_eq!(tried[..4], [Some(0), Some(1), Some(99), None]);
+    // It comes to rest, and is driven again only after its motors were enabled.
+    for number in 30..36 {
+        let frames = datagram(255, 2320, 29_680);
+        link.at(Event::Datagram(&frames), number * PERIOD_NS);
+    }
+    assert!(link.is_at_rest());
+    assert_eq!(link.decision().cause, Cause::OperatorStop);
+    let now = 36 * PERIOD_NS;
+    link.at(Event::Order(Order::Drive, HoldReason::None), now);
+    link.at(Event::Datagram(&datagram(255, 2320, 29_680)), now);
+    let go = sent(&link.at(Event::Command(&command(0, now, TURN, TURN)), now));
+    assert!(
+        go.iter()
+            .any(|it| matches!(it, Command::Enable { on: true, .. })),
+        "{go:?}"
+    );
+    assert!(matches!(go.last(), Some(Command::Motion(_))), "{go:?}");
+}
+
+#[test]
+fn a_sonar_that_says_0_holds_the_robot_until_its_next_reading_and_255_is_one() {
+    let mut link = driving(on_the_wall());
+    let obeying = |sonar: u8, number: u64| {
+        let rolled = 171 * number.min(10) as u16;
+        datagram(sonar, 32_768 - rolled, rolled)
+    };
+    let decisions = drive(&mut link, 1..20, |number| {
+        obeying(u8::from(number < 5) * 255, number)
+    });
+    let [.., (when, Action::Stop, Cause::RangeSilent)] = decisions[..] else {
+        panic!("{decisions:?}");
+    };
+    let last_reading = 4 * PERIOD_NS / MS;
+    assert!((750..900).contains(&(when - last_reading)), "{decisions:?}");
+    let stopped_at = link.decision().cause;
+    assert_eq!(stopped_at, Cause::RangeSilent);
+    drive(&mut link, 20..21, |number| obeying(255, number));
+    assert_eq!(link.decision(), Decision::GO);
+}
+
+#[test]
+fn a_robot_that_only_acknowledges_is_asked_for_its_streams_and_the_cause_is_named() {
+    let mut link = driving(on_the_wall());
+    let decisions = drive(&mut link, 0..3, |number| {
+        let rolled = (171 * number) as u16;
+        datagram(255, (32_768 - rolled) % 32_768, rolled)
+    });
+    assert_eq!(decisions, [(0, Action::Go, Cause::None)]);
+    let (mut asked, mut causes) = (0, Vec::new());
+    for number in 3..30 {
+        let now = number * PERIOD_NS;
+        let mut effects = link.at(Event::Order(Order::Drive, HoldReason::None), now);
+        effects.extend(link.at(Event::Datagram(&ack()), now));
+        causes.extend(decided(&effects).into_iter().map(|(_, cause)| cause));
+        let streams = |command: &Command| matches!(command, Command::Stream { .. });
+        asked += sent(&effects).into_iter().filter(streams).count();
+        // The first is the last command once more.
+        let stands = |velocity: &[Option<i16>; 2]| *velocity == STAND;
+        assert!(number == 3 || velocities(&effects).iter().all(stands));
+    }
+    assert_eq!(causes, [Cause::CommandStale, Cause::FramesSilent]);
+    assert_eq!(asked, 3 * 2, "three streams, twice in four seconds");
+}
+
+#[test]
+fn frames_at_3_hz_are_told_with_rate_and_remedy() {
+    let mut link = driving(on_the_wall());
+    let mut now = 0;
+    for number in 0..12 {
+        now = number * 333 * MS;
+        link.at(Event::Order(Order::Drive, HoldReason::None), now);
+        link.at(Event::Datagram(&datagram(255, 0, 0)), now);
+    }
+    assert_eq!(link.decision().cause, Cause::FramesSlow);
+    let words = link.explain(Cause::FramesSlow, now).unwrap();
+    assert!(
+        words.contains("3.0 motor frames a second")
+            && words.contains("raise robot.command_limit_s"),
+        "{words}"
+    );
+}

@@ -1,0 +1,327 @@
+//! Robots whose frames cannot be true, or do not come: every datagram between link and simulated robot passes through a
+//! proxy here that lies.
+
+use std::{
+    net::{SocketAddr, UdpSocket},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    failsafe::{Robot, pass},
+    support::{Run, assert_nothing_left, operate, output},
+};
+use common::wire::{
+    Addressing, Command, Decoder, Motion, MotorSensors, Quantity, Report, Request, Stream,
+};
+use rustix::process::Signal;
+use serde_json::Value;
+
+/// From the first motion that shows a lie until the last command that moves.
+const BOUND: Duration = Duration::from_millis(1500);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lie {
+    None,
+    /// Every motor frame the same.
+    SameFrame,
+    /// The right encoder stays at 0.
+    DeadEncoder,
+    /// Both wheels count the other way.
+    Reversed,
+    /// Other counts in every frame.
+    Random,
+    /// The encoders roll on by 560 counts/s.
+    RollsOn,
+    /// The front sonar says 0.
+    NoSonar,
+    /// Velocity 0 does not reach the robot, nor does the time limit of commands.
+    IgnoresZero,
+}
+
+/// What the proxy does and has seen.
+#[derive(Debug)]
+struct Shared {
+    lie: Lie,
+    frames: u16,
+    first_motion: Option<Instant>,
+    last_motion: Option<Instant>,
+    /// To send the robot as if the link had.
+    inject: Vec<Command>,
+}
+
+struct Liar {
+    address: SocketAddr,
+    shared: Arc<Mutex<Shared>>,
+    over: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Liar {
+    fn before(robot: &Robot, lie: Lie) -> Self {
+        let host = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
+        wire.connect(&robot.listening).unwrap();
+        let address = host.local_addr().unwrap();
+        let shared = Arc::new(Mutex::new(Shared {
+            lie,
+            frames: 0,
+            first_motion: None,
+            last_motion: None,
+            inject: Vec::new(),
+        }));
+        let over = Arc::new(AtomicBool::new(false));
+        let peer = Arc::new(Mutex::new(None));
+        let out = {
+            let (host, wire) = (host.try_clone().unwrap(), wire.try_clone().unwrap());
+            let (shared, over) = (Arc::clone(&shared), Arc::clone(&over));
+            let peer = Arc::clone(&peer);
+            let mut decoder = Decoder::default();
+            std::thread::spawn(move || {
+                pass(&host, &over, |bytes, from| {
+                    *peer.lock().unwrap() = Some(from);
+                    decoder.push(bytes);
+                    let _ = wire.send(&shared.lock().unwrap().pass_to_robot(&mut decoder));
+                });
+            })
+        };
+        let back = {
+            let (shared, over) = (Arc::clone(&shared), Arc::clone(&over));
+            let mut decoder = Decoder::default();
+            std::thread::spawn(move || {
+                pass(&wire, &over, |bytes, _| {
+                    decoder.push(bytes);
+                    let said = shared.lock().unwrap().pass_to_host(&mut decoder);
+                    if let Some(peer) = *peer.lock().unwrap() {
+                        let _ = host.send_to(&said, peer);
+                    }
+                });
+            })
+        };
+        Self {
+            address,
+            shared,
+            over,
+            threads: vec![out, back],
+        }
+    }
+
+    fn lie(&self, lie: Lie) {
+        self.shared.lock().unwrap().lie = lie;
+    }
+
+    /// Wait until the robot has been told to move for `span`.
+    fn wait_until_moving(&self, run: &mut Run, span: Duration) {
+        run.wait_until("it moves", |_| self.moved_for() > span);
+    }
+
+    /// From the first command that moved to the last.
+    fn moved_for(&self) -> Duration {
+        let shared = self.shared.lock().unwrap();
+        match (shared.first_motion, shared.last_motion) {
+            (Some(first), Some(last)) => last - first,
+            _ => Duration::ZERO,
+        }
+    }
+}
+
+impl Drop for Liar {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    fn pass_to_robot(&mut self, decoder: &mut Decoder) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        for command in self.inject.drain(..) {
+            command.encode(Addressing::default(), &mut bytes);
+        }
+        while let Some(frame) = decoder.next_frame() {
+            let Ok(mut command) = Command::parse(&frame) else {
+                continue;
+            };
+            if let Command::Motion(motion) = &mut command {
+                let moves = moves(motion);
+                if moves {
+                    let now = Instant::now();
+                    self.first_motion.get_or_insert(now);
+                    self.last_motion = Some(now);
+                }
+                if self.lie == Lie::IgnoresZero && motion.quantity == Quantity::Velocity {
+                    motion.limit_ms = None;
+                    if !moves {
+                        continue;
+                    }
+                }
+            }
+            command.encode(Addressing::default(), &mut bytes);
+        }
+        bytes
+    }
+
+    fn pass_to_host(&mut self, decoder: &mut Decoder) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while let Some(frame) = decoder.next_frame() {
+            let Ok(mut report) = Report::parse(&frame) else {
+                continue;
+            };
+            match &mut report {
+                Report::Motor(sensors) => self.distort(sensors),
+                Report::Standard(sensors) if self.lie == Lie::NoSonar => {
+                    sensors.ultrasonic[1] = 0;
+                }
+                _ => {}
+            }
+            report.encode(Addressing::default(), &mut bytes);
+        }
+        bytes
+    }
+
+    fn distort(&mut self, sensors: &mut MotorSensors) {
+        self.frames = self.frames.wrapping_add(1);
+        let frames = self.frames;
+        let [left, right] = &mut sensors.encoders;
+        match self.lie {
+            Lie::None | Lie::NoSonar | Lie::IgnoresZero => {}
+            Lie::SameFrame => *sensors = MotorSensors::default(),
+            Lie::DeadEncoder => right.position = 0,
+            Lie::Reversed => {
+                for encoder in [left, right] {
+                    encoder.position = (32_768 - encoder.position) % 32_768;
+                }
+            }
+            Lie::Random => {
+                left.position = frames.wrapping_mul(9973) % 32_768;
+                right.position = frames.wrapping_mul(20_011) % 32_768;
+            }
+            // 7 frames a second.
+            Lie::RollsOn => right.position = frames.wrapping_mul(80) % 32_768,
+        }
+    }
+}
+
+fn moves(motion: &Motion) -> bool {
+    let turns = |channel| motion.targets.of(channel).is_some_and(|speed| speed != 0);
+    motion.quantity == Quantity::Velocity && (turns(0) || turns(1))
+}
+
+/// A run of the default mission on the wall clock whose robot lies from the beginning.
+fn lying(robot: &str, lie: Lie) -> (Robot, Liar, Run) {
+    let body = Robot::start();
+    let liar = Liar::before(&body, lie);
+    let address = format!("robot.address=\"udp://{}\"", liar.address);
+    let run = Run::start(robot, "obstacle-course", &["--set", &address]);
+    (body, liar, run)
+}
+
+fn cause_is(cause: &'static str) -> impl Fn(&Value) -> bool {
+    move |status| status["link"]["cause"] == cause
+}
+
+#[test]
+fn a_robot_whose_encoders_cannot_be_true_stands_within_1_5_s_and_its_mission_ends_with_the_reason()
+{
+    for lie in [Lie::SameFrame, Lie::DeadEncoder, Lie::Reversed, Lie::Random] {
+        let (_body, liar, mut run) = lying("liar", lie);
+        run.wait_until("it is doubted", cause_is("odometry implausible"));
+        let moved = liar.moved_for();
+        println!("{lie:?}: told to move for {} ms", moved.as_millis());
+        assert!(moved < BOUND, "{lie:?}: {moved:?}");
+        let directory = run.directory();
+        let (code, summary, kept) = run.finish_in();
+        assert_eq!(liar.moved_for(), moved, "{lie:?}: it never moved again");
+        assert_eq!(
+            (code, &summary["outcome"]),
+            (Some(6), &"aborted".into()),
+            "{summary}"
+        );
+        let reason = summary["reason"].as_str().unwrap();
+        assert!(reason.contains("odometry implausible"), "{reason}");
+        let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
+        assert!(log.contains("odometry implausible"), "{log}");
+        drop(kept);
+        assert_nothing_left("liar");
+    }
+}
+
+#[test]
+fn an_operators_stop_fails_until_the_encoders_say_that_the_robot_rests() {
+    let (_body, liar, mut run) = lying("liar-stop", Lie::None);
+    liar.wait_until_moving(&mut run, Duration::from_millis(500));
+    liar.lie(Lie::RollsOn);
+    let refused = output(&["stop", "--robot", "liar-stop"]);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success(), "{refused:?}");
+    assert!(said.contains("robot does not obey: it moves"), "{said}");
+    let status = run.wait_until("status says so", cause_is("robot does not obey"));
+    assert_eq!(status["link"]["at_rest"], false, "{status}");
+    liar.lie(Lie::None);
+    run.wait_until("it rests", |status| status["link"]["at_rest"] == true);
+    operate("liar-stop", &["stop"]);
+    run.signal(Signal::TERM);
+    run.finish();
+    assert_nothing_left("liar-stop");
+}
+
+#[test]
+fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
+    let (_body, liar, mut run) = lying("liar-zero", Lie::None);
+    liar.wait_until_moving(&mut run, Duration::from_millis(500));
+    liar.lie(Lie::IgnoresZero);
+    // A command without its time limit has passed.
+    let moved = liar.moved_for();
+    liar.wait_until_moving(&mut run, moved + Duration::from_millis(200));
+    // It fails unless the robot rests.
+    operate("liar-zero", &["stop"]);
+    let log = std::fs::read_to_string(run.directory().join("x80-link.log")).unwrap();
+    assert!(
+        log.contains("robot does not obey") && log.contains("disable"),
+        "{log}"
+    );
+    liar.lie(Lie::None);
+    operate("liar-zero", &["resume"]);
+    run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
+    run.signal(Signal::TERM);
+    run.finish();
+    assert_nothing_left("liar-zero");
+}
+
+#[test]
+fn without_its_front_sonar_the_robot_stands_and_goes_on_when_it_is_back() {
+    let (_body, liar, mut run) = lying("liar-sonar", Lie::None);
+    run.wait_until_under_way(0.5);
+    liar.lie(Lie::NoSonar);
+    run.wait_until("it stands", cause_is("front sonar silent"));
+    liar.lie(Lie::None);
+    run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
+    run.signal(Signal::TERM);
+    run.finish();
+    assert_nothing_left("liar-sonar");
+}
+
+#[test]
+fn streams_that_stop_while_the_robot_answers_are_asked_for_again_and_the_mission_goes_on() {
+    let (_body, liar, mut run) = lying("liar-mute", Lie::None);
+    run.wait_until_under_way(0.5);
+    liar.shared.lock().unwrap().inject.push(Command::Stream {
+        stream: Stream::All,
+        request: Request::Stop,
+    });
+    let log = run.directory().join("x80-link.log");
+    run.wait_until("they are asked for", |_| {
+        let log = std::fs::read_to_string(&log).unwrap_or_default();
+        log.contains("asked for its streams again")
+    });
+    run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
+    run.signal(Signal::TERM);
+    run.finish();
+    assert_nothing_left("liar-mute");
+}
