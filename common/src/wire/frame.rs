@@ -52,6 +52,12 @@ impl Addressing {
         }
     }
 
+    /// Whether `rid` is the multimedia board's: it acknowledges, and neither moves nor measures.
+    #[must_use]
+    pub const fn is_multimedia(rid: u8) -> bool {
+        rid == 0x08
+    }
+
     /// The form of a frame addressed to a host; none if `rid` is not a host's.
     #[must_use]
     pub const fn of_host(rid: u8) -> Option<Self> {

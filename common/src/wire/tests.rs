@@ -123,6 +123,7 @@ fn a_single_channel_is_set_with_and_without_time() {
     };
     assert_eq!(parsed(3, &[1, 0xfe, 0xff]), meant(None));
     assert_eq!(parsed(3, &[1, 0xfe, 0xff, 28, 10, 1]), meant(Some(266)));
+    assert_eq!(parsed(3, &[1, 0xfe, 0xff, 10, 1]), meant(Some(266)));
 }
 
 #[test]

@@ -12,8 +12,12 @@ use crate::noise::Noise;
 
 /// Pulse width at which a wheel stands.
 const PWM_STOP: f64 = 16_383.5;
+/// Pulse widths so near to that turn no wheel: a client that drives by them adds as much.
+const PWM_DEAD_BAND: f64 = 8000.0;
 /// Speed per count of position error, 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
+/// A wheel this near to the position it was ordered to is there, counts.
+const POSITION_REACHED: f64 = 0.5;
 /// Below this friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
 /// starting is friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
@@ -192,7 +196,14 @@ impl Motor {
     /// wheel.
     pub fn step(&mut self, now: f64, dt: f64, noise: &mut Noise) -> f64 {
         if self.ends_at().is_some_and(|end| now >= end) {
-            self.order = None;
+            // The time of a position is how long the way takes; the wheel goes on to its last count.
+            self.order = self
+                .order
+                .filter(|order| order.quantity == Quantity::Position)
+                .map(|order| Order {
+                    until: None,
+                    ..order
+                });
         }
         let wanted = self.wanted(now);
         if self.pending.back().map_or(self.target, |last| last.1) != wanted {
@@ -250,20 +261,19 @@ impl Motor {
             Quantity::Velocity => value * self.physics.gain,
             Quantity::Pwm => {
                 let duty = value - PWM_STOP;
-                if duty.abs() < 1.0 {
-                    0.0
-                } else {
-                    duty / PWM_STOP * self.top_speed
-                }
+                let beyond = (duty.abs() - PWM_DEAD_BAND).max(0.0);
+                (beyond / (PWM_STOP - PWM_DEAD_BAND) * self.top_speed).copysign(duty)
             }
             Quantity::Position => {
                 let cycle = f64::from(COUNT_CYCLE);
                 let way = (value - self.turned).rem_euclid(cycle);
                 let way = if way > cycle / 2.0 { way - cycle } else { way };
-                match order.until {
-                    Some(end) => way / (end - now).max(1.0 / POSITION_GAIN),
-                    None => way * POSITION_GAIN,
-                }
+                let left = order.until.map_or(0.0, |end| end - now);
+                let asked = way / left.max(1.0 / POSITION_GAIN);
+                // The loop pushes until the wheel is there: no dead band is left over.
+                let least = self.physics.dead_band_counts;
+                let there = way.abs() < POSITION_REACHED;
+                if there { 0.0 } else { asked.abs().max(least).copysign(way) }
             }
         };
         if asked.abs() < self.physics.dead_band_counts {

@@ -213,7 +213,7 @@ impl Robot {
         match Command::parse(frame) {
             Ok(Command::System(SystemSignal::Ack)) => Heard::Ack,
             Ok(Command::System(SystemSignal::Ping)) => Heard::Ping,
-            Ok(Command::Motion(_)) => Heard::Motion,
+            Ok(Command::Motion(_)) if !Addressing::is_multimedia(frame.rid) => Heard::Motion,
             Ok(_) | Err(_) => Heard::Other,
         }
     }
@@ -230,7 +230,9 @@ impl Robot {
         if heard != Heard::Ack {
             Report::System(SystemSignal::Ack).encode(addressing, replies);
         }
-        if let Ok(command) = Command::parse(frame) {
+        if !Addressing::is_multimedia(frame.rid)
+            && let Ok(command) = Command::parse(frame)
+        {
             self.take(command);
         }
         heard
@@ -381,6 +383,7 @@ impl Robot {
             *encoder = sensors::encoder(&self.motors[channel], error);
         }
         self.motor.currents = sensors::currents(&self.motors);
+        self.motor.pots = [sensors::MIDDLE; 6];
         (self.standard, self.custom) =
             self.ranging
                 .measure(&self.world, &self.body, self.time, &self.physics);

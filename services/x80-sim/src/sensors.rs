@@ -19,9 +19,9 @@ use crate::{
 const SIDE_BEARING_DEG: f64 = 45.0;
 const SIDE_FORWARD_M: f64 = 0.194;
 /// A sensor that sees nothing out of the ordinary, AD counts.
-const MIDDLE: u16 = 2048;
-/// Supply of the AD converters, AD counts.
-const REFERENCE: u16 = 2730;
+pub const MIDDLE: u16 = 2048;
+/// Supply of the AD converters, AD counts: drivers convert with it.
+const REFERENCE: u16 = 2048;
 /// Motor current of a standing motor, and for each count per second, AD counts.
 const CURRENT: (f64, f64) = (20.0, 0.2);
 

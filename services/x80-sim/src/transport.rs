@@ -41,6 +41,19 @@ impl Way {
         }
     }
 
+    /// Who is there without having sent anything: a host that is connected, or whoever has the line.
+    pub(crate) fn connected(&mut self) -> Result<Option<Source>, SimError> {
+        let connected = match self {
+            Self::Udp(_) => Ok(None),
+            Self::Tcp(tcp) => tcp.connected(),
+            Self::Pty(_) => Ok(Some(Source::Line)),
+        };
+        connected.map_err(|source| SimError::Lost {
+            address: self.address(),
+            source,
+        })
+    }
+
     /// Where it listens: `address:port`, or the path of the line.
     pub(crate) fn address(&self) -> String {
         match self {

@@ -117,6 +117,39 @@ fn at_a_rate_frames_come_unasked_and_truth_goes_with_them() {
     assert!(sim.stop().is_ok());
 }
 
+/// The sensor frames that come without a word from the host.
+fn listen_only(mut line: impl std::io::Read) {
+    let mut decoder = Decoder::default();
+    let (mut motor, mut standard) = (0, 0);
+    while motor < 3 || standard < 3 {
+        let mut bytes = [0; 512];
+        let length = line.read(&mut bytes).expect("frames come unasked");
+        assert!(length > 0, "the robot hung up");
+        decoder.push(&bytes[..length]);
+        while let Some(frame) = decoder.next_frame() {
+            match Report::parse(&frame) {
+                Ok(Report::Motor(_)) => motor += 1,
+                Ok(Report::Standard(_)) => standard += 1,
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn a_client_that_only_listens_hears_the_streams_over_tcp() {
+    let sim = Sim::start_on("robot.rate_hz = 20", Pace::Rate(5.0), Transport::Tcp);
+    let line = std::net::TcpStream::connect(&sim.listening).unwrap();
+    line.set_read_timeout(Some(support::PATIENCE)).unwrap();
+    listen_only(line);
+}
+
+#[test]
+fn a_client_that_only_listens_hears_the_streams_on_a_serial_line() {
+    let sim = Sim::start_on("robot.rate_hz = 20", Pace::Rate(5.0), Transport::Pty);
+    listen_only(std::fs::File::open(&sim.listening).unwrap());
+}
+
 #[test]
 fn the_stream_goes_to_whoever_spoke_last_and_noise_is_no_speech() {
     let sim = Sim::start("robot.rate_hz = 50", Pace::Rate(2.0));

@@ -71,10 +71,11 @@ fn one(frame: &Frame<'_>, quantity: Quantity) -> Result<Command, MessageError> {
     let did = frame.did;
     let (number, low, high, limit_ms) = match *frame.data {
         [number, low, high] => (number, low, high, None),
-        [number, low, high, _, first, second] => {
+        // One client leaves out the byte before the time.
+        [number, low, high, first, second] | [number, low, high, _, first, second] => {
             (number, low, high, Some(u16::from_le_bytes([first, second])))
         }
-        _ => return Err(length(did, frame.data, "3 or 6")),
+        _ => return Err(length(did, frame.data, "3, 5 or 6")),
     };
     let channel = channel(did, number)?;
     let targets = match target(low, high) {

@@ -106,10 +106,30 @@ fn a_position_is_reached_the_shorter_way_round_and_held() {
 }
 
 #[test]
-fn half_a_pulse_width_stands_and_a_full_one_is_top_speed() {
+fn a_timed_position_is_reached_to_the_last_count_by_a_measured_loop() {
+    let physics = WheelPhysics {
+        noise_counts: 0.0,
+        ..WheelPhysics::preset(Realism::Measured)
+    };
+    for way in [-700, 3, 1200] {
+        let mut motor = Motor::new(physics, 2000.0);
+        motor.order(Quantity::Position, way, Some(1.0));
+        run(&mut motor, 0.0, 4.0);
+        let off = motor.turned() - f64::from(way);
+        assert!(off.abs() < 1.5, "{way}: {off}");
+        assert_eq!(motor.speed(), 0.0, "{way}");
+    }
+}
+
+#[test]
+fn half_a_pulse_width_stands_a_full_one_is_top_speed_and_8000_about_the_half_move_nothing() {
     let mut motor = Motor::new(ideal(), 2000.0);
-    motor.order(Quantity::Pwm, 16_383, None);
-    assert_eq!(run(&mut motor, 0.0, 0.1)[19], 0.0);
+    for width in [16_383, 16_384 - 8000, 16_383 + 8000] {
+        motor.order(Quantity::Pwm, width, None);
+        assert_eq!(run(&mut motor, 0.0, 0.1)[19], 0.0, "{width}");
+    }
+    motor.order(Quantity::Pwm, 16_384 + 8100, None);
+    assert!(run(&mut motor, 0.0, 0.1)[19] > 0.0);
     motor.order(Quantity::Pwm, 32_767, None);
     assert!((run(&mut motor, 0.1, 0.1)[19] - 2000.0).abs() < 1e-6);
     motor.order(Quantity::Pwm, 0, None);

@@ -113,6 +113,28 @@ fn everything_but_an_acknowledgement_is_acknowledged() {
 }
 
 #[test]
+fn the_multimedia_board_acknowledges_and_moves_nothing() {
+    let mut robot = robot("");
+    let mut velocity = Vec::new();
+    Command::velocity([Some(400), Some(400)], None).encode(Addressing::Numbered, &mut velocity);
+    let frame = Frame {
+        rid: 8,
+        sn: 0,
+        did: velocity[4],
+        data: &velocity[6..18],
+    };
+    let mut replies = Vec::new();
+    assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Other);
+    assert_eq!(replies.len(), 10, "an acknowledgement");
+    robot.advance_to(1.0);
+    assert_eq!(robot.motor(0).map(Motor::turned), Some(0.0));
+    let frame = Frame { rid: 1, ..frame };
+    assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Motion);
+    robot.advance_to(2.0);
+    assert!(robot.motor(0).is_some_and(|motor| motor.turned() > 0.0));
+}
+
+#[test]
 fn one_is_answered_in_the_form_one_is_addressed_in() {
     let mut robot = robot("");
     let ping = Command::System(SystemSignal::Ping);

@@ -157,6 +157,7 @@ impl Session {
     /// Pass mission time to the next tick, write the ground truth of it, and send its frames.
     fn tick(&mut self) -> Result<(), SimError> {
         let frames = self.measured()?;
+        self.peer()?;
         self.send(&frames);
         Ok(())
     }
@@ -260,6 +261,14 @@ impl Session {
             }
         }
         Ok(())
+    }
+
+    /// The peer; a host that is connected and has not spoken yet is one.
+    fn peer(&mut self) -> Result<Option<Source>, SimError> {
+        if let Some(connected) = self.way.connected()? {
+            self.peer = Some(connected);
+        }
+        Ok(self.peer)
     }
 
     /// Send to the peer over the radio.

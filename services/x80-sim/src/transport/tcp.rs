@@ -59,6 +59,13 @@ impl Tcp {
         }
     }
 
+    /// The newest connection, while it is open.
+    pub(super) fn connected(&mut self) -> io::Result<Option<Source>> {
+        self.accept()?;
+        let open = self.connection.as_ref();
+        Ok(open.map(|_| Source::Connection(self.accepted)))
+    }
+
     fn accept(&mut self) -> io::Result<()> {
         match self.listener.accept() {
             Ok((connection, _)) => {
