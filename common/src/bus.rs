@@ -7,11 +7,13 @@
 //! | `topic` | what a table of topics is made of, and the services of one topic |
 //! | `make` | making and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files such processes leave |
+//! | `ownership` | whose the files are, and who may write them |
 //! | `write`, `read` | writers; readers and wakeups |
 //! | `error` | what can go wrong |
 //!
 //! Rules it follows, each found by experiment:
-//! - the domain's configuration is made the process-wide one before anything else is called;
+//! - a bus made anew has names of its own, and its configuration goes with the node: the process-wide one, which is set
+//!   once, is that of the first bus a process joins;
 //! - services are created by the supervisor alone ([`Bus::make`]) and opened by everyone else, so that no stage
 //!   killed while starting leaves one half made;
 //! - limits have slack, so authorship is checked here: readers drop samples of a writer's older generations;
@@ -20,6 +22,7 @@
 mod error;
 mod leftovers;
 mod make;
+mod ownership;
 mod payload;
 mod read;
 mod topic;
