@@ -4,6 +4,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `payload` | what may lie in shared memory, and the stamp that every sample begins with |
+//! | `layout` | how payloads lie in memory, for other languages |
 //! | `topic` | what a table of topics is made of, and the services of one topic |
 //! | `make` | making and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files such processes leave |
@@ -20,6 +21,7 @@
 //! - events only wake; data come from receiving until there is none.
 
 mod error;
+mod layout;
 mod leftovers;
 mod make;
 mod ownership;
@@ -28,8 +30,10 @@ mod read;
 mod topic;
 mod write;
 
+pub(crate) use self::layout::{kind_of, layouts};
 pub use self::{
     error::BusError,
+    layout::{Field, Kind, Layout, Structure},
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, ZeroCopySend},
     read::{Reader, Slice, SliceReader, Wakeup},

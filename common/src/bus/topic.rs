@@ -10,6 +10,7 @@ use iceoryx2::{
 
 use super::{
     error::{BusError, refused},
+    layout::{Kind, Layout},
     payload::{Payload, type_name},
 };
 
@@ -138,6 +139,8 @@ pub trait AnyTopic: Sync + CreateServices {
     fn spec(&self) -> &'static Spec;
     /// The name of its payload, for every language: a struct, or a header and a slice of elements.
     fn payload(&self) -> String;
+    /// What each sample is: a struct; or a header, and what a slice is made of.
+    fn layout(&self) -> (Kind, Option<Kind>);
     /// After how long its writer publishes it again when nothing changes; zero where the table does not say.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
@@ -163,13 +166,17 @@ pub trait CreateServices {
     fn create(&self, node: &BusNode) -> Result<Box<dyn Any>, BusError>;
 }
 
-impl<P: Payload> AnyTopic for Topic<P> {
+impl<P: Payload + Layout> AnyTopic for Topic<P> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
 
     fn payload(&self) -> String {
         type_name::<P>().to_owned()
+    }
+
+    fn layout(&self) -> (Kind, Option<Kind>) {
+        (P::kind(), None)
     }
 }
 
@@ -182,13 +189,17 @@ impl<P: Payload> CreateServices for Topic<P> {
     }
 }
 
-impl<H: Payload, T: Payload> AnyTopic for SliceTopic<H, T> {
+impl<H: Payload + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
 
     fn payload(&self) -> String {
         format!("{} + [{}]", type_name::<H>(), type_name::<T>())
+    }
+
+    fn layout(&self) -> (Kind, Option<Kind>) {
+        (H::kind(), Some(T::kind()))
     }
 }
 

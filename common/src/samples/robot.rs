@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::{Stamp, ZeroCopySend},
+    bus::{Stamp, ZeroCopySend, layouts},
     infrared, latency,
 };
 
@@ -259,4 +259,13 @@ pub struct SurroundingsSample {
     pub human_motion_ad: [u16; 2],
     /// Tilt along x and y, AD counts.
     pub tilt_ad: [u16; 2],
+}
+
+layouts! {
+    RangeSample { stamp range_m status raw_cm infrared_ad }
+    WheelSample { stamp left_counts right_counts left_counts_per_s right_counts_per_s restarts }
+    LinkSample { stamp connected action cause frames_in bytes_dropped foreign_datagrams unsent losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
+    InfraredSample { stamp range_m raw_ad }
+    PowerSample { stamp board_v motor_v servo_v driver_c current_ad board_low motor_low servo_low }
+    SurroundingsSample { stamp temperature_c human_alarm_ad human_motion_ad tilt_ad }
 }
