@@ -16,6 +16,7 @@ mod field;
 mod foreign_payload;
 mod kills;
 mod missions;
+mod neighbours;
 mod operators;
 mod planners;
 mod repeatability;

@@ -76,11 +76,22 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             }
             std::thread::park_timeout(left.min(LOOK_EVERY));
         }
-        let joined = self.joined.as_ref();
-        let came = joined.is_some_and(|joined| joined.waiter.wait(timeout).unwrap_or(false));
-        if !came && self.is_gone() {
-            self.joined = None;
-            return Ok(News::Gone);
+        let mut came = false;
+        loop {
+            let left = timeout.saturating_sub(began.elapsed());
+            if let Some(joined) = &self.joined {
+                came = joined.waiter.wait(left.min(LOOK_EVERY)).unwrap_or(false);
+            }
+            if came {
+                break;
+            }
+            if self.is_gone() {
+                self.joined = None;
+                return Ok(News::Gone);
+            }
+            if left.is_zero() {
+                break;
+            }
         }
         Ok(match &mut self.joined {
             Some(joined) if came => News::Samples(&mut joined.topics),

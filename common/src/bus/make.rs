@@ -32,6 +32,8 @@ use crate::{
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
+    /// The process that alone writes the supervisor's topics, of a stage; none of a consumer.
+    pub(super) supervisor: Option<u32>,
     making: Making,
 }
 
@@ -66,7 +68,8 @@ impl Bus {
             .create(making.root())
             .map_err(failed)?;
         Self::write_config(&making)?;
-        let bus = Self::join_making(making, name)?;
+        let mut bus = Self::join_making(making, name)?;
+        bus.supervisor = Some(std::process::id());
         let services = table
             .iter()
             .map(|topic| topic.create(&bus.node))
@@ -107,6 +110,18 @@ impl Bus {
         Self::join_making(making, name)
     }
 
+    /// Join as a stage that process `supervisor` supervises: what others write on the supervisor's topics is ignored,
+    /// and the places that consumers leave free may be taken.
+    ///
+    /// # Errors
+    /// As [`Bus::join`].
+    pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
+        Ok(Self {
+            supervisor: Some(supervisor),
+            ..Self::join(domain, name)?
+        })
+    }
+
     fn join_making(making: Making, name: &str) -> Result<Self, BusError> {
         // We report what the middleware reports; IOX2_LOG_LEVEL brings its own messages back.
         set_log_level_from_env_or(LogLevel::Fatal);
@@ -128,7 +143,11 @@ impl Bus {
             .map_err(|error| join(format!("{error:?}")))?;
         // One that is missing was made anew with the node.
         ownership::close_to_others(&making).map_err(failed)?;
-        Ok(Self { node, making })
+        Ok(Self {
+            node,
+            supervisor: None,
+            making,
+        })
     }
 
     /// Whether nothing is published on it any more: another bus has taken its place, of this run or of the robot's next,

@@ -128,6 +128,12 @@ pub struct LinkSample {
     pub foreign_datagrams: u64,
     /// Messages that could not be sent, lost.
     pub unsent: u64,
+    /// Commands and orders of processes that are neither the controller nor the supervisor, ignored.
+    pub ignored_samples: u64,
+    /// The process that wrote the last of them; 0 for none.
+    pub ignored_writer: u32,
+    /// Another port than the robot's, from which its host answered; 0 for none.
+    pub other_port: u32,
     /// Times the robot was lost.
     pub losses: u64,
     /// Times the robot was seen to have restarted its counts.
@@ -163,6 +169,9 @@ impl Default for LinkSample {
             bytes_dropped: 0,
             foreign_datagrams: 0,
             unsent: 0,
+            ignored_samples: 0,
+            ignored_writer: 0,
+            other_port: 0,
             losses: 0,
             reboots: 0,
             lost_ns: 0,
@@ -264,7 +273,7 @@ pub struct SurroundingsSample {
 layouts! {
     RangeSample { stamp range_m status raw_cm infrared_ad }
     WheelSample { stamp left_counts right_counts left_counts_per_s right_counts_per_s restarts }
-    LinkSample { stamp connected action cause frames_in bytes_dropped foreign_datagrams unsent losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
+    LinkSample { stamp connected action cause frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
     InfraredSample { stamp range_m raw_ad }
     PowerSample { stamp board_v motor_v servo_v driver_c current_ad board_low motor_low servo_low }
     SurroundingsSample { stamp temperature_c human_alarm_ad human_motion_ad tilt_ad }

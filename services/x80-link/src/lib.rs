@@ -10,6 +10,7 @@
 //! | [`restart`] | whether the robot restarted its counts |
 //! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
+//! | `writers` | whose commands and orders are obeyed |
 //! | [`shell`] | wires them to the topics |
 
 pub mod backoff;
@@ -21,3 +22,4 @@ pub mod shell;
 pub mod step;
 pub mod telemetry;
 pub mod transport;
+mod writers;

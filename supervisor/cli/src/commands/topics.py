@@ -10,8 +10,8 @@ class Follower:
     """Follows a robot from run to run.
 
     for news, samples in Follower("x80", ["pose", "grid"]): what came: "here", "gone", "nothing" (for a second),
-    or the name of a topic with one sample of it: its struct, or a header and a list-like slice. A sample is valid until
-    the next one is asked for.
+    or the name of a topic with one sample of it: its struct, or its header and an array. A sample is valid until the
+    next one is asked for.
     """
 
     def __init__(self, robot="x80", topics=("pose",), name="python"):
@@ -32,12 +32,15 @@ class Follower:
                 continue
             yield "here", None
             node, listener, subscribers = readers
+            quiet = 0
             while self._making() == making:
-                came = listener.timed_wait(self.iox2.Duration.from_secs(1))
+                came = listener.timed_wait(self.iox2.Duration.from_millis(200))
                 while came and listener.try_wait():
                     pass
                 yield from self._take(subscribers)
-                if not came:
+                quiet = 0 if came else quiet + 1
+                if quiet == 5:
+                    quiet = 0
                     if not self._supervised():
                         break
                     yield "nothing", None
@@ -60,9 +63,10 @@ class Follower:
                     break
                 if sliced:
                     slice = sample.payload()
-                    count = slice.len() // ctypes.sizeof(self.topics[topic][1])
-                    cells = slice.as_ptr()
-                    yield topic, (sample.user_header().contents, cells, count)
+                    element = self.topics[topic][1]
+                    count = slice.len() // ctypes.sizeof(element)
+                    elements = (element * count).from_address(slice.as_ptr())
+                    yield topic, (sample.user_header().contents, elements)
                 else:
                     yield topic, sample.payload().contents
                 del sample
@@ -95,7 +99,7 @@ class Follower:
         try:
             config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{making}"))
             builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
-            node = builder.signal_handling_mode(iox2.SignalHandlingMode.HandleTerminationRequests).create(iox2.ServiceType.Ipc)
+            node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
             subscribers = {}
             for topic, (payload, element) in self.topics.items():
                 service = node.service_builder(iox2.ServiceName.new(topic))
