@@ -193,7 +193,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
             signal_process(supervisor, Signal::TERM);
         }
         let began = Instant::now();
-        run.wait_for_end();
+        run.reap();
         let took = began.elapsed();
         println!("{robot}: ended {took:?} after SIGTERM");
         assert!(took < Duration::from_secs(4), "{robot}: {took:?}");

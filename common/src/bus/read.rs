@@ -100,10 +100,13 @@ impl Bus {
 
     fn authors(&self, spec: &Spec) -> Authors {
         let admitted = match self.supervisor {
-            Some(process) if spec.writer == SUPERVISOR => Admitted::One(Author {
-                process,
-                generation: 1,
-            }),
+            Some(process) if spec.writer == SUPERVISOR => Admitted::One(
+                Author {
+                    process,
+                    generation: 1,
+                },
+                None,
+            ),
             _ if spec.has_one_writer() => Admitted::Newest(0),
             _ => Admitted::All,
         };
@@ -139,8 +142,8 @@ enum Admitted {
     All,
     /// Of the newest generation that was seen.
     Newest(u32),
-    /// Of this one.
-    One(Author),
+    /// Of this one, and until something of it comes, of the one before.
+    One(Author, Option<Author>),
 }
 
 /// Whose samples a reader gives, and what it ignored.
@@ -160,8 +163,12 @@ impl Authors {
                 *newest = author.generation.max(*newest);
                 new
             }
-            Admitted::One(one) if *one == author => true,
-            Admitted::One(one) => {
+            Admitted::One(one, before) if *one == author => {
+                *before = None;
+                true
+            }
+            Admitted::One(_, Some(before)) if *before == author => true,
+            Admitted::One(one, _) => {
                 let superseded = author.generation < one.generation;
                 if one.process != 0 && one.process != author.process && !superseded {
                     self.ignored.samples += 1;
@@ -170,6 +177,15 @@ impl Authors {
                 false
             }
         }
+    }
+
+    const fn follow(&mut self, author: Author) {
+        let before = match self.admitted {
+            Admitted::One(one, _) if one.process == author.process => return,
+            Admitted::One(one, _) if one.process != 0 => Some(one),
+            _ => None,
+        };
+        self.admitted = Admitted::One(author, before);
     }
 }
 
@@ -203,9 +219,10 @@ impl<P: Payload + Stamped> Reader<P> {
         Ok(None)
     }
 
-    /// Give samples of `author` only, from now on; of nobody where its process is 0.
+    /// Give samples of `author` only, from now on; of nobody where its process is 0. Those of the author before are given
+    /// until one of this comes.
     pub const fn follow(&mut self, author: Author) {
-        self.authors.admitted = Admitted::One(author);
+        self.authors.follow(author);
     }
 
     /// What was ignored.
@@ -258,6 +275,11 @@ impl<H: Payload, T: Payload> Deref for Slice<H, T> {
 }
 
 impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
+    /// As [`Reader::follow`].
+    pub const fn follow(&mut self, author: Author) {
+        self.authors.follow(author);
+    }
+
     /// The next sample; as [`Reader::take`].
     ///
     /// # Errors
