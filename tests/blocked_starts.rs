@@ -8,19 +8,15 @@ use std::{
 };
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, in_own_process, pid,
+    PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, in_own_process, making, pid,
     signal_process,
 };
-use common::{bus::Bus, domain::Domain, topics};
+use common::{bus::Bus, making::Making, topics};
 use rustix::process::Signal;
 use serde_json::Value;
 
 /// Mission time runs so many times as fast as the wall's.
 const PACE: [&str; 2] = ["--pace", "4"];
-
-fn domain(robot: &str) -> Domain {
-    Domain::of(robot.parse().unwrap())
-}
 
 /// The process in a port's or a node's number.
 fn process_of(number: u128) -> u32 {
@@ -28,8 +24,8 @@ fn process_of(number: u128) -> u32 {
 }
 
 /// The directories of the node files of process `pid`.
-fn nodes_of(domain: &Domain, pid: u32) -> Vec<PathBuf> {
-    let nodes = fs::read_dir(domain.middleware_root().join("nodes")).unwrap();
+fn nodes_of(making: &Making, pid: u32) -> Vec<PathBuf> {
+    let nodes = fs::read_dir(making.root().join("nodes")).unwrap();
     let nodes = nodes.map(|entry| entry.unwrap().path()).filter(|path| {
         let name = path.file_name().unwrap().to_str().unwrap();
         name.parse().is_ok_and(|id| process_of(id) == pid)
@@ -38,17 +34,17 @@ fn nodes_of(domain: &Domain, pid: u32) -> Vec<PathBuf> {
 }
 
 /// The files in shared memory of `domain` that end so.
-fn shared(domain: &Domain, suffix: &str) -> Vec<String> {
+fn shared(making: &Making, suffix: &str) -> Vec<String> {
     let names = fs::read_dir("/dev/shm").unwrap().flatten();
     let names = names.filter_map(|entry| entry.file_name().into_string().ok());
     names
-        .filter(|name| name.starts_with(&domain.shared_memory_prefix()) && name.ends_with(suffix))
+        .filter(|name| name.starts_with(&making.shared_memory_prefix()) && name.ends_with(suffix))
         .collect()
 }
 
 /// A connection of port `port` to another, half made.
-fn half_make_connection(domain: &Domain, port: u128) {
-    let made = shared(domain, ".connection");
+fn half_make_connection(making: &Making, port: u128) {
+    let made = shared(making, ".connection");
     // Prefix and hash of the type: up to the first port's number.
     let start = made[0].rsplitn(3, '_').last().unwrap();
     half_make(Path::new(&format!(
@@ -84,14 +80,14 @@ fn assert_bus_was_recreated(summary: &Value) {
 fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
     let mut run = Run::start("block-own", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let domain = domain("block-own");
+    let making = making("block-own");
     let mapper = pid(&status, "mapper");
-    let ports = shared(&domain, ".data");
+    let ports = shared(&making, ".data");
     let port = ports.iter().find_map(|name| {
         let id = name.strip_suffix(".data")?.rsplit('_').next()?;
         id.parse().ok().filter(|id| process_of(*id) == mapper)
     });
-    half_make_connection(&domain, port.unwrap());
+    half_make_connection(&making, port.unwrap());
     let began = Instant::now();
     run.kill_and_await_successor("mapper", Signal::KILL);
     // Not after a start-up that was too late.
@@ -105,16 +101,16 @@ fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
 fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
     let mut run = Run::start("block-other", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let domain = domain("block-other");
+    let making = making("block-other");
     // Of the killed mapper, by its tags, but with a number that is not its own.
     let port = 7;
-    let node = nodes_of(&domain, pid(&status, "mapper")).remove(0);
-    let tag = format!("{}{port}.port_tag", domain.shared_memory_prefix());
+    let node = nodes_of(&making, pid(&status, "mapper")).remove(0);
+    let tag = format!("{}{port}.port_tag", making.shared_memory_prefix());
     fs::write(node.join(tag), "").unwrap();
-    half_make_connection(&domain, port);
+    half_make_connection(&making, port);
     run.kill_and_await_successor("mapper", Signal::KILL);
     let began = Instant::now();
-    while !shared(&domain, "_7.connection").is_empty() {
+    while !shared(&making, "_7.connection").is_empty() {
         assert!(began.elapsed() < PATIENCE, "it stays");
         run.status();
     }
@@ -128,7 +124,7 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
 fn a_half_made_service_blocks_starts_until_the_bus_is_recreated() {
     let mut run = Run::start("block-service", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let services = domain("block-service").middleware_root().join("services");
+    let services = making("block-service").root().join("services");
     for service in fs::read_dir(services).unwrap() {
         half_make(&service.unwrap().path());
     }
@@ -141,7 +137,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
     in_own_process(|| {
         let mut run = Run::start("block-places", "open-room", &PACE);
         let status = run.wait_until_under_way(1.0);
-        let bus = Bus::join(&domain("block-places"), "greedy").unwrap();
+        let bus = Bus::join(making("block-places").domain(), "greedy").unwrap();
         let mut places = Vec::new();
         let mut take_all = || {
             loop {
@@ -182,25 +178,25 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
 fn node_files_of_processes_that_ended_are_removed() {
     let mut run = Run::start("block-nodes", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let domain = domain("block-nodes");
+    let making = making("block-nodes");
     let mapper = pid(&status, "mapper");
-    let nodes = domain.middleware_root().join("nodes");
+    let nodes = making.root().join("nodes");
     // As left by hundreds of processes killed while they joined; of the number, the process alone counts.
     for counter in 1_000..1_300_u128 {
         let id = (counter << 96) | (u128::from(mapper) << 64);
         fs::create_dir(nodes.join(id.to_string())).unwrap();
-        let monitor = format!("{}{id}.node_monitor_context", domain.shared_memory_prefix());
+        let monitor = format!("{}{id}.node_monitor_context", making.shared_memory_prefix());
         fs::write(nodes.join(monitor), [0; 16]).unwrap();
     }
     let status = run.kill_and_await_successor("mapper", Signal::KILL);
     let running: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
     let began = Instant::now();
-    while !nodes_of(&domain, mapper).is_empty() {
+    while !nodes_of(&making, mapper).is_empty() {
         assert!(began.elapsed() < PATIENCE, "node files stay");
         run.status();
     }
     for pid in running {
-        assert_eq!(nodes_of(&domain, pid).len(), 1, "of a running process");
+        assert_eq!(nodes_of(&making, pid).len(), 1, "of a running process");
     }
     assert_arrives("block-nodes", run);
 }

@@ -1,11 +1,12 @@
 //! A consumer that comes late gets everything, and going away changes nothing.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
 use common::{
-    bus::Bus,
+    bus::{Bus, BusError},
     domain::Domain,
+    follower::{Follower, News},
     grid::{CellState, Replica},
     samples::FieldCell,
     topics,
@@ -110,5 +111,132 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
         let restarts = summary["restarts"].as_object().unwrap();
         assert!(restarts.values().all(|times| times == 0), "{summary}");
         assert_nothing_left("consumed");
+    });
+}
+
+/// Listen on every run of `robot` with a follower until it was gone so often; poses heard in each run.
+fn follow(robot: &str, runs: usize) -> Vec<usize> {
+    let domain = Domain::of(robot.parse().unwrap());
+    let mut follower = Follower::new(domain, "logger", &topics::POSE, |bus| {
+        Ok((bus.reader(&topics::POSE)?, bus.slice_reader(&topics::GRID)?))
+    });
+    let (mut heard, mut here) = (Vec::new(), false);
+    let began = Instant::now();
+    while heard.len() < runs || here {
+        assert!(began.elapsed() < support::PATIENCE, "{heard:?}");
+        match follower.wait(Duration::from_secs(1)).unwrap() {
+            News::Here => {
+                here = true;
+                heard.push(0);
+            }
+            News::Gone => here = false,
+            News::Nothing => {}
+            News::Samples((poses, grids)) => {
+                while poses.take().unwrap().is_some() {
+                    *heard.last_mut().unwrap() += 1;
+                }
+                while grids.take().unwrap().is_some() {}
+            }
+        }
+    }
+    heard
+}
+
+#[test]
+fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_none() {
+    in_own_process(|| {
+        let logger = std::thread::spawn(|| follow("followed", 5));
+        for run in 0..5 {
+            let mut started = Run::start("followed", "open-room", &["--pace", "4"]);
+            if run == 1 {
+                let status = started.wait_until_under_way(0.5);
+                let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
+                support::signal_process(supervisor, rustix::process::Signal::KILL);
+                started.reap();
+                // Its bus stays, until the next run removes it.
+                std::thread::park_timeout(Duration::from_secs(3));
+                continue;
+            }
+            let (code, summary) = started.finish();
+            assert_eq!(code, Some(0), "{summary}");
+            let restarts = summary["restarts"].as_object().unwrap();
+            assert!(restarts.values().all(|times| times == 0), "{summary}");
+            // So that it notices: a robot is not started twice in one second.
+            std::thread::park_timeout(Duration::from_secs(1));
+        }
+        let heard = logger.join().unwrap();
+        assert!(heard.iter().all(|&poses| poses > 5), "{heard:?}");
+        assert_nothing_left("followed");
+    });
+}
+
+#[test]
+fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
+    in_own_process(|| {
+        let mut run = Run::start("greedy", "open-room", &["--pace", "2"]);
+        run.wait_until_under_way(0.5);
+        let bus = Bus::join(&Domain::of("greedy".parse().unwrap()), "greedy").unwrap();
+        let mut grids = bus.slice_reader(&topics::GRID).unwrap();
+        let mut held = Vec::new();
+        let began = Instant::now();
+        let refused = loop {
+            match grids.take() {
+                Ok(sample) => held.extend(sample),
+                Err(error) => break error,
+            }
+            assert!(began.elapsed() < support::PATIENCE, "{} held", held.len());
+        };
+        assert!(
+            matches!(refused, BusError::HoldsTooMany { .. }),
+            "{refused}"
+        );
+        assert!(refused.to_string().contains("drop one"), "{refused}");
+        let mut readers = Vec::new();
+        let refused = loop {
+            match bus.reader(&topics::POSE) {
+                Ok(reader) => readers.push(reader),
+                Err(error) => break error,
+            }
+        };
+        assert!(matches!(refused, BusError::NoPlace { .. }), "{refused}");
+        // Who needs a place gets one.
+        for stage in ["mapper", "planner"] {
+            run.kill_and_await_successor(stage, rustix::process::Signal::KILL);
+        }
+        let (code, summary) = run.finish();
+        assert_eq!(code, Some(0), "{summary}");
+        for stage in ["mapper", "planner"] {
+            assert_eq!(summary["restarts"][stage], 1, "{summary}");
+        }
+        assert_eq!(summary["restarts"]["controller"], 0, "{summary}");
+        drop((held, readers, grids, bus));
+        assert_nothing_left("greedy");
+    });
+}
+
+#[test]
+fn poses_go_on_while_an_operators_stop_holds() {
+    in_own_process(|| {
+        let mut run = Run::start("held-poses", "open-room", &["--pace", "2"]);
+        run.wait_until_under_way(0.5);
+        let stopped = support::output(&["stop", "--robot", "held-poses"]);
+        assert!(stopped.status.success());
+        run.wait_until("it stands", |status| {
+            status["order"] == "stopped by an operator" && status["link"]["stopped"] == true
+        });
+        let heard = listen("held-poses", |heard| heard.poses.len() >= 40);
+        let [.., before, last] = &heard.poses[..] else {
+            panic!("{:?}", heard.poses)
+        };
+        assert_eq!(before.1, last.1, "it stands");
+        let resumed = support::output(&["resume", "--robot", "held-poses"]);
+        assert!(resumed.status.success());
+        let (code, summary) = run.finish();
+        assert_eq!(code, Some(0), "{summary}");
+        assert_eq!(
+            (&summary["replans"], &summary["resets"]),
+            (&0.into(), &0.into()),
+            "{summary}"
+        );
     });
 }

@@ -82,8 +82,7 @@ fn a_stage_killed_on_a_clock_of_ticks_does_not_hang_the_mission() {
 
 /// Names of the node files of `robot`'s bus, its nodes' directories among them.
 fn node_files(robot: &str) -> Vec<String> {
-    let user = rustix::process::geteuid().as_raw();
-    let nodes = format!("/dev/shm/fh{user}_{robot}_bus/nodes");
+    let nodes = support::making(robot).root().join("nodes");
     let entries = std::fs::read_dir(nodes).unwrap().flatten();
     entries
         .map(|entry| entry.file_name().into_string().unwrap())
@@ -103,10 +102,11 @@ fn what_a_stage_killed_in_its_start_left_on_the_bus_is_removed() {
     let id = node_files("leftovers").iter().find_map(own).unwrap();
     // A generation that was killed between making its node's directory and registering the node.
     let cut_off = (id + (1 << 96)).to_string();
-    let user = rustix::process::geteuid().as_raw();
-    let directory = format!("/dev/shm/fh{user}_leftovers_bus/nodes/{cut_off}");
+    let making = support::making("leftovers");
+    let directory = making.root().join("nodes").join(&cut_off);
     std::fs::create_dir(&directory).unwrap();
-    std::fs::write(format!("{directory}/fh{user}_leftovers_node.details"), "").unwrap();
+    let details = format!("{}node.details", making.shared_memory_prefix());
+    std::fs::write(directory.join(details), "").unwrap();
     run.kill_and_await_successor("mapper", Signal::KILL);
     run.wait_until("the node is removed", |_| {
         let left = node_files("leftovers");

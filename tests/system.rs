@@ -17,6 +17,7 @@ mod foreign_payload;
 mod kills;
 mod lying_robots;
 mod missions;
+mod neighbours;
 mod operators;
 mod planners;
 mod repeatability;

@@ -4,32 +4,43 @@
 //! | file | holds |
 //! |---|---|
 //! | `payload` | what may lie in shared memory, and the stamp that every sample begins with |
+//! | `layout` | how payloads lie in memory, for other languages |
+//! | `spec` | what a table of topics says of one topic |
 //! | `topic` | what a table of topics is made of, and the services of one topic |
 //! | `make` | making and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files such processes leave |
+//! | `ownership` | whose the files are, and who may write them |
 //! | `write`, `read` | writers; readers and wakeups |
 //! | `error` | what can go wrong |
 //!
 //! Rules it follows, each found by experiment:
-//! - the domain's configuration is made the process-wide one before anything else is called;
+//! - a bus made anew has names of its own, and its configuration goes with the node: the process-wide one, which is set
+//!   once, is that of the first bus a process joins;
 //! - services are created by the supervisor alone ([`Bus::make`]) and opened by everyone else, so that no stage
 //!   killed while starting leaves one half made;
-//! - limits have slack, so authorship is checked here: readers drop samples of a writer's older generations;
+//! - limits have slack, so authorship is checked here: readers drop samples of a writer's older generations, and of
+//!   processes that should not write;
 //! - events only wake; data come from receiving until there is none.
 
 mod error;
+mod layout;
 mod leftovers;
 mod make;
+mod ownership;
 mod payload;
 mod read;
+mod spec;
 mod topic;
 mod write;
 
+pub(crate) use self::layout::{kind_of, layouts};
 pub use self::{
     error::BusError,
+    layout::{Field, Kind, Layout, Structure},
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, ZeroCopySend},
-    read::{Reader, Slice, SliceReader, Wakeup},
-    topic::{AnyTopic, EVERY_STAGE, Limits, OPERATOR, Rate, SUPERVISOR, SliceTopic, Spec, Topic},
+    read::{Author, Ignored, Reader, Slice, SliceReader, Wakeup},
+    spec::{EVERY_STAGE, Limits, OPERATOR, Rate, SUPERVISOR, Spec},
+    topic::{AnyTopic, SliceTopic, Topic},
     write::{SliceWriter, Writer},
 };

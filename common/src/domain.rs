@@ -13,6 +13,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::lock_holders::holders;
+
 /// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
 /// Short, because Unix socket paths are; no `_`, because that ends the name in a shared memory prefix.
@@ -97,6 +99,18 @@ impl Domain {
         self.directory.join("lock")
     }
 
+    /// The process that supervises the robot: whoever holds the lock, whatever the file says. None if nobody does.
+    ///
+    /// # Errors
+    /// When the system does not say.
+    pub fn supervisor(&self) -> io::Result<Option<u32>> {
+        match File::open(self.lock_file()) {
+            Ok(lock) => Ok(holders(&lock)?.first().copied()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Locked, shared, by every stage as long as it runs: a new supervisor waits for the stages of the last one.
     #[must_use]
     pub fn stages_lock_file(&self) -> PathBuf {
@@ -119,29 +133,11 @@ impl Domain {
         self.directory.join("run")
     }
 
-    /// Under it lie the node and service files of the middleware: in memory, since it syncs each to the disk,
-    /// and a stage that starts makes twenty.
-    #[must_use]
-    pub fn middleware_root(&self) -> PathBuf {
-        Path::new(SHARED_MEMORY).join(self.shared_memory_prefix() + "bus")
-    }
-
-    /// Where that directory is moved to be removed.
-    #[must_use]
-    pub fn middleware_root_aside(&self) -> PathBuf {
-        Path::new(SHARED_MEMORY).join(self.shared_memory_prefix() + "bus.old")
-    }
-
-    /// The middleware's configuration: what a consumer in any language loads first.
+    /// The middleware's configuration: what a consumer in any language loads first. A link to that of the bus that is
+    /// there: see [`Making`](crate::making::Making).
     #[must_use]
     pub fn middleware_config(&self) -> PathBuf {
         self.directory.join("iceoryx2.toml")
-    }
-
-    /// The same while the bus is being made: nobody can join before it is complete.
-    #[must_use]
-    pub fn middleware_config_unfinished(&self) -> PathBuf {
-        self.directory.join("iceoryx2.toml.unfinished")
     }
 
     /// Starts the name of every file of this domain in [`SHARED_MEMORY`]. No other domain's prefix

@@ -20,7 +20,7 @@ use crate::{
     roster::Roster,
     run::{self, Run},
     samples::{Order, name_str},
-    start::{Generation, Joined, StageError, enter, name_process},
+    start::{Generation, Joined, StageError, enter, name_process, system},
 };
 
 /// The roster is published five times a second, and the place of a process that has ended is free in the next.
@@ -61,7 +61,9 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
     let domain = Domain::of(robot.clone());
     let (directory, stage_lock) = enter_run(&domain)?;
     let run = Run::load(&directory)?;
-    let bus = Bus::join(&domain, stage)?;
+    let supervisor = domain.supervisor().map_err(system("see who supervises"))?;
+    let supervisor = supervisor.ok_or_else(gone)?;
+    let bus = Bus::join_as_stage(&domain, stage, supervisor)?;
     let place = wait_for_place(&bus, stage)?;
     let number = run::next_generation(&directory, stage)?;
     let generation = Generation {
@@ -111,9 +113,12 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
     })
 }
 
+fn gone() -> StageError {
+    StageError::Other("the supervisor has ended".to_owned())
+}
+
 /// A descriptor that becomes readable when the supervisor ends. It published a moment ago: the number is still its own.
 fn watch(pid: u32) -> Result<OwnedFd, StageError> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
-    let gone = || StageError::Other("the supervisor has ended".to_owned());
     pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())
 }

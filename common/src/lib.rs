@@ -15,13 +15,16 @@
 //! | [`mission`] | the mission file, validated |
 //! | [`poll`] | waiting for descriptors |
 //! | [`signals`] | signals as something to wait for |
+//! | [`lock_holders`] | who holds a lock on a file |
 //! | [`domain`] | a robot's directory, locks and shared memory on this machine |
+//! | [`making`] | the names of one making of its bus |
 //! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
 //! | [`bus`] | writers, readers and wakeups; the one folder that names the middleware |
 //! | [`samples`] | the payloads of the topics |
 //! | [`topics`] | THE table of topics |
 //! | [`faults`] | THE table of what can be broken in a stage on purpose |
 //! | [`waiter`] | one wait for topics, sockets, signals, processes |
+//! | [`follower`] | a consumer that follows a robot from run to run |
 //! | [`run`] | what the supervisor gives the stages of a run |
 //! | [`start`] | how a stage's process takes its place in a run |
 //! | [`external`] | the same for a stage that the supervisor did not start |
@@ -36,6 +39,7 @@ pub mod clock;
 pub mod domain;
 pub mod external;
 pub mod faults;
+pub mod follower;
 pub mod geometry;
 pub mod grid;
 pub mod ground_truth;
@@ -43,6 +47,8 @@ pub mod infrared;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;
+pub mod lock_holders;
+pub mod making;
 pub mod mission;
 pub mod poll;
 pub mod process_status;

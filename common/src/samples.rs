@@ -11,6 +11,7 @@
 //! `robot`, `navigation` and `supervision` hold them; here is what they have in common.
 #![allow(unsafe_code)]
 
+use crate::bus::layouts;
 pub use crate::bus::{Stamp, Stamped};
 
 macro_rules! stamped {
@@ -49,6 +50,10 @@ macro_rules! wire_enum {
             }
         }
     };
+}
+
+layouts! {
+    Stamp { tick stamp_ns generation sequence }
 }
 
 // Below the macros they are written with.

@@ -101,7 +101,7 @@ pub(crate) fn join_as_child(
     let run = Run::load(&generation.directory)?;
     let domain = Domain::of(run.robot.clone());
     let stage_lock = enter(&domain)?;
-    let bus = Bus::join(&domain, generation.stage)?;
+    let bus = Bus::join_as_stage(&domain, generation.stage, supervisor)?;
     Ok(Joined {
         generation: generation.clone(),
         run,

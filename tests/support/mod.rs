@@ -16,11 +16,12 @@ use std::{
     time::{Duration, Instant},
 };
 
+use common::{domain::Domain, making::Making};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Run `test` in a process of its own, where it may join the bus of its robot: a process speaks to one robot.
+/// Run `test` in a process of its own: what it leaves behind of the bus of its robot ends with it.
 pub fn in_own_process<T: FnOnce()>(test: T) {
     // The closure's name is the test's, in its crate: CRATE::MODULE::TEST::{{closure}}.
     let (_, name) = std::any::type_name::<T>().split_once("::").unwrap();
@@ -245,6 +246,11 @@ pub fn half_make(path: &Path) {
     let file = fs::File::create(path).unwrap();
     file.set_permissions(fs::Permissions::from_mode(0o200))
         .unwrap();
+}
+
+/// The bus of `robot` that is there.
+pub fn making(robot: &str) -> Making {
+    Making::current(&Domain::of(robot.parse().unwrap())).unwrap()
 }
 
 /// `firsthand status --json`; none before the robot has a bus.

@@ -2,9 +2,13 @@
 
 use std::fmt::Debug;
 
-use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+use iceoryx2::{
+    port::{ReceiveError, subscriber::SubscriberCreateError},
+    service::builder::publish_subscribe::PublishSubscribeOpenError,
+};
 use thiserror::Error;
 
+use super::spec::Spec;
 use crate::domain::SHARED_MEMORY;
 
 /// What can go wrong between a process and shared memory.
@@ -27,6 +31,26 @@ pub enum BusError {
     Incompatible {
         /// The topic.
         topic: &'static str,
+    },
+    /// All places for readers that consumers may take are taken.
+    #[error(
+        "topic {topic:?} has places for {places} readers, and those for consumers are taken; end one that reads it, or read it once and share it"
+    )]
+    NoPlace {
+        /// The topic.
+        topic: &'static str,
+        /// How many there are, those of stages among them.
+        places: usize,
+    },
+    /// A reader holds as many samples as it may.
+    #[error(
+        "this reader holds {most} samples of topic {topic:?}, as many as one may; drop one before the next is taken (nobody waits for it: the oldest that is not taken is lost)"
+    )]
+    HoldsTooMany {
+        /// The topic.
+        topic: &'static str,
+        /// How many a reader may hold.
+        most: usize,
     },
     /// The middleware refused.
     #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, or the topic's last place taken?", shm = SHARED_MEMORY)]
@@ -59,6 +83,26 @@ pub(super) fn refused<E: Debug>(
         action,
         topic,
         detail: format!("{detail:?}"),
+    }
+}
+
+/// A reader was not admitted.
+pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusError {
+    let (topic, places) = (spec.name, spec.limits.readers);
+    move |error| match error {
+        SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+            BusError::NoPlace { topic, places }
+        }
+        other => refused("read", topic)(other),
+    }
+}
+
+/// A sample could not be taken.
+pub(super) fn taking(spec: &Spec) -> impl FnOnce(ReceiveError) -> BusError {
+    let (topic, most) = (spec.name, spec.limits.borrowed);
+    move |error| match error {
+        ReceiveError::ExceedsMaxBorrows => BusError::HoldsTooMany { topic, most },
+        other => refused("read", topic)(other),
     }
 }
 

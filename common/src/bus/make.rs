@@ -3,8 +3,9 @@
 use std::{
     any::Any,
     ffi::OsStr,
+    fs::DirBuilder,
     io,
-    os::unix::{ffi::OsStrExt as _, fs::MetadataExt as _},
+    os::unix::{ffi::OsStrExt as _, fs::DirBuilderExt as _},
     path::{Path, PathBuf},
 };
 
@@ -19,83 +20,70 @@ use iceoryx2::{
 
 use super::{
     error::BusError,
-    leftovers,
+    leftovers, ownership,
     topic::{AnyTopic, BusNode},
 };
-use crate::domain::{Domain, SHARED_MEMORY};
+use crate::{
+    domain::{Domain, SHARED_MEMORY},
+    making::Making,
+};
 
 /// A process's place on a robot's bus.
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
-    config: PathBuf,
-    identity: ConfigIdentity,
+    /// The process that alone writes the supervisor's topics, of a stage; none of a consumer.
+    pub(super) supervisor: Option<u32>,
+    making: Making,
 }
 
 /// The services of every topic, existing as long as this is held.
 pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
 
-/// Tells the configuration of one bus from that of the next in its place, which may get the file's number, but not
-/// its time too.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct ConfigIdentity {
-    file: u64,
-    seconds: i64,
-    nanoseconds: i64,
-}
-
-impl ConfigIdentity {
-    fn of(config: &Path) -> io::Result<Self> {
-        let file = config.metadata()?;
-        Ok(Self {
-            file: file.ino(),
-            seconds: file.mtime(),
-            nanoseconds: file.mtime_nsec(),
-        })
-    }
-}
-
-fn no_join(domain: &Domain) -> impl Fn(String) -> BusError {
+fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
+    let robot = domain.robot.to_string();
     move |detail| BusError::Join {
-        robot: domain.robot.to_string(),
+        robot: robot.clone(),
         detail,
     }
 }
 
 impl Bus {
     /// Make the bus of a robot: its configuration, which consumers in other languages load too, and the services of
-    /// every topic of `table`. Nobody can join before all are there. Only the supervisor calls this, when the robot
-    /// has no bus.
+    /// every topic of `table`. It takes the place of an earlier one; nobody can join it before all are there. Only the
+    /// supervisor calls this.
     ///
     /// # Errors
-    /// When a file cannot be written, a service exists already, or shared memory is full.
+    /// When a file cannot be written, or shared memory is full.
     pub fn make(
         domain: &Domain,
         name: &str,
         table: &[&dyn AnyTopic],
     ) -> Result<(Self, Services), BusError> {
-        let (unfinished, config) = (
-            domain.middleware_config_unfinished(),
-            domain.middleware_config(),
-        );
-        Self::write_config(domain, &unfinished)?;
-        let mut bus = Self::join_by(&unfinished, domain, name)?;
+        let failed = |error: io::Error| no_join(domain)(error.to_string());
+        let making = Making::new(domain);
+        // Not one that is there: another user may have made it.
+        DirBuilder::new()
+            .mode(0o700)
+            .create(making.root())
+            .map_err(failed)?;
+        Self::write_config(&making)?;
+        let mut bus = Self::join_making(making, name)?;
+        bus.supervisor = Some(std::process::id());
         let services = table
             .iter()
             .map(|topic| topic.create(&bus.node))
             .collect::<Result<_, _>>()?;
-        let failed = |error: io::Error| no_join(domain)(error.to_string());
         leftovers::back_up(&bus.services(), &bus.backup()).map_err(failed)?;
-        std::fs::rename(&unfinished, &config).map_err(failed)?;
-        bus.config = config;
+        bus.making.make_current().map_err(failed)?;
         Ok((bus, Services(services)))
     }
 
-    fn write_config(domain: &Domain, file: &Path) -> Result<(), BusError> {
-        let failed = no_join(domain);
+    fn write_config(making: &Making) -> Result<(), BusError> {
+        let failed = no_join(making.domain());
         let mut config = Config::default();
-        let root = domain.middleware_root();
-        let prefix = domain.shared_memory_prefix();
+        let root = making.root();
+        let prefix = making.shared_memory_prefix();
         let path = SemanticString::new(root.as_os_str().as_encoded_bytes())
             .map_err(|error| failed(format!("{error:?} in {root:?}")))?;
         config.global.set_root_path(&path);
@@ -106,55 +94,67 @@ impl Bus {
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
-        std::fs::write(file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
+        let file = making.config();
+        std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
     /// Join the bus of a robot under a name that `iox2 node list` shows.
     ///
-    /// The first call decides the process's domain: a process joins the bus of one robot only.
-    ///
     /// # Errors
     /// When the robot does not run here, is another user's, or shared memory is full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
-        Self::join_by(&domain.middleware_config(), domain, name)
+        let making = Making::current(domain).map_err(|error| BusError::NotRunning {
+            robot: domain.robot.to_string(),
+            detail: format!("{}: {error}", domain.middleware_config().display()),
+        })?;
+        Self::join_making(making, name)
     }
 
-    fn join_by(file: &Path, domain: &Domain, name: &str) -> Result<Self, BusError> {
+    /// Join as a stage that process `supervisor` supervises: what others write on the supervisor's topics is ignored,
+    /// and the places that consumers leave free may be taken.
+    ///
+    /// # Errors
+    /// As [`Bus::join`].
+    pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
+        Ok(Self {
+            supervisor: Some(supervisor),
+            ..Self::join(domain, name)?
+        })
+    }
+
+    fn join_making(making: Making, name: &str) -> Result<Self, BusError> {
         // We report what the middleware reports; IOX2_LOG_LEVEL brings its own messages back.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let join = no_join(domain);
-        // Before the file is read: if it is replaced meanwhile, `is_replaced` says so.
-        let identity = ConfigIdentity::of(file).map_err(|error| BusError::NotRunning {
-            robot: domain.robot.to_string(),
-            detail: format!("{}: {error}", file.display()),
-        })?;
+        let join = no_join(making.domain());
+        let failed = |error: io::Error| join(error.to_string());
+        ownership::check(&making).map_err(failed)?;
+        let file = making.config();
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
-        let config = Config::setup_global_config_from_file(&path)
-            .map_err(|error| join(format!("{error:?}")))?;
-        if config.global.prefix.as_bytes() != domain.shared_memory_prefix().as_bytes() {
-            return Err(join(
-                "this process has joined the bus of another robot already".to_owned(),
-            ));
-        }
+        // Where a node names none: what killed processes left is then looked for in the first bus.
+        Config::setup_global_config_from_file(&path).map_err(|error| join(format!("{error:?}")))?;
+        let config = Config::from_file(&path).map_err(|error| join(format!("{error:?}")))?;
         let name = NodeName::new(name).map_err(|error| join(format!("{error:?}")))?;
         let node = NodeBuilder::new()
+            .config(&config)
             .name(&name)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| join(format!("{error:?}")))?;
+        // One that is missing was made anew with the node.
+        ownership::close_to_others(&making).map_err(failed)?;
         Ok(Self {
             node,
-            config: file.to_owned(),
-            identity,
+            supervisor: None,
+            making,
         })
     }
 
-    /// Whether another bus has taken its place, of this run or of the robot's next: nothing is published on this one
-    /// any more. A consumer drops everything it has of it, and joins again.
+    /// Whether nothing is published on it any more: another bus has taken its place, of this run or of the robot's next,
+    /// or the robot's run has ended. A consumer drops everything it has of it, and joins again.
     #[must_use]
     pub fn is_replaced(&self) -> bool {
-        ConfigIdentity::of(&self.config).is_ok_and(|now| now != self.identity)
+        Making::current(self.making.domain()).map_or(true, |now| now != self.making)
     }
 
     /// Where the services' files are.

@@ -11,16 +11,20 @@ use std::{
 };
 
 use iceoryx2::{
+    identifiers::UniquePublisherId,
     port::{listener::Listener, subscriber::Subscriber},
     prelude::{FileDescriptorBased, ipc},
     sample::Sample,
+    service::port_factory::PortFactory as _,
 };
 
 use super::{
-    error::{BusError, opening, refused},
+    error::{BusError, opening, reading, refused, taking},
+    leftovers::process_of,
     make::Bus,
-    payload::{Payload, Stamped},
-    topic::{AnyTopic, SliceTopic, Spec, Topic, open_event, slice_service, struct_service},
+    payload::{Payload, Stamp, Stamped},
+    spec::{Limits, SUPERVISOR, Spec},
+    topic::{AnyTopic, SliceTopic, Topic, open_event, slice_service, struct_service},
 };
 
 impl Bus {
@@ -30,15 +34,18 @@ impl Bus {
     /// As [`Bus::writer`].
     pub fn reader<P: Payload + Stamped>(&self, topic: &Topic<P>) -> Result<Reader<P>, BusError> {
         let spec = topic.spec;
-        let subscriber = struct_service::<P>(&self.node, spec)?
+        let service = struct_service::<P>(&self.node, spec)?
             .open()
-            .map_err(opening(spec.name))?
+            .map_err(opening(spec.name))?;
+        self.leave_places(spec, service.dynamic_config().number_of_subscribers())?;
+        let subscriber = service
             .subscriber_builder()
             .create()
-            .map_err(refused("read", spec.name))?;
+            .map_err(reading(spec))?;
         Ok(Reader {
             subscriber,
-            authorship: Authorship::of(spec),
+            authors: self.authors(spec),
+            spec,
         })
     }
 
@@ -51,15 +58,18 @@ impl Bus {
         topic: &SliceTopic<H, T>,
     ) -> Result<SliceReader<H, T>, BusError> {
         let spec = topic.spec;
-        let subscriber = slice_service::<H, T>(&self.node, spec)?
+        let service = slice_service::<H, T>(&self.node, spec)?
             .open()
-            .map_err(opening(spec.name))?
+            .map_err(opening(spec.name))?;
+        self.leave_places(spec, service.dynamic_config().number_of_subscribers())?;
+        let subscriber = service
             .subscriber_builder()
             .create()
-            .map_err(refused("read", spec.name))?;
+            .map_err(reading(spec))?;
         Ok(SliceReader {
             subscriber,
-            authorship: Authorship::of(spec),
+            authors: self.authors(spec),
+            spec,
         })
     }
 
@@ -69,38 +79,121 @@ impl Bus {
     /// When the topic is missing or has no place left.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
         let spec = topic.spec();
-        open_event(&self.node, spec)?
+        let service = open_event(&self.node, spec)?;
+        self.leave_places(spec, service.dynamic_config().number_of_listeners())?;
+        service
             .listener_builder()
             .create()
             .map(|listener| Wakeup { listener })
             .map_err(refused("listen to", spec.name))
     }
+
+    /// A consumer takes no place that a stage may need.
+    fn leave_places(&self, spec: &Spec, taken: usize) -> Result<(), BusError> {
+        let places = spec.limits.readers;
+        if self.supervisor.is_none() && taken + Limits::KEPT_FREE >= places {
+            let topic = spec.name;
+            return Err(BusError::NoPlace { topic, places });
+        }
+        Ok(())
+    }
+
+    fn authors(&self, spec: &Spec) -> Authors {
+        let admitted = match self.supervisor {
+            Some(process) if spec.writer == SUPERVISOR => Admitted::One(
+                Author {
+                    process,
+                    generation: 1,
+                },
+                None,
+            ),
+            _ if spec.has_one_writer() => Admitted::Newest(0),
+            _ => Admitted::All,
+        };
+        Authors {
+            admitted,
+            ignored: Ignored::default(),
+        }
+    }
 }
 
-/// Which generation of the writer a reader listens to.
+/// A process that writes a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Author {
+    /// Its number.
+    pub process: u32,
+    /// The generation it stamps.
+    pub generation: u32,
+}
+
+/// Samples of processes that should not write.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ignored {
+    /// So many.
+    pub samples: u64,
+    /// The process that wrote the last one; 0 for none.
+    pub process: u32,
+}
+
+/// Whose samples a reader gives.
 #[derive(Debug)]
-struct Authorship {
-    /// None where more than one process writes at a time.
-    newest: Option<u32>,
+enum Admitted {
+    /// More than one process writes at a time.
+    All,
+    /// Of the newest generation that was seen.
+    Newest(u32),
+    /// Of this one, and until something of it comes, of the one before.
+    One(Author, Option<Author>),
 }
 
-impl Authorship {
-    fn of(spec: &Spec) -> Self {
-        Self {
-            newest: spec.has_one_writer().then_some(0),
+/// Whose samples a reader gives, and what it ignored.
+#[derive(Debug)]
+struct Authors {
+    admitted: Admitted,
+    ignored: Ignored,
+}
+
+impl Authors {
+    /// Whether a sample of `author` is given. Samples of older generations are dropped: their process has ended.
+    fn admits(&mut self, author: Author) -> bool {
+        match &mut self.admitted {
+            Admitted::All => true,
+            Admitted::Newest(newest) => {
+                let new = author.generation >= *newest;
+                *newest = author.generation.max(*newest);
+                new
+            }
+            Admitted::One(one, before) if *one == author => {
+                *before = None;
+                true
+            }
+            Admitted::One(_, Some(before)) if *before == author => true,
+            Admitted::One(one, _) => {
+                let superseded = author.generation < one.generation;
+                if one.process != 0 && one.process != author.process && !superseded {
+                    self.ignored.samples += 1;
+                    self.ignored.process = author.process;
+                }
+                false
+            }
         }
     }
 
-    /// Whether no newer generation than `generation` was seen: samples of older ones are dropped.
-    fn admits(&mut self, generation: u32) -> bool {
-        match &mut self.newest {
-            Some(newest) if generation < *newest => false,
-            Some(newest) => {
-                *newest = generation;
-                true
-            }
-            None => true,
-        }
+    const fn follow(&mut self, author: Author) {
+        let before = match self.admitted {
+            Admitted::One(one, _) if one.process == author.process => return,
+            Admitted::One(one, _) if one.process != 0 => Some(one),
+            _ => None,
+        };
+        self.admitted = Admitted::One(author, before);
+    }
+}
+
+/// The process of a sample is in the number of the port that it was written with.
+fn author(port: UniquePublisherId, stamp: &Stamp) -> Author {
+    Author {
+        process: process_of(port.value()),
+        generation: stamp.generation,
     }
 }
 
@@ -108,7 +201,8 @@ impl Authorship {
 #[derive(Debug)]
 pub struct Reader<P: Payload> {
     subscriber: Subscriber<ipc::Service, P, ()>,
-    authorship: Authorship,
+    authors: Authors,
+    spec: &'static Spec,
 }
 
 impl<P: Payload + Stamped> Reader<P> {
@@ -117,16 +211,24 @@ impl<P: Payload + Stamped> Reader<P> {
     /// # Errors
     /// When a connection to the writer broke.
     pub fn take(&mut self) -> Result<Option<P>, BusError> {
-        while let Some(sample) = self
-            .subscriber
-            .receive()
-            .map_err(refused("read", "a topic"))?
-        {
-            if self.authorship.admits(sample.stamp().generation) {
+        while let Some(sample) = self.subscriber.receive().map_err(taking(self.spec))? {
+            if self.authors.admits(author(sample.origin(), sample.stamp())) {
                 return Ok(Some(*sample));
             }
         }
         Ok(None)
+    }
+
+    /// Give samples of `author` only, from now on; of nobody where its process is 0. Those of the author before are given
+    /// until one of this comes.
+    pub const fn follow(&mut self, author: Author) {
+        self.authors.follow(author);
+    }
+
+    /// What was ignored.
+    #[must_use]
+    pub const fn ignored(&self) -> Ignored {
+        self.authors.ignored
     }
 
     /// The newest sample; those before it are dropped.
@@ -146,7 +248,8 @@ impl<P: Payload + Stamped> Reader<P> {
 #[derive(Debug)]
 pub struct SliceReader<H: Payload, T: Payload> {
     subscriber: Subscriber<ipc::Service, [T], H>,
-    authorship: Authorship,
+    authors: Authors,
+    spec: &'static Spec,
 }
 
 /// A header with its slice, still in shared memory; the writer cannot reuse it while this is held.
@@ -172,19 +275,20 @@ impl<H: Payload, T: Payload> Deref for Slice<H, T> {
 }
 
 impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
+    /// As [`Reader::follow`].
+    pub const fn follow(&mut self, author: Author) {
+        self.authors.follow(author);
+    }
+
     /// The next sample; as [`Reader::take`].
     ///
     /// # Errors
     /// As [`Reader::take`].
     pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
-        while let Some(sample) = self
-            .subscriber
-            .receive()
-            .map_err(refused("read", "a topic"))?
-        {
+        while let Some(sample) = self.subscriber.receive().map_err(taking(self.spec))? {
             if self
-                .authorship
-                .admits(sample.user_header().stamp().generation)
+                .authors
+                .admits(author(sample.origin(), sample.user_header().stamp()))
             {
                 return Ok(Some(Slice { sample }));
             }

@@ -10,88 +10,10 @@ use iceoryx2::{
 
 use super::{
     error::{BusError, refused},
+    layout::{Kind, Layout},
     payload::{Payload, type_name},
+    spec::{Limits, Rate, Spec},
 };
-
-/// How often a topic is published.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rate {
-    /// Once a tick; again for a tick that the link repeats because no command came, and whole for a new reader
-    /// where readers only get changes.
-    EachTick,
-    /// After each frame of the robot that it is read from, driving or not: about once a tick, in a pause of the
-    /// other work. Of several frames between two pauses only the newest is published.
-    EachFrame,
-    /// At every change, and again when nothing changes, for readers that joined since. The writer looks at the clock
-    /// once in each turn of its work loop, so a long turn delays it.
-    OnChange {
-        /// Changes that follow each other sooner are published together; zero: each at once.
-        at_most_every: Duration,
-        /// How long after the last sample; after the last whole one, where samples carry changes.
-        again_after: Duration,
-    },
-    /// When something happened, once.
-    WhenItHappens,
-}
-
-/// What the table says of a topic.
-#[derive(Debug)]
-pub struct Spec {
-    /// Its name, and the name of its two services.
-    pub name: &'static str,
-    /// Who writes it: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
-    pub writer: &'static str,
-    /// How often.
-    pub rate: Rate,
-    /// Depth of history and buffers, number of readers.
-    pub limits: Limits,
-    /// What it means.
-    pub meaning: &'static str,
-}
-
-/// The writer named by topics that all stages write.
-pub const EVERY_STAGE: &str = "every stage";
-/// The writers that are no stage: whoever uses the command line, one process each time.
-pub const OPERATOR: &str = "operator";
-/// The writer that is no stage.
-pub const SUPERVISOR: &str = "supervisor";
-
-impl Spec {
-    /// Whether at most one process at a time writes it.
-    pub(super) fn has_one_writer(&self) -> bool {
-        ![EVERY_STAGE, OPERATOR].contains(&self.writer)
-    }
-}
-
-/// How much a topic holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Samples a reader that falls behind still gets; then the oldest are dropped.
-    pub buffer: usize,
-    /// Samples a reader may hold at once.
-    pub borrowed: usize,
-    /// Readers at once, dashboards and loggers among them.
-    pub readers: usize,
-}
-
-impl Limits {
-    /// For topics of one small struct.
-    pub const SMALL: Self = Self {
-        buffer: 128,
-        borrowed: 2,
-        readers: 16,
-    };
-    /// For slices of a whole map.
-    pub const MAP: Self = Self {
-        buffer: 4,
-        borrowed: 2,
-        readers: 12,
-    };
-    /// Writers at once. One is meant; a kill while starting can leak a place for good.
-    const WRITERS: usize = 16;
-    /// Processes at once on one topic.
-    const NODES: usize = 64;
-}
 
 /// A topic whose samples are one struct.
 #[derive(Debug)]
@@ -138,6 +60,8 @@ pub trait AnyTopic: Sync + CreateServices {
     fn spec(&self) -> &'static Spec;
     /// The name of its payload, for every language: a struct, or a header and a slice of elements.
     fn payload(&self) -> String;
+    /// What each sample is: a struct; or a header, and what a slice is made of.
+    fn layout(&self) -> (Kind, Option<Kind>);
     /// After how long its writer publishes it again when nothing changes; zero where the table does not say.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
@@ -163,13 +87,17 @@ pub trait CreateServices {
     fn create(&self, node: &BusNode) -> Result<Box<dyn Any>, BusError>;
 }
 
-impl<P: Payload> AnyTopic for Topic<P> {
+impl<P: Payload + Layout> AnyTopic for Topic<P> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
 
     fn payload(&self) -> String {
         type_name::<P>().to_owned()
+    }
+
+    fn layout(&self) -> (Kind, Option<Kind>) {
+        (P::kind(), None)
     }
 }
 
@@ -182,13 +110,17 @@ impl<P: Payload> CreateServices for Topic<P> {
     }
 }
 
-impl<H: Payload, T: Payload> AnyTopic for SliceTopic<H, T> {
+impl<H: Payload + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
 
     fn payload(&self) -> String {
         format!("{} + [{}]", type_name::<H>(), type_name::<T>())
+    }
+
+    fn layout(&self) -> (Kind, Option<Kind>) {
+        (H::kind(), Some(T::kind()))
     }
 }
 

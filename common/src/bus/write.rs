@@ -12,7 +12,8 @@ use super::{
     error::{BusError, opening, refused},
     make::Bus,
     payload::{Payload, Stamp, Stamped},
-    topic::{SliceTopic, Spec, Topic, open_event, slice_service, struct_service},
+    spec::Spec,
+    topic::{SliceTopic, Topic, open_event, slice_service, struct_service},
 };
 use crate::clock::MissionTime;
 

@@ -8,7 +8,7 @@
 use glam::DVec2;
 
 use super::frame::{GridFrame, Window};
-use crate::bus::ZeroCopySend;
+use crate::bus::{ZeroCopySend, layouts};
 
 /// How a map lies and which part of which version came along, as it lies in the headers of `grid` and `field`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -35,6 +35,10 @@ pub struct Part {
     pub centre_x_m: f64,
     /// Where cell (N/2, N/2) lies, metres.
     pub centre_y_m: f64,
+}
+
+layouts! {
+    Part { version cells col row width height keyframe resolution_m centre_x_m centre_y_m }
 }
 
 impl Part {

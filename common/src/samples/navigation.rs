@@ -4,7 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::{Stamp, ZeroCopySend},
+    bus::{Stamp, ZeroCopySend, layouts},
     grid::Part,
     infrared,
     kinematics::{Pose2, Twist},
@@ -299,4 +299,14 @@ pub struct CommandSample {
     pub guidance_ns: u64,
     /// A [`CommandState`].
     pub state: u8,
+}
+
+layouts! {
+    PoseSample { stamp x_m y_m heading_rad v_m_s omega_rad_s travelled_m covariance left_counts right_counts }
+    ClearBeam { x_m y_m bearing_rad clear_m }
+    GridHeader { stamp part safety_events epoch clear_beam_count clear_beams clear_ray_count clear_rays }
+    GuidanceSample { stamp ex ey distance_m speed_limit_m_s status pose_ns x_m y_m heading_rad grid_version safety_events epoch full_solves local_updates full_solve_ns local_update_ns }
+    FieldHeader { stamp part grid_version target_x_m target_y_m worst_residual reachable }
+    FieldCell { ex ey log2_u }
+    CommandSample { stamp left_rad_s right_rad_s v_m_s omega_rad_s distance_m pose_ns guidance_ns state }
 }

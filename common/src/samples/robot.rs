@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::{Stamp, ZeroCopySend},
+    bus::{Stamp, ZeroCopySend, layouts},
     infrared, latency,
 };
 
@@ -142,6 +142,12 @@ pub struct LinkSample {
     pub foreign_datagrams: u64,
     /// Messages that could not be sent, lost.
     pub unsent: u64,
+    /// Commands and orders of processes that are neither the controller nor the supervisor, ignored.
+    pub ignored_samples: u64,
+    /// The process that wrote the last of them; 0 for none.
+    pub ignored_writer: u32,
+    /// Another port than the robot's, from which its host answered; 0 for none.
+    pub other_port: u32,
     /// Times the robot was lost.
     pub losses: u64,
     /// Times the robot was seen to have restarted its counts.
@@ -178,6 +184,9 @@ impl Default for LinkSample {
             bytes_dropped: 0,
             foreign_datagrams: 0,
             unsent: 0,
+            ignored_samples: 0,
+            ignored_writer: 0,
+            other_port: 0,
             losses: 0,
             reboots: 0,
             lost_ns: 0,
@@ -274,4 +283,13 @@ pub struct SurroundingsSample {
     pub human_motion_ad: [u16; 2],
     /// Tilt along x and y, AD counts.
     pub tilt_ad: [u16; 2],
+}
+
+layouts! {
+    RangeSample { stamp range_m status raw_cm infrared_ad }
+    WheelSample { stamp left_counts right_counts left_counts_per_s right_counts_per_s restarts }
+    LinkSample { stamp connected at_rest action cause frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
+    InfraredSample { stamp range_m raw_ad }
+    PowerSample { stamp board_v motor_v servo_v driver_c current_ad board_low motor_low servo_low }
+    SurroundingsSample { stamp temperature_c human_alarm_ad human_motion_ad tilt_ad }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
-use crate::bus::{Stamp, ZeroCopySend};
+use crate::bus::{Stamp, ZeroCopySend, layouts};
 
 wire_enum! {
     /// How a stage is.
@@ -438,4 +438,17 @@ pub struct FaultSample {
     pub kind: u8,
     /// 1: to be done although the robot is a real one.
     pub although_real: u8,
+}
+
+layouts! {
+    HealthSample { stamp stage pid state turns last_fault fault_answer }
+    DirectiveSample { stamp epoch order reason }
+    TickLimitSample { stamp last_tick holds_from_tick epoch }
+    RosterHeader { stamp supervisor_pid order reason simulated last_request }
+    RosterEntry { stage pid generation state restarts uptime_ns beat_age_ns output_age_ns }
+    Words { bytes }
+    DeathSample { stamp stage pid generation beat_age_ns uptime_ns next_after_ns code deaths_in_window cause next hung last_words }
+    StallSample { stamp x_m y_m epoch replans resets cause recovery }
+    RequestSample { stamp id stage kind }
+    FaultSample { stamp id stage kind although_real }
 }

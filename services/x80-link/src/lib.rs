@@ -14,6 +14,7 @@
 //! | [`streams`] | whether what the robot streams comes, and often enough |
 //! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
+//! | `writers` | whose commands and orders are obeyed |
 //! | [`shell`] | wires them to the topics |
 
 pub mod backoff;
@@ -29,3 +30,4 @@ pub mod step;
 pub mod streams;
 pub mod telemetry;
 pub mod transport;
+mod writers;

@@ -18,6 +18,7 @@ use crate::{
     step::{Effect, Event, Input, Link, State},
     telemetry::BatteryChange,
     transport::{Transport, TransportError},
+    writers::Writers,
 };
 
 /// The newest telemetry that is not published yet.
@@ -41,6 +42,7 @@ struct Telemetry {
 pub struct Shell {
     transport: Transport,
     command: Reader<CommandSample>,
+    writers: Writers,
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
     range: Writer<RangeSample>,
@@ -77,9 +79,12 @@ impl Process for Shell {
         };
         link.restore(state)
             .map_err(|foreign| StageError::Other(foreign.to_string()))?;
+        let mut command = context.bus.reader(&topics::COMMAND)?;
+        let writers = Writers::open(&context.bus, &mut command)?;
         Ok(Self {
             transport,
-            command: context.bus.reader(&topics::COMMAND)?,
+            command,
+            writers,
             directive: context.bus.reader(&topics::DIRECTIVE)?,
             tick_limit: context.bus.reader(&topics::TICK_LIMIT)?,
             range: context.bus.writer(&topics::RANGE, generation)?,
@@ -107,6 +112,7 @@ impl Process for Shell {
         if let Some(limit) = self.tick_limit.newest()? {
             self.take(Event::TickLimit(limit.last_tick), monotonic_ns())?;
         }
+        self.writers.follow(&mut self.command)?;
         while let Some(command) = self.command.take()? {
             self.take(Event::Command(&command), monotonic_ns())?;
         }
@@ -298,6 +304,11 @@ impl Shell {
             None => (absence.pings, absence.next_ping_ns),
         };
         let carried = self.transport.tally();
+        let ignored = self.writers.tell([
+            self.command.ignored(),
+            self.directive.ignored(),
+            self.tick_limit.ignored(),
+        ]);
         let sample = LinkSample {
             connected: self.link.connected().into(),
             action: self.link.decision().action.into(),
@@ -307,6 +318,9 @@ impl Shell {
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
             foreign_datagrams: carried.foreign_datagrams,
             unsent: carried.unsent,
+            ignored_samples: ignored.samples,
+            ignored_writer: ignored.process,
+            other_port: carried.other_port.into(),
             losses: self.link.losses(),
             reboots: self.link.restarts().into(),
             lost_ns: absence.lost_ns,

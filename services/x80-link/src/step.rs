@@ -251,6 +251,14 @@ impl Link {
             .is_some_and(|directive| directive.order == Order::Drive)
     }
 
+    /// Whether ticks go on although the robot is to stand: it may be carried meanwhile. A clock of ticks stands with it.
+    fn held_by_operator(&self) -> bool {
+        !self.in_ticks()
+            && self
+                .directive
+                .is_some_and(|directive| directive.reason == HoldReason::Operator)
+    }
+
     fn in_ticks(&self) -> bool {
         self.state.pace == Pace::Max
     }
@@ -262,7 +270,7 @@ impl Link {
     }
 
     fn begin_tick(&mut self, sensors: &MotorSensors, now_ns: u64, effects: &mut Vec<Effect>) {
-        if !self.ordered_to_drive() {
+        if !self.ordered_to_drive() && !self.held_by_operator() {
             return;
         }
         if self.in_ticks() {

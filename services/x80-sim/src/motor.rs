@@ -273,7 +273,11 @@ impl Motor {
                 // The loop pushes until the wheel is there: no dead band is left over.
                 let least = self.physics.dead_band_counts;
                 let there = way.abs() < POSITION_REACHED;
-                if there { 0.0 } else { asked.abs().max(least).copysign(way) }
+                if there {
+                    0.0
+                } else {
+                    asked.abs().max(least).copysign(way)
+                }
             }
         };
         if asked.abs() < self.physics.dead_band_counts {

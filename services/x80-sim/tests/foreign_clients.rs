@@ -15,7 +15,7 @@ use std::{
     fs::{File, OpenOptions},
     io::{Read, Write},
     net::{TcpStream, UdpSocket},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use common::clock::Pace;
@@ -311,4 +311,30 @@ fn drive<W: Wire>(mut host: Host<W>) {
         host.counts();
     }
     assert!(host.counts()[1] > before + 50);
+}
+
+#[test]
+fn one_of_another_host_is_ignored_until_the_first_is_silent() {
+    let sim = Sim::start(QUICK, Pace::Rate(5.0));
+    let ping = |socket: &UdpSocket| {
+        let mut host = Host::new(socket.try_clone().unwrap());
+        host.send(255, &[0]);
+    };
+    let first = sim.host();
+    ping(&first);
+    Host::new(first.try_clone().unwrap()).counts();
+    let second = UdpSocket::bind("127.0.0.2:0").unwrap();
+    second.connect(&sim.listening).unwrap();
+    let short = Duration::from_millis(300);
+    second.set_read_timeout(Some(short)).unwrap();
+    let began = Instant::now();
+    // It asks again and again; the first has said nothing since.
+    loop {
+        ping(&second);
+        if second.recv(&mut [0; 512]).is_ok() {
+            break;
+        }
+        assert!(began.elapsed() < PATIENCE, "never served");
+    }
+    assert!(began.elapsed().as_secs_f64() > 1.0, "{:?}", began.elapsed());
 }

@@ -22,6 +22,7 @@ mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
 #[cfg(feature = "tools")]
+mod python;
 pub(crate) mod replay_log;
 pub(crate) mod run;
 #[cfg(feature = "simulator")]

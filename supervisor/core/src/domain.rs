@@ -3,7 +3,7 @@
 use std::{
     fs::{self, DirBuilder, File, OpenOptions},
     io,
-    os::unix::fs::{DirBuilderExt, MetadataExt},
+    os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
     path::Path,
     rc::Rc,
 };
@@ -59,7 +59,6 @@ impl DomainLock {
             SHARED_MEMORY,
             SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
         )?;
-        make_own_directory(&self.domain.middleware_root())?;
         let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));
         self.stages_lock = None;
@@ -113,6 +112,10 @@ fn make_own_directory(path: &Path) -> Result<(), DomainError> {
             path: path.to_path_buf(),
         });
     }
+    if found.mode() & 0o077 != 0 {
+        let own = fs::Permissions::from_mode(0o700);
+        fs::set_permissions(path, own).map_err(failed("close to other users", path))?;
+    }
     Ok(())
 }
 
@@ -156,22 +159,19 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
     }
 }
 
-/// Remove every trace of the middleware in this domain.
+/// Remove every trace of the middleware in this domain. Files of another user in shared memory are left: a bus that is
+/// made has names that nobody could know.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // Without a configuration no process can join.
-    let files = [
-        domain.middleware_config(),
-        domain.middleware_config_unfinished(),
-        domain.run_link(),
-    ];
-    files.iter().try_for_each(|file| remove_file(file))?;
-    // Renamed first: a consumer that is joining would fill it while it is emptied.
-    let (root, aside) = (domain.middleware_root(), domain.middleware_root_aside());
-    remove_directory(&aside)?;
-    match fs::rename(&root, &aside) {
-        Ok(()) => remove_directory(&aside)?,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        Err(error) => return Err(failed("move", &root)(error)),
+    remove_file(&domain.middleware_config())?;
+    remove_file(&domain.run_link())?;
+    let directory = domain.directory();
+    let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
+    for entry in configs.flatten() {
+        let name = entry.file_name();
+        if name.as_encoded_bytes().starts_with(b"iceoryx2") {
+            remove_file(&entry.path())?;
+        }
     }
     let prefix = domain.shared_memory_prefix();
     let shared = Path::new(SHARED_MEMORY);
@@ -179,21 +179,37 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
         problem: format!("cannot be read: {error}"),
         remedy: "mount a tmpfs there",
     })?;
+    let user = rustix::process::geteuid().as_raw();
     for entry in entries.flatten() {
-        if entry
-            .file_name()
-            .as_encoded_bytes()
-            .starts_with(prefix.as_bytes())
-        {
-            let path = entry.path();
-            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-                remove_directory(&path)?;
-            } else {
-                remove_file(&path)?;
-            }
+        let name = entry.file_name();
+        if !name.as_encoded_bytes().starts_with(prefix.as_bytes()) {
+            continue;
+        }
+        let path = entry.path();
+        // A consumer that leaves at the same time removes its own.
+        let Ok(found) = entry.metadata() else {
+            continue;
+        };
+        if found.uid() != user {
+            tracing::warn!(file = %path.display(), owner = found.uid(), "another user's file has a name of this robot's; it is not used");
+        } else if found.is_dir() {
+            remove_root(&path)?;
+        } else {
+            remove_file(&path)?;
         }
     }
     Ok(())
+}
+
+/// Remove the directory of a bus. Renamed first: a consumer that is joining would fill it while it is emptied.
+fn remove_root(root: &Path) -> Result<(), DomainError> {
+    let aside = root.with_extension("old");
+    remove_directory(&aside)?;
+    match fs::rename(root, &aside) {
+        Ok(()) => remove_directory(&aside),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(failed("move", root)(error)),
+    }
 }
 
 /// Remove a file, if it is there: a consumer that leaves the old bus at the same time removes its own.

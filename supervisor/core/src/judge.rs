@@ -127,7 +127,12 @@ fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
         format!("{held} died again and again and is held; see {file} in the run directory")
     } else if !snapshot.was_ready && !robot_answers {
         let address = snapshot.address;
-        format!("no robot answers at {address}; is it on, is robot.address right?")
+        match snapshot.link.map_or(0, |link| link.other_port) {
+            0 => format!("no robot answers at {address}; is it on, is robot.address right?"),
+            port => format!(
+                "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
+            ),
+        }
     } else {
         "the pipeline makes no progress; see the stages' logs".to_owned()
     };

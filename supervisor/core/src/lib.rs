@@ -57,6 +57,7 @@ pub mod domain;
 mod domain_error;
 mod error;
 mod judge;
+mod last_resort;
 mod lead;
 pub mod observer;
 mod order;

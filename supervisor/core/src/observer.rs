@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use common::{
-    bus::{Bus, BusError, Reader, SliceReader},
+    bus::{Author, Bus, BusError, Reader, SliceReader},
     grid::{Applied, Replica},
     latency::Histogram,
     samples::{
         CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        HealthSample, LinkSample, PoseSample,
+        HealthSample, LinkSample, PoseSample, RosterEntry, name_str,
     },
-    topics::{self, AnyTopic as _},
+    topics::{self, AnyTopic},
     waiter::Waiter,
 };
 
@@ -93,8 +93,39 @@ impl Observer {
         })
     }
 
+    /// Read what the stages of `roster` write, and nothing of other processes.
+    fn follow(&mut self, roster: &[RosterEntry]) {
+        for entry in roster.iter().filter(|entry| entry.pid != 0) {
+            let author = Author {
+                process: entry.pid,
+                generation: entry.generation,
+            };
+            let stage = name_str(&entry.stage);
+            let writes = |topic: &dyn AnyTopic| topic.spec().writer == stage;
+            if writes(&topics::LINK) {
+                self.link.follow(author);
+            }
+            if writes(&topics::POSE) {
+                self.pose.follow(author);
+            }
+            if writes(&topics::GRID) {
+                self.grid.follow(author);
+            }
+            if writes(&topics::GUIDANCE) {
+                self.guidance.follow(author);
+            }
+            if writes(&topics::FIELD) {
+                self.field.follow(author);
+            }
+            if writes(&topics::COMMAND) {
+                self.command.follow(author);
+            }
+        }
+    }
+
     /// Read all that came. Says whether the roster changed by it.
     pub fn take(&mut self, stages: &mut StageProcesses) -> Result<bool, BusError> {
+        self.follow(&stages.roster());
         let mut roster_changed = false;
         while let Some(health) = self.health.take()? {
             roster_changed |= stages.on_health(&health);

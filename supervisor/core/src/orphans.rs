@@ -7,12 +7,14 @@
 use std::{
     fs::{self, File},
     io,
-    os::unix::fs::MetadataExt,
     time::{Duration, Instant},
 };
 
-use common::domain::Domain;
-use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use common::{
+    domain::Domain,
+    lock_holders::{holders, signal},
+};
+use rustix::process::Signal;
 
 use crate::domain_error::{DomainError, failed};
 
@@ -35,7 +37,7 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     for &pid in &holders {
         tracing::warn!(pid, "a stage outlives its supervisor: killed");
         // One that has just ended by itself needs no signal.
-        let _ = kill(pid, &lock);
+        let _ = signal(pid, &lock, Signal::KILL);
     }
     if locked_within(&lock, KILLED).map_err(system)? {
         return Ok(lock);
@@ -59,72 +61,5 @@ fn locked_within(file: &File, patience: Duration) -> io::Result<bool> {
             Err(fs::TryLockError::WouldBlock) => return Ok(false),
             Err(fs::TryLockError::Error(error)) => return Err(error),
         }
-    }
-}
-
-/// The processes that hold a lock on `file`.
-fn holders(file: &File) -> io::Result<Vec<u32>> {
-    let inode = file.metadata()?.ino();
-    Ok(lockers(&fs::read_to_string("/proc/locks")?, inode))
-}
-
-/// The processes that hold a file lock on this inode, as `/proc/locks` lists it: number, kind, mode, access, process,
-/// device and inode. A process that only waits for one has an arrow before the kind.
-fn lockers(locks: &str, inode: u64) -> Vec<u32> {
-    let holder = |line: &str| {
-        let mut words = line.split_ascii_whitespace().skip(1);
-        let ("FLOCK", _, _, pid, file) = (
-            words.next()?,
-            words.next()?,
-            words.next()?,
-            words.next()?,
-            words.next()?,
-        ) else {
-            return None;
-        };
-        let locked: u64 = file.rsplit(':').next()?.parse().ok()?;
-        (locked == inode).then_some(pid.parse().ok()?)
-    };
-    locks.lines().filter_map(holder).collect()
-}
-
-/// Kill process `pid` if it has `file` open: inodes of two file systems may have one number.
-fn kill(pid: u32, file: &File) -> io::Result<()> {
-    let number = i32::try_from(pid).ok().and_then(Pid::from_raw);
-    let process = pidfd_open(number.ok_or(io::ErrorKind::NotFound)?, PidfdFlags::empty())?;
-    let file = file.metadata()?;
-    let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten();
-    let ours = opened
-        .filter_map(|entry| fs::metadata(entry.path()).ok())
-        .any(|opened| (opened.dev(), opened.ino()) == (file.dev(), file.ino()));
-    if ours {
-        pidfd_send_signal(&process, Signal::KILL)?;
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn holders_of_a_lock_are_distinguished_from_waiting_processes_and_other_files() {
-        let locks = "\
-1: FLOCK  ADVISORY  READ 11 fe:00:77 0 EOF
-2: POSIX  ADVISORY  WRITE 12 fe:00:77 0 EOF
-3: FLOCK  ADVISORY  READ 13 fe:00:78 0 EOF
-4: FLOCK  ADVISORY  READ 14 00:31:77 0 EOF
-4: -> FLOCK  ADVISORY  WRITE 15 00:31:77 0 EOF
-5: FLOCK
-";
-        assert_eq!(lockers(locks, 77), [11, 14]);
-    }
-
-    #[test]
-    fn a_lock_of_this_very_process_is_found() {
-        let file = tempfile::tempfile().unwrap();
-        assert_eq!(holders(&file).unwrap(), Vec::<u32>::new());
-        file.lock_shared().unwrap();
-        assert_eq!(holders(&file).unwrap(), [std::process::id()]);
     }
 }

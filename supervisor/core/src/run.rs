@@ -12,6 +12,7 @@ use crate::{
     decisive::{self, Timeout},
     domain::DomainLock,
     error::{SupervisorError, system},
+    last_resort::{self, Turns},
     observer::Record,
     outcome::Ending,
     progress::Progress,
@@ -50,9 +51,12 @@ pub fn run(
 ) -> Result<Finished, SupervisorError> {
     let mut signals =
         Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
+    let turns = Turns::default();
+    let heard = Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
+    last_resort::watch(heard, turns.clone());
     let domain = Domain::of(options.robot.clone());
     let mut lock = DomainLock::acquire(domain, options.mission.grid_frame().area())?;
-    let mut supervisor = Supervisor::start(options, &lock)?;
+    let mut supervisor = Supervisor::start(options, &lock, turns.clone())?;
     let ending = loop {
         match supervisor.drive(&mut signals, show) {
             Ok(Some(ending)) => break Ok(ending),
@@ -62,6 +66,7 @@ pub fn run(
     };
     // Also after an error the robot is stopped first, and the stages in order.
     let stopped = shutdown::stop(&mut supervisor);
+    turns.end();
     let ending = ending?;
     stopped?;
     let end_by_stall = supervisor.end_by_stall();

@@ -23,6 +23,7 @@ use crate::{
     domain::DomainLock,
     error::{SupervisorError, system},
     judge::{self, TickProgress},
+    last_resort::Turns,
     lead::{Lead, Next},
     order::{self, Decision},
     outcome::{Ending, Outcome},
@@ -101,12 +102,17 @@ pub(crate) struct Supervisor<'a> {
     lead: Lead,
     published_limit: Option<TickLimitSample>,
     cleanup: Cleanup,
+    turns: Turns,
     pub service: ServiceManager,
 }
 
 impl<'a> Supervisor<'a> {
     /// Start the robot, write the run file, start the stages.
-    pub(crate) fn start(options: &'a Options, lock: &DomainLock) -> Result<Self, SupervisorError> {
+    pub(crate) fn start(
+        options: &'a Options,
+        lock: &DomainLock,
+        turns: Turns,
+    ) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
         let mission = &options.mission;
         let mut state_file = StateFile::open(directory)?;
@@ -145,6 +151,7 @@ impl<'a> Supervisor<'a> {
             lead,
             published_limit: None,
             cleanup: Cleanup::new(),
+            turns,
             service: ServiceManager::of_environment(),
         };
         supervisor.publish_state()?;
@@ -311,6 +318,10 @@ impl<'a> Supervisor<'a> {
     /// Look for stalls, and take the next recovery step. The last one ends the mission.
     fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
         if self.decision.order() != Order::Drive {
+            // Poses go on while an operator's stop holds; none of them is a stall, then or after.
+            if !self.clock.in_ticks() {
+                self.next_stall();
+            }
             return Ok(None);
         }
         if !self.clock.in_ticks() {
@@ -349,7 +360,8 @@ impl<'a> Supervisor<'a> {
         let in_ticks = self.clock.in_ticks();
         let stopped = record.link.is_none_or(|link| link.stopped());
         // On a clock of ticks no time passes while something holds the robot.
-        let held = !in_ticks && (stopped || !self.stages.all_running());
+        let ordered = self.decision.order() == Order::Drive;
+        let held = !in_ticks && (stopped || !ordered || !self.stages.all_running());
         // Of a tick without its command not all may be here yet.
         let newest = record.published().tick.filter(|_| in_ticks);
         // Several may have passed since the last look: a stall is one whether each was seen alone or not.
@@ -473,6 +485,7 @@ impl<'a> Supervisor<'a> {
 
     /// Wait for the bus, a child, a signal or a deadline.
     pub(crate) fn wait(&self) -> Result<(), SupervisorError> {
+        self.turns.count();
         let mut descriptors = self.stages.descriptors();
         if let Some(simulator) = &self.robot.simulator {
             descriptors.extend(simulator.descriptors());

@@ -5,6 +5,8 @@
 pub struct Tally {
     /// Datagrams from another address than the robot's, dropped.
     pub foreign_datagrams: u64,
+    /// The port from which the robot's host sent the first of them; 0 for none.
+    pub other_port: u16,
     /// Messages to the robot that the wire did not take, lost.
     pub unsent: u64,
 }

@@ -84,6 +84,7 @@ impl<D: Dial> Stream<D> {
     pub(super) const fn tally(&self) -> Tally {
         Tally {
             foreign_datagrams: 0,
+            other_port: 0,
             unsent: self.unsent,
         }
     }

@@ -57,7 +57,7 @@ fn expect_closing(transport: &mut Transport, now_ns: u64) {
 }
 
 #[test]
-fn a_foreign_datagram_is_dropped_and_counted() {
+fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_kept() {
     let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
     let other = UdpSocket::bind("127.0.0.1:0").unwrap();
     let mut transport = Transport::open(&Address::Udp(robot.local_addr().unwrap())).unwrap();
@@ -67,6 +67,9 @@ fn a_foreign_datagram_is_dropped_and_counted() {
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), None);
     assert_eq!(transport.tally().foreign_datagrams, 1);
+    // It may be the robot, whose port was named wrongly.
+    let port = other.local_addr().unwrap().port();
+    assert_eq!(transport.tally().other_port, port);
     robot.send_to(b"hello", link).unwrap();
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), Some(&b"hello"[..]));

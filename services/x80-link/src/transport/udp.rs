@@ -43,7 +43,18 @@ impl Udp {
         loop {
             match self.socket.recv_from(buffer) {
                 Ok((length, from)) if from == self.robot => return Ok(Some(length)),
-                Ok(_) => self.tally.foreign_datagrams += 1,
+                Ok((_, from)) => {
+                    self.tally.foreign_datagrams += 1;
+                    if from.ip() == self.robot.ip() && self.tally.other_port == 0 {
+                        let (port, expected) = (from.port(), self.robot.port());
+                        tracing::warn!(
+                            port,
+                            expected,
+                            "the robot's host answers from another port; is robot.address right?"
+                        );
+                        self.tally.other_port = port;
+                    }
+                }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(None),
                 Err(error) if is_passing(&error) => {}
                 Err(error) => return Err(error),

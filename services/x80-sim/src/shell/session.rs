@@ -1,6 +1,10 @@
 //! Robot, radio, transport and ground truth together: what is done with bytes, and with a tick.
 
-use std::{io::Write, os::fd::BorrowedFd};
+use std::{
+    io::Write,
+    os::fd::BorrowedFd,
+    time::{Duration, Instant},
+};
 
 use common::{
     checkpoint::Checkpoint,
@@ -21,6 +25,9 @@ use crate::{
 /// Ticks that lock-step makes unheard before it waits for a ping: the longest outage at the highest rate.
 const MOST_UNHEARD: usize = 120_000;
 
+/// A host that said nothing for so long, by the machine's clock, has gone: another may take the robot.
+const HOST_SILENT: Duration = Duration::from_secs(2);
+
 /// Which way a datagram goes through the radio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
@@ -36,8 +43,12 @@ pub(super) struct Session {
     way: Way,
     /// None where it is perfect.
     radio: Option<Radio<Leg>>,
-    /// Whoever sent the last valid frame: all streams go there.
+    /// Whoever of the host that is served sent the last valid frame: all streams go there.
     peer: Option<Source>,
+    /// When that was.
+    heard: Instant,
+    /// Frames of other hosts that were ignored since the last warning; the first is told.
+    strangers: u64,
     /// The peer's and one other's: half a frame of the one must not garble the other's.
     decoders: Vec<SourceDecoder>,
     ground_truth: Option<Box<dyn Write + Send>>,
@@ -69,6 +80,8 @@ impl Session {
             way,
             radio: Some(radio).filter(|radio| !radio.is_perfect()),
             peer: None,
+            heard: Instant::now(),
+            strangers: 0,
             decoders: Vec::new(),
             ground_truth,
             checkpoint,
@@ -220,6 +233,9 @@ impl Session {
     }
 
     fn on_frame(&mut self, source: Source, frame: &Frame<'_>) -> Result<(), SimError> {
+        if !self.serves(source) {
+            return Ok(());
+        }
         let mut answer = Vec::with_capacity(16);
         if !self.lock_step {
             if self.robot.on_frame(frame, &mut answer) != Heard::Foreign {
@@ -269,6 +285,21 @@ impl Session {
             self.peer = Some(connected);
         }
         Ok(self.peer)
+    }
+
+    /// Whether `source` is of the host that spoke first; of any host after that one's silence.
+    fn serves(&mut self, source: Source) -> bool {
+        let silent = self.heard.elapsed() >= HOST_SILENT;
+        let serves = silent || self.peer.is_none_or(|peer| peer.is_same_host(source));
+        if serves {
+            (self.heard, self.strangers) = (Instant::now(), 0);
+        } else {
+            self.strangers += 1;
+            if self.strangers == 1 {
+                tracing::warn!(stranger = ?source, served = ?self.peer, "another host speaks to the robot; it is ignored until the first is silent for 2 s");
+            }
+        }
+        serves
     }
 
     /// Send to the peer over the radio.

@@ -1,6 +1,7 @@
 //! `firsthand stop`, `resume`, `restart`, `kill`, `freeze`, `thaw`: what an operator does to a robot that runs.
 
 use std::{
+    fs::File,
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -10,6 +11,7 @@ use common::{
     bus::Bus,
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
+    lock_holders,
     roster::Roster,
     samples::{
         Action, Cause, LinkSample, RequestKind, RequestSample, RosterEntry, RosterHeader, name,
@@ -18,7 +20,7 @@ use common::{
     topics::{self, AnyTopic as _},
     waiter::Waiter,
 };
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use x80_link::failsafe;
 
 use super::Failure;
@@ -187,31 +189,33 @@ pub(crate) fn new_id() -> u64 {
     monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1
 }
 
-/// Send a signal to a process of the robot.
+/// Send a signal to a process of the robot: to who holds the lock that it must hold, and to nobody else.
 fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<ExitCode, Failure> {
     let domain = Domain::of(robot.clone());
-    // A frozen supervisor publishes nothing, so its process id is read from its lock file.
-    let pid = if stage == "supervisor" {
-        std::fs::read_to_string(domain.lock_file())
-            .ok()
-            .and_then(|text| text.trim().parse().ok())
+    // A frozen supervisor publishes nothing.
+    let (pid, lock) = if stage == "supervisor" {
+        let holder = domain.supervisor();
+        let holder = holder.map_err(|error| format!("cannot see who supervises: {error}"))?;
+        (holder, domain.lock_file())
     } else {
-        pid_of(&domain, known(stage)?)?
+        (pid_of(&domain, known(stage)?)?, domain.stages_lock_file())
     };
-    let pid = pid.and_then(Pid::from_raw).ok_or_else(|| {
+    let pid = pid.ok_or_else(|| {
         format!("{stage} of robot {robot} has no process at the moment; see `firsthand status`")
     })?;
-    kill_process(pid, signal).map_err(|error| format!("cannot signal {stage} ({pid}): {error}"))?;
+    File::open(&lock)
+        .and_then(|lock| lock_holders::signal(pid, &lock, signal))
+        .map_err(|error| format!("cannot signal {stage} ({pid}): {error}"))?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// The process that the roster names for `stage`.
-fn pid_of(domain: &Domain, stage: &str) -> Result<Option<i32>, Failure> {
+fn pid_of(domain: &Domain, stage: &str) -> Result<Option<u32>, Failure> {
     let bus = Bus::join(domain, "operator")?;
     find(&mut Roster::open(&bus)?, &domain.robot, |_, entries| {
         let mut entries = entries.iter();
         let entry = entries.find(|entry| name_str(&entry.stage) == stage)?;
-        Some((entry.pid != 0).then_some(entry.pid.cast_signed()))
+        Some((entry.pid != 0).then_some(entry.pid))
     })
 }
 

@@ -68,6 +68,9 @@ struct LinkStatus {
     reboots: u64,
     unsent: u64,
     foreign_datagrams: u64,
+    ignored_samples: u64,
+    ignored_writer: u32,
+    other_port: u32,
 }
 
 /// The robot's batteries.
@@ -178,6 +181,9 @@ fn link_status(link: &LinkSample) -> LinkStatus {
         reboots: link.reboots,
         unsent: link.unsent,
         foreign_datagrams: link.foreign_datagrams,
+        ignored_samples: link.ignored_samples,
+        ignored_writer: link.ignored_writer,
+        other_port: link.other_port,
     }
 }
 

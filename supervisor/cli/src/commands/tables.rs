@@ -9,12 +9,16 @@ use common::{
 };
 use x80_link::failsafe;
 
-use super::{Failure, print_text};
+use super::{Failure, print_text, python};
 use supervisor::stages;
 
 /// Print the table of topics.
 #[derive(Debug, Args)]
-pub(crate) struct TopicArguments {}
+pub(crate) struct TopicArguments {
+    /// Print a module for consumers in Python instead: the structs of all topics, and a class that follows a robot.
+    #[arg(long)]
+    python: bool,
+}
 
 /// Print the table of stages.
 #[derive(Debug, Args)]
@@ -28,8 +32,12 @@ pub(crate) struct FailsafeArguments {}
 #[derive(Debug, Args)]
 pub(crate) struct FaultArguments {}
 
-pub(crate) fn topics(_: &TopicArguments) -> Result<ExitCode, Failure> {
-    print_text(&topic_table())?;
+pub(crate) fn topics(arguments: &TopicArguments) -> Result<ExitCode, Failure> {
+    print_text(&if arguments.python {
+        python::module()
+    } else {
+        topic_table()
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 

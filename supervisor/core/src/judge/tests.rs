@@ -17,6 +17,10 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let go = link(Action::Go, Cause::None);
     let stop = link(Action::Stop, Cause::BatteryLow);
     let end = link(Action::End, Cause::BatteryEmpty);
+    let elsewhere = LinkSample {
+        other_port: 4711,
+        ..LinkSample::default()
+    };
     let robot = "x80".parse().unwrap();
     let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap();
     let address = address.resolve().unwrap();
@@ -67,6 +71,9 @@ fn every_rule_of_the_judgement_decides_its_row() {
         ("a timeout", Snapshot { timeout_s: 10.0, ..driving() }, late, Some((Outcome::Timeout, "10 s"))),
         ("no tick while driving", driving(), late, Some((Outcome::Aborted, "stages' logs"))),
         ("a real robot may be away", Snapshot { simulated: false, ..driving() }, late, None),
+        ("a robot that answers from another port",
+         Snapshot { simulated: false, link: Some(&elsewhere), ..starting() }, late,
+         Some((Outcome::Aborted, "its host does from port 4711"))),
         ("a real robot that is to start may not be away", Snapshot { simulated: false, link: None, ..starting() }, late,
          Some((Outcome::Aborted, "no robot answers at udp://10.0.0.1:10001"))),
         ("a robot that answers and does not start", starting(), late, Some((Outcome::Aborted, "stages' logs"))),

@@ -1,0 +1,153 @@
+//! A consumer that waits for a robot, follows it from run to run, and says when it is gone.
+
+use std::time::{Duration, Instant};
+
+use crate::{
+    bus::{Bus, BusError},
+    domain::Domain,
+    making::Making,
+    topics::AnyTopic,
+    waiter::Waiter,
+};
+
+/// How often a robot that is away is looked for.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// A bus that is there and cannot be used for so long is an error: one that is just being removed is gone by then.
+const REFUSED_FOR: Duration = Duration::from_secs(2);
+
+/// Follows one robot. `Topics` is what it reads: made by `open` for each bus, dropped with it.
+pub struct Follower<Topics, Open> {
+    domain: Domain,
+    name: String,
+    wake_on: &'static dyn AnyTopic,
+    open: Open,
+    joined: Option<Joined<Topics>>,
+    /// Since when the bus that is there cannot be used.
+    refused: Option<(Making, Instant)>,
+}
+
+/// Readers of a bus. Fields are dropped in this order: the bus last.
+struct Joined<Topics> {
+    topics: Topics,
+    waiter: Waiter,
+    bus: Bus,
+}
+
+/// What came.
+#[derive(Debug, PartialEq, Eq)]
+pub enum News<'a, Topics> {
+    /// The robot is there: its bus has just been joined.
+    Here,
+    /// Something may have been published: take all there is.
+    Samples(&'a mut Topics),
+    /// Nothing, for the time that was given. The robot is as it was: there, or away.
+    Nothing,
+    /// The robot's run has ended, or its bus was replaced: it is waited for again.
+    Gone,
+}
+
+impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Open> {
+    /// Follow the robot of `domain` under a name that `iox2 node list` shows. `open` opens what is read on each bus, and
+    /// the follower wakes for samples on `wake_on`.
+    pub fn new(domain: Domain, name: &str, wake_on: &'static dyn AnyTopic, open: Open) -> Self {
+        Self {
+            domain,
+            name: name.to_owned(),
+            wake_on,
+            open,
+            joined: None,
+            refused: None,
+        }
+    }
+
+    /// Wait for news, up to `timeout`.
+    ///
+    /// # Errors
+    /// When a bus that is there cannot be used: what that is about stays until someone mends it.
+    pub fn wait(&mut self, timeout: Duration) -> Result<News<'_, Topics>, BusError> {
+        let began = Instant::now();
+        while self.joined.is_none() {
+            if self.look()? {
+                return Ok(News::Here);
+            }
+            let left = timeout.saturating_sub(began.elapsed());
+            if left.is_zero() {
+                return Ok(News::Nothing);
+            }
+            std::thread::park_timeout(left.min(LOOK_EVERY));
+        }
+        let mut came = false;
+        loop {
+            let left = timeout.saturating_sub(began.elapsed());
+            if let Some(joined) = &self.joined {
+                came = joined.waiter.wait(left.min(LOOK_EVERY)).unwrap_or(false);
+            }
+            if came {
+                break;
+            }
+            if self.is_gone() {
+                self.joined = None;
+                return Ok(News::Gone);
+            }
+            if left.is_zero() {
+                break;
+            }
+        }
+        Ok(match &mut self.joined {
+            Some(joined) if came => News::Samples(&mut joined.topics),
+            _ => News::Nothing,
+        })
+    }
+
+    /// Join the robot's bus, if there is one. Returns whether it was joined.
+    fn look(&mut self) -> Result<bool, BusError> {
+        let Ok(making) = Making::current(&self.domain) else {
+            return Ok(false);
+        };
+        if !self.is_supervised() {
+            return Ok(false);
+        }
+        match self.join() {
+            Ok(joined) => {
+                self.joined = Some(joined);
+                self.refused = None;
+                Ok(true)
+            }
+            Err(error) => {
+                let since = match self.refused.take() {
+                    Some((refused, since)) if refused == making => since,
+                    _ => Instant::now(),
+                };
+                self.refused = Some((making, since));
+                if since.elapsed() >= REFUSED_FOR {
+                    return Err(error);
+                }
+                Ok(false)
+            }
+        }
+    }
+
+    fn join(&mut self) -> Result<Joined<Topics>, BusError> {
+        let bus = Bus::join(&self.domain, &self.name)?;
+        let mut waiter = Waiter::default();
+        waiter.on(bus.wakeup(self.wake_on)?);
+        Ok(Joined {
+            topics: (self.open)(&bus)?,
+            waiter,
+            bus,
+        })
+    }
+
+    fn is_gone(&self) -> bool {
+        let replaced = |joined: &Joined<Topics>| joined.bus.is_replaced();
+        self.joined.as_ref().is_some_and(replaced) || !self.is_supervised()
+    }
+
+    /// A supervisor that was killed leaves its bus, on which nobody publishes.
+    fn is_supervised(&self) -> bool {
+        // Where the system does not say, the bus counts.
+        self.domain
+            .supervisor()
+            .map_or(true, |holder| holder.is_some())
+    }
+}

@@ -1,0 +1,85 @@
+//! Who holds a lock on a file, and signals to a holder that reach nobody else.
+
+use std::{
+    fs::{self, File},
+    io,
+    os::unix::fs::MetadataExt as _,
+};
+
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+
+/// The processes that hold a lock on `file`.
+///
+/// # Errors
+/// When the system does not say.
+pub fn holders(file: &File) -> io::Result<Vec<u32>> {
+    let inode = file.metadata()?.ino();
+    Ok(lockers(&fs::read_to_string("/proc/locks")?, inode))
+}
+
+/// The processes that hold a file lock on this inode, as `/proc/locks` lists it: number, kind, mode, access, process,
+/// device and inode. A process that only waits for one has an arrow before the kind.
+fn lockers(locks: &str, inode: u64) -> Vec<u32> {
+    let holder = |line: &str| {
+        let mut words = line.split_ascii_whitespace().skip(1);
+        let ("FLOCK", _, _, pid, file) = (
+            words.next()?,
+            words.next()?,
+            words.next()?,
+            words.next()?,
+            words.next()?,
+        ) else {
+            return None;
+        };
+        let locked: u64 = file.rsplit(':').next()?.parse().ok()?;
+        (locked == inode).then_some(pid.parse().ok()?)
+    };
+    locks.lines().filter_map(holder).collect()
+}
+
+/// Send `signal` to process `pid` if it has `file` open: another may have its number by now, and inodes of two file
+/// systems may have one number.
+///
+/// # Errors
+/// When it has not, or has ended, or may not be signalled.
+pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
+    let gone = || io::Error::from(io::ErrorKind::NotFound);
+    let number = i32::try_from(pid).ok().and_then(Pid::from_raw);
+    // From here on the number is this process's, whatever ends.
+    let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty())?;
+    let file = file.metadata()?;
+    let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten();
+    let ours = opened
+        .filter_map(|entry| fs::metadata(entry.path()).ok())
+        .any(|opened| (opened.dev(), opened.ino()) == (file.dev(), file.ino()));
+    if !ours {
+        return Err(gone());
+    }
+    Ok(pidfd_send_signal(&process, signal)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holders_of_a_lock_are_distinguished_from_waiting_processes_and_other_files() {
+        let locks = "\
+1: FLOCK  ADVISORY  READ 11 fe:00:77 0 EOF
+2: POSIX  ADVISORY  WRITE 12 fe:00:77 0 EOF
+3: FLOCK  ADVISORY  READ 13 fe:00:78 0 EOF
+4: FLOCK  ADVISORY  READ 14 00:31:77 0 EOF
+4: -> FLOCK  ADVISORY  WRITE 15 00:31:77 0 EOF
+5: FLOCK
+";
+        assert_eq!(lockers(locks, 77), [11, 14]);
+    }
+
+    #[test]
+    fn a_lock_of_this_very_process_is_found() {
+        let file = tempfile::tempfile().unwrap();
+        assert_eq!(holders(&file).unwrap(), Vec::<u32>::new());
+        file.lock_shared().unwrap();
+        assert_eq!(holders(&file).unwrap(), [std::process::id()]);
+    }
+}

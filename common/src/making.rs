@@ -1,0 +1,129 @@
+//! One making of a robot's bus. A bus that is made anew, for the next run or in the middle of one, has files of its own:
+//! who leaves the old one later removes nothing of the new one.
+//!
+//! The robot's directory holds the configuration of each making, and a link to that of the bus that is there.
+
+use std::{
+    fs,
+    hash::{BuildHasher as _, RandomState},
+    io,
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+};
+
+use crate::domain::{Domain, SHARED_MEMORY};
+
+/// Before and after a making's name in that of its configuration.
+const CONFIG: [&str; 2] = ["iceoryx2-", ".toml"];
+/// Letters of a making's name. Paths of sockets hold it twice, and have to be short.
+const LENGTH: usize = 4;
+const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
+
+/// The names of one making's files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Making {
+    domain: Domain,
+    name: String,
+}
+
+impl Making {
+    /// A new one. Its name is random: nobody can make files of it before.
+    #[must_use]
+    pub fn new(domain: &Domain) -> Self {
+        let mut random = RandomState::new().hash_one(std::process::id());
+        let name = (0..LENGTH).map(|_| {
+            let letter = LETTERS[(random % 32) as usize];
+            random /= 32;
+            char::from(letter)
+        });
+        Self {
+            domain: domain.clone(),
+            name: name.collect(),
+        }
+    }
+
+    /// The one whose bus is there.
+    ///
+    /// # Errors
+    /// When the robot has no bus.
+    pub fn current(domain: &Domain) -> io::Result<Self> {
+        let link = domain.middleware_config();
+        let config = fs::read_link(&link)?;
+        let name = config.to_str().and_then(|file| {
+            let name = file.strip_prefix(CONFIG[0])?.strip_suffix(CONFIG[1])?;
+            let known = |byte| LETTERS.contains(&byte);
+            (name.len() == LENGTH && name.bytes().all(known)).then_some(name)
+        });
+        let name = name.ok_or_else(|| {
+            let (link, config) = (link.display(), config.display());
+            let text = format!("{link} leads to {config}, which is no configuration of a bus");
+            io::Error::new(io::ErrorKind::InvalidData, text)
+        })?;
+        Ok(Self {
+            domain: domain.clone(),
+            name: name.to_owned(),
+        })
+    }
+
+    /// From now on this is the one that is joined.
+    ///
+    /// # Errors
+    /// When the link cannot be made.
+    pub fn make_current(&self) -> io::Result<()> {
+        let link = self.domain.middleware_config();
+        let unfinished = link.with_extension("unfinished");
+        symlink(self.config_name(), &unfinished)?;
+        fs::rename(unfinished, link)
+    }
+
+    /// The robot's.
+    #[must_use]
+    pub const fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    fn config_name(&self) -> String {
+        CONFIG.join(&self.name)
+    }
+
+    /// The middleware's configuration.
+    #[must_use]
+    pub fn config(&self) -> PathBuf {
+        self.domain.directory().join(self.config_name())
+    }
+
+    /// Starts the name of every file of it in [`SHARED_MEMORY`].
+    #[must_use]
+    pub fn shared_memory_prefix(&self) -> String {
+        format!("{}{}_", self.domain.shared_memory_prefix(), self.name)
+    }
+
+    /// Under it lie the node and service files of the middleware: in memory, since it syncs each to the disk,
+    /// and a stage that starts makes twenty.
+    #[must_use]
+    pub fn root(&self) -> PathBuf {
+        Path::new(SHARED_MEMORY).join(self.domain.shared_memory_prefix() + &self.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bus_that_is_there_is_the_one_made_last() {
+        let domain = Domain::of("making".parse().unwrap());
+        fs::create_dir_all(domain.directory()).unwrap();
+        assert!(Making::current(&domain).is_err());
+        for _ in 0..2 {
+            let made = Making::new(&domain);
+            made.make_current().unwrap();
+            assert_eq!(Making::current(&domain).unwrap(), made);
+        }
+        fs::remove_file(domain.middleware_config()).unwrap();
+        symlink("../../etc/passwd", domain.middleware_config()).unwrap();
+        let foreign = Making::current(&domain).unwrap_err();
+        assert!(foreign.to_string().contains("passwd"), "{foreign}");
+        fs::remove_dir_all(domain.directory()).unwrap();
+    }
+}

@@ -1,0 +1,62 @@
+//! Whose commands and orders the link obeys: those of the processes that the supervisor started, and of no others.
+
+use common::{
+    bus::{Author, Bus, BusError, Ignored, Reader, SliceReader},
+    samples::{CommandSample, RosterEntry, RosterHeader, name_str},
+    topics::{self, AnyTopic as _},
+};
+
+/// Follows the roster, and tells of processes that write and should not.
+#[derive(Debug)]
+pub(crate) struct Writers {
+    roster: SliceReader<RosterHeader, RosterEntry>,
+    ignored: Ignored,
+}
+
+impl Writers {
+    /// Follow the roster on `bus`. Until it names the controller, no command is obeyed.
+    pub(crate) fn open(bus: &Bus, command: &mut Reader<CommandSample>) -> Result<Self, BusError> {
+        command.follow(Author {
+            process: 0,
+            generation: 0,
+        });
+        Ok(Self {
+            roster: bus.slice_reader(&topics::ROSTER)?,
+            ignored: Ignored::default(),
+        })
+    }
+
+    /// Let `command` give what the controller that the roster names writes.
+    pub(crate) fn follow(&mut self, command: &mut Reader<CommandSample>) -> Result<(), BusError> {
+        while let Some(entries) = self.roster.take()? {
+            let writer = topics::COMMAND.spec().writer;
+            let mut entries = entries.iter();
+            let named = entries.find(|entry| name_str(&entry.stage) == writer);
+            if let Some(entry) = named.filter(|entry| entry.pid != 0) {
+                command.follow(Author {
+                    process: entry.pid,
+                    generation: entry.generation,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// What was ignored on all topics, a warning for each process that is new among them.
+    pub(crate) fn tell(&mut self, ignored: [Ignored; 3]) -> Ignored {
+        let samples = ignored.iter().map(|topic| topic.samples).sum();
+        let changed = samples != self.ignored.samples;
+        let last = ignored
+            .iter()
+            .find(|topic| topic.process != 0 && (changed && topic.process != self.ignored.process));
+        if let Some(last) = last {
+            tracing::warn!(
+                pid = last.process,
+                "a process that is neither the controller nor the supervisor writes commands or orders; they are ignored; end it"
+            );
+            self.ignored.process = last.process;
+        }
+        self.ignored.samples = samples;
+        self.ignored
+    }
+}

@@ -1,0 +1,104 @@
+//! The end of a run whose supervisor hangs: the middleware may wait for ever in a file that somebody truncated, and a
+//! process that waits there hears no signal.
+//!
+//! A thread of its own hears them too. When one came and the loop does not get on for [`STUCK`], it ends the stages and
+//! the process. The robot stands by then: its link stops it when the supervisor is silent, and a command that none
+//! follows ends by itself.
+
+use std::{
+    fs,
+    os::fd::AsFd as _,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use common::{
+    poll,
+    signals::{Signals, exit_at_once},
+};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// A loop that gets on comes around five times a second; on a machine that is overloaded it may take longer.
+const STUCK: Duration = Duration::from_secs(2);
+/// Between the request to the stages to stop and their end.
+const GRACE: Duration = Duration::from_millis(300);
+/// The exit code of a run that ends like this: as of any run that failed.
+const FAILED: u8 = 1;
+
+/// Between looks at the loop.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// Counts the turns of the supervisor's loop, until it has ended.
+#[derive(Clone, Default)]
+pub(crate) struct Turns {
+    count: Arc<AtomicU64>,
+    ended: Arc<AtomicBool>,
+}
+
+impl Turns {
+    /// The loop came around.
+    pub(crate) fn count(&self) {
+        self.count.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The stages have ended in order: what follows takes its time.
+    pub(crate) fn end(&self) {
+        self.ended.store(true, Ordering::Relaxed);
+    }
+
+    /// Return when the loop has not come around for [`STUCK`]. Says false when it has ended.
+    fn are_stuck(&self) -> bool {
+        let (mut seen, mut since) = (0, Instant::now());
+        while !self.ended.load(Ordering::Relaxed) {
+            let now = self.count.load(Ordering::Relaxed);
+            if now != seen {
+                (seen, since) = (now, Instant::now());
+            }
+            if since.elapsed() >= STUCK {
+                return true;
+            }
+            thread::park_timeout(LOOK_EVERY);
+        }
+        false
+    }
+}
+
+/// Watch over `turns` from the first of `signals` on.
+pub(crate) fn watch(mut signals: Signals, turns: Turns) {
+    thread::spawn(move || {
+        while !signals.came() {
+            if poll::readable(&[signals.as_fd()], None).is_err() {
+                return;
+            }
+        }
+        if !turns.are_stuck() {
+            return;
+        }
+        tracing::error!(
+            "the supervisor hangs, perhaps in a file of the bus that was changed; the stages and the run are ended"
+        );
+        end_children(Signal::TERM);
+        thread::park_timeout(GRACE);
+        end_children(Signal::KILL);
+        exit_at_once(FAILED);
+    });
+}
+
+/// Signal all children of this process. Their numbers are their own: nobody reaps them.
+fn end_children(signal: Signal) {
+    let Ok(threads) = fs::read_dir("/proc/self/task") else {
+        return;
+    };
+    for thread in threads.flatten() {
+        let children = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
+        let pids = children.split_ascii_whitespace();
+        for pid in pids.filter_map(|pid| Pid::from_raw(pid.parse().ok()?)) {
+            // One that has ended needs no signal.
+            let _ = kill_process(pid, signal);
+        }
+    }
+}
