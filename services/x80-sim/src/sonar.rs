@@ -36,27 +36,6 @@ const ABSORPTION_DB_PER_M: f64 = 1.3;
 /// Radius of the post whose reach is known, metres.
 const POST_RADIUS_M: f64 = 0.015;
 
-/// How a ranger is mounted, looking outward.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mount {
-    /// Distance from the robot's centre, metres.
-    pub forward: f64,
-    /// Bearing from the robot's axis, radians.
-    pub bearing: f64,
-}
-
-impl Mount {
-    /// Where the ranger is and which way it looks on a robot at `robot`.
-    #[must_use]
-    pub fn on(&self, robot: Pose2) -> Pose2 {
-        let heading = robot.heading + self.bearing;
-        Pose2 {
-            position: robot.position + self.forward * DVec2::from_angle(heading),
-            heading,
-        }
-    }
-}
-
 /// Where an echo may come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
