@@ -9,7 +9,7 @@ use common::{
     mission::Mission,
     run::Run,
     samples::{
-        DirectiveSample, Order, RecoveryStep, RequestKind, RosterHeader, StallSample,
+        DirectiveSample, HoldReason, Order, RecoveryStep, RequestKind, RosterHeader, StallSample,
         TickLimitSample, name_str,
     },
     signals::Signals,
@@ -22,7 +22,7 @@ use crate::{
     decisive,
     domain::DomainLock,
     error::{SupervisorError, system},
-    judge::{self, TickProgress},
+    judge::{self, Deadline, StopClock, TickProgress},
     lead::{Lead, Next},
     order::{self, Decision},
     outcome::{Ending, Outcome},
@@ -97,6 +97,7 @@ pub(crate) struct Supervisor<'a> {
     pub clock: RunClock,
     pub decision: Decision,
     pub tick_progress: TickProgress,
+    stop_clock: StopClock,
     pub stall_watch: StallWatch,
     lead: Lead,
     published_limit: Option<TickLimitSample>,
@@ -141,6 +142,7 @@ impl<'a> Supervisor<'a> {
             clock,
             decision: Decision::STARTING,
             tick_progress: TickProgress::new(Instant::now()),
+            stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
             lead,
             published_limit: None,
@@ -286,6 +288,9 @@ impl<'a> Supervisor<'a> {
         let simulator = self.robot.simulator.as_ref();
         let truth = simulator.map_or(&[][..], Simulator::truth);
         let collision = decisive::first_contact(truth);
+        let time = self.clock.now(record.pose.as_ref(), truth.last());
+        let stopped = self.decision.reason == HoldReason::Operator;
+        self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
         judge::judge(
             &judge::Snapshot {
                 arrived_m: record.arrival.map(|command| command.distance_m),
@@ -293,8 +298,8 @@ impl<'a> Supervisor<'a> {
                 simulated: simulator.is_some(),
                 simulator_ended,
                 collision_m: collision.map(|truth| [truth.x, truth.y]),
-                time: self.clock.now(record.pose.as_ref(), truth.last()),
-                timeout_s: self.options.mission.timeout_s,
+                time,
+                deadline: self.deadline(),
                 in_ticks: self.clock.in_ticks(),
                 progress: self.tick_progress.update(record.newest_tick(), now),
                 was_ready: self.decision.ready,
@@ -308,12 +313,25 @@ impl<'a> Supervisor<'a> {
         )
     }
 
+    /// When the mission is given up.
+    pub(crate) const fn deadline(&self) -> Deadline {
+        Deadline {
+            timeout_s: self.options.mission.timeout_s,
+            stopped_s: self.state_file.state.operator_stopped_s,
+        }
+    }
+
     /// Look for stalls, and take the next recovery step. The last one ends the mission.
     fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let in_ticks = self.clock.in_ticks();
         if self.decision.order() != Order::Drive {
+            // On a clock of ticks no time passes meanwhile.
+            if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
+                self.stall_watch.hold(pose.stamp.tick);
+            }
             return Ok(None);
         }
-        if !self.clock.in_ticks() {
+        if !in_ticks {
             let Some(stall) = self.next_stall() else {
                 return Ok(None);
             };
