@@ -110,7 +110,8 @@ impl Ranging {
         let noise = &mut self.sonar_noise;
         let mut ranges: [f64; 6] = std::array::from_fn(|index| {
             let range = self.mounts[index].map_or(f64::INFINITY, |mount| {
-                sonar::listen(world, mount.on(body.pose()), physics, noise)
+                let centre = body.pose().position;
+                sonar::listen(world, centre, mount.on(body.pose()), physics, noise)
             });
             if silent[index] { f64::INFINITY } else { range }
         });

@@ -88,9 +88,20 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
 
-/// What a ranger at `pose` hears: metres, infinite for nothing. Noise of the range is not in it yet.
-pub fn listen(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> f64 {
+/// What a ranger at `pose` on a robot whose centre is at `centre` hears: metres, infinite for nothing. Noise of the range is not
+/// in it yet.
+pub fn listen(
+    world: &World,
+    centre: DVec2,
+    pose: Pose2,
+    physics: &SonarPhysics,
+    noise: &mut Noise,
+) -> f64 {
     let height = world.heights().sonar_m;
+    if world.is_between(centre, pose.position, height) {
+        // Pressed against what the body touches: it hears that, not what is behind.
+        return 0.0;
+    }
     let receiver = Receiver::new(pose, height, physics);
     let mut candidates: Vec<Candidate> = world
         .solids()

@@ -85,7 +85,7 @@ pub fn run(
         duration_s: supervisor
             .clock
             .duration_s(decided.last_tick, &record, &truth),
-        ending: decided.ending,
+        ending: decided.ending.checked(&options.mission, truth.last()),
         last_tick: decided.last_tick,
         record,
         truth,
