@@ -25,7 +25,7 @@ pub struct Entry {
     pub collisions: u64,
     /// How the mission ended; `goes on` where it had not when the watch ended.
     pub outcome: String,
-    /// Why; of a mission that goes on, why the link lets no command pass.
+    /// Why; of a mission that goes on, why the link lets no command pass, empty where it does.
     pub reason: String,
 }
 
@@ -82,7 +82,11 @@ impl fmt::Display for Ledger {
             // The worst says most.
             let worst = entries.iter().find(|entry| !entry.is_kept());
             let told = worst.or(entries.first()).map_or(String::new(), |entry| {
-                format!("{}: {}", entry.outcome, entry.reason)
+                let reason = match &*entry.reason {
+                    "" => "no reason",
+                    reason => reason,
+                };
+                format!("{}: {reason}", entry.outcome)
             });
             let name = fault.row().name;
             writeln!(

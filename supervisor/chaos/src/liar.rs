@@ -88,7 +88,7 @@ impl Liar {
     }
 
     /// Bytes of the robot that came at `now`: what the host gets, and when.
-    pub(crate) fn from_robot(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
+    pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let mut decoder = std::mem::take(&mut self.from_robot);
         decoder.push(bytes);
         let (mut out, mut more) = (Vec::new(), Vec::new());
@@ -125,7 +125,7 @@ impl Liar {
     }
 
     /// Bytes of the host: what the robot gets. `moves` is called for each command that moves its wheels.
-    pub(crate) fn from_host(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
+    pub(crate) fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
         let mut decoder = std::mem::take(&mut self.from_host);
         decoder.push(bytes);
         let mut out = Vec::new();

@@ -138,14 +138,14 @@ impl Wire {
                 let last = shared.last_moving.lock();
                 *last.unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
             };
-            let bytes = self.liar.from_host(&buffer[..length], &mut moves);
+            let bytes = self.liar.order(&buffer[..length], &mut moves);
             if !bytes.is_empty() {
                 let _ = self.back.send(&bytes);
             }
         }
         let now = self.began.elapsed();
         while let Ok(length) = self.back.recv(&mut buffer) {
-            let passed = self.liar.from_robot(&buffer[..length], now);
+            let passed = self.liar.report(&buffer[..length], now);
             self.held.extend(passed);
         }
         self.held.truncate(MOST_HELD);

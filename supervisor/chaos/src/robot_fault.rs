@@ -137,4 +137,18 @@ mod tests {
         assert_eq!(RobotFault::FramesSlow as usize + 1, TABLE.len());
         assert_eq!(RobotFault::named("honest"), None);
     }
+
+    #[test]
+    fn the_guides_table_is_this_one() {
+        let guide = include_str!("../../guide/break-it.md");
+        for row in TABLE {
+            let promise = match row.promise {
+                Promise::Rests => "rests",
+                Promise::Unharmed => "unharmed",
+            };
+            let what = row.what;
+            let line = format!("| `{}` | {what} | {promise} |\n", row.name);
+            assert!(guide.contains(&line), "missing in break-it.md: {line}");
+        }
+    }
 }

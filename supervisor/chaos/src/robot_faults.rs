@@ -215,7 +215,8 @@ impl Observed {
     ) -> Entry {
         let summary: serde_json::Value = serde_json::from_slice(summary).unwrap_or_default();
         let word = |key: &str| summary[key].as_str().unwrap_or_default().to_owned();
-        let cause = self.link.map_or("", |link| failsafe::name(link.cause()));
+        let stopped = self.link.filter(LinkSample::stopped);
+        let cause = stopped.map_or("", |link| failsafe::name(link.cause()));
         let (mut outcome, reason) = if self.ended_by_itself {
             (word("outcome"), word("reason"))
         } else {
@@ -253,13 +254,13 @@ impl Observed {
         // The run's own end stops the robot: only what it did until then counts.
         let counts = |tick: &&GroundTruthTick| at_time(tick.time_s).is_some_and(|at| at <= ended);
         let track_m = options.loaded.body().track_m;
-        let watched = truth.get(tick..).unwrap_or_default().iter().filter(counts);
+        let mut watched = truth.get(tick..).unwrap_or_default().iter().filter(counts);
         let moving = watched.clone().rfind(|tick| !is_at_rest(tick, track_m));
         let moved_until = moving.and_then(|tick| at_time(tick.time_s));
         entry.rest_s = Some(moved_until.map_or(0.0, since_lies));
         let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
         let before = tick.checked_sub(1).and_then(|before| truth.get(before));
-        entry.collisions = contacts(watched.last()).saturating_sub(contacts(before));
+        entry.collisions = contacts(watched.next_back()).saturating_sub(contacts(before));
         entry
     }
 }

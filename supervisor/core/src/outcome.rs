@@ -111,16 +111,16 @@ mod tests {
 
     #[test]
     fn reached_in_simulation_is_the_word_of_the_ground_truth_too() {
+        use Outcome::{Aborted, Reached, WrongPlace};
         let outcome = |said, set: &str, ended: Option<f64>| {
             let text = format!("target = [3, 0]\n{set}");
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
             let ended = ended.map(at);
             let ending = Ending::asked_for(said, "0.08 m from the target");
             let checked = ending.checked(&mission, ended.as_ref());
-            assert_eq!(checked.asked_for, checked.outcome != Outcome::WrongPlace);
+            assert_eq!(checked.asked_for, checked.outcome != WrongPlace);
             checked.outcome
         };
-        use Outcome::{Aborted, Reached, WrongPlace};
         assert_eq!(outcome(Reached, "", Some(2.6)), Reached);
         assert_eq!(outcome(Reached, "", Some(2.4)), WrongPlace);
         let wide = "arrival_tolerance_m = 0.8";

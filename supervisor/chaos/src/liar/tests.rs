@@ -59,9 +59,9 @@ fn reports(passed: &[Late]) -> Vec<Report> {
 /// What the host gets of a tick with `counts`, of a robot that stood at (100, 200) when it began to lie.
 fn lied(fault: RobotFault, counts: [u16; 2]) -> (Liar, Vec<Late>) {
     let mut liar = Liar::new(fault, 1);
-    liar.from_robot(&tick([100, 200]), at(1.0));
+    liar.report(&tick([100, 200]), at(1.0));
     liar.begin();
-    let passed = liar.from_robot(&tick(counts), at(1.1));
+    let passed = liar.report(&tick(counts), at(1.1));
     (liar, passed)
 }
 
@@ -84,7 +84,7 @@ fn sonar(passed: &[Late]) -> Option<u8> {
 fn a_robot_tells_the_truth_until_it_lies_and_every_lie_is_a_sound_frame() {
     for row in TABLE {
         let mut liar = Liar::new(row.fault, 1);
-        let honest = liar.from_robot(&tick([100, 200]), at(1.0));
+        let honest = liar.report(&tick([100, 200]), at(1.0));
         assert_eq!(honest.len(), 1, "{}", row.name);
         assert_eq!(
             (honest[0].at, &honest[0].bytes),
@@ -93,7 +93,7 @@ fn a_robot_tells_the_truth_until_it_lies_and_every_lie_is_a_sound_frame() {
         liar.begin();
         for number in 0..50 {
             let now = at(1.1 + 0.1 * f64::from(number));
-            let passed = liar.from_robot(&tick([110, 210]), now);
+            let passed = liar.report(&tick([110, 210]), now);
             // Panics where one is broken.
             let reports = reports(&passed);
             let acknowledged = reports.contains(&Report::System(SystemSignal::Ack));
@@ -129,7 +129,7 @@ fn the_encoders_lie_as_the_table_says() {
         "{reversed:?}"
     );
     let (mut liar, first) = lied(F::CountsRandom, [150, 190]);
-    let second = liar.from_robot(&tick([150, 190]), at(1.2));
+    let second = liar.report(&tick([150, 190]), at(1.2));
     assert_ne!(counts(&first), counts(&second));
 }
 
@@ -149,20 +149,20 @@ fn frames_are_late_old_or_rare_as_the_table_says() {
 
     let mut liar = Liar::new(RobotFault::OldFrames, 1);
     for number in 0..40 {
-        liar.from_robot(&tick([number, 200]), at(0.1 * f64::from(number)));
+        liar.report(&tick([number, 200]), at(0.1 * f64::from(number)));
     }
     liar.begin();
-    let passed = liar.from_robot(&tick([40, 200]), at(4.0));
+    let passed = liar.report(&tick([40, 200]), at(4.0));
     assert_eq!(passed.len(), 2);
     assert_eq!(counts(&passed[..1]), Some([40, 200]));
     assert_eq!(counts(&passed[1..]), Some([10, 200]), "3 s old");
-    let next = liar.from_robot(&tick([41, 200]), at(4.1));
+    let next = liar.report(&tick([41, 200]), at(4.1));
     assert_eq!(next.len(), 1, "the next in 2 s");
 
     let mut liar = Liar::new(RobotFault::FramesSlow, 1);
     liar.begin();
     let came = (0..30).filter(|&number| {
-        let passed = liar.from_robot(&tick([number, 200]), at(0.1 * f64::from(number)));
+        let passed = liar.report(&tick([number, 200]), at(0.1 * f64::from(number)));
         counts(&passed).is_some()
     });
     assert!((7..=9).contains(&came.count()), "3 s");
@@ -183,7 +183,7 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
     });
     let mut moved = 0;
     let mut liar = Liar::new(RobotFault::DoesNotStop, 1);
-    let mut heard = |liar: &mut Liar, bytes: &[u8]| liar.from_host(bytes, &mut || moved += 1);
+    let mut heard = |liar: &mut Liar, bytes: &[u8]| liar.order(bytes, &mut || moved += 1);
     assert_eq!(heard(&mut liar, &go), go);
     assert_eq!(heard(&mut liar, &stop), stop, "it obeys before it lies");
     liar.begin();
