@@ -30,15 +30,17 @@ use crate::{
     mission,
     options::Options,
     proxy::Proxy,
-    robot_fault::RobotFault,
+    robot_fault::{Promise, RobotFault},
 };
 
 /// The robot lies from so long after it has departed, seconds: at least, and how much more at most.
 const LIES_AFTER_S: (f64, f64) = (1.0, 4.0);
 /// A robot that has moved so far has departed, metres.
 const DEPARTED_M: f64 = 0.1;
-/// How long a robot that lies is watched: several times as long as it may move.
+/// How long a robot that lies is watched: several times as long as it may move, ...
 const WATCHED: Duration = Duration::from_secs(10);
+/// ... or until it has arrived, where it may go on: only there it can call a wrong place its target.
+const WATCHED_ON_ITS_WAY: Duration = Duration::from_secs(90);
 /// A mission that does not depart within this is given up.
 const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
 /// Time that a mission has to end in order.
@@ -154,9 +156,13 @@ impl Observed {
                 link = None;
             }
             self.ended_by_itself = child.try_reap().map_err(system("reap"))?.is_some();
+            let watched = match fault.row().promise {
+                Promise::Rests => WATCHED,
+                Promise::Unharmed => WATCHED_ON_ITS_WAY,
+            };
             let patience = self
                 .lies
-                .map_or(began + DEPARTS_WITHIN, |(at, _)| at + WATCHED);
+                .map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
             if self.ended_by_itself || Instant::now() >= patience {
                 break;
             }
