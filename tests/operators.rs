@@ -33,6 +33,25 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
 }
 
 #[test]
+fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
+    let (pace, timeout_s) = (8.0, 45.0);
+    let set = format!("timeout_s={timeout_s}");
+    let arguments = ["--pace", "8", "--set", &set];
+    let mut run = Run::start("stop-time", "open-room", &arguments);
+    run.wait_until_under_way(2.0);
+    operate("stop-time", &["stop"]);
+    let stopped = std::time::Instant::now();
+    run.wait_until("the stop has lasted as long as the mission may", |_| {
+        stopped.elapsed().as_secs_f64() * pace > timeout_s
+    });
+    operate("stop-time", &["resume"]);
+    let (code, summary) = run.finish();
+    let ended = (code, &summary["outcome"], &summary["replans"]);
+    assert_eq!(ended, (Some(0), &"reached".into(), &0.into()), "{summary}");
+    assert_nothing_left("stop-time");
+}
+
+#[test]
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     let mut run = Run::start("held", "open-room", &["--pace", "1"]);
     run.wait_until_under_way(1.0);

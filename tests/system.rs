@@ -23,6 +23,7 @@ mod planners;
 mod repeatability;
 mod replaced_bus;
 mod resume;
+mod robot_faults;
 mod services;
 mod structure;
 mod telemetry;

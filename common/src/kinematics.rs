@@ -10,3 +10,11 @@ pub use ackermann::{Ackermann, SteeredWheel};
 pub use differential::{DifferentialDrive, WheelSpeeds};
 pub use drive::Drive;
 pub use pose::{Pose2, Twist};
+
+/// Slower than this a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s), m/s: no robot is
+/// ordered to go slower, and a speed limit below it means stand.
+pub const LEAST_SPEED_M_S: f64 = 0.04;
+
+/// Cosine from which on a robot faces its way, 11 degrees: it has no reason to turn on the spot, and where it may not go on it
+/// stands.
+pub const FACES_COSINE: f64 = 0.98;

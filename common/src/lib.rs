@@ -7,7 +7,7 @@
 //! | [`clock`] | mission time, pace, the monotonic clock |
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows, versions |
 //! | [`kinematics`] | equations (1)-(3) and their inverses |
-//! | [`infrared`] | THE mounting of the infrared rangers |
+//! | [`infrared`], [`sonar`] | THE mounting of the infrared rangers; of an ultrasonic one, (19) |
 //! | [`latency`] | a histogram that fits in a sample |
 //! | [`address`] | where a robot answers, and over which transport |
 //! | [`wire`] | the X80's protocol: frames and messages |
@@ -57,6 +57,7 @@ pub mod run;
 pub mod samples;
 pub mod shell;
 pub mod signals;
+pub mod sonar;
 pub mod stage_command;
 pub mod start;
 pub mod step;

@@ -1,6 +1,9 @@
 //! The robot's body: presets and what a mission overrides.
 
-use crate::kinematics::{Ackermann, DifferentialDrive, Drive};
+use crate::{
+    kinematics::{Ackermann, DifferentialDrive, Drive},
+    sonar::Mount,
+};
 use serde::{Deserialize, Serialize};
 
 /// Kind of robot.
@@ -284,10 +287,21 @@ impl RobotConfig {
 pub struct SonarConfig {
     /// Its index among the six of the standard frame.
     pub index: u8,
-    /// Its distance ahead of the robot's centre, metres (the paper writes W/2).
+    /// Its distance from the robot's centre along its bearing, metres (the paper writes W/2).
     pub forward_m: f64,
     /// delta of (19): its bearing from the robot's axis, degrees.
     pub bearing_deg: f64,
+}
+
+impl SonarConfig {
+    /// How it is mounted.
+    #[must_use]
+    pub fn mount(&self) -> Mount {
+        Mount {
+            forward_m: self.forward_m,
+            bearing_rad: self.bearing_deg.to_radians(),
+        }
+    }
 }
 
 impl Default for SonarConfig {

@@ -4,7 +4,7 @@ mod car;
 
 use common::{
     clock::MissionTime,
-    kinematics::{Drive, Twist},
+    kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, Twist},
     mission::{Method, Mission},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
     step::{ForeignState, Step},
@@ -12,14 +12,10 @@ use common::{
 use glam::DVec2;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Slower than this a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s), m/s.
-const LEAST_SPEED_M_S: f64 = 0.04;
 /// Likewise for turning on the spot, rad/s.
 const LEAST_TURN_RAD_S: f64 = 0.25;
 /// Turn rate on the spot per angle that is left, 1/s.
 const TURN_GAIN: f64 = 3.0;
-/// Cosine from which on a robot follows its guidance however little way it is given: it would stall for ever.
-const CREEPS: f64 = 0.98;
 
 /// No farther from its target than this a robot has arrived beside it, whatever the planner says, metres.
 const BESIDE_M: f64 = 0.5;
@@ -212,7 +208,9 @@ impl Controller {
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);
                 if v == 0.0 {
-                    return Some(on_the_spot(self));
+                    // It may go nowhere: getting it out of there is the planner's order, which is a limit above 0.
+                    let faces = alignment.cosine > FACES_COSINE;
+                    return (!faces).then(|| on_the_spot(self));
                 }
                 let omega = self.angular(alignment);
                 Some(Twist { v, omega })
@@ -255,8 +253,6 @@ impl Controller {
             0.0
         } else if limit >= least {
             wanted.clamp(least, limit)
-        } else if alignment.cosine > CREEPS {
-            least
         } else {
             0.0
         }

@@ -80,15 +80,18 @@ pub(crate) struct EvidenceGrid {
     occupied: Vec<u8>,
 }
 
-/// The lattice laid over a mission's perimeter.
-pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission) -> GridFrame {
+/// The lattice laid over a mission's perimeter, and `beyond_m` metres further: what stands just outside is touched
+/// inside by a body that is as wide.
+pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
     let cells = (width / sonar.resolution_m)
         .ceil()
         .min(f64::from(MAX_CELLS));
+    let resolution_m = (width / cells).max(sonar.resolution_m);
+    let beyond = (beyond_m / resolution_m).ceil();
     GridFrame {
-        cells: cells as u32,
-        resolution_m: (width / cells).max(sonar.resolution_m),
+        cells: (cells + 2.0 * beyond) as u32,
+        resolution_m,
         centre: mission.perimeter.centre,
     }
 }

@@ -57,13 +57,14 @@ impl Evidential {
         let sonar = SonarModel::default();
         let grid = mission.grid_frame();
         let radius = mission.body().radius_m;
+        // A position is up to half a cell off the centre that stands for it.
+        let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         Self {
             sonar,
             geometry: Geometry {
-                lattice: lattice(&sonar, mission),
+                lattice: lattice(&sonar, mission, reach),
                 grid,
-                // A position is up to half a cell off the centre that stands for it.
-                reach: radius + mission.mapper.clearance_m + grid.resolution_m / 2.0,
+                reach,
             },
             radius,
             map_within: mission.map_within_m(),

@@ -9,6 +9,7 @@ use common::{
     grid::{Cell, CellState, GridFrame, Part, Window},
     mission::{Method, Mission, Sensors},
     samples::{FaultKind, GridHeader, PoseSample, RangeSample, RangeStatus},
+    sonar::Mount,
     step::{ForeignState, Step},
 };
 use glam::DVec2;
@@ -115,13 +116,12 @@ pub struct Mapper {
     target_m: DVec2,
     target: Option<Cell>,
     /// The paper's Im of (19).
-    margin: i64,
+    margin: u32,
     evidential: Evidential,
     sensing: bool,
     infrared: bool,
     map_within: f64,
-    sensor_forward: f64,
-    sensor_bearing: f64,
+    mount: Mount,
     footprint: f64,
     half_track: f64,
     belief: Belief,
@@ -146,13 +146,12 @@ impl Step for Mapper {
             frame,
             target_m: mission.target,
             target: frame.cell_at(mission.target),
-            margin: i64::from(margin),
+            margin,
             evidential,
             sensing: mission.sensing,
             infrared: mission.sensors == Sensors::FrontInfrared,
             map_within: mission.map_within_m(),
-            sensor_forward: mission.sonar.forward_m,
-            sensor_bearing: mission.sonar.bearing_deg.to_radians(),
+            mount: mission.sonar.mount(),
             footprint: mission.body().radius_m,
             half_track: mission.body().track_m / 2.0,
             belief: Belief {
@@ -292,9 +291,7 @@ impl Mapper {
             return Window::default();
         }
         let robot = pose.pose();
-        let beam = DVec2::from_angle(robot.heading + self.sensor_bearing);
-        let hit = robot.position + robot.axis() * self.sensor_forward + beam * distance;
-        let changed = self.mark(hit, robot.position);
+        let changed = self.mark(self.mount.hit(robot, distance), robot.position);
         self.belief.safety_events += u64::from(changed.area() > 0);
         changed
     }
@@ -309,9 +306,10 @@ impl Mapper {
             RangeStatus::Nothing => Some(None),
             _ => safety_distance(range).map(Some),
         });
+        let ranger = self.mount.on(robot);
         let reading = echo.map(|echo| Reading {
-            origin: robot.position + robot.axis() * self.sensor_forward,
-            axis: DVec2::from_angle(robot.heading + self.sensor_bearing),
+            origin: ranger.position,
+            axis: ranger.axis(),
             echo,
         });
         let rays = range
@@ -349,20 +347,23 @@ impl Mapper {
         changed
     }
 
-    /// (19): the hit's cell and the margin around it.
+    /// (19): the hit's cell and the margin around it. A hit outside the map marks as much of its margin as is inside.
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
         let mut changed = Window::default();
-        let Some(middle) = self.frame.cell_at(hit) else {
+        let margin = f64::from(self.margin);
+        let middle = self.frame.to_cells(hit).round();
+        let last = DVec2::splat(f64::from(self.frame.cells) - 1.0);
+        let (from, to) = (
+            (middle - margin).max(DVec2::ZERO),
+            (middle + margin).min(last),
+        );
+        if !middle.is_finite() || !from.cmple(to).all() {
             return changed;
-        };
-        for row in i64::from(middle.row) - self.margin..=i64::from(middle.row) + self.margin {
-            for col in i64::from(middle.col) - self.margin..=i64::from(middle.col) + self.margin {
-                let (Ok(col), Ok(row)) = (u32::try_from(col), u32::try_from(row)) else {
-                    continue;
-                };
+        }
+        for row in from.y as u32..=to.y as u32 {
+            for col in from.x as u32..=to.x as u32 {
                 let cell = Cell { col, row };
-                let inside = col < self.frame.cells && row < self.frame.cells;
-                if !inside || self.frame.is_rim(cell) || Some(cell) == self.target {
+                if self.frame.is_rim(cell) || Some(cell) == self.target {
                     continue;
                 }
                 if self.frame.centre_of(cell).distance(robot) <= self.footprint {

@@ -10,14 +10,17 @@
 
 use common::{
     grid::{Cell, CellState, GridFrame},
-    kinematics::Pose2,
+    kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
     mission::Mission,
     samples::GridHeader,
 };
 use glam::DVec2;
 use harmonic::{Field, Guidance};
 
-use crate::unheard_faces::UnheardFaces;
+use crate::{
+    near_echoes::{STANDS_BEFORE_M, clear_ahead_m},
+    unheard_faces::UnheardFaces,
+};
 
 /// From point to point along a way, metres.
 const STEP_M: f64 = 0.05;
@@ -96,15 +99,28 @@ impl ActiveSensing {
         match scan(self.bearing.rotate(pose.axis()), unseen) {
             // The robot turns until its sonar faces it.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
-            None => Advice::Go(self.limit(view, &unheard, pose, direction)),
+            None => Advice::Go(self.limit(view, &unheard, belief, pose, direction)),
         }
     }
 
-    /// The speed that the arc allows on which the controller brings the robot into `direction`, m/s.
+    /// The most speed that the newest readings allow along the robot's axis, m/s: none towards what is right before the body.
+    pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
+        let clear_m = clear_ahead_m(belief, pose, self.radius);
+        if clear_m < STANDS_BEFORE_M {
+            return 0.0;
+        }
+        clear_m / STOPS_WITHIN_S
+    }
+
+    /// The speed that the readings, and the arc on which the controller brings the robot into `direction`, allow, m/s.
+    ///
+    /// A robot that faces a way which the belief does not forbid would stall for ever where the arc allows no speed: it
+    /// goes as slowly as it can, as long as the readings allow that.
     fn limit(
         &self,
         view: &View<'_>,
         unheard: &UnheardFaces,
+        belief: &GridHeader,
         pose: &Pose2,
         direction: DVec2,
     ) -> f64 {
@@ -119,7 +135,12 @@ impl ActiveSensing {
                 && unheard.normals(at, ahead.axis()).next().is_none()
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
-        free as f64 * STEP_M / STOPS_WITHIN_S
+        let on_arc = free as f64 * STEP_M / STOPS_WITHIN_S;
+        let faces = pose.axis().dot(direction) > FACES_COSINE;
+        let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
+        on_arc
+            .max(least)
+            .min(self.limit_before_echoes(belief, pose))
     }
 }
 

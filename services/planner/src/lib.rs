@@ -11,6 +11,7 @@ mod aim;
 mod arcs;
 pub mod background_solver;
 mod fault;
+mod near_echoes;
 pub mod shell;
 pub mod step;
 mod unheard_faces;

@@ -389,7 +389,10 @@ impl Planner {
                 Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
                 Advice::Go(limit) => (status, direction, limit),
             },
-            GuidanceStatus::WayOut => (status, direction, WAY_OUT_M_S),
+            GuidanceStatus::WayOut => {
+                let limit = sensing.limit_before_echoes(&self.belief, pose);
+                (status, direction, limit.min(WAY_OUT_M_S))
+            }
             // It may be an echo that was none: one look around before the belief is blamed.
             GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),
             _ => (status, direction, 0.0),

@@ -21,9 +21,14 @@ pub fn read(
     noise: &mut Noise,
 ) -> [u16; RANGERS] {
     rangers(pose, radius).map(|ranger| {
-        let range = world
-            .first_hit(ranger.position, ranger.axis(), world.heights().infrared_m)
-            .map_or(NOTHING_M, |(range, _)| range);
+        let height_m = world.heights().infrared_m;
+        let range = if world.is_between(pose.position, ranger.position, height_m) {
+            // Pressed against what the body touches: it sees that, not what is behind.
+            0.0
+        } else {
+            let hit = world.first_hit(ranger.position, ranger.axis(), height_m);
+            hit.map_or(NOTHING_M, |(range, _)| range)
+        };
         let counts = f64::from(infrared_ad(range)) + noise.normal(physics.noise_counts);
         counts.round().clamp(0.0, 4095.0) as u16
     })

@@ -2,6 +2,7 @@
 
 use common::{
     mission::{Mission, Physics, SonarPhysics},
+    sonar::Mount,
     wire::{COUNT_CYCLE, CustomSensors, Encoder, LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors},
 };
 
@@ -11,7 +12,7 @@ use crate::{
     motor::Motor,
     noise::{Noise, Source},
     silence::Silence,
-    sonar::{self, Mount},
+    sonar,
     world::World,
 };
 
@@ -54,10 +55,10 @@ impl Ranging {
             (index, ranger.forward_m, ranger.bearing_deg)
         });
         let last = [(front, mission.sonar.forward_m, ahead)];
-        for (index, forward, bearing_deg) in sides.into_iter().chain(written).chain(last) {
+        for (index, forward_m, bearing_deg) in sides.into_iter().chain(written).chain(last) {
             mounts[index] = Some(Mount {
-                forward,
-                bearing: f64::to_radians(bearing_deg),
+                forward_m,
+                bearing_rad: f64::to_radians(bearing_deg),
             });
         }
         Self {
@@ -109,7 +110,8 @@ impl Ranging {
         let noise = &mut self.sonar_noise;
         let mut ranges: [f64; 6] = std::array::from_fn(|index| {
             let range = self.mounts[index].map_or(f64::INFINITY, |mount| {
-                sonar::listen(world, mount.on(body.pose()), physics, noise)
+                let centre = body.pose().position;
+                sonar::listen(world, centre, mount.on(body.pose()), physics, noise)
             });
             if silent[index] { f64::INFINITY } else { range }
         });

@@ -36,27 +36,6 @@ const ABSORPTION_DB_PER_M: f64 = 1.3;
 /// Radius of the post whose reach is known, metres.
 const POST_RADIUS_M: f64 = 0.015;
 
-/// How a ranger is mounted, looking outward.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mount {
-    /// Distance from the robot's centre, metres.
-    pub forward: f64,
-    /// Bearing from the robot's axis, radians.
-    pub bearing: f64,
-}
-
-impl Mount {
-    /// Where the ranger is and which way it looks on a robot at `robot`.
-    #[must_use]
-    pub fn on(&self, robot: Pose2) -> Pose2 {
-        let heading = robot.heading + self.bearing;
-        Pose2 {
-            position: robot.position + self.forward * DVec2::from_angle(heading),
-            heading,
-        }
-    }
-}
-
 /// Where an echo may come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
@@ -109,9 +88,20 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
 
-/// What a ranger at `pose` hears: metres, infinite for nothing. Noise of the range is not in it yet.
-pub fn listen(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> f64 {
+/// What a ranger at `pose` on a robot whose centre is at `centre` hears: metres, infinite for nothing. Noise of the range is not
+/// in it yet.
+pub fn listen(
+    world: &World,
+    centre: DVec2,
+    pose: Pose2,
+    physics: &SonarPhysics,
+    noise: &mut Noise,
+) -> f64 {
     let height = world.heights().sonar_m;
+    if world.is_between(centre, pose.position, height) {
+        // Pressed against what the body touches: it hears that, not what is behind.
+        return 0.0;
+    }
     let receiver = Receiver::new(pose, height, physics);
     let mut candidates: Vec<Candidate> = world
         .solids()

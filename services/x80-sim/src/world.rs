@@ -6,6 +6,9 @@ use common::{
 };
 use glam::DVec2;
 
+/// A sensor that is no farther from a surface touches it, metres.
+const TOUCHES_M: f64 = 1e-3;
+
 /// One surface, as it is seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
@@ -211,6 +214,19 @@ impl World {
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
             .filter_map(|Solid { surface, .. }| Some((surface.hit(origin, along)?, surface)))
             .min_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+}
+
+impl World {
+    /// Whether a surface at `height_m` stands between two points, or within [`TOUCHES_M`] of the second: what a body
+    /// touches may do so between a sensor at its edge and its centre.
+    #[must_use]
+    pub fn is_between(&self, from: DVec2, to: DVec2, height_m: f64) -> bool {
+        let Some(along) = (to - from).try_normalize() else {
+            return false;
+        };
+        let hit = self.first_hit(from, along, height_m);
+        hit.is_some_and(|(range, _)| range <= (to - from).length() + TOUCHES_M)
     }
 }
 

@@ -12,22 +12,32 @@
 //! | `attack`, `subscriptions` | the attacker of one mission; what it reads from the bus |
 //! | `resources`, `leftovers` | what a process holds; what outlived a mission |
 //! | [`Report`] | the result of all missions |
+//! | [`robot_fault`] | THE table of the ways in which a robot lies to its link |
+//! | `robot_faults`, `proxy`, `liar` | missions of such robots; the wire, and what becomes of the bytes on it |
+//! | [`Ledger`] | how long each moved after that |
 //! | [`ipc_bench`] | five bare hops on the bus |
 
 mod attack;
 mod error;
 pub mod ipc_bench;
+mod ledger;
 mod leftovers;
+mod liar;
 mod mission;
 mod options;
+mod proxy;
 mod report;
 mod resources;
+pub mod robot_fault;
+mod robot_faults;
 mod schedule;
 mod subscriptions;
 
 pub use error::ChaosError;
+pub use ledger::{Entry, Ledger};
 pub use options::Options;
 pub use report::Report;
+pub use robot_faults::{FaultOptions, check, run_robot_faults};
 
 use schedule::Schedule;
 

@@ -4,6 +4,7 @@ use std::{
     fs::{self, File},
     path::Path,
     process::{Command, Stdio},
+    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
@@ -25,7 +26,12 @@ use supervisor::{
 /// A mission that takes longer is stopped; at a wall-clock pace it takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Result<Command, ChaosError> {
+pub(crate) fn command(
+    options: &Options,
+    seed: u64,
+    pace: &str,
+    out: &Path,
+) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
     command.args(["--robot", &options.robot.to_string()]);
     command.args(["--seed", &seed.to_string(), "--out"]);
@@ -146,7 +152,11 @@ fn pose_allowance_m(mission: &Mission, kills: u32) -> f64 {
 }
 
 /// A robot that does not end with its supervisor.
-fn robot(options: &Options, seed: u64, directory: &Path) -> Result<Simulator, ChaosError> {
+pub(crate) fn robot(
+    options: &Options,
+    seed: u64,
+    directory: &Path,
+) -> Result<Simulator, ChaosError> {
     fs::create_dir(directory).map_err(system("make a directory"))?;
     let mission = Mission {
         seed,
@@ -165,17 +175,21 @@ fn one_supervisor(
     report: &mut Report,
 ) -> Result<Vec<u8>, ChaosError> {
     let mut child = Process::spawn(start).map_err(system("start a mission"))?;
+    let summary = read_stdout(&mut child);
+    let attacked = attack.run(options, &mut child, robot, schedule, report, PATIENCE);
+    child.end(Duration::from_secs(2));
+    let summary = summary.join().unwrap_or_default();
+    attacked.map(|()| summary)
+}
+
+/// Read its standard output to the end, by a thread: a long summary would fill the pipe.
+pub(crate) fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
     let stdout = child.take_stdout();
-    // Read by a thread: a long summary would fill the pipe.
-    let summary = std::thread::spawn(move || {
+    std::thread::spawn(move || {
         let mut text = Vec::new();
         if let Some(mut stdout) = stdout {
             let _ = std::io::Read::read_to_end(&mut stdout, &mut text);
         }
         text
-    });
-    let attacked = attack.run(options, &mut child, robot, schedule, report, PATIENCE);
-    child.end(Duration::from_secs(2));
-    let summary = summary.join().unwrap_or_default();
-    attacked.map(|()| summary)
+    })
 }

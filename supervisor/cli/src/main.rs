@@ -85,7 +85,8 @@ const EXIT_CODES: &str = "Exit codes of run:
   4  timeout
   5  collision (simulated robot)
   6  aborted by a fault
-  7  an earlier run was cut off (--resume-last)";
+  7  an earlier run was cut off (--resume-last)
+  9  in the wrong place by the ground truth (simulated robot)";
 
 /// Run the command line of this process.
 fn main() -> ExitCode {

@@ -6,7 +6,7 @@
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
 use crate::{
-    judge::{reached, timed_out, touched},
+    judge::{Deadline, reached, touched},
     observer::Record,
     outcome::{Ending, Outcome},
 };
@@ -31,8 +31,8 @@ pub(crate) struct Decided {
 /// When a mission runs out of time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timeout {
-    /// After so many seconds.
-    pub seconds: f64,
+    /// When it is given up.
+    pub deadline: Deadline,
     /// By the simulated robot's own clock, which also counts the ticks that nobody heard: on a clock of ticks.
     pub by_robot: bool,
 }
@@ -40,11 +40,12 @@ pub(crate) struct Timeout {
 impl Timeout {
     /// The first tick that was too late.
     fn tick(self, poses: &[PoseSample], truth: &[GroundTruthTick]) -> Option<u64> {
+        let seconds = self.deadline.at_s();
         if self.by_robot {
-            let late = truth.partition_point(|tick| tick.time_s < self.seconds);
+            let late = truth.partition_point(|tick| tick.time_s < seconds);
             return truth.get(late).map(|tick| tick_of(tick, poses));
         }
-        let late = poses.partition_point(|pose| pose.stamp.time().seconds() < self.seconds);
+        let late = poses.partition_point(|pose| pose.stamp.time().seconds() < seconds);
         poses.get(late).map(|pose| pose.stamp.tick)
     }
 }
@@ -73,7 +74,7 @@ pub(crate) fn first(
         .arrival
         .map(|command| (command.stamp.tick, reached(command.distance_m)));
     let late = timeout.tick(poses, truth);
-    let late = late.map(|tick| (tick, timed_out(timeout.seconds)));
+    let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
     // Of two at one tick the one named first.
     let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
@@ -87,7 +88,7 @@ pub(crate) fn first(
     let truth_ticks = match ending.outcome {
         Outcome::Collision => truth.partition_point(|tick| tick.contacts == 0) + 1,
         Outcome::Timeout if timeout.by_robot => {
-            truth.partition_point(|tick| tick.time_s < timeout.seconds)
+            truth.partition_point(|tick| tick.time_s < timeout.deadline.at_s())
         }
         _ => record
             .pose_at(last_tick)
@@ -128,7 +129,10 @@ mod tests {
     use super::*;
 
     const TIMEOUT: Timeout = Timeout {
-        seconds: 20.0,
+        deadline: Deadline {
+            timeout_s: 20.0,
+            stopped_s: 0.0,
+        },
         by_robot: true,
     };
 

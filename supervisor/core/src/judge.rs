@@ -34,8 +34,8 @@ pub(crate) struct Snapshot<'a> {
     pub collision_m: Option<[f64; 2]>,
     /// Mission time.
     pub time: MissionTime,
-    /// Mission time at which the mission is given up, seconds.
-    pub timeout_s: f64,
+    /// When the mission is given up.
+    pub deadline: Deadline,
     /// Mission time advances with ticks, not with the wall clock.
     pub in_ticks: bool,
     /// When the newest tick was first seen, or the order last changed.
@@ -76,9 +76,33 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
     Ending::failed(Outcome::Collision, reason)
 }
 
-/// So many seconds of mission time were not enough.
-pub(crate) fn timed_out(timeout_s: f64) -> Ending {
-    Ending::failed(Outcome::Timeout, format!("not there after {timeout_s} s"))
+/// When a mission is given up: the time that an operator's stop takes is not the robot's.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deadline {
+    /// The mission's own limit, seconds.
+    pub timeout_s: f64,
+    /// Mission time that an operator's stop took, seconds.
+    pub stopped_s: f64,
+}
+
+impl Deadline {
+    /// Mission time at which it is given up, seconds.
+    pub(crate) const fn at_s(self) -> f64 {
+        self.timeout_s + self.stopped_s
+    }
+
+    /// The mission's time was not enough.
+    pub(crate) fn timed_out(self) -> Ending {
+        let Self {
+            timeout_s,
+            stopped_s,
+        } = self;
+        let mut reason = format!("not there after {timeout_s} s");
+        if stopped_s > 0.0 {
+            reason += &format!(", {stopped_s:.0} s of an operator's stop not counted");
+        }
+        Ending::failed(Outcome::Timeout, reason)
+    }
 }
 
 fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
@@ -102,8 +126,8 @@ fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {
 }
 
 fn overran(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    let timeout_s = snapshot.timeout_s;
-    (snapshot.time.seconds() >= timeout_s).then(|| timed_out(timeout_s))
+    let late = snapshot.time.seconds() >= snapshot.deadline.at_s();
+    late.then(|| snapshot.deadline.timed_out())
 }
 
 fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
@@ -137,6 +161,21 @@ fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
         "the pipeline makes no progress; see the stages' logs".to_owned()
     };
     Some(Ending::failed(Outcome::Aborted, reason))
+}
+
+/// Mission time since an operator's stop was last looked at, to be counted as stopped.
+#[derive(Debug, Default)]
+pub(crate) struct StopClock {
+    /// When a stop was last seen to hold.
+    stopped_at: Option<MissionTime>,
+}
+
+impl StopClock {
+    /// Seconds of the stop since the last call; `stopped` says whether one holds at `now`.
+    pub(crate) fn passed_s(&mut self, stopped: bool, now: MissionTime) -> f64 {
+        let before = std::mem::replace(&mut self.stopped_at, stopped.then_some(now));
+        before.map_or(0.0, |before| now.since(before).as_secs_f64())
+    }
 }
 
 /// When the newest tick was first seen.

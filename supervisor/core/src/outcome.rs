@@ -1,13 +1,20 @@
 //! How a run ended.
 
+use common::{ground_truth::GroundTruthTick, mission::Mission};
 use serde::Serialize;
+
+/// A simulated robot that says it arrived, and by the ground truth stands farther from its target than this, is in the wrong
+/// place, metres: what counts as success on other benches. A mission whose tolerance is wider asks for no more than that.
+pub const RIGHT_PLACE_M: f64 = 0.5;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The robot is within the tolerance of the target.
+    /// The robot is within the tolerance of the target: by its own word, and in simulation by the ground truth, too.
     Reached,
+    /// It says so, and the ground truth says otherwise.
+    WrongPlace,
     /// The robot stalls, and no recovery step is left.
     Unreachable,
     /// Mission time ran out.
@@ -23,6 +30,7 @@ impl Outcome {
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Reached => "reached",
+            Self::WrongPlace => "wrong_place",
             Self::Unreachable => "unreachable",
             Self::Timeout => "timeout",
             Self::Collision => "collision",
@@ -52,11 +60,72 @@ impl Ending {
         }
     }
 
+    /// The same, or the wrong place where a robot that reached its target did not by the ground truth `ended`.
+    pub(crate) fn checked(self, mission: &Mission, ended: Option<&GroundTruthTick>) -> Self {
+        let distance_m = ended.map_or(0.0, |ended| {
+            (ended.x - mission.target.x).hypot(ended.y - mission.target.y)
+        });
+        let allowed_m = RIGHT_PLACE_M.max(mission.arrival_tolerance_m);
+        if self.outcome != Outcome::Reached || distance_m <= allowed_m {
+            return self;
+        }
+        let said = self.reason;
+        let reason = format!(
+            "{said} by its own pose, {distance_m:.2} m by the ground truth: more than {allowed_m} m"
+        );
+        Self::failed(Outcome::WrongPlace, reason)
+    }
+
     /// What the user asked for.
     pub(crate) fn asked_for(outcome: Outcome, reason: impl Into<String>) -> Self {
         Self {
             asked_for: true,
             ..Self::failed(outcome, reason)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn at(x: f64) -> GroundTruthTick {
+        GroundTruthTick {
+            tick: 9,
+            time_s: 9.0,
+            x,
+            y: 0.0,
+            heading: 0.0,
+            v: 0.0,
+            omega: 0.0,
+            clearance_m: 1.0,
+            contacts: 0,
+            left_counts: 0,
+            right_counts: 0,
+            sonar_cm: 255,
+            stopping_time_s: 0.0,
+            radio: None,
+        }
+    }
+
+    #[test]
+    fn reached_in_simulation_is_the_word_of_the_ground_truth_too() {
+        use Outcome::{Aborted, Reached, WrongPlace};
+        let outcome = |said, set: &str, ended: Option<f64>| {
+            let text = format!("target = [3, 0]\n{set}");
+            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            let ended = ended.map(at);
+            let ending = Ending::asked_for(said, "0.08 m from the target");
+            let checked = ending.checked(&mission, ended.as_ref());
+            assert_eq!(checked.asked_for, checked.outcome != WrongPlace);
+            checked.outcome
+        };
+        assert_eq!(outcome(Reached, "", Some(2.6)), Reached);
+        assert_eq!(outcome(Reached, "", Some(2.4)), WrongPlace);
+        let wide = "arrival_tolerance_m = 0.8";
+        assert_eq!(outcome(Reached, wide, Some(2.3)), Reached);
+        assert_eq!(outcome(Reached, "", None), Reached, "a real robot");
+        assert_eq!(outcome(Aborted, "", Some(0.0)), Aborted);
     }
 }

@@ -14,7 +14,7 @@ use dead_reckoning::shell::saved_state;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Room for the encoded [`SupervisorState`], bytes: it is under 80.
+/// Room for the encoded [`SupervisorState`], bytes: it is under 90.
 const CAPACITY: usize = 256;
 /// The kernel's name for the time since the machine was started.
 const BOOT_ID: &str = "/proc/sys/kernel/random/boot_id";
@@ -28,6 +28,8 @@ const SIMULATOR: &str = "x80-sim";
 pub struct SupervisorState {
     /// An operator said stop, and has not said resume.
     pub operator_stop: bool,
+    /// Mission time that such stops took, seconds.
+    pub operator_stopped_s: f64,
     /// Times another supervisor went on with this run.
     pub resumes: u32,
     /// The boot of the machine it ran in.

@@ -70,6 +70,7 @@ pub fn run(
     let ending = ending?;
     stopped?;
     let end_by_stall = supervisor.end_by_stall();
+    let deadline = supervisor.deadline();
     let simulator = supervisor.robot.simulator;
     let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
     let record = supervisor.bus.observer.record;
@@ -78,7 +79,7 @@ pub fn run(
         &record,
         &truth,
         Timeout {
-            seconds: options.mission.timeout_s,
+            deadline,
             by_robot: supervisor.clock.in_ticks(),
         },
         end_by_stall,
@@ -89,7 +90,7 @@ pub fn run(
         duration_s: supervisor
             .clock
             .duration_s(decided.last_tick, &record, &truth),
-        ending: decided.ending,
+        ending: decided.ending.checked(&options.mission, truth.last()),
         last_tick: decided.last_tick,
         record,
         truth,

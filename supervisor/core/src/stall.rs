@@ -23,6 +23,9 @@ use glam::DVec2;
 const STALLED_AFTER: Duration = Duration::from_secs(3);
 /// Mission time without a way to the target that is no passing false echo.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
+/// Mission time that a planner may compute a field without one that counts, and the robot stand for it: the largest one
+/// takes several seconds, and a new planner would begin again.
+const FIELD_WITHIN: Duration = Duration::from_secs(60);
 /// With the evidential method a robot that is cut off first turns so often on the spot, at half the speed it is
 /// ordered.
 const SCAN_TURNS: f64 = 1.2;
@@ -98,6 +101,8 @@ pub(crate) struct StallWatch {
     anchor: Option<Anchor>,
     place: Option<Place>,
     cut_off_since: Option<MissionTime>,
+    /// Since when it has stood because the planner computes a field.
+    waits_since: Option<MissionTime>,
     /// What it had travelled when it was first seen in hazard, metres.
     inside_hazard_since: Option<f64>,
     /// Replans at this place, with this belief.
@@ -157,6 +162,7 @@ impl StallWatch {
             anchor: None,
             place: None,
             cut_off_since: None,
+            waits_since: None,
             inside_hazard_since: None,
             replans_here: 0,
             replans: 0,
@@ -209,6 +215,10 @@ impl StallWatch {
         // The belief outlives its supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
         if held {
+            self.hold(pose.stamp.tick);
+            return None;
+        }
+        if self.waits_for_field(pose, guidance) {
             (self.anchor, self.place) = (None, None);
             return None;
         }
@@ -234,6 +244,7 @@ impl StallWatch {
             (anchor.time, place.since) = (now, now);
         }
         (self.cut_off_since, self.inside_hazard_since) = (None, None);
+        self.waits_since = None;
         let stall = StallSample {
             stamp: pose.stamp,
             x_m: pose.x_m,
@@ -246,6 +257,23 @@ impl StallWatch {
         };
         self.stalls.push(stall);
         Some(stall)
+    }
+
+    /// The robot was not to drive until `tick`: what it did by then is no stall.
+    pub(crate) fn hold(&mut self, tick: u64) {
+        self.tick = Some(tick);
+        (self.anchor, self.place) = (None, None);
+        (self.cut_off_since, self.waits_since) = (None, None);
+    }
+
+    /// Whether the robot stands because the planner computes a field, and may go on to.
+    fn waits_for_field(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> bool {
+        if GuidanceStatus::from_byte(guidance.status) != GuidanceStatus::Waiting {
+            self.waits_since = None;
+            return false;
+        }
+        let now = pose.stamp.time();
+        now.since(*self.waits_since.get_or_insert(now)) < FIELD_WITHIN
     }
 
     /// Whether u = 0 where the robot stands, in the field of the current belief, for longer than a robot needs to get

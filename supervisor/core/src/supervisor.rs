@@ -9,7 +9,7 @@ use common::{
     mission::Mission,
     run::Run,
     samples::{
-        DirectiveSample, Order, RecoveryStep, RequestKind, RosterHeader, StallSample,
+        DirectiveSample, HoldReason, Order, RecoveryStep, RequestKind, RosterHeader, StallSample,
         TickLimitSample, name_str,
     },
     signals::Signals,
@@ -22,7 +22,7 @@ use crate::{
     decisive,
     domain::DomainLock,
     error::{SupervisorError, system},
-    judge::{self, TickProgress},
+    judge::{self, Deadline, StopClock, TickProgress},
     last_resort::Turns,
     lead::{Lead, Next},
     order::{self, Decision},
@@ -98,6 +98,7 @@ pub(crate) struct Supervisor<'a> {
     pub clock: RunClock,
     pub decision: Decision,
     pub tick_progress: TickProgress,
+    stop_clock: StopClock,
     pub stall_watch: StallWatch,
     lead: Lead,
     published_limit: Option<TickLimitSample>,
@@ -147,6 +148,7 @@ impl<'a> Supervisor<'a> {
             clock,
             decision: Decision::STARTING,
             tick_progress: TickProgress::new(Instant::now()),
+            stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
             lead,
             published_limit: None,
@@ -293,6 +295,9 @@ impl<'a> Supervisor<'a> {
         let simulator = self.robot.simulator.as_ref();
         let truth = simulator.map_or(&[][..], Simulator::truth);
         let collision = decisive::first_contact(truth);
+        let time = self.clock.now(record.pose.as_ref(), truth.last());
+        let stopped = self.decision.reason == HoldReason::Operator;
+        self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
         judge::judge(
             &judge::Snapshot {
                 arrived_m: record.arrival.map(|command| command.distance_m),
@@ -300,8 +305,8 @@ impl<'a> Supervisor<'a> {
                 simulated: simulator.is_some(),
                 simulator_ended,
                 collision_m: collision.map(|truth| [truth.x, truth.y]),
-                time: self.clock.now(record.pose.as_ref(), truth.last()),
-                timeout_s: self.options.mission.timeout_s,
+                time,
+                deadline: self.deadline(),
                 in_ticks: self.clock.in_ticks(),
                 progress: self.tick_progress.update(record.newest_tick(), now),
                 was_ready: self.decision.ready,
@@ -315,16 +320,25 @@ impl<'a> Supervisor<'a> {
         )
     }
 
+    /// When the mission is given up.
+    pub(crate) const fn deadline(&self) -> Deadline {
+        Deadline {
+            timeout_s: self.options.mission.timeout_s,
+            stopped_s: self.state_file.state.operator_stopped_s,
+        }
+    }
+
     /// Look for stalls, and take the next recovery step. The last one ends the mission.
     fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let in_ticks = self.clock.in_ticks();
         if self.decision.order() != Order::Drive {
-            // Poses go on while an operator's stop holds; none of them is a stall, then or after.
-            if !self.clock.in_ticks() {
-                self.next_stall();
+            // On a clock of ticks no time passes meanwhile.
+            if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
+                self.stall_watch.hold(pose.stamp.tick);
             }
             return Ok(None);
         }
-        if !self.clock.in_ticks() {
+        if !in_ticks {
             let Some(stall) = self.next_stall() else {
                 return Ok(None);
             };
@@ -360,8 +374,7 @@ impl<'a> Supervisor<'a> {
         let in_ticks = self.clock.in_ticks();
         let stopped = record.link.is_none_or(|link| link.stopped());
         // On a clock of ticks no time passes while something holds the robot.
-        let ordered = self.decision.order() == Order::Drive;
-        let held = !in_ticks && (stopped || !ordered || !self.stages.all_running());
+        let held = !in_ticks && (stopped || !self.stages.all_running());
         // Of a tick without its command not all may be here yet.
         let newest = record.published().tick.filter(|_| in_ticks);
         // Several may have passed since the last look: a stall is one whether each was seen alone or not.

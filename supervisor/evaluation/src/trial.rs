@@ -6,6 +6,7 @@ use common::{
 };
 use glam::DVec2;
 use std::path::Path;
+use supervisor::outcome::RIGHT_PLACE_M;
 
 use crate::shortest_path::{ShortestPath, shortest_path};
 
@@ -28,7 +29,7 @@ pub struct Rules {
 impl Default for Rules {
     fn default() -> Self {
         Self {
-            success_within_m: 0.5,
+            success_within_m: RIGHT_PLACE_M,
             clock_after_departure: false,
             optimal_time_s: None,
         }

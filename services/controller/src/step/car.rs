@@ -1,8 +1,11 @@
 //! A car under guidance: (15), (16), limited in speed, and never on the spot.
 
-use common::{kinematics::Twist, samples::GuidanceStatus};
+use common::{
+    kinematics::{LEAST_SPEED_M_S, Twist},
+    samples::GuidanceStatus,
+};
 
-use super::{Alignment, Controller, LEAST_SPEED_M_S};
+use super::{Alignment, Controller};
 
 impl Controller {
     /// How a car moves under guidance of that status; none to stand, which it does where it would have to turn on the

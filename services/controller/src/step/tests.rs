@@ -174,6 +174,23 @@ fn an_evidential_robot_goes_no_faster_than_its_guidance_allows() {
 }
 
 #[test]
+fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
+    for limit in [0.0, f64::NAN, -1.0, 0.01, 0.039] {
+        let command = evidential().at(facing(0.0), &limited(limit));
+        assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
+        assert_eq!(
+            (command.left_rad_s, command.right_rad_s),
+            (0.0, 0.0),
+            "{limit}"
+        );
+        let turning = evidential().at(facing(0.4), &limited(limit));
+        assert_eq!(turning.v_m_s, 0.0, "{limit}");
+        assert!(turning.omega_rad_s < 0.0, "{limit}");
+    }
+    close(evidential().at(facing(0.0), &limited(0.04)).v_m_s, 0.04);
+}
+
+#[test]
 fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
     // 20 counts/s after a gain of 0.78, at 1200 counts a turn.
     let dead = 20.0 / 0.78 / 1200.0 * std::f64::consts::TAU;
@@ -181,8 +198,9 @@ fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
         for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
             let command = evidential().at(facing(f64::from(degrees).to_radians()), &limited(limit));
             let fastest = command.left_rad_s.abs().max(command.right_rad_s.abs());
+            let halts = CommandState::from_byte(command.state) == CommandState::Halt;
             assert!(
-                fastest > dead,
+                fastest > dead || halts && fastest == 0.0,
                 "{degrees} degrees, limit {limit}: {command:?}"
             );
         }

@@ -29,6 +29,16 @@ fn mapper(extra: &str) -> Mapper {
     Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
 }
 
+/// The same place in other cells, with a range so far mapped and `set` as its last lines.
+fn of(set: &str, cell_m: f64) -> Mapper {
+    let text = format!(
+        "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = {} }}\n\
+         sonar.forward_m = 0.2\nmapper.map_within_m = 2.0\n{set}",
+        (5.0 / cell_m) as u32
+    );
+    Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+}
+
 fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
     PoseSample {
         stamp: Stamp {
@@ -83,6 +93,38 @@ fn equation_19_by_hand() {
     );
     assert_eq!(mapper.state().safety_events(), 1);
     assert_eq!(mapper.state().version(), 2);
+}
+
+#[test]
+fn equation_19_takes_the_sensors_offset_along_its_bearing() {
+    // From the origin facing x: S + offset = 0.8 + 0.2 along the bearing.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    for (bearing_deg, hit) in [
+        (0, DVec2::new(1.0, 0.0)),
+        (45, DVec2::new(half, half)),
+        (-90, DVec2::new(0.0, -1.0)),
+    ] {
+        let set = format!("sonar.bearing_deg = {bearing_deg}\nmapper.margin_m = 0.0");
+        let mut mapper = of(&set, 0.02);
+        let heard = reading(RangeStatus::Measured, 0.8);
+        mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&heard));
+        let cell = mapper.frame().cell_at(hit).unwrap();
+        assert_eq!(sensed(&mapper), [(cell.col, cell.row)], "{bearing_deg}");
+    }
+}
+
+#[test]
+fn a_hit_just_outside_the_map_marks_the_part_of_its_margin_that_is_inside() {
+    let mut mapper = mapper("");
+    // The hit is at (2.5, 0), the cell after the last; the margin is a cell, and the last one stays border.
+    let outside = reading(RangeStatus::Measured, 0.5);
+    mapper.hear(&at(0, 1.8, 0.0, 0.0), Some(&outside));
+    assert_eq!(sensed(&mapper), []);
+    let mut mapper = of("mapper.margin_m = 0.25", 0.1);
+    mapper.hear(&at(0, 1.8, 0.0, 0.0), Some(&outside));
+    assert!(sensed(&mapper).contains(&(48, 25)), "{:?}", sensed(&mapper));
+    let far = at(1, f64::NAN, 1e300, 0.0);
+    assert_eq!(mapper.hear(&far, Some(&outside)).area(), 0);
 }
 
 #[test]

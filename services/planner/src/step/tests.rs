@@ -229,6 +229,28 @@ fn over_swept_ground_an_evidential_robot_goes_at_full_speed() {
 }
 
 #[test]
+fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
+    for (clear_m, may_go) in [(-0.01, false), (0.07, false), (0.5, true)] {
+        let mut planner = evidential(|_| true);
+        let count = planner.belief.clear_beam_count as usize;
+        // Every second reading hears nothing.
+        for beam in planner.belief.clear_beams[..count].iter_mut().step_by(2) {
+            (beam.x_m, beam.clear_m) = (0.19, clear_m);
+            beam.bearing_rad = 0.0;
+        }
+        let guidance = planner.guide(&at(0.0, 0.0));
+        let limit = guidance.speed_limit_m_s;
+        assert_eq!(limit > 0.0, may_go, "{clear_m} m: {guidance:?}");
+        let ahead = planner.advise(&Pose2::default(), GuidanceStatus::WayOut, DVec2::X);
+        assert_eq!(
+            ahead.2 > 0.0,
+            may_go,
+            "on the way out of a hazard, {clear_m} m"
+        );
+    }
+}
+
+#[test]
 fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
     let swept = |at: DVec2| at.x < 0.2 || at.y < 0.1;
     let (one, other) = (evidential(swept), evidential(swept));

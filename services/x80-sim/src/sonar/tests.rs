@@ -15,7 +15,13 @@ fn heard_in(text: &str, physics: &SonarPhysics, heading_deg: f64) -> f64 {
         heading: heading_deg.to_radians(),
     };
     let mut noise = Noise::new(1, Source::Sonar);
-    listen(&World::new(&mission), pose, physics, &mut noise)
+    listen(
+        &World::new(&mission),
+        pose.position,
+        pose,
+        physics,
+        &mut noise,
+    )
 }
 
 fn laboratory(text: &str, heading_deg: f64) -> f64 {
@@ -138,7 +144,7 @@ fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
     let mut noise = Noise::new(2, Source::Sonar);
     let pings = 20_000;
     let heard: Vec<f64> = (0..pings)
-        .map(|_| listen(&world, Pose2::default(), &physics, &mut noise))
+        .map(|_| listen(&world, DVec2::ZERO, Pose2::default(), &physics, &mut noise))
         .collect();
     let share = |want: fn(f64) -> bool| {
         heard.iter().filter(|range| want(**range)).count() as f64 / f64::from(pings)
@@ -199,4 +205,31 @@ fn what_is_low_hides_nothing_that_is_higher() {
         format!("{WALL}\nworld.box = [{{ at = [0.35, 0], size_m = [0.1, 2], top_m = 0.05 }}]");
     // The cone meets what is 0.05 m high from 0.13 m / tan(15 degrees) = 0.49 m on.
     close(laboratory(&scene, 0.0), 1.5);
+}
+
+#[test]
+fn a_sensor_at_or_within_the_bodys_edge_never_looks_through_a_wall_that_the_body_touches() {
+    // A body of 0.19 m, its centre at x = 1, that touches the wall at x = 1.19; behind it another one, 2.33 m on.
+    let text = "target = [0, -5]\nworld.wall = [{ points = [[1.19, -3], [1.19, 3]] }, { points = [[3.52, -3], [3.52, 3]] }]";
+    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let world = World::new(&mission);
+    let mut noise = Noise::new(1, Source::Sonar);
+    for realism in [Realism::Laboratory, Realism::Measured] {
+        let physics = SonarPhysics::preset(realism);
+        for forward_m in [0.19, 0.1915, 0.2] {
+            let pose = Pose2 {
+                position: DVec2::new(1.0 + forward_m, 0.0),
+                heading: 0.0,
+            };
+            let range = listen(&world, DVec2::X, pose, &physics, &mut noise);
+            close(range, 0.0);
+        }
+    }
+    let within = Pose2 {
+        position: DVec2::new(1.1, 0.0),
+        heading: 0.0,
+    };
+    let physics = SonarPhysics::preset(Realism::Laboratory);
+    let range = listen(&world, DVec2::X, within, &physics, &mut noise);
+    close(range, 0.09);
 }

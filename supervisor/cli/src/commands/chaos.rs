@@ -3,10 +3,13 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName};
+use common::{clock::Pace, domain::RobotName, mission::Mission};
 
 use super::{Failure, missions};
-use chaos::Options;
+use chaos::{
+    FaultOptions, Options,
+    robot_fault::{RobotFault, TABLE},
+};
 
 /// Send random signals to random stages at random times, mission after mission, and report.
 #[derive(Debug, Args)]
@@ -36,42 +39,66 @@ pub(crate) struct Arguments {
     /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "chaos")]
     robot: RobotName,
+    /// Instead of signals: a robot that lies to its link from a random moment on, mission after mission; all ways to lie, or
+    /// those named. At the end, for each: the time from the fault to the last moving command and to wheels at rest.
+    #[arg(
+        long, value_name = "FAULT,...", num_args = 0..=1, require_equals = true, default_missing_value = "all",
+        value_parser = parse_faults, conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
+    )]
+    robot_faults: Option<Faults>,
+    /// Missions of each lying robot.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
+    missions: u32,
     /// One line of JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// The exit code when a mission did not arrive, touched something, lost its pose, or left something behind.
+/// Ways to lie.
+#[derive(Clone, Debug)]
+struct Faults(Vec<RobotFault>);
+
+fn parse_faults(names: &str) -> Result<Faults, String> {
+    if names == "all" {
+        return Ok(Faults(TABLE.iter().map(|row| row.fault).collect()));
+    }
+    let named = |name: &str| {
+        RobotFault::named(name).ok_or_else(|| {
+            let all: Vec<_> = TABLE.iter().map(|row| row.name).collect();
+            format!("no robot fault {name:?}; give some of {}", all.join(", "))
+        })
+    };
+    names
+        .split(',')
+        .map(named)
+        .collect::<Result<_, _>>()
+        .map(Faults)
+}
+
+/// The exit code when a mission did not arrive, touched something, lost its pose, or left something behind; or a robot that lied
+/// did not come to rest in time.
 const NOT_CLEAN: u8 = 8;
 
 #[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // Errors in it are reported before anything is started.
     let loaded = missions::load(&arguments.mission, &arguments.set)?;
+    if let Some(Faults(faults)) = &arguments.robot_faults {
+        return robot_faults(arguments, loaded, faults.clone());
+    }
     if arguments.include_supervisor && loaded.robot.address.is_some() {
         return Err("chaos brings its own robot; leave robot.address out".into());
     }
     if arguments.pace == Pace::Max {
         return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
     }
-    let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
-    std::fs::create_dir(&directory)?;
-    let options = Options {
-        mission: arguments.mission.clone(),
-        loaded,
-        set: arguments.set.clone(),
-        robot: arguments.robot.clone(),
-        pace: if arguments.include_supervisor {
-            Pace::Rate(1.0)
-        } else {
-            arguments.pace
-        },
-        supervisor: arguments.include_supervisor,
-        kills: arguments.kills,
-        seed: arguments.seed,
-        startup: arguments.include_startup,
-        directory: directory.clone(),
+    let pace = if arguments.include_supervisor {
+        Pace::Rate(1.0)
+    } else {
+        arguments.pace
     };
+    let options = options(arguments, loaded, pace)?;
+    let directory = options.directory.clone();
     let ended = chaos::run(&options, &mut |report| {
         let (kills, missions) = (report.kills(), report.missions());
         eprintln!("{kills} of {} signals, {missions} missions", options.kills);
@@ -98,4 +125,59 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     } else {
         NOT_CLEAN
     }))
+}
+
+/// What missions are started with, in a new directory.
+fn options(arguments: &Arguments, loaded: Mission, pace: Pace) -> Result<Options, std::io::Error> {
+    let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
+    std::fs::create_dir(&directory)?;
+    Ok(Options {
+        mission: arguments.mission.clone(),
+        loaded,
+        set: arguments.set.clone(),
+        robot: arguments.robot.clone(),
+        pace,
+        supervisor: arguments.include_supervisor,
+        kills: arguments.kills,
+        seed: arguments.seed,
+        startup: arguments.include_startup,
+        directory,
+    })
+}
+
+#[allow(clippy::print_stdout, clippy::print_stderr)]
+fn robot_faults(
+    arguments: &Arguments,
+    loaded: Mission,
+    faults: Vec<RobotFault>,
+) -> Result<ExitCode, Failure> {
+    chaos::check(&loaded)?;
+    let options = FaultOptions {
+        base: options(arguments, loaded, Pace::Rate(1.0))?,
+        faults,
+        missions: arguments.missions,
+    };
+    let directory = options.base.directory.clone();
+    let of = options.faults.len() as u64 * u64::from(options.missions);
+    let ended = chaos::run_robot_faults(&options, &mut |ledger| {
+        eprintln!("{} of {of} missions", ledger.entries.len());
+    });
+    let ledger = match ended {
+        Ok(ledger) => ledger,
+        Err(error) => {
+            return Err(format!("{error}; see {}", directory.display()).into());
+        }
+    };
+    if ledger.is_kept() {
+        std::fs::remove_dir_all(&directory)?;
+    } else {
+        let directory = directory.display();
+        eprintln!("firsthand: the files of the missions that went wrong are in {directory}");
+    }
+    if arguments.json {
+        println!("{}", serde_json::to_string(&ledger)?);
+    } else {
+        print!("{ledger}");
+    }
+    Ok(ExitCode::from(if ledger.is_kept() { 0 } else { NOT_CLEAN }))
 }

@@ -219,6 +219,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
         Outcome::Timeout => 4,
         Outcome::Collision => 5,
         Outcome::Aborted => 6,
+        Outcome::WrongPlace => 9,
     })
 }
 

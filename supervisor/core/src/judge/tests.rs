@@ -11,6 +11,28 @@ fn link(action: Action, cause: Cause) -> LinkSample {
     }
 }
 
+const fn deadline(timeout_s: f64, stopped_s: f64) -> Deadline {
+    Deadline {
+        timeout_s,
+        stopped_s,
+    }
+}
+
+#[test]
+fn the_time_of_an_operators_stop_is_counted_from_its_first_sight_to_its_last() {
+    let mut clock = StopClock::default();
+    let at = MissionTime::from_seconds;
+    let looks = [
+        (3.0, false),
+        (4.0, true),
+        (6.0, true),
+        (9.0, false),
+        (12.0, false),
+    ];
+    let passed = looks.map(|(seconds, stopped)| clock.passed_s(stopped, at(seconds)));
+    assert_eq!(passed, [0.0, 0.0, 2.0, 3.0, 0.0]);
+}
+
 #[test]
 fn every_rule_of_the_judgement_decides_its_row() {
     let start = Instant::now();
@@ -32,7 +54,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
         simulator_ended: false,
         collision_m: None,
         time: MissionTime::from_seconds(10.0),
-        timeout_s: 60.0,
+        deadline: deadline(60.0, 0.0),
         in_ticks: true,
         progress: start,
         was_ready: true,
@@ -66,9 +88,12 @@ fn every_rule_of_the_judgement_decides_its_row() {
          early, Some((Outcome::Aborted, "battery"))),
         ("a stop by the link's failsafe is no end",
          Snapshot { link: Some(&stop), ..driving() }, early, None),
-        ("a collision", Snapshot { collision_m: Some([1.0, 2.0]), timeout_s: 5.0, ..driving() }, early,
+        ("a collision", Snapshot { collision_m: Some([1.0, 2.0]), deadline: deadline(5.0, 0.0), ..driving() }, early,
          Some((Outcome::Collision, "(1.00, 2.00)"))),
-        ("a timeout", Snapshot { timeout_s: 10.0, ..driving() }, late, Some((Outcome::Timeout, "10 s"))),
+        ("a timeout", Snapshot { deadline: deadline(10.0, 0.0), ..driving() }, late, Some((Outcome::Timeout, "10 s"))),
+        ("the time of an operator's stop is no mission time", Snapshot { deadline: deadline(8.0, 3.0), ..driving() }, early, None),
+        ("a timeout after an operator's stop", Snapshot { deadline: deadline(8.0, 2.0), ..driving() }, late,
+         Some((Outcome::Timeout, "not there after 8 s, 2 s of an operator's stop not counted"))),
         ("no tick while driving", driving(), late, Some((Outcome::Aborted, "stages' logs"))),
         ("a real robot may be away", Snapshot { simulated: false, ..driving() }, late, None),
         ("a robot that answers from another port",

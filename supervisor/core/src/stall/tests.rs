@@ -76,6 +76,35 @@ fn a_robot_held_by_something_else_is_not_stalled() {
 }
 
 #[test]
+fn a_robot_that_waits_for_a_field_is_not_stalled_until_that_takes_too_long() {
+    let mut watch = watch();
+    let waiting = guidance(GuidanceStatus::Waiting, 0);
+    let first = (0..300).find(|&second| {
+        let pose = pose(f64::from(second), 0.0);
+        watch.step(&pose, &waiting, false).is_some()
+    });
+    let least = FIELD_WITHIN.as_secs() as i32;
+    assert_eq!(first, Some(least + STALLED_AFTER.as_secs() as i32));
+    // The next one is asked for after as long again.
+    let second = pose(f64::from(least) + 10.0, 0.0);
+    assert_eq!(watch.step(&second, &waiting, false), None);
+}
+
+#[test]
+fn what_a_robot_did_while_it_was_not_to_drive_is_no_stall() {
+    let mut watch = watch();
+    let along = guidance(GuidanceStatus::Along, 0);
+    let cut_off = guidance(GuidanceStatus::Unreachable, 0);
+    assert_eq!(watch.step(&pose(0.0, 0.0), &along, false), None);
+    assert_eq!(watch.step(&pose(0.5, 0.0), &cut_off, false), None);
+    let resumed = pose(20.0, 0.0);
+    watch.hold(resumed.stamp.tick);
+    assert_eq!(watch.tick(), Some(resumed.stamp.tick));
+    assert_eq!(watch.step(&pose(20.2, 0.0), &cut_off, false), None);
+    assert_eq!(watch.step(&pose(20.4, 0.0), &along, false), None);
+}
+
+#[test]
 fn a_robot_cut_off_forgets_three_times_and_gives_up() {
     let mut watch = watch();
     let mut stalls = Vec::new();

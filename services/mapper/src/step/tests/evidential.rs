@@ -50,6 +50,17 @@ fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept(
     assert_eq!(mapper.state().safety_events(), 1);
 }
 
+#[test]
+fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
+    let mut mapper = mapper("");
+    // The map ends at x = 2.45; a wall stands at 2.5, 0.5 m ahead of the sensor. The body reaches 0.22 m and half a cell.
+    for tick in 0..3 {
+        hear(&mut mapper, tick, 1.8, 0.0, Some(0.5));
+    }
+    assert!(state(&mapper, 2.3, 0.0).is_hazard());
+    assert!(!state(&mapper, 2.2, 0.0).is_hazard());
+}
+
 /// A robot at the origin facing along x whose infrared rangers give these counts, and whose sonar gives nothing.
 fn see(mapper: &mut Mapper, tick: u64, infrared_ad: [u16; 7]) {
     let stamp = Stamp {

@@ -1,0 +1,90 @@
+//! What the newest readings heard right ahead of the body.
+//!
+//! The belief weighs echoes against silences, so that an echo that comes and goes, or one that lies where the map has no
+//! room for it, may leave the way open. Right before the body that is not enough: there what is nearest counts.
+
+use common::{kinematics::Pose2, samples::GridHeader};
+use glam::DVec2;
+
+/// So many of the newest readings count: about a second of them. One false echo holds the robot no longer than that.
+const NEWEST: usize = 8;
+/// A reading is of what lies ahead when it was taken within this of the robot's axis: the cone, and a little more.
+const AHEAD_DEG: f64 = 20.0;
+/// With less free ground than this right ahead the body does not go there, metres. Readings are free only up to 0.05 m before their
+/// echo: 0.13 m.
+pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
+
+/// Free ground ahead of a body of `radius` metres at `pose`, by the least of the newest readings in `belief`, metres; infinite
+/// without one that looked there.
+pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64) -> f64 {
+    let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
+    let newest = belief.clear_beams().iter().rev().take(NEWEST);
+    newest
+        .filter(|beam| DVec2::from_angle(beam.bearing_rad.into()).dot(axis) >= within)
+        .map(|beam| {
+            let origin = DVec2::new(beam.x_m.into(), beam.y_m.into());
+            (origin - pose.position).dot(axis) + f64::from(beam.clear_m) - radius
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use common::samples::ClearBeam;
+
+    use super::*;
+
+    /// Readings of a sonar 0.19 m ahead, by a robot at the origin: bearing in degrees and how far nothing answered.
+    fn belief(readings: &[(f32, f32)]) -> GridHeader {
+        let mut belief = GridHeader {
+            clear_beam_count: readings.len() as u64,
+            ..GridHeader::default()
+        };
+        for (beam, &(bearing_deg, clear_m)) in belief.clear_beams.iter_mut().zip(readings) {
+            let bearing_rad = bearing_deg.to_radians();
+            *beam = ClearBeam {
+                x_m: 0.19 * bearing_rad.cos(),
+                y_m: 0.19 * bearing_rad.sin(),
+                bearing_rad,
+                clear_m,
+            };
+        }
+        belief
+    }
+
+    fn clear(readings: &[(f32, f32)], radius: f64, x: f64) -> f64 {
+        let pose = Pose2 {
+            position: DVec2::new(x, 0.0),
+            heading: 0.0,
+        };
+        clear_ahead_m(&belief(readings), &pose, radius)
+    }
+
+    #[test]
+    fn an_echo_that_comes_and_goes_is_there() {
+        let near = clear(
+            &[(0.0, 0.03), (0.0, 2.0), (0.0, 0.03), (0.0, 2.0)],
+            0.19,
+            0.0,
+        );
+        assert!((near - 0.03).abs() < 1e-6, "{near}");
+        let inside = clear(&[(0.0, 0.07)], 0.22, 0.0);
+        assert!(
+            (inside - 0.04).abs() < 1e-6,
+            "a sensor within the body's edge: {inside}"
+        );
+        let nearer = clear(&[(0.0, 0.5)], 0.19, 0.4);
+        assert!(
+            (nearer - 0.1).abs() < 1e-6,
+            "the robot went on since: {nearer}"
+        );
+    }
+
+    #[test]
+    fn what_is_beside_or_long_past_is_not_ahead() {
+        assert_eq!(clear(&[(30.0, 0.03)], 0.19, 0.0), f64::INFINITY);
+        let mut readings = vec![(0.0, 0.03)];
+        readings.extend([(0.0, 2.0); NEWEST]);
+        assert!(clear(&readings, 0.19, 0.0) > 1.9);
+    }
+}
