@@ -15,6 +15,7 @@ mod faults;
 mod field;
 mod foreign_payload;
 mod kills;
+mod machine;
 mod missions;
 mod operators;
 mod planners;

@@ -16,6 +16,7 @@ use rustix::process::Signal;
 
 use crate::{
     death::Death,
+    observed_time::ObservedTime,
     output_watchdog::OutputWatchdog,
     policy::{Action, Event, Now, Phase},
     stage_process::{StageProcess, StageProcessError},
@@ -39,7 +40,7 @@ pub struct StageProcesses {
     stages: Vec<StageProcess>,
     watchdog: OutputWatchdog,
     directory: PathBuf,
-    clock: Instant,
+    clock: ObservedTime,
     starter: Starter,
     /// A stage that ends stays down.
     ending: bool,
@@ -57,7 +58,7 @@ impl StageProcesses {
                 .collect(),
             watchdog: OutputWatchdog::new(cells),
             directory,
-            clock: Instant::now(),
+            clock: ObservedTime::new(Instant::now()),
             starter,
             ending: false,
             start_blocked: false,
@@ -65,7 +66,12 @@ impl StageProcesses {
     }
 
     fn now(&self) -> Now {
-        self.clock.elapsed()
+        self.clock.at(Instant::now())
+    }
+
+    /// A wait ended that should have taken at most `planned`: the stages are not blamed for what it took beyond that.
+    pub fn on_waited(&mut self, planned: Duration) {
+        self.clock.on_waited(planned, Instant::now());
     }
 
     fn position(&self, stage: &str) -> Option<usize> {
@@ -74,6 +80,7 @@ impl StageProcesses {
 
     /// Start every stage that is down on a new bus, in order, from `first_tick` on; external ones are not started here.
     pub fn start_all(&mut self, first_tick: u64) {
+        self.ending = false;
         if self.starter == Starter::External {
             return;
         }
@@ -177,7 +184,7 @@ impl StageProcesses {
         std::mem::take(&mut self.start_blocked)
     }
 
-    /// From now on a stage that ends stays down.
+    /// From now on a stage that ends stays down, until all are started again.
     pub fn start_no_more(&mut self) {
         self.ending = true;
     }

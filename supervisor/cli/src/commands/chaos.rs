@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use clap::Args;
 use common::{clock::Pace, domain::RobotName};
 
-use super::{Failure, missions};
+use super::{Failure, missions, print_text};
+use crate::progress_line::write_stderr;
 use chaos::Options;
 
 /// Send random signals to random stages at random times, mission after mission, and report.
@@ -27,6 +28,9 @@ pub(crate) struct Arguments {
     /// of its own, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     include_supervisor: bool,
+    /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals: as a machine that stands still.
+    #[arg(long)]
+    freeze_all: bool,
     /// Mission time, R times wall-clock.
     #[arg(long, default_value = "4")]
     pace: Pace,
@@ -41,10 +45,9 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The exit code when a mission did not arrive, touched something, lost its pose, or left something behind.
+/// The exit code when a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something behind.
 const NOT_CLEAN: u8 = 8;
 
-#[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // Errors in it are reported before anything is started.
     let loaded = missions::load(&arguments.mission, &arguments.set)?;
@@ -70,11 +73,15 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         kills: arguments.kills,
         seed: arguments.seed,
         startup: arguments.include_startup,
+        freeze_all: arguments.freeze_all,
         directory: directory.clone(),
     };
     let ended = chaos::run(&options, &mut |report| {
         let (kills, missions) = (report.kills(), report.missions());
-        eprintln!("{kills} of {} signals, {missions} missions", options.kills);
+        write_stderr(&format!(
+            "{kills} of {} signals, {missions} missions\n",
+            options.kills
+        ));
     });
     let report = match ended {
         Ok(report) => report,
@@ -86,12 +93,14 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         std::fs::remove_dir_all(&directory)?;
     } else {
         let directory = directory.display();
-        eprintln!("firsthand: the files of the missions that went wrong are in {directory}");
+        write_stderr(&format!(
+            "firsthand: the files of the missions that went wrong are in {directory}\n"
+        ));
     }
     if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
+        print_text(&format!("{}\n", serde_json::to_string(&report)?))?;
     } else {
-        print!("{report}");
+        print_text(&report.to_string())?;
     }
     Ok(ExitCode::from(if report.is_clean() {
         0

@@ -1,0 +1,71 @@
+//! Time that the supervisor was there to see. A deadline of a stage counts that alone: where the whole machine stood still,
+//! or this process was not scheduled, nobody can say that a stage was late.
+
+use std::time::{Duration, Instant};
+
+use crate::policy::Now;
+
+/// A wait, or the work between two waits, that takes so much longer than it should is noticed as lateness. On a machine
+/// that is not overloaded a wait ends within a hundredth of it.
+const TOLERANCE: Duration = Duration::from_millis(20);
+
+/// The clock of the stages' deadlines.
+#[derive(Debug)]
+pub(crate) struct ObservedTime {
+    observed: Now,
+    /// Until when that was counted.
+    until: Instant,
+}
+
+impl ObservedTime {
+    /// Zero at `now`.
+    pub(crate) const fn new(now: Instant) -> Self {
+        Self {
+            observed: Now::ZERO,
+            until: now,
+        }
+    }
+
+    /// Its reading at `now`, while the supervisor works.
+    pub(crate) fn at(&self, now: Instant) -> Now {
+        self.observed + self.since(now).min(TOLERANCE)
+    }
+
+    /// At `now` a wait ended that should have taken at most `planned`: what it took beyond that does not count.
+    pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
+        self.observed += self.since(now).min(planned + TOLERANCE);
+        self.until = now;
+    }
+
+    fn since(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.until)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_wait_counts_as_long_as_it_took() {
+        let began = Instant::now();
+        let mut time = ObservedTime::new(began);
+        for wait in 1..=10 {
+            time.on_waited(200 * MS, began + wait * 50 * MS);
+        }
+        assert_eq!(time.at(began + 500 * MS), 500 * MS);
+    }
+
+    #[test]
+    fn a_stall_of_everything_does_not_count_wherever_it_falls() {
+        let began = Instant::now();
+        let mut time = ObservedTime::new(began);
+        // In the work between two waits.
+        assert_eq!(time.at(began + 600 * MS), TOLERANCE);
+        // In a wait that should have taken 5 ms.
+        time.on_waited(5 * MS, began + 600 * MS);
+        assert_eq!(time.at(began + 600 * MS), 5 * MS + TOLERANCE);
+    }
+}
