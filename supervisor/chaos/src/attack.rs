@@ -130,8 +130,9 @@ impl Attack {
             self.hit_starting(report);
             let enough = report.kills() >= options.kills;
             if Instant::now() >= next && self.driving && !enough {
-                next = Instant::now() + schedule.pause();
+                let pause = schedule.pause();
                 self.hit(options, schedule, report);
+                next = Instant::now() + pause;
             }
         }
         if let Some([first, last]) = self.resources {

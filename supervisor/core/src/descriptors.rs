@@ -9,28 +9,39 @@ use std::{fs, io, os::fd::BorrowedFd};
 
 use rustix::{
     io::{FdFlags, fcntl_setfd},
-    process::{Resource, Rlimit, getrlimit, setrlimit},
+    process::{Resource, Rlimit, setrlimit},
 };
 
-/// A supervisor has about 130 open with no consumer on the bus, and as many again while stages are replaced.
+/// A supervisor has some 200 open.
 const NEEDED: u64 = 256;
 
 /// As many descriptors as the hard limit allows this process and its children. An error says the limit, if they are too
 /// few: the middleware would report no more than that something failed.
 pub(crate) fn raise_limit() -> Result<(), u64> {
-    let Rlimit { maximum, .. } = getrlimit(Resource::Nofile);
-    // One that cannot be raised is judged as it is.
-    let _ = setrlimit(
-        Resource::Nofile,
-        Rlimit {
-            current: maximum,
-            maximum,
-        },
-    );
-    match getrlimit(Resource::Nofile).current {
-        Some(limit) if limit < NEEDED => Err(limit),
+    let Some([_, hard]) = limits() else {
+        return Ok(());
+    };
+    let limit = Rlimit {
+        current: Some(hard),
+        maximum: Some(hard),
+    };
+    // One that cannot be raised, as under the service's unit, is judged as it is.
+    let _ = setrlimit(Resource::Nofile, limit);
+    match limits() {
+        Some([soft, _]) if soft < NEEDED => Err(soft),
         _ => Ok(()),
     }
+}
+
+/// The soft and the hard limit; none where the kernel does not say, or there is none. As text: the call that asks may be
+/// forbidden to a service, together with the one that sets.
+fn limits() -> Option<[u64; 2]> {
+    let limits = fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max open files"))?;
+    let mut numbers = line.split_ascii_whitespace().map(str::parse);
+    Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
 }
 
 /// Standard input, output and error are the child's own.

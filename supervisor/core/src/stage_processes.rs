@@ -152,10 +152,13 @@ impl StageProcesses {
             if let Some(cause) = self.stages[index].try_reap()? {
                 let now = self.now();
                 let stage = &mut self.stages[index];
-                let asked = matches!(
+                let by_us = matches!(
                     stage.phase(),
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
+                // Systemd stops the stages before the supervisor that they depend on.
+                let by_starter = self.starter == Starter::External && stage.is_stopping();
+                let asked = by_us || by_starter;
                 let mut death = stage.record_death(cause, &self.directory, now);
                 if let Err(error) = bus.remove_unfinished(death.pid) {
                     tracing::warn!(stage = death.stage, %error, "cannot prepare the bus for its successor");

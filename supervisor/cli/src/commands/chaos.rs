@@ -48,9 +48,17 @@ pub(crate) struct Arguments {
 /// The exit code when a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something behind.
 const NOT_CLEAN: u8 = 8;
 
+/// Ten times that of a mission.
+const LONG_TIMEOUT: &str = "timeout_s=1800";
+
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let mut set = arguments.set.clone();
+    if arguments.freeze_all {
+        // The robot's clock goes on while its processes are frozen; what --set says comes later and holds.
+        set.insert(0, LONG_TIMEOUT.to_owned());
+    }
     // Errors in it are reported before anything is started.
-    let loaded = missions::load(&arguments.mission, &arguments.set)?;
+    let loaded = missions::load(&arguments.mission, &set)?;
     if arguments.include_supervisor && loaded.robot.address.is_some() {
         return Err("chaos brings its own robot; leave robot.address out".into());
     }
@@ -62,7 +70,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let options = Options {
         mission: arguments.mission.clone(),
         loaded,
-        set: arguments.set.clone(),
+        set,
         robot: arguments.robot.clone(),
         pace: if arguments.include_supervisor {
             Pace::Rate(1.0)
