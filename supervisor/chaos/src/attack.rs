@@ -264,10 +264,8 @@ impl Attack {
     fn freeze_all(&mut self, pause: Duration, report: &mut Report) {
         // One that hangs alone stays so.
         let hangs = |entry: &&RosterEntry| {
-            let stage = name_str(&entry.stage);
             self.frozen
-                .iter()
-                .any(|frozen| *frozen == (stage, entry.generation))
+                .contains(&(name_str(&entry.stage), entry.generation))
         };
         let stages = self.entries.iter().filter(|entry| !hangs(entry));
         let stages = stages.map(|entry| entry.pid);
