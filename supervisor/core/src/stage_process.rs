@@ -175,7 +175,13 @@ impl StageProcess {
 
     fn spawn(&self, directory: &Path, first_tick: u64) -> io::Result<Process> {
         let log = self.log(directory);
-        let log = File::options().create(true).append(true).open(log)?;
+        let named =
+            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log.display()));
+        let log = File::options()
+            .create(true)
+            .append(true)
+            .open(&log)
+            .map_err(named)?;
         let generation = Generation {
             stage: self.stage.name,
             directory: directory.to_path_buf(),

@@ -66,7 +66,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
     }
     let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
-    std::fs::create_dir(&directory)?;
+    std::fs::create_dir(&directory)
+        .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
     let options = Options {
         mission: arguments.mission.clone(),
         loaded,

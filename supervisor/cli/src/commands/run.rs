@@ -103,7 +103,8 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
         if recovery::age_s(&cut)?.is_some_and(|age| age <= RESUMED_WITHIN_S) {
             return resumed(arguments, cut).map(Some);
         }
-        directories::mark_cut_off(&cut)?;
+        directories::mark_cut_off(&cut)
+            .map_err(|error| format!("cannot mark {} as cut off: {error}", cut.display()))?;
         let cut = cut.display();
         write_stderr(&format!(
             "firsthand: {cut} was cut off, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`\n"
