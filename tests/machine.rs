@@ -356,6 +356,9 @@ fn a_run_is_not_resumed_after_the_machine_was_suspended_for_hours() {
     assert_eq!(late.status.code(), Some(7), "{said}");
     assert!(said.contains("was cut off"), "{said}");
     support::wait_until_all_ended("mach-susp");
+    // The next run removes what the killed one left.
+    assert_eq!(support::run("mach-susp", "open-room", &[]).0, Some(0));
+    assert_nothing_left("mach-susp");
 }
 
 #[test]
