@@ -1,18 +1,10 @@
 //! A run whose supervisor was killed, and everything else with it, goes on.
 
-use std::{path::Path, process::Stdio, time::Instant};
+use std::{path::Path, process::Stdio};
 
 use crate::support::{self, Run, assert_nothing_left, firsthand, pids_of, run, signal_process};
 use rustix::process::Signal;
 use serde_json::Value;
-
-/// Wait until no process works for `robot` any more.
-fn wait_until_all_ended(robot: &str) {
-    let began = Instant::now();
-    while !pids_of(robot).is_empty() {
-        assert!(began.elapsed() < support::PATIENCE, "{:?}", pids_of(robot));
-    }
-}
 
 /// Go on with the run in `directory` to its end.
 fn resume(directory: &Path) -> (Option<i32>, Value) {
@@ -72,7 +64,7 @@ fn a_run_goes_on_after_everything_was_killed_at_once() {
         signal_process(pid, Signal::KILL);
     }
     all.reap();
-    wait_until_all_ended("res-all");
+    support::wait_until_all_ended("res-all");
     let (code, summary) = resume(&all.directory());
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()));
     assert_eq!(

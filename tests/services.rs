@@ -278,6 +278,27 @@ fn a_frozen_external_stage_is_ended_by_the_supervisor_that_only_watches() {
 }
 
 #[test]
+fn external_stages_that_systemd_stops_before_their_supervisor_are_no_deaths() {
+    let (mut run, mut units) = watching("unit-order");
+    run.wait_until_under_way(1.0);
+    let status = run.kill_and_await_successor("planner", Signal::KILL);
+    for stage in support::STAGES.iter().rev() {
+        signal_process(support::pid(&status, stage), Signal::TERM);
+    }
+    run.wait_until("all have ended", |status| {
+        let stages = status["stages"].as_array().unwrap();
+        stages.iter().all(|stage| stage["state"] == "down")
+    });
+    let deaths = run.records("deaths.jsonl");
+    let stages: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
+    assert_eq!(stages, ["planner"], "{deaths:?}");
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
+    units.assert_all_leave();
+    assert_nothing_left("unit-order");
+}
+
+#[test]
 fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
     let robot = "unit-orphan";
     let (mut run, mut units) = watching(robot);

@@ -16,6 +16,7 @@ mod field;
 mod foreign_payload;
 mod kills;
 mod lying_robots;
+mod machine;
 mod missions;
 mod neighbours;
 mod operators;

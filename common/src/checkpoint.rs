@@ -3,7 +3,11 @@
 //! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older
 //! slot, so a kill at any instruction leaves at least one whole; the checksum shows which. Nothing is
 //! synced to the disk: the kernel keeps what a killed process has written, and a robot that lost
-//! power has lost its encoder counts too.
+//! power has lost its encoder counts too. The room of both slots is reserved at opening: a disk that is full later does
+//! not keep a state from being saved.
+//!
+//! The last byte of the magic is the version of the states: one of another version, or one that is whole and
+//! cannot be decoded, is refused. To take it for none would lose the state without a word.
 
 use std::{
     fs::{File, OpenOptions},
@@ -12,6 +16,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use rustix::{
+    fs::{FallocateFlags, fallocate},
+    io::Errno,
+};
 use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
@@ -42,6 +50,16 @@ pub enum CheckpointError {
         /// Bytes it was given.
         length: usize,
     },
+    /// Its state is whole, and not one of this program.
+    #[error(
+        "checkpoint {file} was written by another version of this program ({problem}); go on with that version, or start a new run"
+    )]
+    Foreign {
+        /// The file.
+        file: PathBuf,
+        /// What shows it.
+        problem: String,
+    },
     /// The state could not be encoded.
     #[error("cannot encode checkpoint {file}: {source}; this is a fault in the stage")]
     Encode {
@@ -52,8 +70,10 @@ pub enum CheckpointError {
     },
 }
 
-/// "firsthand checkpoint, first layout".
-const MAGIC: u32 = u32::from_le_bytes(*b"FHC1");
+/// "firsthand checkpoint", before the version.
+const MAGIC: [u8; 3] = *b"FHC";
+/// The version of the states, of all processes: to be raised when the encoding of one of them changes.
+const VERSION: u8 = b'2';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;
 
@@ -72,7 +92,7 @@ impl Checkpoint {
     /// restore the newest whole one, if there is one of this type.
     ///
     /// # Errors
-    /// When the file can be neither read nor made.
+    /// When the file can be neither read nor made, or holds a state that is whole and of another version or type.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -84,6 +104,7 @@ impl Checkpoint {
             .truncate(false)
             .open(path)
             .map_err(failed("open", path))?;
+        reserve(&file, 2 * (HEADER + capacity) as u64).map_err(failed("reserve room for", path))?;
         let mut checkpoint = Self {
             file,
             path: path.to_path_buf(),
@@ -118,7 +139,10 @@ impl Checkpoint {
         let mut bytes = vec![0; HEADER + self.capacity];
         let length =
             read_up_to(&self.file, &mut bytes, offset).map_err(failed("read", &self.path))?;
-        Ok(decode(&bytes[..length]))
+        decode(&bytes[..length]).map_err(|problem| CheckpointError::Foreign {
+            file: self.path.clone(),
+            problem,
+        })
     }
 
     /// Save `state` in place of the older of the two held.
@@ -143,7 +167,8 @@ impl Checkpoint {
                 length,
             });
         }
-        bytes[0..4].copy_from_slice(&MAGIC.to_le_bytes());
+        bytes[..3].copy_from_slice(&MAGIC);
+        bytes[3] = VERSION;
         bytes[4..12].copy_from_slice(&sequence.to_le_bytes());
         bytes[12..16].copy_from_slice(&(length as u32).to_le_bytes());
         let crc = checksum(&bytes);
@@ -177,20 +202,40 @@ fn checksum(bytes: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Option<(u64, T)> {
-    let word = |at: usize| -> Option<u32> {
-        bytes
-            .get(at..at + 4)?
-            .try_into()
-            .ok()
-            .map(u32::from_le_bytes)
+/// The sequence and state of a slot; none where it was never written, or is torn. An error says why a whole one is not
+/// of this program.
+fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String> {
+    let Some(&version) = bytes.strip_prefix(&MAGIC).and_then(<[u8]>::first) else {
+        return Ok(None);
     };
+    if version != VERSION {
+        let [found, known] = [version, VERSION].map(|version| version.escape_ascii().to_string());
+        return Err(format!("its state has version {found}, not {known}"));
+    }
+    let Some((sequence, body)) = whole(bytes) else {
+        return Ok(None);
+    };
+    match postcard::from_bytes(body) {
+        Ok(state) => Ok(Some((sequence, state))),
+        Err(error) => Err(format!("its state cannot be decoded: {error}")),
+    }
+}
+
+/// The sequence and body of a slot that is not torn.
+fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     let sequence = u64::from_le_bytes(bytes.get(4..12)?.try_into().ok()?);
     let whole = bytes.get(..HEADER + word(12)? as usize)?;
-    if word(0)? != MAGIC || word(16)? != checksum(whole) {
-        return None;
+    (word(16)? == checksum(whole)).then(|| (sequence, &whole[HEADER..]))
+}
+
+/// Reserve `length` bytes of the disk for `file`, whose own length stays. Where the file system cannot reserve, nothing
+/// is.
+pub(crate) fn reserve(file: &File, length: u64) -> io::Result<()> {
+    match fallocate(file, FallocateFlags::KEEP_SIZE, 0, length) {
+        Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),
+        reserved => Ok(reserved?),
     }
-    Some((sequence, postcard::from_bytes(&whole[HEADER..]).ok()?))
 }
 
 fn read_up_to(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
@@ -260,6 +305,38 @@ mod tests {
         let path = directory.path().join("pose");
         std::fs::write(&path, [0xA5; 300]).unwrap();
         assert_eq!(open(&path).1, None);
+    }
+
+    #[test]
+    fn a_whole_state_of_another_type_or_version_is_refused_and_not_taken_for_none() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("pose");
+        let (mut checkpoint, _) = open(&path);
+        checkpoint.save(&vec![1_u32]).unwrap();
+        let refused = || Checkpoint::open::<[String; 3]>(&path, CAPACITY).unwrap_err();
+        assert!(
+            refused().to_string().contains("cannot be decoded"),
+            "{}",
+            refused()
+        );
+        let mut bytes = std::fs::read(&path).unwrap();
+        let slot = checkpoint.slot_offset(1) as usize;
+        bytes[slot + 3] = b'1';
+        std::fs::write(&path, bytes).unwrap();
+        let refused = Checkpoint::open::<Vec<u32>>(&path, CAPACITY)
+            .unwrap_err()
+            .to_string();
+        assert!(refused.contains("version 1, not 2"), "{refused}");
+    }
+
+    #[test]
+    fn room_for_both_slots_is_reserved_at_opening() {
+        use std::os::unix::fs::MetadataExt as _;
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map");
+        let (_checkpoint, _) = Checkpoint::open::<Vec<u32>>(&path, 1 << 20).unwrap();
+        let reserved = std::fs::metadata(&path).unwrap().blocks() * 512;
+        assert!(reserved >= 2 << 20, "{reserved} bytes are reserved");
     }
 
     #[test]

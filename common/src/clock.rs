@@ -106,7 +106,17 @@ impl MissionClock {
 /// CLOCK_MONOTONIC, nanoseconds: the same for every process of the machine.
 #[must_use]
 pub fn monotonic_ns() -> u64 {
-    let now = clock_gettime(ClockId::Monotonic);
+    nanoseconds(ClockId::Monotonic)
+}
+
+/// CLOCK_BOOTTIME, nanoseconds: as [`monotonic_ns`], and it counts the time that the machine was suspended.
+#[must_use]
+pub fn boot_ns() -> u64 {
+    nanoseconds(ClockId::Boottime)
+}
+
+fn nanoseconds(clock: ClockId) -> u64 {
+    let now = clock_gettime(clock);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }
 

@@ -4,6 +4,9 @@
 //! small write however large the state is; a new process restores the snapshot and folds the later entries into it. An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an
 //! append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
 //! leaves entries that the snapshot holds already, which their numbers show.
+//!
+//! Room is reserved at opening, for a disk that is full later. The journal is emptied by an end mark at its beginning, not by
+//! shortening it, which would give the room away.
 
 use std::{
     fs::{File, OpenOptions},
@@ -13,7 +16,7 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::checkpoint::{Checkpoint, CheckpointError, failed};
+use crate::checkpoint::{Checkpoint, CheckpointError, failed, reserve};
 
 /// Entries after which a snapshot is due at the soonest and at the latest.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
@@ -22,8 +25,12 @@ const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
+/// Stands after the last entry: no header, whose checksum is not 0 where the rest is.
+const END: [u8; HEADER] = [0; HEADER];
 /// No entry is longer, bytes.
 const LONGEST: usize = 4096;
+/// Room that is reserved for each entry until the next snapshot, bytes: an entry of the mapper takes 250 at most.
+const ENTRY_ROOM: u64 = 512;
 /// What a snapshot takes besides the state.
 const NUMBER: usize = 10;
 
@@ -78,6 +85,8 @@ impl Journal {
             .truncate(false)
             .open(&path)
             .map_err(failed("open", &path))?;
+        let snapshot_after = snapshot_after(capacity);
+        reserve(&file, snapshot_after * ENTRY_ROOM).map_err(failed("reserve room for", &path))?;
         let (first, state) = match snapshot {
             Some(Snapshot { next, state }) => (next, Some(state)),
             None => (0, None),
@@ -89,7 +98,7 @@ impl Journal {
             end: 0,
             number: first,
             first,
-            snapshot_after: snapshot_after(capacity),
+            snapshot_after,
         };
         let entries = journal.read()?;
         Ok((journal, Restored { state, entries }))
@@ -115,15 +124,16 @@ impl Journal {
         }
         self.end = (bytes.len() - rest.len()) as u64;
         // A whole one is left alone: the file system may have to wait for the disk.
-        if !rest.is_empty() {
+        if !rest.is_empty() && !rest.starts_with(&END) {
             self.cut()?;
         }
         Ok(entries)
     }
 
+    /// Whatever follows is no entry.
     fn cut(&self) -> Result<(), CheckpointError> {
-        let cut = self.file.set_len(self.end);
-        cut.map_err(failed("shorten", &self.path))
+        let cut = self.file.write_all_at(&END, self.end);
+        cut.map_err(failed("write", &self.path))
     }
 
     /// Append an entry.
@@ -138,6 +148,7 @@ impl Journal {
                 source,
             })?;
         let length = bytes.len() - HEADER;
+        bytes.extend_from_slice(&END);
         if length > LONGEST {
             return Err(CheckpointError::TooLarge {
                 file: self.path.clone(),
@@ -147,12 +158,13 @@ impl Journal {
         }
         bytes[..8].copy_from_slice(&self.number.to_le_bytes());
         bytes[8..12].copy_from_slice(&(length as u32).to_le_bytes());
-        let crc = checksum(&bytes);
+        let end = HEADER + length;
+        let crc = checksum(&bytes[..end]);
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
         self.file
             .write_all_at(&bytes, self.end)
             .map_err(failed("write", &self.path))?;
-        self.end += bytes.len() as u64;
+        self.end += end as u64;
         self.number += 1;
         Ok(())
     }
@@ -245,12 +257,16 @@ mod tests {
         let file = path.with_extension("journal");
         let (mut journal, _) = open(&path);
         journal.append(&100_u64).unwrap();
-        let before = std::fs::read(&file).unwrap().len();
+        let before = std::fs::read(&file).unwrap().len() - HEADER;
         journal.append(&200_u64).unwrap();
         let whole = std::fs::read(&file).unwrap();
         for cut in before..=whole.len() {
             std::fs::write(&file, &whole[..cut]).unwrap();
-            let mut sum = if cut == whole.len() { 300 } else { 100 };
+            let mut sum = if cut >= whole.len() - HEADER {
+                300
+            } else {
+                100
+            };
             assert_eq!(folded(&path), sum, "cut at {cut}");
             // The next process writes over the torn tail.
             open(&path).0.append(&7_u64).unwrap();

@@ -4,7 +4,8 @@
 //! A stage's own shell file implements [`Process`]: it wires topics to its pure step, and nothing else.
 
 use std::{
-    env,
+    env, fmt,
+    io::{self, Write as _},
     os::fd::OwnedFd,
     path::PathBuf,
     process::ExitCode,
@@ -119,17 +120,22 @@ pub fn main<P: Process>(stage: &'static str) -> ExitCode {
     let start = match stage_command::start(stage, env::args_os().skip(1)) {
         Ok(start) => start,
         Err(error) => {
-            eprintln!("{error}");
+            complain(&error);
             return ExitCode::from(WRONG_USAGE);
         }
     };
     match run_stage::<P>(&start) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{stage}: {error}");
+            complain(&format_args!("{stage}: {error}"));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Write the error to standard error; where that is closed or its disk is full, the exit code has to say it.
+fn complain(error: &dyn fmt::Display) {
+    let _ = writeln!(io::stderr(), "{error}");
 }
 
 /// The exit code of a command line that is none, as that of `firsthand`.

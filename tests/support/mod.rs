@@ -308,6 +308,14 @@ pub fn pids_of(robot: &str) -> Vec<u32> {
     found(robot).map(|(pid, _)| pid).collect()
 }
 
+/// Wait until no process works for `robot` any more.
+pub fn wait_until_all_ended(robot: &str) {
+    let began = Instant::now();
+    while !pids_of(robot).is_empty() {
+        assert!(began.elapsed() < PATIENCE, "{:?}", pids_of(robot));
+    }
+}
+
 fn found(robot: &str) -> impl Iterator<Item = (u32, String)> {
     let mark = mark(robot);
     let entries = fs::read_dir("/proc").unwrap().flatten();

@@ -53,7 +53,7 @@ pub enum BusError {
         most: usize,
     },
     /// The middleware refused.
-    #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, or the topic's last place taken?", shm = SHARED_MEMORY)]
+    #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, `ulimit -n` reached, or the topic's last place taken?", shm = SHARED_MEMORY)]
     Refused {
         /// What was tried.
         action: &'static str,

@@ -6,7 +6,7 @@ mod shapes;
 mod simulation;
 
 use std::{
-    fs::File,
+    fs::{self, File},
     io::{self, Read as _},
     path::{Path, PathBuf},
 };
@@ -23,6 +23,10 @@ const MAX_BYTES: u64 = 8 << 20;
 
 fn read_bounded(path: &Path) -> io::Result<String> {
     let mut text = String::new();
+    // To open a pipe waits for who writes to it.
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is no regular file"));
+    }
     let read = File::open(path)?
         .take(MAX_BYTES)
         .read_to_string(&mut text)?;

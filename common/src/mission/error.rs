@@ -44,6 +44,21 @@ pub enum MissionError {
 }
 
 impl MissionError {
+    /// The same without file and line, for a value that is not from the file.
+    #[must_use]
+    pub fn without_place(&self) -> String {
+        match self {
+            Self::Unreadable { source, .. } => source.to_string(),
+            Self::Syntax { problem, .. } => problem.clone(),
+            Self::Value {
+                key,
+                problem,
+                remedy,
+                ..
+            } => format!("{key}: {problem}; {remedy}"),
+        }
+    }
+
     /// Whether `other` is the same fault, perhaps on another line.
     #[must_use]
     pub fn is_same_fault(&self, other: &Self) -> bool {

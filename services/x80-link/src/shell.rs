@@ -5,8 +5,8 @@ use common::{
     clock::{MissionClock, Pace, monotonic_ns},
     latency::Histogram,
     samples::{
-        CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order, PowerSample,
-        RangeSample, SurroundingsSample, TickLimitSample, WheelSample,
+        Cause, CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order,
+        PowerSample, RangeSample, SurroundingsSample, TickLimitSample, WheelSample,
     },
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -204,7 +204,8 @@ fn log_battery(change: &BatteryChange) {
 fn log_decision(before: Decision, now: Decision) {
     let robot = failsafe::effect(now.action);
     let cause = failsafe::name(now.cause);
-    if now.action > before.action {
+    // The end of a mission is no fault.
+    if now.action > before.action && now.cause != Cause::MissionOver {
         tracing::warn!(robot, cause, "failsafe");
     } else {
         tracing::info!(robot, cause, "failsafe");

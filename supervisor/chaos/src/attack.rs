@@ -7,7 +7,8 @@ use common::{
     samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
     topics::{self, AnyTopic as _, SUPERVISOR},
 };
-use rustix::process::{Pid, kill_process};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
 
 use supervisor::{
     policy::{HOLD_AFTER, HOLD_WINDOW},
@@ -19,7 +20,7 @@ use supervisor::{
 use crate::{
     error::{ChaosError, system},
     options::Options,
-    report::Report,
+    report::{EVERYTHING, Report},
     resources::Resources,
     schedule::{Kind, Schedule},
     subscriptions::{POLL, Subscriptions},
@@ -78,6 +79,8 @@ pub(crate) struct Attack {
     supervisor_hit: bool,
     driving: bool,
     pending: Vec<PendingRecovery>,
+    /// Generations that were frozen alone: those may be taken for hung.
+    frozen: Vec<(&'static str, u32)>,
     /// Stages that were hit lately, and when.
     hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
@@ -127,8 +130,9 @@ impl Attack {
             self.hit_starting(report);
             let enough = report.kills() >= options.kills;
             if Instant::now() >= next && self.driving && !enough {
-                next = Instant::now() + schedule.pause();
+                let pause = schedule.pause();
                 self.hit(options, schedule, report);
+                next = Instant::now() + pause;
             }
         }
         if let Some([first, last]) = self.resources {
@@ -142,6 +146,20 @@ impl Attack {
         self.pending
             .iter()
             .any(|recovery| recovery.stage == SUPERVISOR)
+    }
+
+    /// Stages that were aborted as hung, by the `deaths` of the run, and were not frozen alone.
+    pub(crate) fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
+        let frozen = |death: &Value| {
+            self.frozen.iter().any(|(stage, generation)| {
+                death["stage"] == *stage && death["generation"] == *generation
+            })
+        };
+        let hung = deaths.iter().filter(|death| death["hung"] == true);
+        let healthy = hung.filter(|death| !frozen(death));
+        healthy
+            .map(|death| format!("{} generation {}", death["stage"], death["generation"]))
+            .collect()
     }
 
     /// How far the last published pose was from the ground truth of its tick, metres; none without both.
@@ -242,6 +260,37 @@ impl Attack {
         }
     }
 
+    /// Stop supervisor and stages together, and let them go on after `pause`.
+    fn freeze_all(&mut self, pause: Duration, report: &mut Report) {
+        // One that hangs alone stays so.
+        let hangs = |entry: &&RosterEntry| {
+            self.frozen
+                .contains(&(name_str(&entry.stage), entry.generation))
+        };
+        let stages = self.entries.iter().filter(|entry| !hangs(entry));
+        let stages = stages.map(|entry| entry.pid);
+        // The supervisor first: it must not see the stages stand still.
+        let all: Vec<u32> = std::iter::once(self.supervisor).chain(stages).collect();
+        let all: Vec<Pid> = all
+            .iter()
+            .filter_map(|pid| Pid::from_raw(pid.cast_signed()))
+            .filter(|pid| kill_process(*pid, Kind::FreezeAll.signal()).is_ok())
+            .collect();
+        let began = Instant::now();
+        while let Some(left) = pause.checked_sub(began.elapsed()) {
+            std::thread::park_timeout(left);
+        }
+        // The supervisor last.
+        for pid in all.iter().rev() {
+            let _ = kill_process(*pid, Signal::CONT);
+        }
+        report.hit(EVERYTHING, Kind::FreezeAll);
+        // What took longer only because nothing ran is no time of recovery.
+        for recovery in &mut self.pending {
+            recovery.at += began.elapsed();
+        }
+    }
+
     /// Hit a stage that runs and has no pending recovery, or the supervisor.
     fn hit(&mut self, options: &Options, schedule: &mut Schedule, report: &mut Report) {
         if options.supervisor && schedule.supervisor() {
@@ -253,6 +302,12 @@ impl Attack {
                 self.supervisor_hit = true;
                 self.driving = false;
             }
+            return;
+        }
+        if options.freeze_all
+            && let Some(pause) = schedule.freeze_all()
+        {
+            self.freeze_all(pause, report);
             return;
         }
         let Some(stage) = stages::find(schedule.stage()).map(|stage| stage.name) else {
@@ -273,6 +328,9 @@ impl Attack {
             return;
         }
         report.hit(stage, kind);
+        if kind == Kind::Freeze {
+            self.frozen.push((stage, entry.generation));
+        }
         self.hits.push((stage, Instant::now()));
         let startup_hit = match startup_hit {
             Some(after) if options.startup && kind != Kind::Freeze => StartupHit::After(after),

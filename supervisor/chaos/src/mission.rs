@@ -19,6 +19,7 @@ use crate::{
     schedule::Schedule,
 };
 use supervisor::{
+    DEATHS,
     process::{Process, firsthand},
     simulator::Simulator,
 };
@@ -124,6 +125,7 @@ pub(crate) fn attack(
         stopping_time_s: number(&summary, "stopping_time_s"),
         pose_allowance_m: pose_allowance_m(&options.loaded, kills),
         kills,
+        healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
     };
     if let Some(mut robot) = robot {
         robot.stop()?;
@@ -138,6 +140,13 @@ pub(crate) fn attack(
         fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
     }
     Ok(())
+}
+
+/// The records of the deaths of the run in `directory`.
+fn deaths(directory: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.filter_map(Result::ok).collect()
 }
 
 /// How much worse than the undisturbed run's the pose may be at the end, metres.

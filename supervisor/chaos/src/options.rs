@@ -25,6 +25,8 @@ pub struct Options {
     /// Whether the supervisor is hit too; its run is resumed then. The robot is a process of its own in that case,
     /// as a real one is.
     pub supervisor: bool,
+    /// Whether some hits freeze supervisor and stages together, as a machine does that stands still for a moment.
+    pub freeze_all: bool,
     /// Where the run directories go; emptied mission by mission.
     pub directory: PathBuf,
 }

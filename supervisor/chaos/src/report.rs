@@ -12,6 +12,9 @@ use serde::Serialize;
 use crate::{resources::Resources, schedule::Kind};
 use supervisor::stages::TABLE;
 
+/// What is hit where supervisor and stages are frozen together.
+pub(crate) const EVERYTHING: &str = "everything";
+
 /// The result of all missions under attack. Times in milliseconds.
 #[derive(Debug, Serialize)]
 pub struct Report {
@@ -20,6 +23,8 @@ pub struct Report {
     collisions: u64,
     /// Missions that did not reach the target, touched something or lost the pose: their seeds and what was wrong.
     wrong: Vec<String>,
+    /// Stages aborted as hung that were not frozen alone.
+    healthy_aborted: u64,
     /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
     #[serde(serialize_with = "recoveries")]
@@ -63,6 +68,8 @@ pub struct End {
     pub pose_allowance_m: f64,
     pub stopping_time_s: f64,
     pub kills: u32,
+    /// Stages aborted as hung that were not frozen alone.
+    pub healthy_aborted: Vec<String>,
 }
 
 impl Report {
@@ -72,6 +79,7 @@ impl Report {
             reached: 0,
             collisions: 0,
             wrong: Vec::new(),
+            healthy_aborted: 0,
             kills: BTreeMap::new(),
             recovery_ms: BTreeMap::new(),
             worst_pose_excess_m: 0.0,
@@ -129,6 +137,11 @@ impl Report {
                 "seed {seed}: touched something {} times",
                 end.collisions
             ));
+        }
+        self.healthy_aborted += end.healthy_aborted.len() as u64;
+        for stage in &end.healthy_aborted {
+            self.wrong
+                .push(format!("seed {seed}: aborted although healthy: {stage}"));
         }
         if excess > allowance {
             self.wrong.push(format!(
@@ -195,12 +208,13 @@ impl fmt::Display for Report {
         let took = Duration::from_secs_f64(self.took_s);
         writeln!(
             to,
-            "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} leftovers",
+            "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} healthy stages aborted, {} leftovers",
             self.kills(),
             self.missions,
             took.as_secs_f64(),
             self.reached,
             self.collisions,
+            self.healthy_aborted,
             self.leftovers
         )?;
         for wrong in &self.wrong {

@@ -1,6 +1,6 @@
 //! Which stage gets which signal when: seeded, so that a schedule can be repeated.
 
-use std::time::Duration;
+use std::{ops::Range, time::Duration};
 
 use rand_pcg::{Pcg64, rand_core::Rng};
 use rustix::process::Signal;
@@ -19,6 +19,11 @@ const STARTUP_SHARE: f64 = 0.3;
 /// Share of the signals that hit the supervisor, where that is asked for: a hundred in two thousand.
 const SUPERVISOR_SHARE: f64 = 0.05;
 
+/// Share of the hits that freeze everything, where that is asked for; the others fall as they do otherwise.
+const FREEZE_ALL_SHARE: f64 = 0.5;
+/// For how long everything is frozen, seconds: less than a stage's deadline, up to three times as long.
+const FREEZE_ALL_S: Range<f64> = 0.3..1.5;
+
 /// How a stage is hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -34,6 +39,8 @@ pub(crate) enum Kind {
     Terminate,
     /// SIGSTOP: it hangs.
     Freeze,
+    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
+    FreezeAll,
 }
 
 impl Kind {
@@ -43,7 +50,7 @@ impl Kind {
             Self::Kill | Self::KillAtStart => Signal::KILL,
             Self::Crash => Signal::ABORT,
             Self::Terminate => Signal::TERM,
-            Self::Freeze => Signal::STOP,
+            Self::Freeze | Self::FreezeAll => Signal::STOP,
         }
     }
 
@@ -55,6 +62,7 @@ impl Kind {
             Self::Crash => "crashed",
             Self::Terminate => "terminated",
             Self::Freeze => "frozen",
+            Self::FreezeAll => "all frozen together",
         }
     }
 }
@@ -95,6 +103,13 @@ impl Schedule {
             ..0.8 => Kind::Kill,
             _ => Kind::Crash,
         }
+    }
+
+    /// Whether to freeze everything instead, and for how long.
+    pub(crate) fn freeze_all(&mut self) -> Option<Duration> {
+        let Range { start, end } = FREEZE_ALL_S;
+        let frozen = self.uniform() < FREEZE_ALL_SHARE;
+        frozen.then(|| Duration::from_secs_f64(start + (end - start) * self.uniform()))
     }
 
     /// How to hit it.

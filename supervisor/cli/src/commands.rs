@@ -8,6 +8,7 @@ pub(crate) mod check;
 mod directories;
 #[cfg(feature = "tools")]
 pub(crate) mod evaluate;
+pub(crate) mod exit_code;
 #[cfg(feature = "tools")]
 pub(crate) mod experiments;
 pub(crate) mod fault;
@@ -21,6 +22,7 @@ pub(crate) mod latency;
 mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
+pub(crate) mod other_user;
 #[cfg(feature = "tools")]
 mod python;
 pub(crate) mod replay_log;
@@ -34,17 +36,27 @@ pub(crate) mod tables;
 /// What a subcommand fails with: one clear sentence.
 type Failure = Box<dyn std::error::Error>;
 
-/// Write `text` to standard output. A reader that went away has read enough (`firsthand help tables | head`).
+/// Write `text` to standard output, at once. A reader that went away has read enough (`firsthand help tables | head`).
 fn print_text(text: &str) -> io::Result<()> {
-    unless_closed(io::stdout().write_all(text.as_bytes()))
+    let mut stdout = io::stdout();
+    unless_closed(
+        stdout
+            .write_all(text.as_bytes())
+            .and_then(|()| stdout.flush()),
+    )
 }
 
+/// A pipe whose reader has ended, or a terminal that was closed, is no failure.
 fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(error) if error.raw_os_error() == Some(CLOSED_TERMINAL) => Ok(()),
         written => written,
     }
 }
+
+/// What the kernel answers who writes to a terminal that was closed.
+const CLOSED_TERMINAL: i32 = rustix::io::Errno::IO.raw_os_error();
 
 #[cfg(test)]
 mod tests {
@@ -53,6 +65,7 @@ mod tests {
     #[test]
     fn a_reader_that_went_away_is_no_failure() {
         assert!(unless_closed(Err(io::ErrorKind::BrokenPipe.into())).is_ok());
+        assert!(unless_closed(Err(io::Error::from_raw_os_error(CLOSED_TERMINAL))).is_ok());
         assert!(unless_closed(Err(io::ErrorKind::StorageFull.into())).is_err());
     }
 }

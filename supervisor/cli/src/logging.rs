@@ -2,6 +2,9 @@
 //!
 //! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
 //! records the time itself. That needs no library, and a line is the same wherever it is read.
+//!
+//! A line that cannot be written, because the disk is full or the terminal closed, is lost without a word: tracing would report
+//! it on standard error and panic where that fails too.
 
 use std::{
     fs::File,
@@ -45,7 +48,13 @@ pub(crate) fn to_stderr(default: &str) {
 /// When the file cannot be made.
 pub(crate) fn to_file(file: &Path, default: &str) -> io::Result<()> {
     let log = Mutex::new(File::options().create(true).append(true).open(file)?);
-    let mut layers: Vec<AnyLayer> = vec![fmt::layer().with_writer(log).with_ansi(false).boxed()];
+    let mut layers: Vec<AnyLayer> = vec![
+        fmt::layer()
+            .with_writer(log)
+            .log_internal_errors(false)
+            .with_ansi(false)
+            .boxed(),
+    ];
     if to_journal() {
         layers.push(stderr_layer());
     }
@@ -56,9 +65,12 @@ pub(crate) fn to_file(file: &Path, default: &str) -> io::Result<()> {
 fn stderr_layer() -> AnyLayer {
     if to_journal() {
         let lines = fmt::layer().without_time().with_level(false);
+        let lines = lines.log_internal_errors(false);
         lines.with_writer(Journal).with_ansi(false).boxed()
     } else {
-        let lines = fmt::layer().with_writer(io::stderr);
+        let lines = fmt::layer()
+            .with_writer(io::stderr)
+            .log_internal_errors(false);
         lines.with_ansi(false).boxed()
     }
 }

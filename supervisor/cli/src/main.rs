@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`commands`] | one file a subcommand |
 //! | [`summary`] | how a run ended, as numbers |
+//! | [`summary_file`] | its file, with room reserved at the start |
 //! | [`run_picture`] | the picture of a run |
 //! | [`progress_line`] | progress on standard error |
 //! | [`logging`] | logs to standard error, to a file, to the journal |
@@ -14,6 +15,7 @@ mod progress_line;
 #[cfg(feature = "tools")]
 mod run_picture;
 mod summary;
+mod summary_file;
 
 use std::process::ExitCode;
 
@@ -23,7 +25,10 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use commands::sim;
 #[cfg(feature = "tools")]
 use commands::{chaos, evaluate, experiments, field, latency, replay_log};
-use commands::{check, fault, help, install, missions, operate, run, stage, status, tables};
+use commands::{
+    check, exit_code, fault, help, install, missions, operate, other_user, run, stage, status,
+    tables,
+};
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
 ///
@@ -86,7 +91,8 @@ const EXIT_CODES: &str = "Exit codes of run:
   5  collision (simulated robot)
   6  aborted by a fault
   7  an earlier run was cut off (--resume-last)
-  9  in the wrong place by the ground truth (simulated robot)";
+  9  in the wrong place by the ground truth (simulated robot)
+ 78  the mission is wrongly written: to try again is of no use";
 
 /// Run the command line of this process.
 fn main() -> ExitCode {
@@ -139,8 +145,11 @@ fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("firsthand: {error}");
-            ExitCode::FAILURE
+            progress_line::write_stderr(&format!("firsthand: {error}\n"));
+            if let Some(remark) = other_user::remark(error.as_ref()) {
+                progress_line::write_stderr(&format!("firsthand: {remark}\n"));
+            }
+            exit_code::of(error.as_ref())
         }
     }
 }

@@ -37,6 +37,7 @@ impl ProgressLine {
     /// Show `line`; where it would stay, only if it `may_stay`.
     pub(crate) fn show(&self, line: &str, may_stay: bool) {
         if self.rewrites {
+            let line = cut(line, columns());
             write_stderr(&format!("\r\x1b[K{line}"));
         } else if may_stay {
             write_stderr(&format!("{line}\n"));
@@ -51,10 +52,37 @@ impl ProgressLine {
     }
 }
 
+/// Columns of the terminal; 0 where it does not say.
+fn columns() -> usize {
+    let size = rustix::termios::tcgetwinsize(io::stderr());
+    size.map_or(0, |size| size.ws_col.into())
+}
+
+/// As much of `line` as `columns` show, of which the last stays free; all of it for 0. A line that is wrapped cannot be
+/// rewritten: each would stay.
+fn cut(line: &str, columns: usize) -> &str {
+    let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
+    let end = line.char_indices().nth(shown);
+    end.map_or(line, |(end, _)| &line[..end])
+}
+
 /// Write to standard error; a reader that was closed does not end what is under way.
 pub(crate) fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
     let _ = stderr
         .write_all(text.as_bytes())
         .and_then(|()| stderr.flush());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_cut_to_less_than_the_terminal_is_wide() {
+        assert_eq!(cut("12.3 s  0.50 m", 8), "12.3 s ");
+        assert_eq!(cut("12.3 s", 8), "12.3 s");
+        assert_eq!(cut("µµµµ", 3), "µµ");
+        assert_eq!(cut("12.3 s", 0), "12.3 s");
+    }
 }

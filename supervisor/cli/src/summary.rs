@@ -211,12 +211,17 @@ impl fmt::Display for Quantiles {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {}", self.outcome.as_str(), self.reason)?;
-        let ratio = self.path_length_m / self.straight_m;
-        writeln!(
+        write!(
             f,
-            "{:.1} s, {:.2} m driven, {ratio:.2} x the straight {:.2} m, {} safety events",
-            self.mission_time_s, self.path_length_m, self.straight_m, self.safety_events
+            "{:.1} s, {:.2} m driven, ",
+            self.mission_time_s, self.path_length_m
         )?;
+        // A target where the robot stands has no straight way.
+        if self.straight_m > 0.0 {
+            let ratio = self.path_length_m / self.straight_m;
+            write!(f, "{ratio:.2} x the straight {:.2} m, ", self.straight_m)?;
+        }
+        writeln!(f, "{} safety events", self.safety_events)?;
         for caption in self.captions() {
             writeln!(f, "{caption}")?;
         }

@@ -6,6 +6,7 @@ use std::{
     os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
     path::Path,
     rc::Rc,
+    time::{Duration, Instant},
 };
 
 use common::{
@@ -15,6 +16,7 @@ use common::{
 };
 
 use crate::{
+    descriptors,
     domain_error::{DomainError, failed},
     orphans,
 };
@@ -24,6 +26,11 @@ const SMALL_TOPICS_BYTES: u64 = 16 << 20;
 /// Shared memory a cell of the map takes: a byte in `grid` and twelve in `field`, in each of the samples
 /// that are under way at once when readers keep up.
 const CELL_BYTES: u64 = 8 * 13;
+
+/// A supervisor that was killed a moment ago holds its lock no longer than this, on a loaded machine too.
+const LAST_HOLDER_ENDS: Duration = Duration::from_secs(1);
+/// How often the lock is tried: a file lock has no descriptor to wait on.
+const RETRY: Duration = Duration::from_millis(10);
 
 /// A domain held by this process. Dropping it leaves nothing behind.
 pub struct DomainLock {
@@ -40,6 +47,7 @@ impl DomainLock {
     /// Lock `domain`, wipe what an earlier supervisor left, create the services for a map of so many
     /// `cells`.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
+        descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         let lock = lock(&domain)?;
         let mut acquired = Self {
             domain,
@@ -122,6 +130,7 @@ fn make_own_directory(path: &Path) -> Result<(), DomainError> {
 /// Lock the domain; the file names the holder, for the error message of another supervisor.
 fn lock(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.lock_file();
+    let began = Instant::now();
     loop {
         make_directory(domain)?;
         let opened = OpenOptions::new()
@@ -138,6 +147,11 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
         };
         match file.try_lock() {
             Ok(()) => {}
+            // A supervisor that was killed holds it until the kernel has taken it apart.
+            Err(fs::TryLockError::WouldBlock) if began.elapsed() < LAST_HOLDER_ENDS => {
+                std::thread::park_timeout(RETRY);
+                continue;
+            }
             Err(fs::TryLockError::WouldBlock) => {
                 let holder = fs::read_to_string(&path).unwrap_or_default();
                 return Err(DomainError::Supervised {

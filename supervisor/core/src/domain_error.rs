@@ -39,6 +39,14 @@ pub enum DomainError {
         /// What to do.
         remedy: &'static str,
     },
+    /// The process may not have enough descriptors.
+    #[error(
+        "a process may have {limit} descriptors here, and a supervisor needs 256; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
+    )]
+    Descriptors {
+        /// The limit.
+        limit: u64,
+    },
     /// The directory belongs to another user.
     #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
     Foreign {

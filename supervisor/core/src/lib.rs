@@ -37,8 +37,10 @@
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
 //! | [`planner_executable`] | the executable that a mission names for the planner, checked |
 //! | [`process`] | a process that is watched, signalled, reaped |
+//! | `descriptors` | what a child must not inherit |
 //! | `stage_process`, `stage_processes` | one stage with its policy and process; all of them |
 //! | `bus_endpoints`, [`observer`], [`totals`] | what the supervisor reads from and writes to the bus; totals of it |
+//! | `observed_time` | time that the supervisor was there to see: what deadlines count |
 //! | `cleanup` | when the bus is cleaned of what ended processes held |
 //! | `run_clock` | mission time of a run, and its first tick that is not made yet |
 //! | `death`, `records` | the record of a death; files of records in the run directory |
@@ -53,12 +55,14 @@ mod bus_endpoints;
 mod cleanup;
 mod death;
 mod decisive;
+mod descriptors;
 pub mod domain;
 mod domain_error;
 mod error;
 mod judge;
 mod last_resort;
 mod lead;
+mod observed_time;
 pub mod observer;
 mod order;
 mod orphans;
@@ -85,6 +89,7 @@ pub mod totals;
 pub use domain_error::DomainError;
 pub use error::SupervisorError;
 pub use progress::Progress;
+pub use records::DEATHS;
 pub use run::{Finished, run};
 pub use stage_processes::Starter;
 pub use supervisor::Options;

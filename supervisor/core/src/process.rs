@@ -16,6 +16,8 @@ use common::poll;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
+use crate::descriptors;
+
 /// The kernel ends a killed process within this, unless it hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
@@ -97,8 +99,9 @@ impl fmt::Display for ExitCause {
 }
 
 impl Process {
-    /// Start `command`.
+    /// Start `command`. It inherits no descriptor but the standard ones.
     pub fn spawn(mut command: Command) -> io::Result<Self> {
+        descriptors::close_all_on_exec()?;
         let mut child = command.spawn()?;
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
             Ok(pidfd) => Ok(Self {

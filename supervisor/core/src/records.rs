@@ -10,7 +10,7 @@ use std::{
 use serde::Serialize;
 
 /// The deaths of a run.
-pub(crate) const DEATHS: &str = "deaths.jsonl";
+pub const DEATHS: &str = "deaths.jsonl";
 /// The stalls of a run.
 pub(crate) const STALLS: &str = "stalls.jsonl";
 

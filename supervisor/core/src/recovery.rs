@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 
 use common::{
     checkpoint::{Checkpoint, CheckpointError},
-    clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    clock::{MissionClock, MissionTime, Pace, boot_ns, monotonic_ns},
     run::{self, Run, RunError},
 };
 use dead_reckoning::shell::saved_state;
@@ -34,7 +34,7 @@ pub struct SupervisorState {
     pub resumes: u32,
     /// The boot of the machine it ran in.
     boot: String,
-    /// When it last saved this, [`monotonic_ns`].
+    /// When it last saved this, [`boot_ns`]: while the machine is suspended, the robot may be carried off.
     saved_ns: u64,
 }
 
@@ -58,7 +58,7 @@ impl StateFile {
 
     /// Save the state.
     pub fn save(&mut self) -> Result<(), CheckpointError> {
-        self.state.saved_ns = monotonic_ns();
+        self.state.saved_ns = boot_ns();
         self.checkpoint.save(&self.state)
     }
 }
@@ -71,11 +71,11 @@ fn boot() -> String {
 
 /// Seconds since the supervisor of `directory` last saved its state; none if the machine was booted since, or there is
 /// no state.
-pub fn age_s(directory: &Path) -> Option<f64> {
+pub fn age_s(directory: &Path) -> Result<Option<f64>, CheckpointError> {
     let file = run::checkpoint_file(directory, "supervisor");
-    let (_, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY).ok()?;
-    let state = state.filter(|state| state.boot == boot())?;
-    Some(monotonic_ns().saturating_sub(state.saved_ns) as f64 * 1e-9)
+    let (_, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY)?;
+    let state = state.filter(|state| state.boot == boot());
+    Ok(state.map(|state| boot_ns().saturating_sub(state.saved_ns) as f64 * 1e-9))
 }
 
 /// A run whose supervisor ended, to go on with.

@@ -34,6 +34,8 @@ pub struct Finished {
     pub record: Record,
     /// What really happened until then, of a simulated robot.
     pub truth: Vec<GroundTruthTick>,
+    /// Whether the robot was ever ordered to drive.
+    pub drove: bool,
     /// Times each stage was started again.
     pub restarts: BTreeMap<&'static str, u32>,
     /// Times another supervisor went on with the run.
@@ -94,6 +96,7 @@ pub fn run(
         last_tick: decided.last_tick,
         record,
         truth,
+        drove: supervisor.drove,
         restarts: supervisor.stages.restarts().collect(),
         resumes: supervisor.state_file.state.resumes,
         replans,

@@ -34,6 +34,8 @@ pub(crate) fn recreate_bus<'a>(
     tracing::error!("the bus is recreated; consumers must join it again");
     supervisor.decision = Decision::STARTING;
     stand(&mut supervisor)?;
+    // One that dies meanwhile is not started again on the bus that goes.
+    supervisor.stages.start_no_more();
     stop_stages(&mut supervisor)?;
     let mut supervisor = supervisor.with_new_bus(lock)?;
     supervisor.publish_state()?;
@@ -60,6 +62,7 @@ fn stand(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
 /// Stop one stage after the other, in reverse order.
 fn stop_stages(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
     while supervisor.stages.stop_last() {
+        supervisor.service.feed();
         supervisor.wait()?;
         supervisor.bus.observer.take(&mut supervisor.stages)?;
         supervisor.poll_processes(0)?;

@@ -35,7 +35,7 @@ pub enum SimulatorError {
     #[error("cannot {action} the simulated robot: {source}")]
     System {
         /// What was tried.
-        action: &'static str,
+        action: String,
         /// The system's error.
         source: io::Error,
     },
@@ -44,7 +44,8 @@ pub enum SimulatorError {
     Startup(String),
 }
 
-fn system(action: &'static str) -> impl FnOnce(io::Error) -> SimulatorError {
+fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SimulatorError {
+    let action = action.into();
     move |source| SimulatorError::System { action, source }
 }
 
@@ -71,10 +72,10 @@ impl Simulator {
         let text = toml::to_string(mission)
             .map_err(|error| system("write the mission of")(io::Error::other(error)))?;
         let file = directory.join("mission.toml");
-        fs::write(&file, text).map_err(system("write the mission of"))?;
+        fs::write(&file, text).map_err(system(format!("write {} for", file.display())))?;
         let log_path = directory.join("x80-sim.log");
         let log = File::options().create(true).append(true).open(&log_path);
-        let log = log.map_err(system("log"))?;
+        let log = log.map_err(system(format!("write {} for", log_path.display())))?;
         let checkpoint = run::checkpoint_file(directory, "x80-sim");
         let mission = file.to_str().ok_or_else(|| {
             SimulatorError::Startup("the run directory's name is not UTF-8".into())

@@ -47,6 +47,8 @@ pub(crate) struct StageProcess {
     log_start: u64,
     /// When the supervisor noticed that it hung.
     hung: Option<Now>,
+    /// Its last beat says that it was asked to stop.
+    stopping: bool,
 }
 
 impl StageProcess {
@@ -64,6 +66,7 @@ impl StageProcess {
             output: None,
             log_start: 0,
             hung: None,
+            stopping: false,
         }
     }
 
@@ -95,6 +98,11 @@ impl StageProcess {
     /// Times it was started again.
     pub(crate) const fn restarts(&self) -> u32 {
         self.generation.saturating_sub(1)
+    }
+
+    /// Whether it said that it was asked to stop.
+    pub(crate) const fn is_stopping(&self) -> bool {
+        self.stopping
     }
 
     /// When its policy must next look at the clock.
@@ -130,7 +138,9 @@ impl StageProcess {
         }
         self.beat = Some(now);
         let was_running = self.is_running();
-        let event = match HealthState::from_byte(health.state) {
+        let state = HealthState::from_byte(health.state);
+        self.stopping = state == HealthState::Stopping;
+        let event = match state {
             HealthState::Ready => Event::BeatReady,
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
         };
@@ -165,7 +175,13 @@ impl StageProcess {
 
     fn spawn(&self, directory: &Path, first_tick: u64) -> io::Result<Process> {
         let log = self.log(directory);
-        let log = File::options().create(true).append(true).open(log)?;
+        let named =
+            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log.display()));
+        let log = File::options()
+            .create(true)
+            .append(true)
+            .open(&log)
+            .map_err(named)?;
         let generation = Generation {
             stage: self.stage.name,
             directory: directory.to_path_buf(),
@@ -225,7 +241,7 @@ impl StageProcess {
             next: Next::Nothing,
             last_words: last_words(&self.log(directory), self.log_start),
         };
-        (self.process, self.beat) = (None, None);
+        (self.process, self.beat, self.stopping) = (None, None, false);
         death
     }
 

@@ -16,6 +16,7 @@ use rustix::process::Signal;
 
 use crate::{
     death::Death,
+    observed_time::ObservedTime,
     output_watchdog::OutputWatchdog,
     policy::{Action, Event, Now, Phase},
     stage_process::{StageProcess, StageProcessError},
@@ -39,7 +40,7 @@ pub struct StageProcesses {
     stages: Vec<StageProcess>,
     watchdog: OutputWatchdog,
     directory: PathBuf,
-    clock: Instant,
+    clock: ObservedTime,
     starter: Starter,
     /// A stage that ends stays down.
     ending: bool,
@@ -57,7 +58,7 @@ impl StageProcesses {
                 .collect(),
             watchdog: OutputWatchdog::new(cells),
             directory,
-            clock: Instant::now(),
+            clock: ObservedTime::new(Instant::now()),
             starter,
             ending: false,
             start_blocked: false,
@@ -65,7 +66,12 @@ impl StageProcesses {
     }
 
     fn now(&self) -> Now {
-        self.clock.elapsed()
+        self.clock.at(Instant::now())
+    }
+
+    /// A wait ended that should have taken at most `planned`: the stages are not blamed for what it took beyond that.
+    pub fn on_waited(&mut self, planned: Duration) {
+        self.clock.on_waited(planned, Instant::now());
     }
 
     fn position(&self, stage: &str) -> Option<usize> {
@@ -74,6 +80,7 @@ impl StageProcesses {
 
     /// Start every stage that is down on a new bus, in order, from `first_tick` on; external ones are not started here.
     pub fn start_all(&mut self, first_tick: u64) {
+        self.ending = false;
         if self.starter == Starter::External {
             return;
         }
@@ -145,10 +152,13 @@ impl StageProcesses {
             if let Some(cause) = self.stages[index].try_reap()? {
                 let now = self.now();
                 let stage = &mut self.stages[index];
-                let asked = matches!(
+                let by_us = matches!(
                     stage.phase(),
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
+                // Systemd stops the stages before the supervisor that they depend on.
+                let by_starter = self.starter == Starter::External && stage.is_stopping();
+                let asked = by_us || by_starter;
                 let mut death = stage.record_death(cause, &self.directory, now);
                 if let Err(error) = bus.remove_unfinished(death.pid) {
                     tracing::warn!(stage = death.stage, %error, "cannot prepare the bus for its successor");
@@ -177,7 +187,7 @@ impl StageProcesses {
         std::mem::take(&mut self.start_blocked)
     }
 
-    /// From now on a stage that ends stays down.
+    /// From now on a stage that ends stays down, until all are started again.
     pub fn start_no_more(&mut self) {
         self.ending = true;
     }

@@ -97,6 +97,8 @@ pub(crate) struct Supervisor<'a> {
     pub state_file: StateFile,
     pub clock: RunClock,
     pub decision: Decision,
+    /// Whether the robot was ever ordered to drive.
+    pub drove: bool,
     pub tick_progress: TickProgress,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
@@ -147,6 +149,7 @@ impl<'a> Supervisor<'a> {
             state_file,
             clock,
             decision: Decision::STARTING,
+            drove: false,
             tick_progress: TickProgress::new(Instant::now()),
             stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
@@ -279,6 +282,7 @@ impl<'a> Supervisor<'a> {
             tracing::info!(reason = ?decision.reason, "order");
             self.tick_progress = TickProgress::new(Instant::now());
         }
+        self.drove |= decision.order() == Order::Drive;
         self.decision = decision;
         changed
     }
@@ -457,7 +461,10 @@ impl<'a> Supervisor<'a> {
 
     /// Save the state, then publish the order and the roster: what an operator asked is confirmed by the roster.
     pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
-        self.state_file.save()?;
+        if let Err(error) = self.state_file.save() {
+            // It only matters to a supervisor that goes on after this one: no reason to end the mission.
+            tracing::error!(%error, "what was asked would not survive this supervisor");
+        }
         let (tick, time) = self.published_as_of();
         if self.clock.in_ticks() {
             // Before the order that starts the first tick.
@@ -497,7 +504,7 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Wait for the bus, a child, a signal or a deadline.
-    pub(crate) fn wait(&self) -> Result<(), SupervisorError> {
+    pub(crate) fn wait(&mut self) -> Result<(), SupervisorError> {
         self.turns.count();
         let mut descriptors = self.stages.descriptors();
         if let Some(simulator) = &self.robot.simulator {
@@ -507,6 +514,7 @@ impl<'a> Supervisor<'a> {
         let soonest = deadlines.into_iter().flatten().min();
         let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
         self.bus.waiter.wait_also_for(&descriptors, timeout)?;
+        self.stages.on_waited(timeout);
         Ok(())
     }
 }

@@ -5,7 +5,8 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 use common::mission::Mission;
 
-use super::Failure;
+use super::{Failure, print_text};
+use crate::progress_line::write_stderr;
 
 /// Say whether a mission file is one, and if not, line, key and remedy.
 #[derive(Debug, Args)]
@@ -14,20 +15,19 @@ pub(crate) struct Arguments {
     file: PathBuf,
 }
 
-#[allow(clippy::print_stdout, clippy::print_stderr)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mission = Mission::load(&arguments.file)?;
     for remark in &mission.remarks {
-        eprintln!("firsthand: {remark}");
+        write_stderr(&format!("firsthand: {remark}\n"));
     }
     let frame = mission.grid_frame();
-    println!(
-        "{}: {} m to the target, {} x {} cells of {:.3} m",
+    print_text(&format!(
+        "{}: {} m to the target, {} x {} cells of {:.3} m\n",
         mission.name,
         mission.target.length(),
         frame.cells,
         frame.cells,
         frame.resolution_m
-    );
+    ))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -3,9 +3,14 @@
 use std::{
     fs, io,
     path::{Path, PathBuf},
+    time::SystemTime,
 };
 
+use common::domain::RobotName;
+use serde::Deserialize;
+
 use super::Failure;
+use crate::progress_line::write_stderr;
 use supervisor::recovery::SUMMARY;
 
 /// Marks a run directory whose run was cut off, once that was reported.
@@ -29,7 +34,8 @@ pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
     Ok(fs::canonicalize(directory)?)
 }
 
-/// `NAME-NNN` below `runs`, the first number that is free.
+/// `NAME-NNN` below `runs`, the number after the highest there: a directory that was removed gives its number to no
+/// later run.
 pub(crate) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     fs::create_dir_all(runs).map_err(|error| {
         format!(
@@ -37,7 +43,7 @@ pub(crate) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
             runs.display()
         )
     })?;
-    let mut number = 1;
+    let mut number = highest_number(runs, name) + 1;
     loop {
         let directory = runs.join(format!("{name}-{number:03}"));
         match fs::create_dir(&directory) {
@@ -50,23 +56,63 @@ pub(crate) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The newest run below `runs` without a summary whose cut was not reported yet: its supervisor was killed, or the
-/// machine was switched off.
-pub(crate) fn cut_off(runs: &Path) -> io::Result<Option<PathBuf>> {
-    let entries = match fs::read_dir(runs) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error),
+fn highest_number(runs: &Path, name: &str) -> u64 {
+    let number = |entry: fs::DirEntry| {
+        let file_name = entry.file_name();
+        let rest = file_name.to_str()?.strip_prefix(name)?;
+        rest.strip_prefix('-')?.parse().ok()
     };
-    let mut newest = None;
-    for entry in entries {
-        let directory = entry?.path();
-        let has = |name: &str| directory.join(name).exists();
-        if has(common::run::FILE_NAME) && !has(SUMMARY) && !has(CUT_OFF) {
-            let began = fs::metadata(directory.join(common::run::FILE_NAME))?.modified()?;
-            newest = newest.max(Some((began, directory)));
+    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
+    entries.filter_map(number).max().unwrap_or_default()
+}
+
+/// Remove the oldest directories of `robot` below `runs` whose runs have ended, beyond `keep` of them. One that cannot be
+/// removed stays: no mission is given up for it.
+pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
+    let mut ended: Vec<_> = runs_of(robot, runs)
+        .into_iter()
+        .filter(|(_, directory)| {
+            [SUMMARY, CUT_OFF]
+                .iter()
+                .any(|it| directory.join(it).exists())
+        })
+        .collect();
+    ended.sort();
+    let surplus = ended.len().saturating_sub(keep);
+    for (_, directory) in &ended[..surplus] {
+        if let Err(error) = fs::remove_dir_all(directory) {
+            let directory = directory.display();
+            write_stderr(&format!("firsthand: cannot remove {directory}: {error}\n"));
         }
     }
+}
+
+/// The directories below `runs` in which runs of `robot` began, and when.
+fn runs_of(robot: &RobotName, runs: &Path) -> Vec<(SystemTime, PathBuf)> {
+    #[derive(Deserialize)]
+    struct Named {
+        robot: RobotName,
+    }
+    let began = |entry: fs::DirEntry| {
+        let directory = entry.path();
+        let file = directory.join(common::run::FILE_NAME);
+        // What else a run file says may be another version's.
+        let run: Named = toml::from_str(&fs::read_to_string(&file).ok()?).ok()?;
+        let began = fs::metadata(file).ok()?.modified().ok()?;
+        (run.robot == *robot).then_some((began, directory))
+    };
+    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
+    entries.filter_map(began).collect()
+}
+
+/// The newest run of `robot` below `runs` without a summary whose cut was not reported yet: its supervisor was killed, or the
+/// machine was switched off.
+pub(crate) fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
+    let cut = runs_of(robot, runs).into_iter().filter(|(_, directory)| {
+        let has = |name: &str| directory.join(name).exists();
+        !has(SUMMARY) && !has(CUT_OFF)
+    });
+    let newest = cut.max();
     newest
         .map(|(_, directory)| fs::canonicalize(directory))
         .transpose()
@@ -81,20 +127,52 @@ pub(crate) fn mark_cut_off(directory: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    /// The directory of a run of `robot` that has begun.
+    fn begun(runs: &Path, robot: &str, name: &str) -> PathBuf {
+        let directory = runs.join(name);
+        fs::create_dir(&directory).unwrap();
+        let run = format!("robot = '{robot}'");
+        fs::write(directory.join(common::run::FILE_NAME), run).unwrap();
+        directory
+    }
+
+    fn x80() -> RobotName {
+        "x80".parse().unwrap()
+    }
+
     #[test]
-    fn a_run_that_was_cut_off_is_reported_once() {
+    fn a_run_that_was_cut_off_is_reported_once_and_to_its_robot_alone() {
         let runs = tempfile::tempdir().unwrap();
-        let begun = |name: &str| {
-            let directory = runs.path().join(name);
-            fs::create_dir(&directory).unwrap();
-            fs::write(directory.join(common::run::FILE_NAME), "").unwrap();
-            directory
-        };
-        fs::write(begun("ended").join(SUMMARY), "").unwrap();
-        assert_eq!(cut_off(runs.path()).unwrap(), None);
-        let cut = fs::canonicalize(begun("cut")).unwrap();
-        assert_eq!(cut_off(runs.path()).unwrap(), Some(cut.clone()));
+        let runs = runs.path();
+        fs::write(begun(runs, "x80", "ended").join(SUMMARY), "").unwrap();
+        begun(runs, "other", "others");
+        assert_eq!(cut_off(runs, &x80()).unwrap(), None);
+        let cut = fs::canonicalize(begun(runs, "x80", "cut")).unwrap();
+        assert_eq!(cut_off(runs, &x80()).unwrap(), Some(cut.clone()));
         mark_cut_off(&cut).unwrap();
-        assert_eq!(cut_off(runs.path()).unwrap(), None, "reported again");
+        assert_eq!(cut_off(runs, &x80()).unwrap(), None, "reported again");
+    }
+
+    #[test]
+    fn the_oldest_runs_that_ended_are_removed_and_no_other() {
+        let runs = tempfile::tempdir().unwrap();
+        let runs = runs.path();
+        let began = SystemTime::now();
+        for (age, name) in ["a-001", "a-002", "a-003"].iter().rev().enumerate() {
+            let directory = begun(runs, "x80", name);
+            fs::write(directory.join(SUMMARY), "").unwrap();
+            let file = fs::File::open(directory.join(common::run::FILE_NAME)).unwrap();
+            let minutes = std::time::Duration::from_secs(60 * age as u64);
+            file.set_modified(began - minutes).unwrap();
+        }
+        begun(runs, "x80", "a-004");
+        fs::write(begun(runs, "other", "b-001").join(SUMMARY), "").unwrap();
+        prune(runs, &x80(), 1);
+        let mut left: Vec<_> = fs::read_dir(runs).unwrap().flatten().collect();
+        left.sort_by_key(fs::DirEntry::file_name);
+        let left: Vec<_> = left.iter().map(fs::DirEntry::file_name).collect();
+        assert_eq!(left, ["a-003", "a-004", "b-001"]);
+        let next = numbered(runs, "a").unwrap();
+        assert!(next.ends_with("a-005"), "{}", next.display());
     }
 }

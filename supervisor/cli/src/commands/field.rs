@@ -18,7 +18,7 @@ use npyz::WriterBuilder as _;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::Failure;
+use super::{Failure, print_text};
 use maps::Map;
 use picture::FieldOnMap;
 
@@ -91,7 +91,6 @@ enum FieldError {
     Write { file: PathBuf, cause: io::Error },
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let map = maps::load(&arguments.map)?;
     let domain = domain(arguments, &map)?;
@@ -114,9 +113,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         write(file, |to| to.write_all(&png))?;
     }
     if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
+        print_text(&format!("{}\n", serde_json::to_string(&report)?))?;
     } else {
-        print!("{report}");
+        print_text(&report.to_string())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -11,7 +11,7 @@ use std::{
 use clap::Args;
 use thiserror::Error;
 
-use super::Failure;
+use super::{Failure, print_text};
 use supervisor::stages;
 
 /// Make this executable a service of systemd: units, user, configuration.
@@ -91,22 +91,21 @@ struct InstallError {
     source: io::Error,
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let executable = std::env::current_exe()?;
     for part in &PARTS {
         let text = part.text_for(&executable);
         let file = arguments.root.join(part.path);
         if arguments.print {
-            println!("# {}\n{text}", file.display());
+            print_text(&format!("# {}\n{text}\n", file.display()))?;
         } else if part.configuration && file.exists() {
-            println!("{} stays as it is", file.display());
+            print_text(&format!("{} stays as it is\n", file.display()))?;
         } else {
             put(&file, &text)?;
-            println!("{}", file.display());
+            print_text(&format!("{}\n", file.display()))?;
         }
     }
-    println!("# Then:\n{}", remaining());
+    print_text(&format!("# Then:\n{}\n", remaining()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -10,7 +10,7 @@ use clap::Args;
 use common::{clock::Pace, domain::RobotName, latency::Histogram};
 use serde::Serialize;
 
-use super::{Failure, missions};
+use super::{Failure, missions, print_text};
 use chaos::ipc_bench;
 use supervisor::process;
 
@@ -68,7 +68,6 @@ struct Ticks {
     p99_us: f64,
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let robot = match &arguments.robot {
         Some(robot) => robot.clone(),
@@ -96,9 +95,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let report = report(&hops, u64::from(arguments.rounds) * trips, &mut ticks)
         .ok_or("nothing was measured; does the mission drive at all?")?;
     if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
+        print_text(&format!("{}\n", serde_json::to_string(&report)?))?;
     } else {
-        print!("{report}");
+        print_text(&report.to_string())?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -123,7 +122,10 @@ fn report(hops: &Histogram, trips: u64, ticks: &mut [Ticks]) -> Option<Report> {
 
 /// Run the mission.
 fn measure_ticks(arguments: &Arguments, robot: &RobotName) -> Result<Ticks, Failure> {
-    let directory = std::env::temp_dir().join(format!("firsthand-{robot}"));
+    // Made by this process, so that it may remove it: `firsthand-UID` there is all robots of a user.
+    let directory = std::env::temp_dir().join(format!("firsthand-latency-{}", std::process::id()));
+    fs::create_dir(&directory)
+        .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
     let (robot, pace) = (robot.to_string(), arguments.pace.to_string());
     let mut command = process::firsthand(&["run", &arguments.mission, "--json", "--pace", &pace]);
     command.args(["--robot", &robot, "--out"]).arg(&directory);

@@ -6,7 +6,7 @@ use clap::Args;
 use common::mission::{Mission, MissionError};
 use thiserror::Error;
 
-use super::Failure;
+use super::{Failure, print_text};
 
 /// List the missions that ship with the program; with a name, print its file to start your own from.
 #[derive(Debug, Args)]
@@ -41,6 +41,12 @@ pub(crate) enum LookupError {
         "--set {assignment:?} is not KEY=VALUE with a TOML value: {problem}; for example --set start.heading_deg=90"
     )]
     Assignment { assignment: String, problem: String },
+    #[error("{name} with --set {assignments}: {problem}")]
+    Assigned {
+        name: String,
+        assignments: String,
+        problem: String,
+    },
     #[error(transparent)]
     Mission(#[from] MissionError),
 }
@@ -78,7 +84,12 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
     Mission::parse(&assigned, Path::new(&origin)).map_err(|error| match as_written {
         // It knows the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
-        _ => error.into(),
+        // No line of the file is at fault.
+        _ => LookupError::Assigned {
+            name: name.to_owned(),
+            assignments: assignments.join(" --set "),
+            problem: error.without_place(),
+        },
     })
 }
 
@@ -115,15 +126,15 @@ fn merge(base: &mut toml::Table, layer: toml::Table) {
     }
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(name) = &arguments.name {
         let text = shipped(name).ok_or_else(|| LookupError::Unknown { name: name.clone() })?;
-        print!("{text}");
+        print_text(text)?;
         return Ok(ExitCode::SUCCESS);
     }
     for (name, _) in SHIPPED {
-        println!("{name:<18} {}", load(name, &[])?.description);
+        let description = load(name, &[])?.description;
+        print_text(&format!("{name:<18} {description}\n"))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -190,6 +201,8 @@ mod tests {
         assert!(refused(&["seed=3"]).contains("far.toml:3: target"));
         let mended = load(&["perimeter.width_m=12", "perimeter.centre=[10, 0]"]);
         assert!(refused(&["perimeter.width_m=-1"]).contains("perimeter.width_m"));
+        let set = refused(&["perimeter.width_m=-1"]);
+        assert!(!set.contains(".toml:"), "cites a line of the file: {set}");
         let too_far = mended.unwrap_err().to_string();
         assert!(too_far.contains("perimeter.centre"), "{too_far}");
         let mended = load(&["perimeter.width_m=24", "perimeter.centre=[10, 0]"]).unwrap();

@@ -5,19 +5,20 @@ use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
 
-use super::{Failure, directories, missions};
+use super::{Failure, directories, missions, print_text};
 #[cfg(feature = "tools")]
 use crate::run_picture;
 use crate::{
     logging,
     progress_line::{ProgressLine, write_stderr},
     summary::Summary,
+    summary_file::SummaryFile,
 };
 use supervisor::{
-    Options, Progress, Starter,
+    Finished, Options, Progress, Starter,
     outcome::{Ending, Outcome},
     planner_executable,
-    recovery::{self, RecoveredRun, SUMMARY},
+    recovery::{self, RecoveredRun},
 };
 
 /// Carry out a mission: start a robot's stages, let it drive, summarise.
@@ -41,6 +42,9 @@ pub(crate) struct Arguments {
     /// Where the directories of runs are made.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
+    /// Remove the oldest directories of this robot's ended runs below --runs, beyond N.
+    #[arg(long, value_name = "N", conflicts_with_all = ["resume", "out"])]
+    keep: Option<usize>,
     /// Go on with the run in DIR, whose supervisor was killed. The robot must stand where it came to rest.
     #[arg(
         long,
@@ -48,7 +52,7 @@ pub(crate) struct Arguments {
         conflicts_with_all = ["mission", "robot", "pace", "seed", "out", "timeout", "set"]
     )]
     resume: Option<PathBuf>,
-    /// Go on with the newest run below --runs if it was cut off within the last minute. If that was before, report it once
+    /// Go on with this robot's newest run below --runs if it was cut off within the last minute. If that was before, report it once
     /// instead of starting: the robot is not where its mission starts. For services, which systemd starts again.
     #[arg(long, conflicts_with_all = ["resume", "out"])]
     resume_last: bool,
@@ -85,25 +89,37 @@ impl Default for Arguments {
 /// A run to carry out; none when one was cut off too long ago, which is reported.
 fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     if let Some(directory) = &arguments.resume {
-        return resumed(arguments, fs::canonicalize(directory)?).map(Some);
+        let found = fs::canonicalize(directory).map_err(|error| {
+            format!(
+                "cannot resume the run in {}: {error}; give the directory of a run",
+                directory.display()
+            )
+        })?;
+        return resumed(arguments, found).map(Some);
     }
     if arguments.resume_last
-        && let Some(cut) = directories::cut_off(&arguments.runs)?
+        && let Some(cut) = directories::cut_off(&arguments.runs, &arguments.robot)?
     {
-        if recovery::age_s(&cut).is_some_and(|age| age <= RESUMED_WITHIN_S) {
+        if recovery::age_s(&cut)?.is_some_and(|age| age <= RESUMED_WITHIN_S) {
             return resumed(arguments, cut).map(Some);
         }
-        directories::mark_cut_off(&cut)?;
+        directories::mark_cut_off(&cut)
+            .map_err(|error| format!("cannot mark {} as cut off: {error}", cut.display()))?;
         let cut = cut.display();
-        eprintln!(
-            "firsthand: {cut} was cut off, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`"
-        );
+        write_stderr(&format!(
+            "firsthand: {cut} was cut off, and a mission's origin is where the robot stands at its start: put it there, then start again; or, if it still stands where it came to rest, `firsthand run --resume {cut}`\n"
+        ));
         return Ok(None);
     }
     let mission = mission(arguments)?;
     let directory = match &arguments.out {
         Some(directory) => directories::own(directory)?,
-        None => directories::numbered(&arguments.runs, &mission.name)?,
+        None => {
+            if let Some(keep) = arguments.keep {
+                directories::prune(&arguments.runs, &arguments.robot, keep);
+            }
+            directories::numbered(&arguments.runs, &mission.name)?
+        }
     };
     Ok(Some(Options {
         mission,
@@ -154,7 +170,6 @@ fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     Ok(mission)
 }
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(parent) = arguments.parent {
         become_child("firsthand", parent)?;
@@ -163,44 +178,90 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::from(CUT_OFF));
     };
     let directory = &options.directory;
-    // The supervisor's log goes where its stages' logs are.
-    logging::to_file(&directory.join("supervisor.log"), "info")?;
-    for remark in &options.mission.remarks {
-        tracing::warn!("{remark}");
-        eprintln!("firsthand: {remark}");
-    }
+    let made_for_nothing = || {
+        // The directory was made for a run that did not begin.
+        if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
+            let _ = fs::remove_dir_all(directory);
+        }
+    };
+    let summary_file = prepare(&options).inspect_err(|_| made_for_nothing())?;
     let mut console = Console::new(&options);
     let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
         Ok(finished) => finished,
         Err(error) => {
-            // The directory was made for a run that did not begin.
-            if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
-                let _ = fs::remove_dir_all(directory);
-            }
+            made_for_nothing();
             return Err(error.into());
         }
     };
     console.line.end();
     let summary = Summary::new(&options.mission, &finished);
     let json = serde_json::to_string(&summary)?;
-    fs::write(directory.join(SUMMARY), format!("{json}\n"))?;
-    if arguments.json {
-        println!("{json}");
+    let text = if arguments.json {
+        format!("{json}\n")
     } else {
-        print!("{summary}");
-    }
-    // Drawn last, and without effect on the result.
-    #[cfg(feature = "tools")]
-    {
-        let picture = directory.join("picture.svg");
-        let svg = run_picture::svg(&options.mission, &finished, &summary);
-        match fs::write(&picture, svg) {
-            Ok(()) if arguments.json => {}
-            Ok(()) => println!("picture: {}", picture.display()),
-            Err(error) => tracing::warn!(%error, "cannot write the picture"),
-        }
+        summary.to_string()
+    };
+    complain(print_text(&text).map_err(|error| format!("cannot print the summary: {error}")));
+    if may_be_removed(arguments, &options, &finished) {
+        let _ = fs::remove_dir_all(directory);
+    } else {
+        complain(summary_file.write(&format!("{json}\n")));
+        // Drawn last, and without effect on the result.
+        #[cfg(feature = "tools")]
+        complain(draw(arguments, &options, &finished, &summary));
     }
     Ok(exit_code(&summary, &finished.ending))
+}
+
+/// Log into the run directory, reserve room for the summary, tell the mission's remarks.
+fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
+    let directory = &options.directory;
+    // The supervisor's log goes where its stages' logs are.
+    let log = directory.join("supervisor.log");
+    logging::to_file(&log, "info")
+        .map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
+    for remark in &options.mission.remarks {
+        tracing::warn!("{remark}");
+        write_stderr(&format!("firsthand: {remark}\n"));
+    }
+    Ok(SummaryFile::reserve(directory)?)
+}
+
+/// Draw the picture of the run.
+#[cfg(feature = "tools")]
+fn draw(
+    arguments: &Arguments,
+    options: &Options,
+    finished: &Finished,
+    summary: &Summary,
+) -> Result<(), String> {
+    let picture = options.directory.join("picture.svg");
+    let svg = run_picture::svg(&options.mission, finished, summary);
+    let named = |error| format!("cannot write {}: {error}", picture.display());
+    if let Err(error) = fs::write(&picture, svg) {
+        // Half a picture is none.
+        let _ = fs::remove_file(&picture);
+        return Err(named(error));
+    }
+    if arguments.json {
+        return Ok(());
+    }
+    print_text(&format!("picture: {}\n", picture.display())).map_err(named)
+}
+
+/// What only reports has failed: the mission's exit code stays.
+fn complain(reported: Result<(), String>) {
+    if let Err(problem) = reported {
+        tracing::error!("{problem}");
+        write_stderr(&format!("firsthand: {problem}\n"));
+    }
+}
+
+/// Whether the directory was made for a start whose robot never drove, and holds no more than the reason says: a robot that
+/// is switched off would fill the disk with them, start by start.
+fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
+    let made_here = arguments.out.is_none() && options.recovered.is_none();
+    made_here && !finished.drove && finished.restarts.values().all(|&restarts| restarts == 0)
 }
 
 /// A robot that stands without a supervisor for longer may have been moved.

@@ -15,6 +15,7 @@ use common::{
 };
 
 use super::Failure;
+use crate::progress_line::write_stderr;
 use supervisor::stages::{self, Stage};
 
 /// Be one stage of a run. The supervisor starts these, unless it was given --watch-only: then you do, or systemd.
@@ -39,7 +40,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     (stage.run)(&start).map_or_else(
         |error| {
-            eprintln!("firsthand: {error}");
+            write_stderr(&format!("firsthand: {error}\n"));
             Ok(ExitCode::from(error.exit_code()))
         },
         |()| Ok(ExitCode::SUCCESS),

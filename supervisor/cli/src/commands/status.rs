@@ -20,7 +20,7 @@ use common::{
 use serde::Serialize;
 use x80_link::failsafe;
 
-use super::Failure;
+use super::{Failure, print_text};
 
 /// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its link and its batteries.
 #[derive(Debug, Args)]
@@ -100,7 +100,6 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// The link publishes ten times a second, and a robot reports its batteries several times.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
-#[allow(clippy::print_stdout)]
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut roster = Roster::open(&bus)?;
@@ -145,9 +144,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         stages: entries.iter().map(stage_status).collect(),
     };
     if arguments.json {
-        println!("{}", serde_json::to_string(&status)?);
+        print_text(&format!("{}\n", serde_json::to_string(&status)?))?;
     } else {
-        print!("{status}");
+        print_text(&status.to_string())?;
     }
     Ok(ExitCode::SUCCESS)
 }

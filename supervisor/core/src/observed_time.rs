@@ -1,0 +1,80 @@
+//! Time that the supervisor was there to see. A deadline of a stage counts that alone: where the whole machine stood still,
+//! or this process was not scheduled, nobody can say that a stage was late.
+
+use std::time::{Duration, Instant};
+
+use crate::policy::Now;
+
+/// A wait, or the work between two waits, that takes so much longer than it should is noticed as lateness. On a machine
+/// that is not overloaded a wait ends within a hundredth of it.
+const TOLERANCE: Duration = Duration::from_millis(20);
+
+/// The clock of the stages' deadlines.
+#[derive(Debug)]
+pub(crate) struct ObservedTime {
+    observed: Now,
+    /// Until when that was counted.
+    until: Instant,
+}
+
+impl ObservedTime {
+    /// Zero at `now`.
+    pub(crate) const fn new(now: Instant) -> Self {
+        Self {
+            observed: Now::ZERO,
+            until: now,
+        }
+    }
+
+    /// Its reading at `now`, while the supervisor works.
+    pub(crate) fn at(&self, now: Instant) -> Now {
+        self.observed + self.since(now).min(TOLERANCE)
+    }
+
+    /// At `now` a wait ended that should have taken at most `planned`. Of one that took longer nobody can say when the
+    /// machine stood still, so hardly any of it counts; a little does, or a supervisor that is always late would never notice
+    /// anything.
+    pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
+        let took = self.since(now);
+        self.observed += if took <= planned + TOLERANCE {
+            took
+        } else {
+            TOLERANCE
+        };
+        self.until = now;
+    }
+
+    fn since(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.until)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_wait_counts_as_long_as_it_took() {
+        let began = Instant::now();
+        let mut time = ObservedTime::new(began);
+        for wait in 1..=10 {
+            time.on_waited(200 * MS, began + wait * 50 * MS);
+        }
+        assert_eq!(time.at(began + 500 * MS), 500 * MS);
+    }
+
+    #[test]
+    fn a_stall_of_everything_does_not_count_wherever_it_falls() {
+        let began = Instant::now();
+        let mut time = ObservedTime::new(began);
+        // In the work between two waits.
+        assert_eq!(time.at(began + 600 * MS), TOLERANCE);
+        // In a wait, again and again: the stages had no time to beat between.
+        for stall in 1..=5 {
+            time.on_waited(200 * MS, began + stall * 600 * MS);
+            assert_eq!(time.at(began + stall * 600 * MS), stall * TOLERANCE);
+        }
+    }
+}
