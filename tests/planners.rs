@@ -125,7 +125,7 @@ fn a_planner_that_cannot_be_started_is_refused_by_name_before_anything_starts() 
         for arguments in [&run[..], &evaluate] {
             let output = output(arguments);
             let said = String::from_utf8(output.stderr).unwrap();
-            assert_eq!(output.status.code(), Some(1), "{said}");
+            assert_eq!(output.status.code(), Some(78), "{said}");
             assert!(said.contains(named) && said.contains(problem), "{said}");
         }
     }
