@@ -16,7 +16,7 @@ fn numbers(mut summary: Value) -> Value {
 }
 
 /// What a consumer receives of a run, and its summary.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 struct Recording {
     /// Each sample, by topic and tick.
     samples: BTreeMap<(&'static str, u64), String>,
@@ -127,7 +127,14 @@ fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
         for (key, sample) in &one.samples {
             assert_eq!(Some(sample), other.samples.get(key), "{key:?}");
         }
-        assert!(one == other, "{} against {}", one.summary, other.summary);
+        assert_eq!(one.samples.len(), other.samples.len());
+        for (version, cells) in &one.grids {
+            let others = &other.grids[version];
+            let differ = (0..cells.len()).filter(|&at| cells[at] != others[at]);
+            let differ: Vec<_> = differ.map(|at| (at, cells[at], others[at])).collect();
+            assert!(differ.is_empty(), "grid {version}: {differ:?}");
+        }
+        assert_eq!(one.summary, other.summary);
         assert_nothing_left("recorded");
     });
 }

@@ -33,7 +33,7 @@
 //! | `judge` | whether the mission is over, pure; [`outcome`] is its result |
 //! | `decisive` | which of the things that end a mission came first, and at which tick, pure |
 //! | `stall` | whether the robot stalls, and the next recovery step, pure |
-//! | `supervisor` | the loop, which asks these |
+//! | `supervisor`, `stall_recovery` | the loop, which asks these; what it does about stalls |
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
 //! | [`planner_executable`] | the executable that a mission names for the planner, checked |
 //! | [`process`] | a process that is watched, signalled, reaped |
@@ -49,6 +49,8 @@
 //! | [`simulator`] | the simulated robot as a child process |
 //! | `service_manager` | notifications to systemd |
 //! | `progress` | how far a run has come, as shown to its user |
+//! | `lead` | on a clock of ticks: how far the link may go, and from which tick a recovery step holds, pure |
+//! | `last_resort` | the end of a run whose supervisor hangs |
 //! | `error`, `domain_error` | why a run could not be carried out |
 
 mod bus_endpoints;
@@ -83,6 +85,7 @@ mod stage_process;
 mod stage_processes;
 pub mod stages;
 mod stall;
+mod stall_recovery;
 mod supervisor;
 pub mod totals;
 

@@ -9,8 +9,7 @@ use common::{
     mission::Mission,
     run::Run,
     samples::{
-        DirectiveSample, HoldReason, Order, RecoveryStep, RequestKind, RosterHeader, StallSample,
-        TickLimitSample, name_str,
+        DirectiveSample, HoldReason, Order, RequestKind, RosterHeader, TickLimitSample, name_str,
     },
     signals::Signals,
     topics,
@@ -24,7 +23,7 @@ use crate::{
     error::{SupervisorError, system},
     judge::{self, Deadline, StopClock, TickProgress},
     last_resort::Turns,
-    lead::{Lead, Next},
+    lead::Lead,
     order::{self, Decision},
     outcome::{Ending, Outcome},
     progress::Progress,
@@ -34,8 +33,7 @@ use crate::{
     service_manager::ServiceManager,
     simulator::Simulator,
     stage_processes::{StageProcesses, Starter},
-    stages,
-    stall::{self, StallWatch},
+    stall::StallWatch,
 };
 
 /// What a run is made from.
@@ -89,7 +87,7 @@ impl Robot {
 
 /// The supervisor of one run.
 pub(crate) struct Supervisor<'a> {
-    options: &'a Options,
+    pub options: &'a Options,
     // Dropped in this order: the stages end before the robot.
     pub stages: StageProcesses,
     pub robot: Robot,
@@ -102,8 +100,8 @@ pub(crate) struct Supervisor<'a> {
     pub tick_progress: TickProgress,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
-    lead: Lead,
-    published_limit: Option<TickLimitSample>,
+    pub lead: Lead,
+    pub published_limit: Option<TickLimitSample>,
     cleanup: Cleanup,
     turns: Turns,
     pub service: ServiceManager,
@@ -332,113 +330,6 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// Look for stalls, and take the next recovery step. The last one ends the mission.
-    fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
-        let in_ticks = self.clock.in_ticks();
-        if self.decision.order() != Order::Drive {
-            // On a clock of ticks no time passes meanwhile.
-            if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
-                self.stall_watch.hold(pose.stamp.tick);
-            }
-            return Ok(None);
-        }
-        if !in_ticks {
-            let Some(stall) = self.next_stall() else {
-                return Ok(None);
-            };
-            self.carry_out(stall.recovery())?;
-            return Ok(self.given_up());
-        }
-        loop {
-            let published = self.bus.observer.record.published();
-            match self.lead.next(published, Instant::now()) {
-                Next::Wait => break,
-                Next::Begin(step) => self.carry_out(step)?,
-                Next::Look => match self.next_stall() {
-                    Some(stall) => self.lead.stalled(stall),
-                    None => {
-                        if let Some(tick) = published.tick {
-                            self.lead.looked_at(tick);
-                        }
-                        break;
-                    }
-                },
-            }
-            if let Some(ending) = self.given_up() {
-                return Ok(Some(ending));
-            }
-        }
-        self.publish_tick_limit()?;
-        Ok(None)
-    }
-
-    /// Look at the ticks that were not looked at, up to the next at which the robot stalls.
-    fn next_stall(&mut self) -> Option<StallSample> {
-        let record = &self.bus.observer.record;
-        let in_ticks = self.clock.in_ticks();
-        let stopped = record.link.is_none_or(|link| link.stopped());
-        // On a clock of ticks no time passes while something holds the robot.
-        let held = !in_ticks && (stopped || !self.stages.all_running());
-        // Of a tick without its command not all may be here yet.
-        let newest = record.published().tick.filter(|_| in_ticks);
-        // Several may have passed since the last look: a stall is one whether each was seen alone or not.
-        let mut found = None;
-        for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
-            if newest.is_some_and(|newest| pose.stamp.tick > newest) {
-                break;
-            }
-            if let Some(stall) = self.stall_watch.step(pose, guidance, held) {
-                found = Some((*pose, stall));
-                break;
-            }
-        }
-        let (pose, stall) = found?;
-        stall::log(&stall);
-        self.bus.publish_stall(&pose, stall);
-        records::append(&self.options.directory, records::STALLS, &stall);
-        Some(stall)
-    }
-
-    /// Carry out a recovery step.
-    fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {
-        match step {
-            RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
-            // The new epoch is in the directive.
-            RecoveryStep::Forget => self.publish_state()?,
-            RecoveryStep::GiveUp => {}
-        }
-        Ok(())
-    }
-
-    /// The end of a mission that has no recovery step left.
-    fn given_up(&self) -> Option<Ending> {
-        let stall = self.stall_watch.gave_up()?;
-        let words = stall::words(stall.cause(), &self.options.mission.body());
-        let reason = format!("target unreachable: {words}");
-        Some(Ending::failed(Outcome::Unreachable, reason))
-    }
-
-    /// After the run: the tick at which there was no recovery step left, and what that ends the mission with. On a clock of
-    /// ticks how many ticks were looked at before the end was seen depends on the machine, so the others are now.
-    pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
-        while self.clock.in_ticks()
-            && self.stall_watch.gave_up().is_none()
-            && self.next_stall().is_some()
-        {}
-        let tick = self.stall_watch.gave_up()?.stamp.tick;
-        Some((tick, self.given_up()?))
-    }
-
-    /// Tell the link how far it may go, if that is news.
-    fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
-        let limit = self.lead.limit();
-        if self.published_limit.replace(limit) != Some(limit) {
-            let (tick, time) = self.published_as_of();
-            self.bus.publish_tick_limit(tick, time, limit)?;
-        }
-        Ok(())
-    }
-
     /// The tick that a new generation of a stage starts from.
     pub(crate) fn first_tick(&self) -> u64 {
         self.clock
@@ -452,7 +343,7 @@ impl<'a> Supervisor<'a> {
     }
 
     /// The tick and the time that the supervisor's samples are published as of.
-    fn published_as_of(&self) -> (u64, MissionTime) {
+    pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
         // An external stage takes its first tick from here: it must not be one that was made.
         let tick = self.first_tick().saturating_sub(1);
         let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());

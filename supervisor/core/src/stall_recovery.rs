@@ -1,0 +1,123 @@
+//! What the loop does about stalls: it looks for them, starts the planner anew or resets the belief, and ends the mission when
+//! no step is left.
+
+use std::time::Instant;
+
+use common::samples::{Order, RecoveryStep, StallSample};
+
+use crate::{
+    error::SupervisorError,
+    lead::Next,
+    outcome::{Ending, Outcome},
+    records, stages, stall,
+    supervisor::Supervisor,
+};
+
+impl Supervisor<'_> {
+    /// Look for stalls, and take the next recovery step. The last one ends the mission.
+    pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
+        let in_ticks = self.clock.in_ticks();
+        if self.decision.order() != Order::Drive {
+            // On a clock of ticks no time passes meanwhile.
+            if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
+                self.stall_watch.hold(pose.stamp.tick);
+            }
+            return Ok(None);
+        }
+        if !in_ticks {
+            let Some(stall) = self.next_stall() else {
+                return Ok(None);
+            };
+            self.carry_out(stall.recovery())?;
+            return Ok(self.given_up());
+        }
+        loop {
+            let published = self.bus.observer.record.published();
+            match self.lead.next(published, Instant::now()) {
+                Next::Wait => break,
+                Next::Begin(step) => self.carry_out(step)?,
+                Next::Look => match self.next_stall() {
+                    Some(stall) => self.lead.stalled(stall),
+                    None => {
+                        if let Some(tick) = published.tick {
+                            self.lead.looked_at(tick);
+                        }
+                        break;
+                    }
+                },
+            }
+            if let Some(ending) = self.given_up() {
+                return Ok(Some(ending));
+            }
+        }
+        self.publish_tick_limit()?;
+        Ok(None)
+    }
+
+    /// Look at the ticks that were not looked at, up to the next at which the robot stalls.
+    fn next_stall(&mut self) -> Option<StallSample> {
+        let record = &self.bus.observer.record;
+        let in_ticks = self.clock.in_ticks();
+        let stopped = record.link.is_none_or(|link| link.stopped());
+        // On a clock of ticks no time passes while something holds the robot.
+        let held = !in_ticks && (stopped || !self.stages.all_running());
+        // Of a tick without its command not all may be here yet.
+        let newest = record.published().tick.filter(|_| in_ticks);
+        // Several may have passed since the last look: a stall is one whether each was seen alone or not.
+        let mut found = None;
+        for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
+            if newest.is_some_and(|newest| pose.stamp.tick > newest) {
+                break;
+            }
+            if let Some(stall) = self.stall_watch.step(pose, guidance, held) {
+                found = Some((*pose, stall));
+                break;
+            }
+        }
+        let (pose, stall) = found?;
+        stall::log(&stall);
+        self.bus.publish_stall(&pose, stall);
+        records::append(&self.options.directory, records::STALLS, &stall);
+        Some(stall)
+    }
+
+    /// Carry out a recovery step.
+    fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {
+        match step {
+            RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
+            // The new epoch is in the directive.
+            RecoveryStep::Forget => self.publish_state()?,
+            RecoveryStep::GiveUp => {}
+        }
+        Ok(())
+    }
+
+    /// The end of a mission that has no recovery step left.
+    fn given_up(&self) -> Option<Ending> {
+        let stall = self.stall_watch.gave_up()?;
+        let words = stall::words(stall.cause(), &self.options.mission.body());
+        let reason = format!("target unreachable: {words}");
+        Some(Ending::failed(Outcome::Unreachable, reason))
+    }
+
+    /// After the run: the tick at which there was no recovery step left, and what that ends the mission with. On a clock of
+    /// ticks how many ticks were looked at before the end was seen depends on the machine, so the others are now.
+    pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
+        while self.clock.in_ticks()
+            && self.stall_watch.gave_up().is_none()
+            && self.next_stall().is_some()
+        {}
+        let tick = self.stall_watch.gave_up()?.stamp.tick;
+        Some((tick, self.given_up()?))
+    }
+
+    /// Tell the link how far it may go, if that is news.
+    pub(crate) fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
+        let limit = self.lead.limit();
+        if self.published_limit.replace(limit) != Some(limit) {
+            let (tick, time) = self.published_as_of();
+            self.bus.publish_tick_limit(tick, time, limit)?;
+        }
+        Ok(())
+    }
+}
