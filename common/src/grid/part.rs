@@ -15,7 +15,8 @@ use crate::bus::{ZeroCopySend, layouts};
 #[type_name("firsthand.Part")]
 #[repr(C)]
 pub struct Part {
-    /// The version the map has with these cells. Consecutive versions differ in one window.
+    /// The version the map has with these cells. Consecutive versions differ in one window; an empty one says that nothing
+    /// changed since this version.
     pub version: u64,
     /// N: the map is N x N cells.
     pub cells: u32,

@@ -52,6 +52,18 @@ fn a_replica_follows_windows_and_drops_the_map_when_one_is_missing() {
 }
 
 #[test]
+fn a_part_without_a_change_after_a_missed_window_is_a_gap() {
+    let frame = frame(4);
+    let mut replica = Replica::default();
+    replica.apply(&Part::whole(frame, 1), &[0_u8; 16]);
+    let unchanged = |version| Part::of(frame, Window::default(), version);
+    let nothing = Applied::Window(Window::default());
+    assert_eq!(replica.apply(&unchanged(1), &[]), nothing);
+    assert_eq!(replica.apply(&unchanged(2), &[]), Applied::Missed);
+    assert_eq!(replica.frame(), None);
+}
+
+#[test]
 fn a_keyframe_that_changes_one_cell_is_told_as_that_window() {
     let frame = frame(4);
     let mut replica = Replica::default();
