@@ -116,6 +116,8 @@ wire_enum! {
         FramesSlow = 16,
         /// The front sonar of a mission that senses gives no readings.
         RangeSilent = 17,
+        /// What the robot sends is old.
+        RobotLate = 18,
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Senses {
     pub odometry: Belief,
     /// How its motor frames come.
     pub motor: Motor,
+    /// What it sends is old, or may be: that is being found out.
+    pub late: bool,
     /// A mission that senses gets no readings of the front sonar.
     pub range_silent: bool,
 }
@@ -198,6 +200,14 @@ pub static TABLE: &[Rule] = &[
         action: Action::Stop,
         until: "its next frame",
         applies: |flags, _| !flags.connected,
+    },
+    Rule {
+        cause: Cause::RobotLate,
+        name: "robot late",
+        when: "it was lost and has just been found, or it acknowledges later than `robot.command_limit_s` what it is sent",
+        action: Action::Stop,
+        until: "it is sent nothing for that time and 0.3 s, and acknowledges nothing late; tried every 2 s",
+        applies: |flags, _| flags.senses.late,
     },
     Rule {
         cause: Cause::FramesSilent,

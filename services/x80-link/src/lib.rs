@@ -7,6 +7,7 @@
 //! | [`failsafe`] | THE table of what slows, stops or ends, and why |
 //! | [`transport`] | datagrams, a connection or a serial line |
 //! | [`presence`] | whether the robot answers, and how it is looked for |
+//! | [`lateness`] | whether what the robot sends is old |
 //! | [`restart`] | whether counts can follow those before, or began anew |
 //! | [`odometry`] | whether the wheels turn as told, by their encoders |
 //! | [`obedience`] | whether the robot comes to rest when told, and what else it is told |
@@ -20,6 +21,7 @@
 pub mod backoff;
 pub mod drive;
 pub mod failsafe;
+pub mod lateness;
 pub mod obedience;
 pub mod odometry;
 pub mod presence;

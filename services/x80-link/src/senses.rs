@@ -5,10 +5,16 @@
 
 use std::time::Duration;
 
-use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::COUNT_CYCLE};
+use common::{
+    clock::{MissionTime, Pace},
+    mission::Mission,
+    samples::Cause,
+    wire::COUNT_CYCLE,
+};
 
 use crate::{
     failsafe,
+    lateness::Lateness,
     obedience::{Means, Obedience},
     odometry::Odometry,
     restart::{Counts, RestartWatch},
@@ -25,6 +31,7 @@ pub struct Senses {
     odometry: Odometry,
     obedience: Obedience,
     streams: Streams,
+    lateness: Lateness,
     limit: Duration,
     sonar_index: u8,
     tried: Option<MissionTime>,
@@ -39,10 +46,37 @@ impl Senses {
             odometry: Odometry::new(mission),
             obedience: Obedience::new(mission),
             streams: Streams::new(mission),
+            lateness: Lateness::new(mission),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             sonar_index: mission.sonar.index,
             tried: None,
         }
+    }
+
+    /// Mission time passes at that pace.
+    pub fn set_pace(&mut self, pace: Pace) {
+        self.lateness.set_pace(pace);
+    }
+
+    /// Something was sent to the robot.
+    pub const fn sent(&mut self, now_ns: u64) {
+        self.lateness.sent(now_ns);
+    }
+
+    /// It acknowledged something.
+    pub const fn acknowledged(&mut self, now_ns: u64) {
+        self.lateness.acknowledged(now_ns);
+    }
+
+    /// Time passes.
+    pub fn pass(&mut self, now_ns: u64) {
+        self.lateness.pass(now_ns);
+    }
+
+    /// Whether nothing is to be sent to the robot: what it acknowledges meanwhile tells its age.
+    #[must_use]
+    pub const fn awaits_late_ones(&self) -> bool {
+        self.lateness.asks()
     }
 
     /// The wheels were told these counts/s, forward positive.
@@ -51,14 +85,18 @@ impl Senses {
         self.obedience.commanded(counts, now);
     }
 
-    /// The robot answers since `now_ns`, and was asked for its streams.
-    pub fn found(&mut self, now_ns: u64) {
+    /// The robot answers since `now_ns`, `again` after it was lost, and was asked for its streams.
+    pub fn found(&mut self, now_ns: u64, again: bool) {
         self.streams.found(now_ns);
+        if again {
+            self.lateness.found(now_ns);
+        }
     }
 
     /// The robot does not answer.
     pub const fn lost(&mut self) {
         self.restart.lost();
+        self.lateness.lost();
         self.obedience.unheard();
     }
 
@@ -120,13 +158,14 @@ impl Senses {
             disobeys: self.obedience.disobeys(),
             odometry: self.odometry.belief(now),
             motor: self.streams.motor_frames(now_ns, silence),
+            late: self.lateness.doubted(),
             range_silent: self.streams.range_is_silent(now_ns, silence),
         }
     }
 
     /// Whether to ask for the streams again, now.
     pub fn wants_streams(&mut self, now_ns: u64, silence: Duration) -> bool {
-        self.streams.wants_request(now_ns, silence)
+        !self.lateness.asks() && self.streams.wants_request(now_ns, silence)
     }
 
     /// Whether the encoders say that no wheel turns.
@@ -180,6 +219,9 @@ impl Senses {
                 "the front sonar, index {} of the standard frame (sonar.index), is missing or 0",
                 self.sonar_index
             )),
+            Cause::RobotLate => Some(
+                "what it sends may be old: look at the network and the radio between, which hold it back".to_owned(),
+            ),
             Cause::RobotDisobeys => Some(
                 "it was told to stand and its encoders say that it moves; every means is tried in turn: velocity 0, disable, pulse width 0, suspend"
                     .to_owned(),

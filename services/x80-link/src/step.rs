@@ -155,6 +155,7 @@ impl Step for Link {
     fn restore(&mut self, state: State) -> Result<(), ForeignState> {
         self.state = state;
         self.presence.set_pace(state.pace);
+        self.senses.set_pace(state.pace);
         Ok(())
     }
 
@@ -177,6 +178,12 @@ impl Step for Link {
         self.give_tick(now_ns, &mut effects);
         self.repeat_command(now_ns, &mut effects);
         self.guard(now_ns, &mut effects);
+        if effects
+            .iter()
+            .any(|effect| matches!(effect, Effect::Send(_)))
+        {
+            self.senses.sent(now_ns);
+        }
         effects
     }
 }

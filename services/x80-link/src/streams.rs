@@ -85,7 +85,8 @@ impl Streams {
     /// How the motor frames of a robot that answers come; `silence` is how long none may.
     #[must_use]
     pub fn motor_frames(&self, now_ns: u64, silence: Duration) -> Motor {
-        if self.missing(self.motor_ns, now_ns, silence) {
+        let since = self.motor_ns.max(self.found_ns);
+        if now_ns.saturating_sub(since) >= silence.as_nanos() as u64 {
             return Motor::Silent;
         }
         let mut sorted: Vec<_> = self.intervals.iter().copied().collect();
@@ -101,12 +102,8 @@ impl Streams {
     /// Whether a mission that senses gets no readings of its front sonar; `silence` is how long none may come.
     #[must_use]
     pub fn range_is_silent(&self, now_ns: u64, silence: Duration) -> bool {
-        self.senses && self.missing(self.range_ns, now_ns, silence)
-    }
-
-    fn missing(&self, heard_ns: u64, now_ns: u64, silence: Duration) -> bool {
-        let since = heard_ns.max(self.found_ns);
-        now_ns.saturating_sub(since) >= silence.as_nanos() as u64
+        // One that was found a moment ago must be heard first: what stood ahead before says nothing.
+        self.senses && now_ns.saturating_sub(self.range_ns) >= silence.as_nanos() as u64
     }
 
     /// Whether to ask for the streams again, now. The pauses between requests grow.

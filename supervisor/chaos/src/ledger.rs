@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-use crate::robot_fault::{Promise, REST_WITHIN_S, RobotFault};
+use crate::robot_fault::{Promise, REST_LATER_S, REST_WITHIN_S, RobotFault};
 
 /// One mission of a robot that lied.
 #[derive(Clone, Debug, Serialize)]
@@ -33,17 +33,12 @@ impl Entry {
     /// Whether what is promised was kept.
     #[must_use]
     pub fn is_kept(&self) -> bool {
-        let within = |seconds: Option<f64>| seconds.is_some_and(|seconds| seconds <= REST_WITHIN_S);
         let unharmed = self.lied && self.collisions == 0 && self.outcome != "wrong_place";
-        match self.fault.row().promise {
-            Promise::Unharmed => unharmed,
-            Promise::Rests => {
-                unharmed
-                    && within(self.last_moving_s)
-                    && within(self.rest_s)
-                    && !self.reason.is_empty()
-            }
-        }
+        let Some(limit_s) = self.fault.row().promise.rest_within_s() else {
+            return unharmed;
+        };
+        let within = |seconds: Option<f64>| seconds.is_some_and(|seconds| seconds <= limit_s);
+        unharmed && within(self.last_moving_s) && within(self.rest_s) && !self.reason.is_empty()
     }
 }
 
@@ -96,18 +91,19 @@ impl fmt::Display for Ledger {
         }
         writeln!(
             to,
-            "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, except where the robot may go on \
-             unharmed: {}.",
-            unharmed()
+            "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, or {REST_LATER_S} s: {}; except where \
+             the robot may go on unharmed: {}.",
+            names(Promise::RestsLater),
+            names(Promise::Unharmed)
         )
     }
 }
 
-/// Kinds of which it is only promised that the robot comes to no harm.
-fn unharmed() -> String {
+/// Kinds of which that is promised.
+fn names(promise: Promise) -> String {
     let table = crate::robot_fault::TABLE.iter();
     let names: Vec<_> = table
-        .filter(|row| row.promise == Promise::Unharmed)
+        .filter(|row| row.promise == promise)
         .map(|row| row.name)
         .collect();
     names.join(", ")

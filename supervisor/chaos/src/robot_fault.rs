@@ -2,15 +2,20 @@
 
 use serde::{Serialize, Serializer};
 
-/// From the fault to the last moving command, and to wheels at rest, at most: 1.5 s until what was commanded and what is
-/// reported are known to disagree, half a second to come to rest. Seconds.
+/// From the fault to the last moving command, and to wheels at rest, at most: 1.5 s of motion until what was commanded and
+/// what is reported are known to disagree, half a second to come to rest. Seconds.
 pub const REST_WITHIN_S: f64 = 2.0;
+/// Where the motion that shows the fault comes later: counts that become 0 are first those of a robot that restarted; wheels
+/// that are swapped are seen in turns; nine slow frames make a rate. Each command lasts for 0.25 s meanwhile.
+pub const REST_LATER_S: f64 = 4.0;
 
 /// What is promised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
     /// The robot is at rest within [`REST_WITHIN_S`] and stays so, with a reason, and touches nothing.
     Rests,
+    /// The same within [`REST_LATER_S`].
+    RestsLater,
     /// It touches nothing, and does not call a wrong place its target: what it is told is poor, and not false.
     Unharmed,
 }
@@ -81,10 +86,10 @@ const fn row(fault: RobotFault, name: &'static str, promise: Promise, what: &'st
 pub static TABLE: &[Row] = &[
     row(RobotFault::Silence, "silence", Promise::Rests, "nothing comes from the robot any more"),
     row(RobotFault::MotorOnes, "motor-ones", Promise::Rests, "the data of every motor frame are 0xFF"),
-    row(RobotFault::MotorZeros, "motor-zeros", Promise::Rests, "the data of every motor frame are 0"),
+    row(RobotFault::MotorZeros, "motor-zeros", Promise::RestsLater, "the data of every motor frame are 0"),
     row(RobotFault::MotorRepeated, "motor-repeated", Promise::Rests, "the same motor frame for ever"),
     row(RobotFault::EncoderDead, "encoder-dead", Promise::Rests, "one encoder does not count"),
-    row(RobotFault::EncodersSwapped, "encoders-swapped", Promise::Rests, "the encoders of left and right are swapped"),
+    row(RobotFault::EncodersSwapped, "encoders-swapped", Promise::RestsLater, "the encoders of left and right are swapped"),
     row(RobotFault::EncoderReversed, "encoder-reversed", Promise::Rests, "one encoder counts backwards"),
     row(RobotFault::CountsRandom, "counts-random", Promise::Rests, "random counts in each frame"),
     row(RobotFault::CountsReset, "counts-reset", Promise::Unharmed, "counts begin again from 0 without silence"),
@@ -95,8 +100,20 @@ pub static TABLE: &[Row] = &[
     row(RobotFault::OldFrames, "old-frames", Promise::Unharmed, "every 2 s a motor frame of 3 s ago comes again"),
     row(RobotFault::StreamsStop, "streams-stop", Promise::Rests, "no sensor frame comes, acknowledgements do"),
     row(RobotFault::DoesNotStop, "does-not-stop", Promise::Rests, "after `firsthand stop`: given speed 0 the robot keeps its speed"),
-    row(RobotFault::FramesSlow, "frames-slow", Promise::Rests, "sensor frames come three times a second"),
+    row(RobotFault::FramesSlow, "frames-slow", Promise::RestsLater, "sensor frames come three times a second"),
 ];
+
+impl Promise {
+    /// Within which time of the fault the robot rests, seconds; none where it may go on.
+    #[must_use]
+    pub const fn rest_within_s(self) -> Option<f64> {
+        match self {
+            Self::Rests => Some(REST_WITHIN_S),
+            Self::RestsLater => Some(REST_LATER_S),
+            Self::Unharmed => None,
+        }
+    }
+}
 
 impl RobotFault {
     /// Its row.
@@ -142,9 +159,9 @@ mod tests {
     fn the_guides_table_is_this_one() {
         let guide = include_str!("../../guide/break-it.md");
         for row in TABLE {
-            let promise = match row.promise {
-                Promise::Rests => "rests",
-                Promise::Unharmed => "unharmed",
+            let promise = match row.promise.rest_within_s() {
+                Some(within_s) => format!("rests within {within_s} s"),
+                None => "unharmed".to_owned(),
             };
             let what = row.what;
             let line = format!("| `{}` | {what} | {promise} |\n", row.name);

@@ -30,7 +30,7 @@ use crate::{
     mission,
     options::Options,
     proxy::Proxy,
-    robot_fault::{Promise, RobotFault},
+    robot_fault::RobotFault,
 };
 
 /// The robot lies from so long after it has departed, seconds: at least, and how much more at most.
@@ -156,9 +156,9 @@ impl Observed {
                 link = None;
             }
             self.ended_by_itself = child.try_reap().map_err(system("reap"))?.is_some();
-            let watched = match fault.row().promise {
-                Promise::Rests => WATCHED,
-                Promise::Unharmed => WATCHED_ON_ITS_WAY,
+            let watched = match fault.row().promise.rest_within_s() {
+                Some(_) => WATCHED,
+                None => WATCHED_ON_ITS_WAY,
             };
             let patience = self
                 .lies

@@ -14,6 +14,7 @@ const WELL: Senses = Senses {
     disobeys: false,
     odometry: Belief::Believed,
     motor: Motor::Regular,
+    late: false,
     range_silent: false,
 };
 const DRIVE: Directive = Directive {
@@ -55,6 +56,7 @@ fn cases() -> Vec<(Flags, Action, Cause)> {
         range_silent: true,
         ..WELL
     };
+    let late_frames = Senses { late: true, ..WELL };
     let silent = Directive {
         age: SUPERVISOR_SILENT + MOMENT,
         ..DRIVE
@@ -122,6 +124,7 @@ fn cases() -> Vec<(Flags, Action, Cause)> {
             Action::Stop,
             Cause::OdometryImplausible,
         ),
+        (senses(late_frames), Action::Stop, Cause::RobotLate),
         (senses(range_silent), Action::Stop, Cause::RangeSilent),
         (battery(Charge::Low), Action::Slow, Cause::BatteryLow),
     ]
@@ -218,14 +221,13 @@ fn sensed() -> Vec<Senses> {
     let mut all = Vec::new();
     for odometry in [Belief::Believed, Belief::Doubted, Belief::GivenUp] {
         for motor in [Motor::Regular, Motor::Silent, Motor::Slow(3.0)] {
-            for (disobeys, range_silent) in
-                [(false, false), (false, true), (true, false), (true, true)]
-            {
+            for bits in 0..8_u8 {
                 all.push(Senses {
-                    disobeys,
+                    disobeys: bits & 1 != 0,
                     odometry,
                     motor,
-                    range_silent,
+                    late: bits & 2 != 0,
+                    range_silent: bits & 4 != 0,
                 });
             }
         }

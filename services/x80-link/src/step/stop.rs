@@ -67,6 +67,7 @@ impl Link {
     /// Stop the robot when it must not move. On a clock of ticks it waits for commands, and to let none pass
     /// stops its time, too: a run that was held goes on as if it had not been.
     pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+        self.senses.pass(now_ns);
         let now = self.decide(now_ns);
         let before = std::mem::replace(&mut self.decision, now);
         if now.stops() {
@@ -94,6 +95,9 @@ impl Link {
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
             effects.extend(self.final_stops().into_iter().map(Effect::Send));
+        } else if self.senses.awaits_late_ones() && self.stop_sent_ns.is_some() {
+            // Whatever is acknowledged now was sent long ago.
+            return;
         } else if let Some(means) = self.senses.next_means(self.now) {
             effects.push(Effect::Send(self.drive.stop_by(means)));
             effects.push(Effect::StopBy(means));

@@ -27,8 +27,9 @@ impl Link {
                 Ok(Report::Custom(sensors)) => custom = Some(sensors),
                 Ok(Report::Motor(sensors)) => motor = Some(sensors),
                 Ok(Report::System(SystemSignal::Ping)) => ping = true,
-                // An ACK only says that the robot is there; so does a frame nobody here needs.
-                Ok(Report::System(SystemSignal::Ack)) | Err(_) => {}
+                Ok(Report::System(SystemSignal::Ack)) => self.senses.acknowledged(now_ns),
+                // A frame nobody here needs only says that the robot is there.
+                Err(_) => {}
             }
             heard = true;
         }
@@ -51,7 +52,7 @@ impl Link {
         }
         self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
         if heard && self.presence.heard(now_ns) {
-            self.senses.found(now_ns);
+            self.senses.found(now_ns, self.presence.losses() > 0);
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
             // It may be driving still by a command of an earlier link.

@@ -199,3 +199,37 @@ fn frames_at_3_hz_are_told_with_rate_and_remedy() {
         "{words}"
     );
 }
+
+#[test]
+fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven() {
+    let mut link = driving(on_the_wall());
+    link.at(Event::Quiet, 1000 * MS);
+    assert!(!link.connected());
+    let mut moving = Vec::new();
+    let mut causes = Vec::new();
+    for number in 14..40 {
+        let now = number * PERIOD_NS;
+        let late = number < 28;
+        let mut datagram = datagram(255, 0, 0);
+        if late {
+            datagram.extend(ack());
+        }
+        let mut effects = link.at(Event::Order(Order::Drive, HoldReason::None), now);
+        effects.extend(link.at(Event::Datagram(&datagram), now));
+        effects.extend(link.at(Event::Command(&command(number, now, TURN, TURN)), now + MS));
+        causes.extend(decided(&effects).into_iter().map(|(_, cause)| cause));
+        if velocities(&effects)
+            .iter()
+            .any(|velocity| *velocity != STAND)
+        {
+            moving.push(number);
+        }
+    }
+    assert_eq!(causes.first(), Some(&Cause::RobotLate), "{causes:?}");
+    // It is asked again every 2 s.
+    assert!(
+        moving.first().is_some_and(|first| *first > 28),
+        "{moving:?}"
+    );
+    assert_eq!(causes.last(), Some(&Cause::None), "{causes:?}");
+}
