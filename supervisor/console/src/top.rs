@@ -63,6 +63,10 @@ pub fn show(robot: &RobotName, act: Act) -> Result<(), TopError> {
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
     let mut terminal = ratatui::try_init()?;
     let shown = run(robot, act, &mut signals, &mut terminal);
+    if terminal.show_cursor().is_err() {
+        // Dropped, it would tell standard error that it cannot show the cursor, and panic where that is closed too.
+        std::mem::forget(terminal);
+    }
     let restored = ratatui::try_restore();
     match shown.and(restored.map_err(TopError::from)) {
         Err(TopError::Terminal(_)) if signals.came() || is_closed() => Ok(()),

@@ -60,6 +60,11 @@ fn page(mut whole: Command) -> io::Result<Vec<u8>> {
         let sections = String::from_utf8_lossy(&sections).replace(".SH ", ".SS ");
         page.extend_from_slice(sections.as_bytes());
     }
-    man.render_extra_section(&mut page)?;
+    let mut extra = Vec::new();
+    man.render_extra_section(&mut extra)?;
+    // Its lines stay lines.
+    let titled = ".SH \"PAGES OF THE GUIDE, EXIT CODES\"\n.nf";
+    let extra = String::from_utf8_lossy(&extra).replace(".SH EXTRA", titled);
+    page.extend_from_slice(extra.as_bytes());
     Ok(page)
 }

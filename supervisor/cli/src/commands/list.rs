@@ -60,7 +60,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     print_text(&text)?;
     let others: Vec<_> = robots::other_users().iter().map(u32::to_string).collect();
-    if !others.is_empty() {
+    if !others.is_empty() && !arguments.json {
         let others = others.join(", ");
         write_stderr(&format!(
             "firsthand: users {others} have, or had, robots here: `sudo -u '#USER' firsthand list`\n"

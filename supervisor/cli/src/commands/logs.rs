@@ -13,6 +13,7 @@ use console::{logs::Logs, robots::Robot, runs};
 use super::{
     Failure,
     echo::Waiting,
+    operate,
     stream::{LOOK_EVERY, Stream},
 };
 
@@ -77,6 +78,12 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
 
 /// Print what the robot's runs log, one after the other.
 fn follow(arguments: &Arguments, stream: &mut Stream) -> Result<(), Failure> {
+    // Its log may not be there yet.
+    if let Some(stage) = arguments.stage.as_deref()
+        && !OTHERS.contains(&stage)
+    {
+        operate::known(stage)?;
+    }
     let mut waiting = Waiting::default();
     let mut followed: Option<(PathBuf, Logs)> = None;
     while !stream.has_ended() {
@@ -120,5 +127,7 @@ fn print_round(logs: &mut Logs, stream: &mut Stream) -> std::io::Result<()> {
     stream.write(&text)
 }
 
+/// Processes of a run that are no stages.
+const OTHERS: [&str; 2] = ["supervisor", "x80-sim"];
 /// Lines are written together up to so many bytes.
 const PRINTED_AT_ONCE: usize = 64 << 10;

@@ -141,5 +141,6 @@ fn table(listed: &[Listed<'_>]) -> String {
         ]);
         all += run.size_bytes;
     }
-    text + &format!("{} runs, {}\n", listed.len(), words::size(all))
+    let runs = if listed.len() == 1 { "run" } else { "runs" };
+    text + &format!("{} {runs}, {}\n", listed.len(), words::size(all))
 }

@@ -6,7 +6,7 @@ use common::{
     bus::{AnyReader, Bus, BusError, Reader, SliceReader},
     samples::{
         CommandSample, DeathSample, FieldCell, FieldHeader, GridHeader, GuidanceSample, LinkSample,
-        PoseSample, PowerSample, RosterEntry, RosterHeader, StallSample,
+        PoseSample, PowerSample, RosterEntry, RosterHeader, StallSample, name_str,
     },
     topics,
 };
@@ -14,11 +14,7 @@ use glam::DVec2;
 use supervisor::stages;
 
 use super::view::View;
-use crate::{
-    rates::TopicRates,
-    usage::{Processes, Usage},
-    words,
-};
+use crate::{rates::TopicRates, usage::Processes, words};
 
 /// Rates are counted over so long.
 const COUNT_FOR: Duration = Duration::from_secs(1);
@@ -123,7 +119,7 @@ impl Feed {
         for stage in &mut view.stages {
             stage.usage = usages.next().unwrap_or_default();
         }
-        view.supervisor_usage = usages.next().unwrap_or(Usage::default());
+        view.supervisor_usage = usages.next().unwrap_or_default();
     }
 
     /// Count what the stages write.
@@ -142,7 +138,7 @@ impl Feed {
             self.counted = now;
         }
         for stage in &mut view.stages {
-            let name = common::samples::name_str(&stage.entry.stage);
+            let name = name_str(&stage.entry.stage);
             let its = self.outputs.iter().find(|output| output.stage == name);
             stage.rate_hz = its.and_then(|output| output.rate_hz);
         }
