@@ -30,10 +30,7 @@ use common::{
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
     topics,
 };
-use ratatui::{
-    DefaultTerminal,
-    crossterm::event::{self, Event, KeyEventKind},
-};
+use ratatui::DefaultTerminal;
 use thiserror::Error;
 
 pub use self::action::{Act, Action};
@@ -90,6 +87,8 @@ fn run(
     let mut view = View::of(robot.clone());
     let mut operator = Operator::new(robot, act);
     let mut drawn = None::<Instant>;
+    // Keys are read here: the reader of the terminal's library never ends where the terminal was closed.
+    let mut typed = Vec::new();
     while !signals.came() && !is_closed() {
         match follower.wait(LOOK_EVERY)? {
             News::Here => view.on_here(),
@@ -98,20 +97,24 @@ fn run(
             News::Samples(feed) => feed.take(&mut view)?,
         }
         let mut changed = false;
-        while event::poll(Duration::ZERO)? {
+        while poll::is_readable(io::stdin(), Duration::ZERO)? {
+            let mut bytes = [0; 64];
+            let read = rustix::io::read(io::stdin(), &mut bytes).map_err(io::Error::from)?;
+            if read == 0 {
+                // The terminal was closed.
+                return Ok(());
+            }
+            typed.extend_from_slice(&bytes[..read]);
+        }
+        for key in action::take_keys(&mut typed) {
             changed = true;
-            let key = match event::read()? {
-                Event::Key(key) if key.kind != KeyEventKind::Release => action::meaning(key),
-                _ => None,
-            };
             match key {
-                None => {}
-                Some(Key::Quit) => return Ok(()),
-                Some(Key::Up) => view.chosen = view.chosen.saturating_sub(1),
-                Some(Key::Down) => {
+                Key::Quit => return Ok(()),
+                Key::Up => view.chosen = view.chosen.saturating_sub(1),
+                Key::Down => {
                     view.chosen = (view.chosen + 1).min(view.stages.len().saturating_sub(1));
                 }
-                Some(Key::Act(action)) => view.message = operator.ask(action, view.chosen_stage()),
+                Key::Act(action) => view.message = operator.ask(action, view.chosen_stage()),
             }
         }
         if let Some(message) = operator.answer() {

@@ -1,7 +1,6 @@
 //! What the keys do.
 
 use common::domain::RobotName;
-use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 /// What an operator does to a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,22 +68,79 @@ pub(super) const KEYS: [(&str, &str); 8] = [
     ("q", "quit"),
 ];
 
-/// What `key` means; none for any other.
-pub(super) fn meaning(key: KeyEvent) -> Option<Key> {
-    let control = key.modifiers.contains(KeyModifiers::CONTROL);
-    Some(match key.code {
-        // The terminal sends it as a key.
-        KeyCode::Char('c') if control => Key::Quit,
-        _ if control => return None,
-        KeyCode::Up => Key::Up,
-        KeyCode::Down => Key::Down,
-        KeyCode::Char('k') => Key::Act(Action::Kill),
-        KeyCode::Char('f') => Key::Act(Action::Freeze),
-        KeyCode::Char('t') => Key::Act(Action::Thaw),
-        KeyCode::Char('r') => Key::Act(Action::Restart),
-        KeyCode::Char('s') => Key::Act(Action::Stop),
-        KeyCode::Char('c') => Key::Act(Action::Resume),
-        KeyCode::Char('q') => Key::Quit,
+/// Takes the keys out of `typed`, what a terminal in raw mode sent. The beginning of a key whose rest has not come stays.
+pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
+    let mut keys = Vec::new();
+    let mut rest = &typed[..];
+    loop {
+        rest = match rest {
+            // A key that sends a sequence: its last byte is a letter or `~`.
+            [ESCAPE, b'[' | b'O', sequence @ ..] => {
+                let Some(last) = sequence
+                    .iter()
+                    .position(|byte| (b'@'..=b'~').contains(byte))
+                else {
+                    break;
+                };
+                match sequence[last] {
+                    b'A' => keys.push(Key::Up),
+                    b'B' => keys.push(Key::Down),
+                    _ => {}
+                }
+                &sequence[last + 1..]
+            }
+            [] | [ESCAPE] => break,
+            [byte, others @ ..] => {
+                keys.extend(meaning(*byte));
+                others
+            }
+        };
+    }
+    let left = rest.len();
+    typed.drain(..typed.len() - left);
+    if left > LONGEST_SEQUENCE {
+        typed.clear();
+    }
+    keys
+}
+
+const ESCAPE: u8 = 0x1b;
+/// Ctrl-C, which a terminal in raw mode sends as a byte.
+const CONTROL_C: u8 = 0x03;
+/// No key sends so many bytes.
+const LONGEST_SEQUENCE: usize = 32;
+
+/// What a letter means; none for any other.
+const fn meaning(letter: u8) -> Option<Key> {
+    Some(match letter {
+        b'k' => Key::Act(Action::Kill),
+        b'f' => Key::Act(Action::Freeze),
+        b't' => Key::Act(Action::Thaw),
+        b'r' => Key::Act(Action::Restart),
+        b's' => Key::Act(Action::Stop),
+        b'c' => Key::Act(Action::Resume),
+        b'q' | CONTROL_C => Key::Quit,
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_understood_however_their_bytes_come() {
+        let mut typed = b"\x1b[B\x1bOA\x1b[3~xk\x1b".to_vec();
+        let keys = [Key::Down, Key::Up, Key::Act(Action::Kill)];
+        assert_eq!(take_keys(&mut typed), keys);
+        assert_eq!(typed, [ESCAPE], "the rest may come");
+        typed.extend(b"[1;5");
+        assert_eq!(take_keys(&mut typed), []);
+        typed.extend(b"B\x03");
+        assert_eq!(take_keys(&mut typed), [Key::Down, Key::Quit]);
+        typed.extend([ESCAPE, b'[']);
+        typed.extend([b'1'; 100]);
+        assert_eq!(take_keys(&mut typed), []);
+        assert!(typed.is_empty(), "what is no key is not kept");
+    }
 }
