@@ -288,7 +288,7 @@ pub struct SurroundingsSample {
 layouts! {
     RangeSample { stamp range_m status raw_cm infrared_ad }
     WheelSample { stamp left_counts right_counts left_counts_per_s right_counts_per_s restarts }
-    LinkSample { stamp connected at_rest action cause frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
+    LinkSample { stamp connected action cause at_rest frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
     InfraredSample { stamp range_m raw_ad }
     PowerSample { stamp board_v motor_v servo_v driver_c current_ad board_low motor_low servo_low }
     SurroundingsSample { stamp temperature_c human_alarm_ad human_motion_ad tilt_ad }
