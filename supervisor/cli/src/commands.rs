@@ -29,8 +29,8 @@ mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
 pub(crate) mod other_user;
-#[cfg(feature = "tools")]
 mod python;
+#[cfg(feature = "tools")]
 pub(crate) mod replay_log;
 pub(crate) mod run;
 pub(crate) mod runs;
