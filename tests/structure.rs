@@ -234,6 +234,7 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
             "npyz",
             "rand",
             "rand_pcg",
+            "ratatui",
             "chaos",
             "picture",
             "maps",

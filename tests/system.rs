@@ -7,6 +7,7 @@ mod support;
 
 mod bad_input;
 mod blocked_starts;
+mod console;
 mod consumers;
 mod evaluation;
 mod experiments;
@@ -25,6 +26,7 @@ mod repeatability;
 mod replaced_bus;
 mod resume;
 mod robot_faults;
+mod screen;
 mod services;
 mod structure;
 mod telemetry;

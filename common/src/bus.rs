@@ -4,13 +4,14 @@
 //! | file | holds |
 //! |---|---|
 //! | `payload` | what may lie in shared memory, and the stamp that every sample begins with |
-//! | `layout` | how payloads lie in memory, for other languages |
+//! | `layout` | how payloads lie in memory, for other languages; what they hold |
 //! | `spec` | what a table of topics says of one topic |
 //! | `topic` | what a table of topics is made of, and the services of one topic |
 //! | `make` | making and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files such processes leave |
 //! | `ownership` | whose the files are, and who may write them |
 //! | `write`, `read` | writers; readers and wakeups |
+//! | `any` | readers of any topic |
 //! | `error` | what can go wrong |
 //!
 //! Rules it follows, each found by experiment:
@@ -22,6 +23,7 @@
 //!   processes that should not write;
 //! - events only wake; data come from receiving until there is none.
 
+mod any;
 mod error;
 mod layout;
 mod leftovers;
@@ -35,8 +37,9 @@ mod write;
 
 pub(crate) use self::layout::{kind_of, layouts};
 pub use self::{
+    any::{AnyReader, AnySample, ReadableTopic},
     error::BusError,
-    layout::{Field, Kind, Layout, Structure},
+    layout::{Field, Kind, Layout, Structure, Value},
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, ZeroCopySend},
     read::{Author, Ignored, Reader, Slice, SliceReader, Wakeup},

@@ -18,7 +18,7 @@ use crate::lock_holders::holders;
 /// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
 /// Short, because Unix socket paths are; no `_`, because that ends the name in a shared memory prefix.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct RobotName(String);
 

@@ -19,7 +19,7 @@ const REFUSED_FOR: Duration = Duration::from_secs(2);
 pub struct Follower<Topics, Open> {
     domain: Domain,
     name: String,
-    wake_on: &'static dyn AnyTopic,
+    wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
     joined: Option<Joined<Topics>>,
     /// Since when the bus that is there cannot be used.
@@ -53,11 +53,18 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         Self {
             domain,
             name: name.to_owned(),
-            wake_on,
+            wake_on: vec![wake_on],
             open,
             joined: None,
             refused: None,
         }
+    }
+
+    /// Wake for samples on `topics` too.
+    #[must_use]
+    pub fn also_on(mut self, topics: impl IntoIterator<Item = &'static dyn AnyTopic>) -> Self {
+        self.wake_on.extend(topics);
+        self
     }
 
     /// Wait for news, up to `timeout`.
@@ -99,6 +106,11 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         })
     }
 
+    /// What is read while the robot is there.
+    pub fn topics(&mut self) -> Option<&mut Topics> {
+        self.joined.as_mut().map(|joined| &mut joined.topics)
+    }
+
     /// Join the robot's bus, if there is one. Returns whether it was joined.
     fn look(&mut self) -> Result<bool, BusError> {
         let Ok(making) = Making::current(&self.domain) else {
@@ -130,7 +142,9 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     fn join(&mut self) -> Result<Joined<Topics>, BusError> {
         let bus = Bus::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();
-        waiter.on(bus.wakeup(self.wake_on)?);
+        for &topic in &self.wake_on {
+            waiter.on(bus.wakeup(topic)?);
+        }
         Ok(Joined {
             topics: (self.open)(&bus)?,
             waiter,

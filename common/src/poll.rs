@@ -50,6 +50,16 @@ pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool>
     )
 }
 
+/// Whether the other end of `descriptor` was closed, or it broke.
+///
+/// # Errors
+/// As [`readable`].
+pub fn is_closed(descriptor: impl AsFd) -> io::Result<bool> {
+    let nothing_else = PollFlags::empty();
+    let mut polled = [PollFd::new(&descriptor, nothing_else)];
+    wait(&mut polled, Some(Duration::ZERO))
+}
+
 /// Whether anything came within `timeout`; it is in the entries of `polled`.
 fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
     let began = Instant::now();
@@ -85,7 +95,9 @@ mod tests {
     fn a_closed_end_is_readable() {
         let (end, other) = UnixStream::pair().unwrap();
         assert!(!is_readable(&end, Duration::ZERO).unwrap());
+        assert!(!is_closed(&end).unwrap());
         drop(other);
         assert!(is_readable(&end, Duration::ZERO).unwrap());
+        assert!(is_closed(&end).unwrap());
     }
 }

@@ -14,7 +14,8 @@ use crate::samples::{
 };
 
 pub use crate::bus::{
-    AnyTopic, EVERY_STAGE, Limits, OPERATOR, Rate, SUPERVISOR, SliceTopic, Spec, Topic,
+    AnyTopic, EVERY_STAGE, Limits, OPERATOR, Rate, ReadableTopic, SUPERVISOR, SliceTopic, Spec,
+    Topic,
 };
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
@@ -54,6 +55,8 @@ macro_rules! topics {
         )*
         /// Every topic, in the order of the pipeline.
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
+        /// The same, for consumers that read a topic by its name.
+        pub static READABLE: &[&dyn ReadableTopic] = &[$(&$id),*];
     };
 }
 

@@ -1,11 +1,39 @@
-//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields.
+//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields; and what a payload
+//! holds, field by field, for whoever shows it.
 
 use super::payload::{Payload, type_name};
 
 /// A payload, or a part of one, whose layout is known.
-pub trait Layout {
+pub trait Layout: Sized {
     /// What it is made of.
     fn kind() -> Kind;
+
+    /// What this one holds.
+    fn value(&self) -> Value;
+
+    /// What an array of them holds.
+    fn array(array: &[Self]) -> Value {
+        Value::Array(array.iter().map(Self::value).collect())
+    }
+}
+
+/// What a payload, or a part of one, holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// An integer without sign.
+    Unsigned(u64),
+    /// An integer.
+    Signed(i64),
+    /// A number of 32 bits.
+    Single(f32),
+    /// A number of 64 bits.
+    Double(f64),
+    /// An array of bytes in a struct: UTF-8, filled up with zeros. What is not UTF-8 is replaced.
+    Text(String),
+    /// Of one kind.
+    Array(Vec<Self>),
+    /// Its fields by their names, in their order.
+    Struct(Vec<(&'static str, Self)>),
 }
 
 /// What a field is.
@@ -58,20 +86,43 @@ pub(crate) fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
 }
 
 macro_rules! numbers {
-    ($($number:ident)*) => {$(
+    ($($number:ident: $value:ident)*) => {$(
         impl Layout for $number {
             fn kind() -> Kind {
                 Kind::Number(stringify!($number))
+            }
+
+            fn value(&self) -> Value {
+                Value::$value((*self).into())
             }
         }
     )*};
 }
 
-numbers!(u8 u16 u32 u64 i32 f32 f64);
+numbers!(u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed f32: Single f64: Double);
+
+impl Layout for u8 {
+    fn kind() -> Kind {
+        Kind::Number("u8")
+    }
+
+    fn value(&self) -> Value {
+        Value::Unsigned((*self).into())
+    }
+
+    fn array(array: &[Self]) -> Value {
+        let text = array.split(|&byte| byte == 0).next().unwrap_or_default();
+        Value::Text(String::from_utf8_lossy(text).into_owned())
+    }
+}
 
 impl<T: Layout, const N: usize> Layout for [T; N] {
     fn kind() -> Kind {
         Kind::Array(Box::new(T::kind()), N)
+    }
+
+    fn value(&self) -> Value {
+        T::array(self)
     }
 }
 
@@ -86,6 +137,12 @@ macro_rules! layouts {
                     offset: std::mem::offset_of!(Self, $field),
                     kind: $crate::bus::kind_of(|payload: &Self| &payload.$field),
                 }),*])
+            }
+
+            fn value(&self) -> $crate::bus::Value {
+                $crate::bus::Value::Struct(vec![$(
+                    (stringify!($field), $crate::bus::Layout::value(&self.$field))
+                ),*])
             }
         }
     )*};

@@ -211,9 +211,18 @@ impl<P: Payload + Stamped> Reader<P> {
     /// # Errors
     /// When a connection to the writer broke.
     pub fn take(&mut self) -> Result<Option<P>, BusError> {
+        Ok(self.take_with_author()?.map(|(_, sample)| sample))
+    }
+
+    /// [`Reader::take`], and who wrote it.
+    ///
+    /// # Errors
+    /// As [`Reader::take`].
+    pub fn take_with_author(&mut self) -> Result<Option<(Author, P)>, BusError> {
         while let Some(sample) = self.subscriber.receive().map_err(taking(self.spec))? {
-            if self.authors.admits(author(sample.origin(), sample.stamp())) {
-                return Ok(Some(*sample));
+            let author = author(sample.origin(), sample.stamp());
+            if self.authors.admits(author) {
+                return Ok(Some((author, *sample)));
             }
         }
         Ok(None)
@@ -263,6 +272,14 @@ impl<H: Payload, T: Payload> Slice<H, T> {
     #[must_use]
     pub fn header(&self) -> &H {
         self.sample.user_header()
+    }
+}
+
+impl<H: Payload + Stamped, T: Payload> Slice<H, T> {
+    /// Who wrote it.
+    #[must_use]
+    pub fn author(&self) -> Author {
+        author(self.sample.origin(), self.header().stamp())
     }
 }
 

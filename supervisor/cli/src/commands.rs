@@ -5,7 +5,10 @@ use std::io::{self, Write as _};
 #[cfg(feature = "tools")]
 pub(crate) mod chaos;
 pub(crate) mod check;
+#[cfg(feature = "tools")]
+pub(crate) mod command_line;
 mod directories;
+pub(crate) mod echo;
 #[cfg(feature = "tools")]
 pub(crate) mod evaluate;
 pub(crate) mod exit_code;
@@ -15,23 +18,30 @@ pub(crate) mod fault;
 #[cfg(feature = "tools")]
 pub(crate) mod field;
 pub(crate) mod help;
+pub(crate) mod hz;
 pub(crate) mod install;
 #[cfg(feature = "tools")]
 pub(crate) mod latency;
+pub(crate) mod list;
+pub(crate) mod logs;
 #[cfg(feature = "tools")]
 mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
 pub(crate) mod other_user;
-#[cfg(feature = "tools")]
 mod python;
+#[cfg(feature = "tools")]
 pub(crate) mod replay_log;
 pub(crate) mod run;
+pub(crate) mod runs;
 #[cfg(feature = "simulator")]
 pub(crate) mod sim;
 pub(crate) mod stage;
 pub(crate) mod status;
+mod stream;
 pub(crate) mod tables;
+#[cfg(feature = "tools")]
+pub(crate) mod top;
 
 /// What a subcommand fails with: one clear sentence.
 type Failure = Box<dyn std::error::Error>;

@@ -24,10 +24,10 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 #[cfg(feature = "simulator")]
 use commands::sim;
 #[cfg(feature = "tools")]
-use commands::{chaos, evaluate, experiments, field, latency, replay_log};
+use commands::{chaos, command_line, evaluate, experiments, field, latency, replay_log, top};
 use commands::{
-    check, exit_code, fault, help, install, missions, operate, other_user, run, stage, status,
-    tables,
+    check, echo, exit_code, fault, help, hz, install, list, logs, missions, operate, other_user,
+    run, runs, stage, status, tables,
 };
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
@@ -64,6 +64,13 @@ enum Command {
     #[cfg(feature = "tools")]
     ReplayLog(replay_log::Arguments),
     Status(status::Arguments),
+    #[cfg(feature = "tools")]
+    Top(top::Arguments),
+    Echo(echo::Arguments),
+    Hz(hz::Arguments),
+    Logs(logs::Arguments),
+    List(list::Arguments),
+    Runs(runs::Arguments),
     Stop(operate::Stop),
     Resume(operate::Resume),
     Restart(operate::Restart),
@@ -78,6 +85,10 @@ enum Command {
     Stages(tables::StageArguments),
     Failsafe(tables::FailsafeArguments),
     Faults(tables::FaultArguments),
+    #[cfg(feature = "tools")]
+    Completions(command_line::Completions),
+    #[cfg(feature = "tools")]
+    Man(command_line::Manual),
     Help(help::Arguments),
 }
 
@@ -126,6 +137,13 @@ fn main() -> ExitCode {
         #[cfg(feature = "tools")]
         Command::ReplayLog(arguments) => replay_log::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Top(arguments) => top::main(&arguments),
+        Command::Echo(arguments) => echo::main(&arguments),
+        Command::Hz(arguments) => hz::main(&arguments),
+        Command::Logs(arguments) => logs::main(&arguments),
+        Command::List(arguments) => list::main(&arguments),
+        Command::Runs(arguments) => runs::main(&arguments),
         Command::Stop(arguments) => operate::stop(&arguments),
         Command::Resume(arguments) => operate::resume(&arguments),
         Command::Restart(arguments) => operate::restart(&arguments),
@@ -140,6 +158,12 @@ fn main() -> ExitCode {
         Command::Stages(arguments) => tables::stages(&arguments),
         Command::Failsafe(arguments) => tables::failsafe(&arguments),
         Command::Faults(arguments) => tables::faults(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Completions(arguments) => {
+            command_line::completions(&arguments, Arguments::command())
+        }
+        #[cfg(feature = "tools")]
+        Command::Man(arguments) => command_line::manual(&arguments, Arguments::command()),
         Command::Help(arguments) => help::main(&arguments, Arguments::command()),
     };
     match result {

@@ -3,18 +3,13 @@
 use std::{
     fs, io,
     path::{Path, PathBuf},
-    time::SystemTime,
 };
 
 use common::domain::RobotName;
-use serde::Deserialize;
+use console::runs::{self, CUT_OFF, Kept};
 
 use super::Failure;
 use crate::progress_line::write_stderr;
-use supervisor::recovery::SUMMARY;
-
-/// Marks a run directory whose run was cut off, once that was reported.
-const CUT_OFF: &str = "cut-off";
 
 /// The directory asked for; results of an earlier run are not mixed with this one's.
 pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
@@ -69,17 +64,11 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
 /// Remove the oldest directories of `robot` below `runs` whose runs have ended, beyond `keep` of them. One that cannot be
 /// removed stays: no mission is given up for it.
 pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
-    let mut ended: Vec<_> = runs_of(robot, runs)
-        .into_iter()
-        .filter(|(_, directory)| {
-            [SUMMARY, CUT_OFF]
-                .iter()
-                .any(|it| directory.join(it).exists())
-        })
-        .collect();
+    let mut ended = runs_of(robot, runs);
+    ended.retain(Kept::has_ended);
     ended.sort();
     let surplus = ended.len().saturating_sub(keep);
-    for (_, directory) in &ended[..surplus] {
+    for Kept { directory, .. } in &ended[..surplus] {
         if let Err(error) = fs::remove_dir_all(directory) {
             let directory = directory.display();
             write_stderr(&format!("firsthand: cannot remove {directory}: {error}\n"));
@@ -87,34 +76,20 @@ pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     }
 }
 
-/// The directories below `runs` in which runs of `robot` began, and when.
-fn runs_of(robot: &RobotName, runs: &Path) -> Vec<(SystemTime, PathBuf)> {
-    #[derive(Deserialize)]
-    struct Named {
-        robot: RobotName,
-    }
-    let began = |entry: fs::DirEntry| {
-        let directory = entry.path();
-        let file = directory.join(common::run::FILE_NAME);
-        // What else a run file says may be another version's.
-        let run: Named = toml::from_str(&fs::read_to_string(&file).ok()?).ok()?;
-        let began = fs::metadata(file).ok()?.modified().ok()?;
-        (run.robot == *robot).then_some((began, directory))
-    };
-    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
-    entries.filter_map(began).collect()
+/// The runs of `robot` in directories below `runs`.
+fn runs_of(robot: &RobotName, runs: &Path) -> Vec<Kept> {
+    let mut kept = runs::kept(runs);
+    kept.retain(|run| run.robot == *robot);
+    kept
 }
 
 /// The newest run of `robot` below `runs` without a summary whose cut was not reported yet: its supervisor was killed, or the
 /// machine was switched off.
 pub(crate) fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
-    let cut = runs_of(robot, runs).into_iter().filter(|(_, directory)| {
-        let has = |name: &str| directory.join(name).exists();
-        !has(SUMMARY) && !has(CUT_OFF)
-    });
-    let newest = cut.max();
+    let runs = runs_of(robot, runs).into_iter();
+    let newest = runs.filter(|run| !run.has_ended()).max();
     newest
-        .map(|(_, directory)| fs::canonicalize(directory))
+        .map(|run| fs::canonicalize(run.directory))
         .transpose()
 }
 
@@ -125,6 +100,10 @@ pub(crate) fn mark_cut_off(directory: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::SystemTime;
+
+    use supervisor::recovery::SUMMARY;
+
     use super::*;
 
     /// The directory of a run of `robot` that has begun.

@@ -35,6 +35,7 @@ static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
     "simulation",
+    "at-the-prompt",
     "attach",
     "deploy",
     "break-it",

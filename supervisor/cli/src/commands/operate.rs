@@ -99,7 +99,11 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
 const REST_PATIENCE: Duration = Duration::from_secs(5);
 
 pub(crate) fn stop(arguments: &Stop) -> Result<ExitCode, Failure> {
-    let robot = &arguments.robot.name;
+    stand(&arguments.robot.name)
+}
+
+/// Let the robot stand, and wait until it rests.
+pub(crate) fn stand(robot: &RobotName) -> Result<ExitCode, Failure> {
     ask(robot, RequestKind::Stop, "")?;
     await_rest(robot)
 }
@@ -166,7 +170,7 @@ pub(crate) fn known(stage: &str) -> Result<&'static str, Failure> {
 }
 
 /// Send a request to the supervisor, and wait until it has taken it.
-fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<ExitCode, Failure> {
+pub(crate) fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<ExitCode, Failure> {
     let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
     // Opened first: the confirmation must not be missed.
     let mut roster = Roster::open(&bus)?;
@@ -190,7 +194,7 @@ pub(crate) fn new_id() -> u64 {
 }
 
 /// Send a signal to a process of the robot: to who holds the lock that it must hold, and to nobody else.
-fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<ExitCode, Failure> {
+pub(crate) fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<ExitCode, Failure> {
     let domain = Domain::of(robot.clone());
     // A frozen supervisor publishes nothing.
     let (pid, lock) = if stage == "supervisor" {

@@ -4,6 +4,7 @@ use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
+use console::robots::SUPERVISOR_LOG;
 
 use super::{Failure, directories, missions, print_text};
 #[cfg(feature = "tools")]
@@ -217,7 +218,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
     let directory = &options.directory;
     // The supervisor's log goes where its stages' logs are.
-    let log = directory.join("supervisor.log");
+    let log = directory.join(SUPERVISOR_LOG);
     logging::to_file(&log, "info")
         .map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
     for remark in &options.mission.remarks {

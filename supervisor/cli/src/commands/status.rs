@@ -16,7 +16,7 @@ use common::{
     },
     topics,
 };
-
+use console::words::{age, order, seconds, state};
 use serde::Serialize;
 use x80_link::failsafe;
 
@@ -195,29 +195,6 @@ const fn power_status(power: &PowerSample) -> PowerStatus {
     }
 }
 
-const fn order(order: Order, reason: HoldReason) -> &'static str {
-    match order {
-        Order::Hold => match reason {
-            HoldReason::Operator => "stopped by an operator",
-            HoldReason::StageHeld => "stopped, a stage is held",
-            HoldReason::Starting | HoldReason::None | HoldReason::Ending => "starting",
-        },
-        Order::Drive => "driving",
-        Order::Stop => "stopping",
-    }
-}
-
-const fn state(state: StageState) -> &'static str {
-    match state {
-        StageState::Down => "down",
-        StageState::Starting => "starting",
-        StageState::Running => "running",
-        StageState::BackingOff => "backing off",
-        StageState::Stopping => "stopping",
-        StageState::Held => "held",
-    }
-}
-
 impl fmt::Display for Status<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -290,19 +267,5 @@ impl fmt::Display for PowerStatus {
             "{word}: board {:.1} V, motors {:.1} V, servos {:.1} V",
             self.board_v, self.motor_v, self.servo_v
         )
-    }
-}
-
-/// Seconds of so many nanoseconds; u64::MAX stands for never.
-fn seconds(nanoseconds: u64) -> Option<f64> {
-    (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
-}
-
-/// An age for people.
-fn age(seconds: Option<f64>) -> String {
-    match seconds {
-        None => "never".to_owned(),
-        Some(seconds) if seconds < 1.0 => format!("{:.0} ms", seconds * 1e3),
-        Some(seconds) => format!("{seconds:.1} s"),
     }
 }

@@ -1,0 +1,102 @@
+//! Readers of any topic, for consumers that count or show what comes, whatever it is.
+
+use super::{
+    error::BusError,
+    layout::{Layout, Value},
+    make::Bus,
+    payload::{Payload, Stamp, Stamped},
+    read::{Author, Reader, Slice, SliceReader},
+    topic::{AnyTopic, SliceTopic, Topic},
+};
+
+/// A row of the table that can be read without knowing its payload.
+pub trait ReadableTopic: AnyTopic {
+    /// Read it.
+    ///
+    /// # Errors
+    /// As [`Bus::reader`].
+    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
+}
+
+/// Receives samples of a topic.
+pub trait AnyReader {
+    /// The next sample in order of publication; none when all were taken.
+    ///
+    /// # Errors
+    /// When a connection to the writer broke.
+    fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError>;
+}
+
+/// A sample of a topic. One with a slice stays in shared memory, where its writer cannot reuse it while this is held.
+pub trait AnySample {
+    /// Its stamp.
+    fn stamp(&self) -> &Stamp;
+    /// Who wrote it.
+    fn author(&self) -> Author;
+    /// What the struct holds, or the header.
+    fn value(&self) -> Value;
+    /// What the slice holds; none where the topic carries structs.
+    fn elements(&self) -> Option<Vec<Value>>;
+}
+
+impl<P: Payload + Layout + Stamped> ReadableTopic for Topic<P> {
+    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
+        Ok(Box::new(bus.reader(self)?))
+    }
+}
+
+impl<H: Payload + Layout + Stamped, T: Payload + Layout> ReadableTopic for SliceTopic<H, T> {
+    fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError> {
+        Ok(Box::new(bus.slice_reader(self)?))
+    }
+}
+
+impl<P: Payload + Layout + Stamped> AnyReader for Reader<P> {
+    fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError> {
+        let taken = self.take_with_author()?;
+        Ok(taken.map(|sample| Box::new(sample) as Box<dyn AnySample>))
+    }
+}
+
+impl<H: Payload + Layout + Stamped, T: Payload + Layout> AnyReader for SliceReader<H, T> {
+    fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError> {
+        let taken = Self::take(self)?;
+        Ok(taken.map(|sample| Box::new(sample) as Box<dyn AnySample>))
+    }
+}
+
+impl<P: Payload + Layout + Stamped> AnySample for (Author, P) {
+    fn stamp(&self) -> &Stamp {
+        self.1.stamp()
+    }
+
+    fn author(&self) -> Author {
+        self.0
+    }
+
+    fn value(&self) -> Value {
+        self.1.value()
+    }
+
+    fn elements(&self) -> Option<Vec<Value>> {
+        None
+    }
+}
+
+impl<H: Payload + Layout + Stamped, T: Payload + Layout> AnySample for Slice<H, T> {
+    fn stamp(&self) -> &Stamp {
+        self.header().stamp()
+    }
+
+    fn author(&self) -> Author {
+        Self::author(self)
+    }
+
+    fn value(&self) -> Value {
+        self.header().value()
+    }
+
+    fn elements(&self) -> Option<Vec<Value>> {
+        Some(self.iter().map(T::value).collect())
+    }
+}

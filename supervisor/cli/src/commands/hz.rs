@@ -1,0 +1,124 @@
+//! `firsthand hz`: how often topics are published, against the table.
+
+use std::{
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use common::{
+    bus::{AnyReader, Bus, BusError, ReadableTopic},
+    domain::{Domain, RobotName},
+    follower::{Follower, News},
+    topics::{self, AnyTopic},
+};
+use console::rates::{self, TopicRates};
+
+use super::{
+    Failure,
+    echo::{Waiting, readable},
+    stream::{LOOK_EVERY, Stream},
+};
+
+/// Each second, print how often topics are published: rates, longest gaps and ages, against the table of topics.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// One topic alone (`firsthand topics`).
+    topic: Option<String>,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// One JSON object a line.
+    #[arg(long)]
+    json: bool,
+    /// End after N seconds of a robot that is there.
+    #[arg(short, long, value_name = "N")]
+    number: Option<u64>,
+}
+
+/// A report covers so much.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
+
+/// The readers of a bus, and what came.
+struct Readers(Vec<(Box<dyn AnyReader>, TopicRates)>);
+
+impl Readers {
+    fn open(bus: &Bus, topics: &[&'static dyn ReadableTopic]) -> Result<Self, BusError> {
+        let now = Instant::now();
+        let opened = topics.iter().map(|topic| {
+            let rates = TopicRates::new(topic.spec(), now);
+            Ok((topic.any_reader(bus)?, rates))
+        });
+        Ok(Self(opened.collect::<Result<_, BusError>>()?))
+    }
+
+    fn take(&mut self) -> Result<(), BusError> {
+        for (reader, rates) in &mut self.0 {
+            while let Some(sample) = reader.take()? {
+                rates.add(sample.author(), *sample.stamp(), Instant::now());
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, json: bool) -> serde_json::Result<String> {
+        let now = Instant::now();
+        let mut text = String::new();
+        if !json {
+            text = rates::heading() + "\n";
+        }
+        for (_, rates) in &mut self.0 {
+            let report = rates.report(now);
+            text += &if json {
+                serde_json::to_string(&report)?
+            } else {
+                report.line()
+            };
+            text += "\n";
+        }
+        if !json {
+            text += "\n";
+        }
+        Ok(text)
+    }
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let topics = match &arguments.topic {
+        Some(name) => vec![readable(name)?],
+        None => topics::READABLE.to_vec(),
+    };
+    let mut stream = Stream::open()?;
+    let domain = Domain::of(arguments.robot.clone());
+    let open = |bus: &Bus| Readers::open(bus, &topics);
+    let others = topics
+        .iter()
+        .skip(1)
+        .map(|&topic| topic as &'static dyn AnyTopic);
+    let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);
+    let mut waiting = Waiting::default();
+    let mut left = arguments.number.unwrap_or(u64::MAX);
+    let mut due = None;
+    while left > 0 && !stream.has_ended() {
+        match follower.wait(LOOK_EVERY)? {
+            News::Here => {
+                waiting.is_here();
+                due = Some(Instant::now() + REPORT_EVERY);
+            }
+            News::Gone => {
+                waiting.is_gone(&arguments.robot);
+                due = None;
+            }
+            News::Nothing => waiting.nothing(&arguments.robot),
+            News::Samples(readers) => readers.take()?,
+        }
+        if due.is_some_and(|due| Instant::now() >= due)
+            && let Some(readers) = follower.topics()
+        {
+            stream.write(&readers.report(arguments.json)?)?;
+            due = Some(Instant::now() + REPORT_EVERY);
+            left -= 1;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,202 @@
+//! The believed map, the field on it, the robot, its way and its target, in letters of a terminal. A letter is about twice as
+//! high as wide: it shows two squares, one above the other.
+
+use std::f64::consts::FRAC_PI_4;
+
+use common::grid::{Cell, CellState, GridFrame};
+use glam::DVec2;
+use ratatui::{
+    style::{Color, Modifier, Style},
+    text::{Line, Span},
+};
+
+use super::view::View;
+
+/// Directions from east on, counter-clockwise, 45 degrees each.
+const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
+const ROBOT: [char; 8] = ['▶', '◥', '▲', '◤', '◀', '◣', '▼', '◢'];
+/// Where the target is.
+pub(super) const TARGET: char = 'X';
+/// Where the robot was.
+pub(super) const WAY: char = '·';
+/// The field is drawn at one letter of so many, to the right and down.
+const FIELD_EVERY: (usize, usize) = (4, 2);
+
+/// Nothing was sensed there, and the sonar looked.
+const SWEPT: Color = Color::Indexed(236);
+pub(super) const FIELD_STYLE: Style = Style::new().fg(Color::Indexed(67));
+pub(super) const WAY_STYLE: Style = Style::new().fg(Color::Magenta);
+pub(super) const TARGET_STYLE: Style = Style::new().fg(Color::Green).add_modifier(Modifier::BOLD);
+pub(super) const ROBOT_STYLE: Style = Style::new().fg(Color::White).add_modifier(Modifier::BOLD);
+
+/// What is drawn of a square.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Square {
+    Free,
+    Swept,
+    Margin,
+    Perimeter,
+    Known,
+    Sensed,
+}
+
+impl Square {
+    const fn of(cell: u8) -> Self {
+        match CellState::from_byte(cell) {
+            CellState::Free => Self::Free,
+            CellState::Swept => Self::Swept,
+            CellState::Margin => Self::Margin,
+            CellState::Perimeter => Self::Perimeter,
+            CellState::Known => Self::Known,
+            CellState::Sensed => Self::Sensed,
+        }
+    }
+
+    /// Its colour, if it is a hazard.
+    const fn hazard(self) -> Option<Color> {
+        match self {
+            Self::Free | Self::Swept => None,
+            Self::Margin => Some(Color::Indexed(94)),
+            Self::Perimeter => Some(Color::DarkGray),
+            Self::Known => Some(Color::Blue),
+            Self::Sensed => Some(Color::Indexed(208)),
+        }
+    }
+}
+
+/// The styles of hazards, for a legend.
+pub(super) fn legend() -> [(Style, &'static str); 4] {
+    let style = |square: Square| Style::new().fg(square.hazard().unwrap_or_default());
+    [
+        (style(Square::Sensed), "sensed"),
+        (style(Square::Margin), "margin"),
+        (style(Square::Known), "known"),
+        (style(Square::Perimeter), "perimeter"),
+    ]
+}
+
+/// How squares of the screen lie on the map.
+struct Scale {
+    frame: GridFrame,
+    /// Squares along each side.
+    side: usize,
+    /// Cells along each side of a square.
+    step: f64,
+}
+
+impl Scale {
+    /// The square of `point`, from the left and from above; none outside the map.
+    fn square(&self, point: DVec2) -> Option<(usize, usize)> {
+        let at = (self.frame.to_cells(point) + DVec2::splat(0.5)) / self.step;
+        let inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(DVec2::splat(self.side as f64)).all();
+        inside.then(|| (at.x as usize, self.side - 1 - at.y as usize))
+    }
+
+    /// The cells of a square along one axis, the number of which is counted along the axis.
+    fn cells(&self, square: usize) -> std::ops::Range<usize> {
+        let all = self.frame.cells as usize;
+        let first = ((square as f64 * self.step) as usize).min(all - 1);
+        let end = ((square + 1) as f64 * self.step).ceil() as usize;
+        first..end.clamp(first + 1, all)
+    }
+}
+
+/// The map of `view` in at most so many letters; none before one has come.
+pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
+    let frame = view.grid.frame()?;
+    let side = usize::from(width).min(2 * usize::from(height)) & !1;
+    if side == 0 {
+        return None;
+    }
+    let scale = Scale {
+        frame,
+        side,
+        step: f64::from(frame.cells) / side as f64,
+    };
+    let mut letters: Vec<Vec<(char, Style)>> = (0..side / 2)
+        .map(|line| {
+            (0..side)
+                .map(|col| letter(view, &scale, col, line))
+                .collect()
+        })
+        .collect();
+    let mut put = |point: DVec2, letter: char, style: Style| {
+        if let Some((col, row)) = scale.square(point) {
+            letters[row / 2][col] = (letter, style);
+        }
+    };
+    for &point in &view.way {
+        put(point, WAY, WAY_STYLE);
+    }
+    if let Some(target) = view.target {
+        put(target, TARGET, TARGET_STYLE);
+    }
+    if let Some(pose) = view.pose {
+        put(pose.pose().position, robot(pose.heading_rad), ROBOT_STYLE);
+    }
+    let line = |letters: Vec<(char, Style)>| {
+        let spans = letters
+            .into_iter()
+            .map(|(letter, style)| Span::styled(letter.to_string(), style));
+        Line::from(spans.collect::<Vec<_>>())
+    };
+    Some(letters.into_iter().map(line).collect())
+}
+
+/// The robot that looks along `heading`, radians.
+pub(super) fn robot(heading: f64) -> char {
+    ROBOT[octant(heading)]
+}
+
+fn octant(angle: f64) -> usize {
+    // NaN is 0.
+    ((angle / FRAC_PI_4).round() as i64).rem_euclid(8) as usize
+}
+
+/// Two squares of the map, one above the other, and the field there.
+fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) {
+    let square = |row: usize| {
+        let (cells, side) = (view.grid.cells(), scale.frame.cells as usize);
+        let rows = scale.cells(scale.side - 1 - row);
+        let cols = scale.cells(col);
+        let of_rows = rows.flat_map(|row| &cells[row * side + cols.start..row * side + cols.end]);
+        of_rows
+            .map(|&cell| Square::of(cell))
+            .max()
+            .unwrap_or(Square::Free)
+    };
+    let (above, below) = (square(2 * line), square(2 * line + 1));
+    let ground = |square| match square {
+        Square::Swept => SWEPT,
+        _ => Color::Reset,
+    };
+    match (above.hazard(), below.hazard()) {
+        (Some(one), Some(other)) if one == other => ('█', Style::new().fg(one)),
+        (Some(one), Some(other)) => ('▀', Style::new().fg(one).bg(other)),
+        (Some(one), None) => ('▀', Style::new().fg(one).bg(ground(below))),
+        (None, Some(other)) => ('▄', Style::new().fg(other).bg(ground(above))),
+        (None, None) => {
+            let arrow = field(view, scale, col, line);
+            (
+                arrow.unwrap_or(' '),
+                FIELD_STYLE.bg(ground(above.max(below))),
+            )
+        }
+    }
+}
+
+/// The field's direction in the middle of a letter; none where it is not drawn, or has none.
+fn field(view: &View, scale: &Scale, col: usize, line: usize) -> Option<char> {
+    let (every_col, every_line) = FIELD_EVERY;
+    let drawn = col % every_col == every_col / 2 && line % every_line == every_line / 2;
+    if !drawn || view.field.frame() != Some(scale.frame) {
+        return None;
+    }
+    let cell = Cell {
+        col: scale.cells(col).start as u32,
+        row: scale.cells(scale.side - 1 - 2 * line).start as u32,
+    };
+    let policy = view.field.cells().get(scale.frame.index(cell))?;
+    let (ex, ey) = (f64::from(policy.ex), f64::from(policy.ey));
+    (ex != 0.0 || ey != 0.0).then(|| FIELD[octant(ey.atan2(ex))])
+}

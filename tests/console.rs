@@ -1,0 +1,458 @@
+//! Commands at the prompt: echo, hz, list, runs, logs, completions, the manual page. Consumers like any other, which end quietly
+//! when their reader has gone.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    io::{BufRead as _, BufReader, Read as _},
+    path::Path,
+    process::{Child, ChildStderr, ChildStdout, Command, Stdio},
+};
+
+use common::{bus::Kind, topics};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::support::{
+    Run, STAGES, assert_nothing_left, directory_of, firsthand, operate, output, run,
+    signal_process, wait_for_status,
+};
+
+/// A command whose lines are read as they come. Ended when the test ends.
+struct Reading {
+    child: Child,
+    lines: BufReader<ChildStdout>,
+    said: BufReader<ChildStderr>,
+}
+
+impl Reading {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = firsthand(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap());
+        let said = BufReader::new(child.stderr.take().unwrap());
+        Self { child, lines, said }
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.lines.read_line(&mut line).unwrap();
+        line
+    }
+
+    fn json(&mut self) -> Value {
+        let line = self.line();
+        serde_json::from_str(&line).unwrap_or_else(|error| panic!("{line:?}: {error}"))
+    }
+
+    /// Close the pipe; how the command ended by that, and what it said.
+    fn close(self) -> (Option<i32>, String) {
+        let Self {
+            mut child,
+            lines,
+            mut said,
+        } = self;
+        drop(lines);
+        let mut rest = String::new();
+        said.read_to_string(&mut rest).unwrap();
+        (child.wait().unwrap().code(), rest)
+    }
+}
+
+/// What a command prints that must succeed.
+fn printed(arguments: &[&str]) -> String {
+    let output = output(arguments);
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn echo_prints_every_topic_with_the_fields_of_its_layout() {
+    let robot = "con-echo";
+    let mut run = Run::start(robot, "open-room", &["--pace", "2"]);
+    run.wait_until_under_way(1.0);
+    let poses = printed(&["echo", "pose", "--robot", robot, "--json", "-n", "3"]);
+    let ticks: Vec<u64> = poses
+        .lines()
+        .map(|line| {
+            let pose: Value = serde_json::from_str(line).unwrap();
+            assert_eq!(pose["covariance"].as_array().unwrap().len(), 6);
+            pose["stamp"]["tick"].as_u64().unwrap()
+        })
+        .collect();
+    assert!(
+        ticks.windows(2).all(|pair| pair[1] == pair[0] + 1),
+        "{ticks:?}"
+    );
+    for topic in topics::TABLE {
+        let name = topic.spec().name;
+        // These come when something happens; that of a clock of ticks is not this run's.
+        if ["tick_limit", "deaths", "stalls", "requests", "faults"].contains(&name) {
+            continue;
+        }
+        let text = printed(&["echo", name, "--robot", robot, "-n", "1"]);
+        assert!(
+            text.starts_with("stamp:\n  tick: ") && text.ends_with("---\n"),
+            "{text}"
+        );
+        let (header, element) = topic.layout();
+        let Kind::Struct(header) = header else {
+            panic!("{name}");
+        };
+        for field in &header.fields {
+            assert!(
+                text.contains(&format!("\n{}:", field.name)) || field.name == "stamp",
+                "{text}"
+            );
+        }
+        assert_eq!(text.contains("\nelements:"), element.is_some(), "{text}");
+    }
+    let roster = printed(&["echo", "roster", "--robot", robot, "-n", "1"]);
+    for stage in STAGES {
+        assert!(
+            roster.contains(&format!("- {{stage: {stage:?}, pid: ")),
+            "{roster}"
+        );
+    }
+    let unknown = output(&["echo", "poses", "--robot", robot]);
+    let said = String::from_utf8(unknown.stderr).unwrap();
+    assert!(
+        unknown.status.code() == Some(1) && said.contains("pose, grid"),
+        "{said}"
+    );
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn echo_follows_its_robot_from_run_to_run_and_ends_on_a_signal() {
+    let robot = "con-follow";
+    let mut echo = Reading::start(&["echo", "command", "--robot", robot, "--json"]);
+    let mut waits = String::new();
+    echo.said.read_line(&mut waits).unwrap();
+    assert_eq!(
+        waits,
+        format!("firsthand: robot {robot} is not running here; waiting for it\n")
+    );
+    let arguments = ["--pace", "8"];
+    let first = Run::start(robot, "open-room", &arguments);
+    let mut tick = || echo.json()["stamp"]["tick"].as_u64().unwrap();
+    while tick() < 10 {}
+    first.signal(Signal::TERM);
+    first.finish();
+    let second = Run::start(robot, "open-room", &arguments);
+    while tick() >= 10 {}
+    signal_process(echo.child.id(), Signal::TERM);
+    let (code, said) = echo.close();
+    let expected = format!("firsthand: robot {robot} has ended its run; waiting for it\n");
+    assert_eq!((code, said), (Some(0), expected));
+    assert_eq!(second.finish().0, Some(0));
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
+    let robot = "con-pipe";
+    let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
+    run.wait_until_under_way(0.5);
+    for command in [
+        &["echo", "pose"][..],
+        &["echo", "field", "--json"],
+        &["hz"],
+        &["hz", "pose", "--json"],
+        &["logs", "-f"],
+    ] {
+        let mut reading = Reading::start(&[command, &["--robot", robot]].concat());
+        assert!(!reading.line().is_empty(), "{command:?}");
+        assert_eq!(reading.close(), (Some(0), String::new()), "{command:?}");
+    }
+    // Nothing is ever printed that could tell.
+    let silent = Reading::start(&["echo", "stalls", "--robot", robot]);
+    assert_eq!(silent.close(), (Some(0), String::new()));
+    for command in [
+        &["list"][..],
+        &["completions", "zsh"],
+        &["man"],
+        &["echo", "pose", "-n", "1", "--robot", robot],
+    ] {
+        let (code, said) = Reading::start(command).close();
+        assert!(
+            code == Some(0) && !said.contains("panic"),
+            "{command:?}: {said}"
+        );
+    }
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says() {
+    let robot = "con-hz";
+    let mut run = Run::start(robot, "obstacle-course", &["--pace", "1"]);
+    run.wait_until_under_way(0.5);
+    let lines = printed(&["hz", "--robot", robot, "--json", "-n", "2"]);
+    let reports: Vec<Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let names: Vec<_> = reports
+        .iter()
+        .map(|report| report["topic"].as_str().unwrap())
+        .collect();
+    let table: Vec<_> = topics::TABLE
+        .iter()
+        .map(|topic| topic.spec().name)
+        .collect();
+    assert_eq!(names, [&table[..], &table].concat());
+    let second = |topic: &str| {
+        reports[table.len()..]
+            .iter()
+            .find(|report| report["topic"] == topic)
+            .unwrap()
+    };
+    // 7 ticks a second.
+    let rate = second("pose")["rate_hz"].as_f64().unwrap();
+    assert!((0.5..=20.0).contains(&rate), "{}", second("pose"));
+    assert!(
+        second("pose")["missing_ticks"].is_u64(),
+        "{}",
+        second("pose")
+    );
+    assert!(
+        second("health")["rate_hz"].as_f64() > Some(5.0),
+        "{}",
+        second("health")
+    );
+    assert!(second("stalls")["age_s"].is_null(), "{}", second("stalls"));
+    let text = printed(&["hz", "pose", "--robot", robot, "-n", "1"]);
+    assert!(
+        text.starts_with("topic") && text.contains("\npose ") && text.contains("  each tick: "),
+        "{text}"
+    );
+
+    let mut roster = Reading::start(&["hz", "roster", "--robot", robot, "--json"]);
+    assert!(!roster.line().is_empty());
+    operate(robot, &["freeze", "supervisor"]);
+    while roster.json()["late"] != true {}
+    operate(robot, &["thaw", "supervisor"]);
+    while roster.json()["late"] != false {}
+    roster.close();
+    run.signal(Signal::TERM);
+    assert_eq!(run.finish().0, Some(0));
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn list_shows_the_robots_that_run_and_where() {
+    let [one, two] = ["con-list-1", "con-list-2"];
+    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &["--pace", "1"]));
+    runs.iter_mut()
+        .for_each(|run| drop(run.wait_until_under_way(0.5)));
+    let listed = |robot: &str| {
+        let lines = printed(&["list", "--json"]);
+        let mut robots = lines
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        robots.find(|it| it["robot"] == robot)
+    };
+    for run in &runs {
+        let robot = listed(&run.robot).unwrap();
+        assert_eq!(robot["supervisor_pid"], run.pid(), "{robot}");
+        assert_eq!(
+            (&robot["state"], &robot["simulated"]),
+            (&"driving".into(), &true.into())
+        );
+        let directory = fs::canonicalize(run.directory()).unwrap();
+        assert_eq!(robot["run"], directory.to_str().unwrap(), "{robot}");
+        assert!(robot["mission_time_s"].as_f64() > Some(0.4), "{robot}");
+    }
+    assert!(printed(&["list"]).contains("con-list-2 "));
+    // A supervisor that was killed leaves its bus.
+    let [mut killed, ended] = runs;
+    killed.signal(Signal::KILL);
+    killed.reap();
+    let robot = listed(one).unwrap();
+    assert_eq!(
+        (&robot["state"], &robot["supervisor_pid"]),
+        (&"its supervisor was killed".into(), &Value::Null)
+    );
+    ended.signal(Signal::TERM);
+    ended.finish();
+    assert_eq!(listed(two), None);
+    let (code, _) = run(one, "open-room", &["--timeout", "1"]);
+    assert_eq!(code, Some(4));
+    assert_nothing_left(one);
+}
+
+#[test]
+fn runs_are_listed_with_their_outcomes_and_pruned() {
+    let robot = "con-runs";
+    let directory = directory_of(robot);
+    let below = directory.path().to_str().unwrap();
+    let start = |arguments: &[&str]| {
+        let fixed = [
+            "run",
+            "open-room",
+            "--robot",
+            robot,
+            "--json",
+            "--runs",
+            below,
+        ];
+        firsthand(&[&fixed[..], arguments].concat())
+            .output()
+            .unwrap()
+    };
+    start(&["--timeout", "1"]);
+    start(&[]);
+    let mut goes_on = firsthand(&[
+        "run",
+        "open-room",
+        "--robot",
+        robot,
+        "--runs",
+        below,
+        "--pace",
+        "1",
+    ])
+    .stdout(Stdio::null())
+    .stderr(Stdio::null())
+    .spawn()
+    .unwrap();
+    wait_for_status(robot, |status| status["order"] == "driving");
+    let list = |arguments: &[&str]| -> Vec<(String, String)> {
+        let lines = printed(&[&["runs", "--runs", below, "--json"], arguments].concat());
+        let runs = lines
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let of = |run: Value| {
+            assert!(
+                run["size_bytes"].as_u64() > Some(10_000) && run["mission"] == "open-room",
+                "{run}"
+            );
+            let name = Path::new(run["run"].as_str().unwrap())
+                .file_name()
+                .unwrap()
+                .to_owned();
+            (
+                name.into_string().unwrap(),
+                run["outcome"].as_str().unwrap().to_owned(),
+            )
+        };
+        runs.map(of).collect()
+    };
+    let run = |name: &str, outcome: &str| (name.to_owned(), outcome.to_owned());
+    let all = [
+        run("open-room-001", "timeout"),
+        run("open-room-002", "reached"),
+        run("open-room-003", "running"),
+    ];
+    assert_eq!(list(&[]), all);
+    assert_eq!(list(&["--robot", "con-other"]), []);
+    let table = printed(&["runs", "--runs", below]);
+    assert!(
+        table.contains("3 runs, ") && table.contains(" reached "),
+        "{table}"
+    );
+    assert_eq!(
+        list(&["--prune", "0"]),
+        all[2..],
+        "what goes on is not removed"
+    );
+    goes_on.kill().unwrap();
+    goes_on.wait().unwrap();
+    assert_eq!(list(&[]), [run("open-room-003", "cut off")]);
+    let missing = output(&["runs", "--runs", "/no/such/directory"]);
+    assert_eq!(missing.status.code(), Some(1));
+    start(&["--timeout", "1"]);
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn logs_of_all_processes_come_merged_by_time_and_are_followed_into_the_next_run() {
+    let robot = "con-logs";
+    let mut follow = Reading::start(&["logs", "-f", "supervisor", "--robot", robot]);
+    let first = Run::start(robot, "open-room", &[]);
+    while !follow.line().contains("all stages ready") {}
+    let directory = first.directory();
+    let (code, _, kept) = first.finish_in();
+    assert_eq!(code, Some(0));
+    let second = Run::start(robot, "open-room", &[]);
+    while !follow.line().contains("all stages ready") {}
+    second.finish();
+    assert_eq!(follow.close().0, Some(0));
+
+    let all = printed(&["logs", "--run", directory.to_str().unwrap()]);
+    let words: Vec<Vec<_>> = all
+        .lines()
+        .map(|line| line.split_whitespace().collect())
+        .collect();
+    let times: Vec<_> = words.iter().map(|words| words[0]).collect();
+    assert!(times.is_sorted() && times[0].ends_with('Z'), "{all}");
+    let processes: BTreeSet<_> = words.iter().map(|words| words[1]).collect();
+    let expected = STAGES.iter().copied().chain(["supervisor", "x80-sim"]);
+    assert_eq!(processes, expected.collect(), "{all}");
+    let written: usize = fs::read_dir(&directory)
+        .unwrap()
+        .flatten()
+        .map(|file| file.path())
+        .filter(|file| file.extension().is_some_and(|end| end == "log"))
+        .map(|file| fs::read_to_string(file).unwrap().lines().count())
+        .sum();
+    assert_eq!(words.len(), written);
+    let mapper = printed(&["logs", "mapper", "--run", directory.to_str().unwrap()]);
+    assert!(
+        mapper.lines().all(|line| line.contains(" mapper ")),
+        "{mapper}"
+    );
+    let unknown = output(&["logs", "wheel", "--run", directory.to_str().unwrap()]);
+    let said = String::from_utf8(unknown.stderr).unwrap();
+    assert!(
+        unknown.status.code() == Some(1) && said.contains("dead-reckoning"),
+        "{said}"
+    );
+    drop(kept);
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn completions_and_manual_page_know_every_subcommand() {
+    let help = printed(&["help"]);
+    let commands = help.split("Commands:\n").nth(1).unwrap();
+    let commands = commands.lines().take_while(|line| line.starts_with("  "));
+    let names: Vec<_> = commands
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert!(names.len() > 25, "{names:?}");
+    let man = printed(&["man"]);
+    for name in &names {
+        assert!(
+            man.contains(&format!(".SH \"{}\"\n", name.to_uppercase())),
+            "{name}"
+        );
+    }
+    assert!(
+        man.starts_with(".ie") && man.contains("\\-\\-resume\\-last"),
+        "{man}"
+    );
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = printed(&["completions", shell]);
+        for name in &names {
+            assert!(script.contains(name), "{shell}: {name}");
+        }
+    }
+    let bash = printed(&["completions", "bash"]);
+    let ask = "COMP_WORDS=(firsthand kill --ro); COMP_CWORD=2; _firsthand firsthand --ro kill; echo \"${COMPREPLY[@]}\"";
+    let completed = Command::new("bash")
+        .arg("-c")
+        .arg(format!("{bash}\n{ask}"))
+        .output()
+        .unwrap();
+    let completed = String::from_utf8(completed.stdout).unwrap();
+    assert_eq!(completed.trim(), "--robot", "{completed}");
+}

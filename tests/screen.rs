@@ -1,0 +1,220 @@
+//! `firsthand top`, on a pseudo-terminal.
+
+use std::{
+    fs::File,
+    io::{Read as _, Write as _},
+    os::fd::OwnedFd,
+    process::{Child, Command},
+    time::Instant,
+};
+
+use rustix::{
+    process::Signal,
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    termios::{Winsize, tcsetwinsize},
+};
+
+use crate::support::{PATIENCE, Run, assert_nothing_left, find, output, signal_process};
+
+/// Lines and columns of the terminal.
+const SIZE: (usize, usize) = (24, 80);
+
+/// `firsthand top` on a terminal of its own.
+struct Screen {
+    child: Child,
+    terminal: Option<File>,
+    /// What was written to it.
+    written: Vec<u8>,
+}
+
+/// What is on a screen to which this was written: letters where the cursor was moved to. Colours are left out.
+fn shown(written: &[u8]) -> String {
+    let mut letters = vec![vec![' '; SIZE.1]; SIZE.0];
+    let (mut row, mut col) = (0, 0);
+    let text = String::from_utf8_lossy(written);
+    let mut rest = text.chars();
+    while let Some(letter) = rest.next() {
+        if letter != '\x1b' {
+            if let Some(place) = letters.get_mut(row).and_then(|line| line.get_mut(col)) {
+                *place = letter;
+            }
+            col += 1;
+            continue;
+        }
+        let code: String = rest.by_ref().take_while(|it| *it != '[').collect();
+        assert_eq!(code, "", "no code of this kind is known");
+        let mut numbers = String::new();
+        let end = rest.find(|letter| {
+            numbers.push(*letter);
+            letter.is_ascii_alphabetic()
+        });
+        // A movement; the others are colours and modes.
+        if end == Some('H')
+            && let Some((line, column)) = numbers.trim_end_matches('H').split_once(';')
+        {
+            row = line.parse::<usize>().unwrap() - 1;
+            col = column.parse::<usize>().unwrap() - 1;
+        }
+    }
+    let lines = letters
+        .into_iter()
+        .map(|line| line.into_iter().collect::<String>());
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+impl Screen {
+    fn start(robot: &str) -> Self {
+        let terminal: OwnedFd =
+            openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+        grantpt(&terminal).unwrap();
+        unlockpt(&terminal).unwrap();
+        let size = Winsize {
+            ws_row: SIZE.0 as u16,
+            ws_col: SIZE.1 as u16,
+            ws_xpixel: 0,
+            ws_ypixel: 0,
+        };
+        tcsetwinsize(&terminal, size).unwrap();
+        let name = ptsname(&terminal, Vec::new())
+            .unwrap()
+            .into_string()
+            .unwrap();
+        let its = || File::options().read(true).write(true).open(&name).unwrap();
+        // With the terminal as the one that controls it, as from a shell.
+        let child = Command::new("setsid")
+            .args([
+                "--ctty",
+                env!("CARGO_BIN_EXE_firsthand"),
+                "top",
+                "--robot",
+                robot,
+            ])
+            .stdin(its())
+            .stdout(its())
+            .stderr(its())
+            .spawn()
+            .unwrap();
+        Self {
+            child,
+            terminal: Some(terminal.into()),
+            written: Vec::new(),
+        }
+    }
+
+    /// Read what is written, until the screen shows `text`.
+    fn wait_for(&mut self, text: &str) {
+        let began = Instant::now();
+        while !shown(&self.written).contains(text) {
+            let so_far = shown(&self.written);
+            assert!(began.elapsed() < PATIENCE, "no {text:?} on\n{so_far}");
+            assert!(self.read(), "top has ended:\n{so_far}");
+        }
+    }
+
+    /// Read some of what is written; whether there was any. A terminal that nobody has open any more gives an error.
+    fn read(&mut self) -> bool {
+        let mut some = [0; 4096];
+        let Some(Ok(read)) = self.terminal.as_mut().map(|it| it.read(&mut some)) else {
+            return false;
+        };
+        self.written.extend_from_slice(&some[..read]);
+        read > 0
+    }
+
+    fn press(&mut self, keys: &str) {
+        let terminal = self.terminal.as_mut().unwrap();
+        terminal.write_all(keys.as_bytes()).unwrap();
+    }
+
+    /// The exit code, once it has ended, and all that it wrote.
+    fn end(&mut self) -> (Option<i32>, String) {
+        while self.read() {}
+        let code = self.child.wait().unwrap().code();
+        (code, String::from_utf8_lossy(&self.written).into_owned())
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
+    let robot = "con-top";
+    let mut screen = Screen::start(robot);
+    screen.wait_for("is not running here");
+    let slow = ["--pace", "2", "--timeout", "600"];
+    let mut run = Run::start(robot, "obstacle-course", &slow);
+    screen.wait_for("driving");
+    screen.wait_for("dead-reckoning");
+    screen.wait_for("perimeter");
+    run.wait_until_under_way(1.0);
+    // The planner is the fourth.
+    screen.press("\x1b[B\x1b[B\x1b[Bk");
+    screen.wait_for("kill planner: done");
+    run.wait_until("it is replaced", |status| {
+        let planner = find(status, "planner");
+        planner["generation"].as_u64() >= Some(2) && planner["state"] == "running"
+    });
+    let deaths = run.records("deaths.jsonl");
+    let killed = deaths.iter().any(|death| {
+        let by_signal = death["cause"]["signalled"]["signal"] == 9 && death["hung"] == false;
+        death["stage"] == "planner" && by_signal
+    });
+    assert!(killed, "{deaths:?}");
+    screen.wait_for("signal 9");
+    screen.press("s");
+    screen.wait_for("stop: done");
+    run.wait_until("it stands", |status| {
+        status["order"] == "stopped by an operator"
+    });
+    screen.press("c");
+    screen.wait_for("resume: done");
+    screen.press("r");
+    screen.wait_for("restart planner: done");
+    screen.press("f");
+    screen.wait_for("freeze planner: done");
+    screen.press("q");
+    let (code, written) = screen.end();
+    assert_eq!(code, Some(0), "{written:?}");
+    // Back to the first screen, cursor and all.
+    for restored in ["\x1b[?1049l", "\x1b[?25h"] {
+        assert!(written.contains(restored), "{written:?}");
+    }
+    let (code, summary) = run.finish();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(0), &"reached".into()),
+        "{summary}"
+    );
+    assert_nothing_left(robot);
+}
+
+#[test]
+fn top_ends_when_its_terminal_is_closed_and_on_a_signal_and_needs_one() {
+    let robot = "con-top-end";
+    let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
+    run.wait_until_under_way(0.5);
+    let mut closed = Screen::start(robot);
+    closed.wait_for("controller");
+    closed.terminal = None;
+    assert_eq!(closed.end().0, Some(0));
+    let mut signalled = Screen::start(robot);
+    signalled.wait_for("controller");
+    signal_process(signalled.child.id(), Signal::TERM);
+    let (code, written) = signalled.end();
+    assert_eq!(code, Some(0), "{written:?}");
+    assert!(written.contains("\x1b[?1049l"), "{written:?}");
+    let none = output(&["top", "--robot", robot]);
+    let said = String::from_utf8(none.stderr).unwrap();
+    assert!(
+        none.status.code() == Some(1) && said.contains("firsthand status"),
+        "{said}"
+    );
+    let (code, summary) = run.finish();
+    assert_eq!(code, Some(0), "{summary}");
+    assert_nothing_left(robot);
+}
