@@ -19,8 +19,10 @@ const REFUSED_FOR: Duration = Duration::from_secs(2);
 pub struct Follower<Topics, Open> {
     domain: Domain,
     name: String,
-    wake_on: &'static dyn AnyTopic,
+    wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
+    /// It is gone, and what was published last is given first.
+    ending: bool,
     joined: Option<Joined<Topics>>,
     /// Since when the bus that is there cannot be used.
     refused: Option<(Making, Instant)>,
@@ -53,11 +55,24 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         Self {
             domain,
             name: name.to_owned(),
-            wake_on,
+            wake_on: vec![wake_on],
             open,
+            ending: false,
             joined: None,
             refused: None,
         }
+    }
+
+    /// Wake for samples on `topic`, too.
+    #[must_use]
+    pub fn also_waking_on(mut self, topic: &'static dyn AnyTopic) -> Self {
+        self.wake_on.push(topic);
+        self
+    }
+
+    /// What is read, while the robot is there: samples may have come that nothing woke for.
+    pub fn topics(&mut self) -> Option<&mut Topics> {
+        self.joined.as_mut().map(|joined| &mut joined.topics)
     }
 
     /// Wait for news, up to `timeout`.
@@ -85,9 +100,14 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             if came {
                 break;
             }
-            if self.is_gone() {
-                self.joined = None;
+            if self.ending {
+                (self.joined, self.ending) = (None, false);
                 return Ok(News::Gone);
+            }
+            if self.is_gone() {
+                self.ending = true;
+                came = true;
+                break;
             }
             if left.is_zero() {
                 break;
@@ -130,7 +150,9 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     fn join(&mut self) -> Result<Joined<Topics>, BusError> {
         let bus = Bus::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();
-        waiter.on(bus.wakeup(self.wake_on)?);
+        for topic in &self.wake_on {
+            waiter.on(bus.wakeup(*topic)?);
+        }
         Ok(Joined {
             topics: (self.open)(&bus)?,
             waiter,

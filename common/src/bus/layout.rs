@@ -1,11 +1,68 @@
-//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields.
+//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields; and how they
+//! are written where there is no shared memory.
 
-use super::payload::{Payload, type_name};
+use super::{
+    cdr::{Decoder, Encoder},
+    payload::{Payload, type_name},
+};
 
 /// A payload, or a part of one, whose layout is known.
-pub trait Layout {
+pub trait Layout: Copy {
     /// What it is made of.
     fn kind() -> Kind;
+
+    /// Write it, field by field.
+    fn encode(&self, to: &mut Encoder<'_>);
+
+    /// Read what [`Layout::encode`] wrote; none where that is too short.
+    fn decode(from: &mut Decoder<'_>) -> Option<Self>;
+
+    /// Write all of `items`, one after another.
+    fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
+        for item in items {
+            item.encode(to);
+        }
+    }
+
+    /// Read into all of `items`.
+    fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
+        for item in items {
+            *item = Self::decode(from)?;
+        }
+        Some(())
+    }
+}
+
+/// `sample` as a message of its own.
+pub fn encode_sample<P: Layout>(sample: &P, bytes: &mut Vec<u8>) {
+    sample.encode(&mut Encoder::new(bytes));
+}
+
+/// `header` and `slice` as a message of their own.
+pub fn encode_slice<H: Layout, T: Layout>(header: &H, slice: &[T], bytes: &mut Vec<u8>) {
+    let mut to = Encoder::new(bytes);
+    header.encode(&mut to);
+    (slice.len() as u32).encode(&mut to);
+    T::encode_all(slice, &mut to);
+}
+
+/// The sample of a message; none if it holds another.
+#[must_use]
+pub fn decode_sample<P: Layout>(message: &[u8]) -> Option<P> {
+    P::decode(&mut Decoder::new(message)?)
+}
+
+/// The header and slice of a message; none if it holds others.
+#[must_use]
+pub fn decode_slice<H: Layout, T: Layout + Default>(message: &[u8]) -> Option<(H, Vec<T>)> {
+    let mut from = Decoder::new(message)?;
+    let header = H::decode(&mut from)?;
+    let count = u32::decode(&mut from)? as usize;
+    // Each takes a byte at least: the length may be anything.
+    let count = (count <= from.left()).then_some(count)?;
+    let mut slice = vec![T::default(); count];
+    T::decode_all(&mut slice, &mut from)?;
+    Some((header, slice))
 }
 
 /// What a field is.
@@ -63,15 +120,56 @@ macro_rules! numbers {
             fn kind() -> Kind {
                 Kind::Number(stringify!($number))
             }
+
+            fn encode(&self, to: &mut Encoder<'_>) {
+                to.number(self.to_le_bytes());
+            }
+
+            fn decode(from: &mut Decoder<'_>) -> Option<Self> {
+                from.number().map(Self::from_le_bytes)
+            }
         }
     )*};
 }
 
-numbers!(u8 u16 u32 u64 i32 f32 f64);
+numbers!(u16 u32 u64 i32 f32 f64);
 
-impl<T: Layout, const N: usize> Layout for [T; N] {
+impl Layout for u8 {
+    fn kind() -> Kind {
+        Kind::Number("u8")
+    }
+
+    fn encode(&self, to: &mut Encoder<'_>) {
+        to.bytes(&[*self]);
+    }
+
+    fn decode(from: &mut Decoder<'_>) -> Option<Self> {
+        from.bytes(1)?.first().copied()
+    }
+
+    fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
+        to.bytes(items);
+    }
+
+    fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
+        items.copy_from_slice(from.bytes(items.len())?);
+        Some(())
+    }
+}
+
+impl<T: Layout + Default, const N: usize> Layout for [T; N] {
     fn kind() -> Kind {
         Kind::Array(Box::new(T::kind()), N)
+    }
+
+    fn encode(&self, to: &mut Encoder<'_>) {
+        T::encode_all(self, to);
+    }
+
+    fn decode(from: &mut Decoder<'_>) -> Option<Self> {
+        let mut items = [T::default(); N];
+        T::decode_all(&mut items, from)?;
+        Some(items)
     }
 }
 
@@ -86,6 +184,16 @@ macro_rules! layouts {
                     offset: std::mem::offset_of!(Self, $field),
                     kind: $crate::bus::kind_of(|payload: &Self| &payload.$field),
                 }),*])
+            }
+
+            fn encode(&self, to: &mut $crate::bus::cdr::Encoder<'_>) {
+                $($crate::bus::Layout::encode(&self.$field, to);)*
+            }
+
+            fn decode(from: &mut $crate::bus::cdr::Decoder<'_>) -> Option<Self> {
+                Some(Self {
+                    $($field: $crate::bus::Layout::decode(from)?),*
+                })
             }
         }
     )*};

@@ -225,6 +225,14 @@ impl<P: Payload + Stamped> Reader<P> {
         self.authors.follow(author);
     }
 
+    /// Give the samples of every generation, from now on: an older one's may still be on their way when the next one's
+    /// come.
+    #[must_use]
+    pub fn of_all_generations(mut self) -> Self {
+        self.authors.admitted = Admitted::All;
+        self
+    }
+
     /// What was ignored.
     #[must_use]
     pub const fn ignored(&self) -> Ignored {
@@ -278,6 +286,13 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
     /// As [`Reader::follow`].
     pub const fn follow(&mut self, author: Author) {
         self.authors.follow(author);
+    }
+
+    /// As [`Reader::of_all_generations`].
+    #[must_use]
+    pub fn of_all_generations(mut self) -> Self {
+        self.authors.admitted = Admitted::All;
+        self
     }
 
     /// The next sample; as [`Reader::take`].

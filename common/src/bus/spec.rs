@@ -23,6 +23,15 @@ pub enum Rate {
     WhenItHappens,
 }
 
+/// Whether a recording keeps a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Logged {
+    /// Always.
+    Yes,
+    /// Where fields are asked for: they are larger than all else together.
+    WithFields,
+}
+
 /// What the table says of a topic.
 #[derive(Debug)]
 pub struct Spec {
@@ -32,6 +41,8 @@ pub struct Spec {
     pub writer: &'static str,
     /// How often.
     pub rate: Rate,
+    /// Whether a recording keeps it.
+    pub logged: Logged,
     /// Depth of history and buffers, number of readers.
     pub limits: Limits,
     /// What it means.
@@ -69,6 +80,12 @@ impl Limits {
         buffer: 128,
         borrowed: 2,
         readers: 16,
+    };
+    /// For what a replay needs whole: a recorder that the machine keeps waiting for a tenth of a second loses nothing.
+    pub const DEEP: Self = Self {
+        buffer: 512,
+        borrowed: 2,
+        readers: 8,
     };
     /// For slices of a whole map.
     pub const MAP: Self = Self {

@@ -23,6 +23,7 @@ pub mod failsafe;
 pub mod obedience;
 pub mod odometry;
 pub mod presence;
+pub mod replay;
 pub mod restart;
 pub mod senses;
 pub mod shell;

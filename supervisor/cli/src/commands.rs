@@ -25,8 +25,10 @@ pub(crate) mod operate;
 pub(crate) mod other_user;
 #[cfg(feature = "tools")]
 mod python;
+pub(crate) mod record;
 pub(crate) mod replay_log;
 pub(crate) mod run;
+mod run_recorder;
 #[cfg(feature = "simulator")]
 pub(crate) mod sim;
 pub(crate) mod stage;

@@ -26,8 +26,8 @@ use commands::sim;
 #[cfg(feature = "tools")]
 use commands::{chaos, evaluate, experiments, field, latency, replay_log};
 use commands::{
-    check, exit_code, fault, help, install, missions, operate, other_user, run, stage, status,
-    tables,
+    check, exit_code, fault, help, install, missions, operate, other_user, record, run, stage,
+    status, tables,
 };
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
@@ -63,6 +63,7 @@ enum Command {
     Experiments(experiments::Arguments),
     #[cfg(feature = "tools")]
     ReplayLog(replay_log::Arguments),
+    Record(record::Arguments),
     Status(status::Arguments),
     Stop(operate::Stop),
     Resume(operate::Resume),
@@ -125,6 +126,7 @@ fn main() -> ExitCode {
         Command::Experiments(arguments) => experiments::main(&arguments),
         #[cfg(feature = "tools")]
         Command::ReplayLog(arguments) => replay_log::main(&arguments),
+        Command::Record(arguments) => record::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Stop(arguments) => operate::stop(&arguments),
         Command::Resume(arguments) => operate::resume(&arguments),

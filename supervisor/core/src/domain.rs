@@ -179,6 +179,7 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // Without a configuration no process can join.
     remove_file(&domain.middleware_config())?;
     remove_file(&domain.run_link())?;
+    remove_file(&domain.run_directory())?;
     let directory = domain.directory();
     let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
     for entry in configs.flatten() {
