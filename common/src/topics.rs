@@ -81,7 +81,7 @@ topics! {
     }
     /// The whole-domain policy, for consumers.
     FIELD: SliceTopic<FieldHeader, FieldCell> {
-        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::MAP, logged: WithFields,
+        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::WHOLE_MAP, logged: WithFields,
     }
     /// Wheel speeds for the robot.
     COMMAND: Topic<CommandSample> {

@@ -199,3 +199,35 @@ macro_rules! layouts {
     )*};
 }
 pub(crate) use layouts;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{FieldCell, FieldHeader, LinkSample};
+
+    #[test]
+    fn a_sample_is_read_as_it_was_written_and_none_from_half_of_it() {
+        let mut link = LinkSample {
+            losses: 7,
+            ..LinkSample::default()
+        };
+        link.latency_histogram[3] = 11;
+        let mut message = Vec::new();
+        encode_sample(&link, &mut message);
+        assert_eq!(decode_sample(&message), Some(link));
+        message.pop();
+        assert_eq!(decode_sample::<LinkSample>(&message), None);
+    }
+
+    #[test]
+    fn a_slice_is_read_as_it_was_written_and_none_where_its_length_is_a_lie() {
+        let cells = [FieldCell::default(); 3];
+        let mut message = Vec::new();
+        encode_slice(&FieldHeader::default(), &cells, &mut message);
+        let read = decode_slice::<FieldHeader, FieldCell>(&message);
+        assert_eq!(read, Some((FieldHeader::default(), cells.to_vec())));
+        let length = message.len() - 3 * 12 - 4;
+        message[length..length + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert_eq!(decode_slice::<FieldHeader, FieldCell>(&message), None);
+    }
+}

@@ -109,7 +109,8 @@ impl<P: Payload + Stamped + Layout> AnyTopic for Topic<P> {
 
     fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
         Ok(Box::new(SampleReader(
-            bus.reader(self)?.of_all_generations(),
+            bus.reader_that_keeps(self, self.spec.limits.recorder_buffer)?
+                .of_all_generations(),
         )))
     }
 }
@@ -138,7 +139,8 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> AnyTopic for SliceTopic
 
     fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
         Ok(Box::new(SliceSampleReader(
-            bus.slice_reader(self)?.of_all_generations(),
+            bus.slice_reader_that_keeps(self, self.spec.limits.recorder_buffer)?
+                .of_all_generations(),
         )))
     }
 }
@@ -159,7 +161,7 @@ macro_rules! samples_service {
             .service_builder(&service_name($spec)?)
             .publish_subscribe::<$payload>()
             .user_header::<$header>()
-            .subscriber_max_buffer_size($spec.limits.buffer)
+            .subscriber_max_buffer_size($spec.limits.recorder_buffer)
             .subscriber_max_borrowed_samples($spec.limits.borrowed)
             .max_subscribers($spec.limits.readers)
             .max_publishers(Limits::WRITERS)

@@ -26,6 +26,8 @@ pub(crate) mod other_user;
 #[cfg(feature = "tools")]
 mod python;
 pub(crate) mod record;
+#[cfg(feature = "tools")]
+pub(crate) mod replay;
 pub(crate) mod replay_log;
 pub(crate) mod run;
 mod run_recorder;

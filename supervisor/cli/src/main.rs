@@ -24,7 +24,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 #[cfg(feature = "simulator")]
 use commands::sim;
 #[cfg(feature = "tools")]
-use commands::{chaos, evaluate, experiments, field, latency, replay_log};
+use commands::{chaos, evaluate, experiments, field, latency, replay, replay_log};
 use commands::{
     check, exit_code, fault, help, install, missions, operate, other_user, record, run, stage,
     status, tables,
@@ -64,6 +64,10 @@ enum Command {
     #[cfg(feature = "tools")]
     ReplayLog(replay_log::Arguments),
     Record(record::Arguments),
+    #[cfg(feature = "tools")]
+    Replay(replay::Arguments),
+    #[cfg(feature = "tools")]
+    Diff(replay::Diff),
     Status(status::Arguments),
     Stop(operate::Stop),
     Resume(operate::Resume),
@@ -127,6 +131,10 @@ fn main() -> ExitCode {
         #[cfg(feature = "tools")]
         Command::ReplayLog(arguments) => replay_log::main(&arguments),
         Command::Record(arguments) => record::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Replay(arguments) => replay::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Diff(arguments) => replay::diff(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         Command::Stop(arguments) => operate::stop(&arguments),
         Command::Resume(arguments) => operate::resume(&arguments),

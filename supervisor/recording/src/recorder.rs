@@ -33,7 +33,7 @@ const LOGS_EVERY: Duration = Duration::from_millis(250);
 /// No run file is longer, bytes.
 const LONGEST_RUN_FILE: u64 = 1 << 24;
 /// Niceness of the process: stages that answer the robot go first.
-const NICE: i32 = 10;
+const NICE: i32 = 5;
 
 /// What to record, and where.
 #[derive(Clone)]
@@ -97,6 +97,7 @@ pub fn record(
         Follower::new(domain, "recorder", &topics::LINK, open).also_waking_on(&topics::INPUTS);
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
+    let mut supervisor = None;
     loop {
         let stopped = stop();
         let news = match follower.wait(if stopped { Duration::ZERO } else { POLL })? {
@@ -105,6 +106,15 @@ pub fn record(
             News::Samples(_) | News::Nothing => None,
         };
         if news == Some(true) {
+            let holder = options.domain.supervisor().ok().flatten();
+            // Another supervisor goes on with the run, and starts a recorder of its own.
+            if options.run.is_some() && supervisor.is_some() && supervisor != holder {
+                if let Some(mut ended) = current.take() {
+                    ended.finish(tell)?;
+                }
+                return Ok(());
+            }
+            supervisor = holder;
             let run = find_run(options);
             // A bus that was made anew within the run goes into the same file.
             if let Some(mut ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
