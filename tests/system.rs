@@ -21,6 +21,7 @@ mod missions;
 mod neighbours;
 mod operators;
 mod planners;
+mod recording;
 mod repeatability;
 mod replaced_bus;
 mod resume;

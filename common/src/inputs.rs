@@ -19,9 +19,9 @@ use crate::{
 };
 
 /// A piece has at most so many bytes.
-const PIECE: usize = 2048;
+const PIECE: usize = 16_384;
 /// On a large map that is too little for its keyframes: then one byte for so many cells.
-const CELLS_FOR_A_BYTE: usize = 16;
+const CELLS_FOR_A_BYTE: usize = 8;
 /// An entry has at most so many bytes: the whole belief of the largest map, and more.
 pub const LONGEST_ENTRY: usize = 1 << 30;
 

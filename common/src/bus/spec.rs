@@ -94,7 +94,7 @@ impl Limits {
     /// For slices of a whole map.
     pub const MAP: Self = Self {
         buffer: 4,
-        recorder_buffer: 128,
+        recorder_buffer: 256,
         borrowed: 2,
         readers: 12,
     };

@@ -249,6 +249,10 @@ impl Shell {
 
     /// Publish the bytes that came and went, once nobody waits.
     fn publish_wire(&mut self) -> Result<(), StageError> {
+        if self.carried.wire.is_empty() {
+            return Ok(());
+        }
+        self.inputs.publish(self.carried.progress)?;
         for (at, header, bytes) in self.carried.wire.drain(..) {
             for piece in bytes.chunks(WIRE_PIECE) {
                 self.wire

@@ -9,6 +9,7 @@ use std::{
 use common::{
     bus::decode_slice,
     clock::{MissionTime, Pace},
+    run::Run,
     samples::{DeathSample, HealthSample, HealthState, InputsHeader, name_str},
     topics::{self, AnyTopic as _},
 };
@@ -29,6 +30,8 @@ pub struct Options {
     pub from: MissionTime,
     /// As fast as the machine can, or so many times mission time.
     pub pace: Pace,
+    /// The run to replay in place of the recorded one: what another mission would have done with the same inputs.
+    pub run: Option<Run>,
 }
 
 impl Default for Options {
@@ -37,6 +40,7 @@ impl Default for Options {
             stages: Vec::new(),
             from: MissionTime::default(),
             pace: Pace::Max,
+            run: None,
         }
     }
 }
@@ -56,7 +60,7 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
         End::Cut { after, .. } => Some(after.as_secs_f64()),
     };
     let setting = Setting {
-        run: recording.run(),
+        run: options.run.as_ref().unwrap_or_else(|| recording.run()),
         recorded: &recorded,
         from: options.from,
         cut: cut.is_some(),

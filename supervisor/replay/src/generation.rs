@@ -314,7 +314,7 @@ impl Generation {
             return Verdict::NotReplayed(why.clone());
         }
         if self.pieces_came {
-            return if self.inputs == 0 && !self.worked {
+            return if self.inputs == 0 {
                 Verdict::WithoutStep
             } else {
                 Verdict::Equal

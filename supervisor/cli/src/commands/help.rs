@@ -37,6 +37,7 @@ static GUIDE: &[Page] = guide! {
     "simulation",
     "attach",
     "deploy",
+    "recordings",
     "break-it",
     "field-tool",
     "evaluate-worlds",

@@ -57,6 +57,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         stages: arguments.stage.clone(),
         from: MissionTime::from_seconds(arguments.from),
         pace: arguments.pace,
+        run: None,
     };
     let report = replay::replay(&recording, &options)?;
     print_text(&if arguments.json {
