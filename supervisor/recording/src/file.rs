@@ -2,8 +2,8 @@
 
 use std::{
     collections::{BTreeMap, HashMap},
-    fs::File,
-    io::BufWriter,
+    fs::{self, File},
+    io::{self, BufWriter},
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
@@ -43,17 +43,24 @@ pub(crate) fn now_ns() -> u64 {
 }
 
 impl RecordingFile {
-    /// Make the file, which must not exist, with a channel for each of `topics`.
+    /// Make the file, which must not exist, `about` a run, with a channel for each of `topics`. It gets its name when all of that
+    /// is written: whatever is called so can be read.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn AnyTopic],
+        about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
-        let file = File::options().write(true).create_new(true).open(path);
-        let file = file.map_err(|source| RecordingError::File {
+        let named = |source| RecordingError::File {
             action: "make",
             file: path.to_path_buf(),
             source,
-        })?;
+        };
+        if path.exists() {
+            return Err(named(io::ErrorKind::AlreadyExists.into()));
+        }
+        let mut unfinished = path.as_os_str().to_owned();
+        unfinished.push(".new");
+        let file = File::create(&unfinished).map_err(named)?;
         let options = WriteOptions::new()
             .profile("")
             .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
@@ -82,6 +89,8 @@ impl RecordingFile {
             let schema = foxglove::schema(name);
             recording.add(topic, name, "jsonschema", &schema, "json", &BTreeMap::new())?;
         }
+        recording.metadata(about)?;
+        fs::rename(&unfinished, path).map_err(named)?;
         Ok(recording)
     }
 
@@ -151,10 +160,7 @@ impl RecordingFile {
     }
 
     /// Say what is recorded.
-    pub(crate) fn metadata(
-        &mut self,
-        metadata: BTreeMap<String, String>,
-    ) -> Result<(), RecordingError> {
+    fn metadata(&mut self, metadata: BTreeMap<String, String>) -> Result<(), RecordingError> {
         let name = RUN.to_owned();
         let record = Metadata { name, metadata };
         let written = self.writer.write_metadata(&record);

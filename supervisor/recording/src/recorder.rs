@@ -193,7 +193,6 @@ impl CurrentRun {
         let run_file = directory.as_ref().map(|run| run.join(run::FILE_NAME));
         let text = run_file.and_then(|file| log_files::text(&file, LONGEST_RUN_FILE));
         let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
-        let mut file = RecordingFile::create(path, topics)?;
         let mut about = BTreeMap::from([
             ("robot", options.domain.robot.to_string()),
             ("build", build()),
@@ -205,7 +204,8 @@ impl CurrentRun {
             about.insert("seed", run.mission.seed.to_string());
         }
         let about = about.into_iter();
-        file.metadata(about.map(|(key, value)| (key.to_owned(), value)).collect())?;
+        let about = about.map(|(key, value)| (key.to_owned(), value)).collect();
+        let file = RecordingFile::create(path, topics, about)?;
         let whole = options.run.is_some();
         let logs = directory.as_ref();
         let logs = logs.map(|directory| LogFiles::follow(directory, whole));
