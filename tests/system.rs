@@ -22,6 +22,7 @@ mod missions;
 mod neighbours;
 mod operators;
 mod planners;
+mod recording;
 mod repeatability;
 mod replaced_bus;
 mod resume;

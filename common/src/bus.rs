@@ -4,7 +4,9 @@
 //! | file | holds |
 //! |---|---|
 //! | `payload` | what may lie in shared memory, and the stamp that every sample begins with |
-//! | `layout` | how payloads lie in memory, for other languages; what they hold |
+//! | `layout` | how payloads lie in memory, for other languages; what they hold; how they are written elsewhere |
+//! | [`cdr`] | the encoding they are written in elsewhere |
+//! | `encoded` | readers of any topic, whose samples come encoded |
 //! | `spec` | what a table of topics says of one topic |
 //! | `topic` | what a table of topics is made of, and the services of one topic |
 //! | `make` | making and joining a bus, and removing what killed processes leave on it |
@@ -24,6 +26,8 @@
 //! - events only wake; data come from receiving until there is none.
 
 mod any;
+pub mod cdr;
+mod encoded;
 mod error;
 mod layout;
 mod leftovers;
@@ -38,12 +42,16 @@ mod write;
 pub(crate) use self::layout::{kind_of, layouts};
 pub use self::{
     any::{AnyReader, AnySample, ReadableTopic},
+    encoded::EncodedReader,
     error::BusError,
-    layout::{Field, Kind, Layout, Structure, Value},
+    layout::{
+        Field, Kind, Layout, Structure, Value, decode_sample, decode_slice, encode_sample,
+        encode_slice,
+    },
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, ZeroCopySend},
     read::{Author, Ignored, Reader, Slice, SliceReader, Wakeup},
-    spec::{EVERY_STAGE, Limits, OPERATOR, Rate, SUPERVISOR, Spec},
+    spec::{EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec},
     topic::{AnyTopic, SliceTopic, Topic},
     write::{SliceWriter, Writer},
 };

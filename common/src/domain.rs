@@ -133,6 +133,12 @@ impl Domain {
         self.directory.join("run")
     }
 
+    /// A link to the directory of the run that is under way, for consumers.
+    #[must_use]
+    pub fn run_directory(&self) -> PathBuf {
+        self.directory.join("run-directory")
+    }
+
     /// The middleware's configuration: what a consumer in any language loads first. A link to that of the bus that is
     /// there: see [`Making`](crate::making::Making).
     #[must_use]

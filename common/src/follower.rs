@@ -21,6 +21,8 @@ pub struct Follower<Topics, Open> {
     name: String,
     wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
+    /// It is gone, and what was published last is given first.
+    ending: bool,
     joined: Option<Joined<Topics>>,
     /// Since when the bus that is there cannot be used.
     refused: Option<(Making, Instant)>,
@@ -55,6 +57,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             name: name.to_owned(),
             wake_on: vec![wake_on],
             open,
+            ending: false,
             joined: None,
             refused: None,
         }
@@ -92,9 +95,14 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             if came {
                 break;
             }
-            if self.is_gone() {
-                self.joined = None;
+            if self.ending {
+                (self.joined, self.ending) = (None, false);
                 return Ok(News::Gone);
+            }
+            if self.is_gone() {
+                self.ending = true;
+                came = true;
+                break;
             }
             if left.is_zero() {
                 break;

@@ -31,6 +31,7 @@
 //! | [`stage_command`] | the command line of a stage's process |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
+//! | [`inputs`], [`replay`] | what every step took, published; what a replay makes of it |
 
 pub mod address;
 pub mod bus;
@@ -44,6 +45,7 @@ pub mod geometry;
 pub mod grid;
 pub mod ground_truth;
 pub mod infrared;
+pub mod inputs;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;
@@ -52,6 +54,7 @@ pub mod making;
 pub mod mission;
 pub mod poll;
 pub mod process_status;
+pub mod replay;
 pub mod roster;
 pub mod run;
 pub mod samples;

@@ -83,6 +83,8 @@ stamped!(
     StallSample,
     RequestSample,
     FaultSample,
+    WireHeader,
+    InputsHeader,
 );
 
 #[cfg(test)]

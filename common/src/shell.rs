@@ -12,6 +12,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     bus::{Bus, Writer},
     clock::{MissionClock, MissionTime},
@@ -54,7 +56,7 @@ impl Context {
 }
 
 /// The tick a stage is at: what its heartbeats are stamped with.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     /// The tick last worked on.
     pub tick: u64,

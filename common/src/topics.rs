@@ -8,14 +8,14 @@ use std::time::Duration;
 
 use crate::samples::{
     CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader, GridHeader,
-    GuidanceSample, HealthSample, InfraredSample, LinkSample, PoseSample, PowerSample, RangeSample,
-    RequestSample, RosterEntry, RosterHeader, StallSample, SurroundingsSample, TickLimitSample,
-    WheelSample,
+    GuidanceSample, HealthSample, InfraredSample, InputsHeader, LinkSample, PoseSample,
+    PowerSample, RangeSample, RequestSample, RosterEntry, RosterHeader, StallSample,
+    SurroundingsSample, TickLimitSample, WheelSample, WireHeader,
 };
 
 pub use crate::bus::{
-    AnyTopic, EVERY_STAGE, Limits, OPERATOR, Rate, ReadableTopic, SUPERVISOR, SliceTopic, Spec,
-    Topic,
+    AnyTopic, EVERY_STAGE, Limits, Logged, OPERATOR, Rate, ReadableTopic, SUPERVISOR, SliceTopic,
+    Spec, Topic,
 };
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
@@ -41,7 +41,7 @@ const fn on_change(again_after: Duration) -> Rate {
 
 macro_rules! topics {
     ($($(#[doc = $meaning:literal])+ $id:ident: $kind:ident<$($payload:ty),+> {
-        name: $name:literal, writer: $writer:expr, rate: $rate:expr, limits: $limits:expr $(,)?
+        name: $name:literal, writer: $writer:expr, rate: $rate:expr, limits: $limits:expr, logged: $logged:ident $(,)?
     })*) => {
         $(
             $(#[doc = $meaning])+
@@ -50,6 +50,7 @@ macro_rules! topics {
                 writer: $writer,
                 rate: $rate,
                 limits: $limits,
+                logged: Logged::$logged,
                 meaning: concat!($($meaning),+),
             });
         )*
@@ -63,79 +64,87 @@ macro_rules! topics {
 topics! {
     /// Front sonar: distance to the nearest thing ahead; the infrared rangers of the same tick.
     RANGE: Topic<RangeSample> {
-        name: "range", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL,
+        name: "range", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {
-        name: "wheels", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL,
+        name: "wheels", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// Where the robot believes it is.
     POSE: Topic<PoseSample> {
-        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL,
+        name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// The safety map: keyframes and changed windows.
     GRID: SliceTopic<GridHeader, u8> {
-        name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP,
+        name: "grid", writer: "mapper", rate: Rate::EachTick, limits: Limits::MAP, logged: Yes,
     }
     /// The reference direction at the robot's pose.
     GUIDANCE: Topic<GuidanceSample> {
-        name: "guidance", writer: "planner", rate: Rate::EachTick, limits: Limits::SMALL,
+        name: "guidance", writer: "planner", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// The whole-domain policy, for consumers.
     FIELD: SliceTopic<FieldHeader, FieldCell> {
-        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::MAP,
+        name: "field", writer: "planner", rate: FIELD_RATE, limits: Limits::WHOLE_MAP, logged: WithFields,
     }
     /// Wheel speeds for the robot.
     COMMAND: Topic<CommandSample> {
-        name: "command", writer: "controller", rate: Rate::EachTick, limits: Limits::SMALL,
+        name: "command", writer: "controller", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
     /// Heartbeats, from inside the work loop.
     HEALTH: Topic<HealthSample> {
-        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT), limits: Limits::SMALL,
+        name: "health", writer: EVERY_STAGE, rate: on_change(BEAT), limits: Limits::SMALL, logged: Yes,
     }
     /// The connection to the robot: its state, counts, tick latency.
     LINK: Topic<LinkSample> {
-        name: "link", writer: "x80-link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL,
+        name: "link", writer: "x80-link", rate: on_change(LINK_AGAIN), limits: Limits::SMALL, logged: Yes,
     }
     /// The seven infrared rangers, metres.
     INFRARED: Topic<InfraredSample> {
-        name: "infrared", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
+        name: "infrared", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
     }
     /// Battery volts and whether they are low, motor currents, temperatures of the drivers.
     POWER: Topic<PowerSample> {
-        name: "power", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
+        name: "power", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
     }
     /// Human sensors, tilt, temperature.
     SURROUNDINGS: Topic<SurroundingsSample> {
-        name: "surroundings", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL,
+        name: "surroundings", writer: "x80-link", rate: Rate::EachFrame, limits: Limits::SMALL, logged: Yes,
     }
     /// The supervisor's order to all stages.
     DIRECTIVE: Topic<DirectiveSample> {
-        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
+        name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
     }
     /// How far the robot may go on a clock of ticks, and since which tick the newest recovery step holds.
     TICK_LIMIT: Topic<TickLimitSample> {
-        name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL,
+        name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
     }
     /// The stages' processes, as the supervisor sees them.
     ROSTER: SliceTopic<RosterHeader, RosterEntry> {
-        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::MAP,
+        name: "roster", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::MAP, logged: Yes,
     }
     /// A stage's process ended: cause, ages, the end of its log, what follows.
     DEATHS: Topic<DeathSample> {
-        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
+        name: "deaths", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// The robot should make progress and does not: how, and what is tried.
     STALLS: Topic<StallSample> {
-        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
+        name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// What an operator asks: restart, stop, resume.
     REQUESTS: Topic<RequestSample> {
-        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
+        name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
     /// What an operator breaks in a stage on purpose; every stage reads it.
     FAULTS: Topic<FaultSample> {
-        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL,
+        name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
+    /// The bytes that the link received from the robot and sent to it.
+    WIRE: SliceTopic<WireHeader, u8> {
+        name: "wire", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
+    }
+    /// What the step of every stage took, and the checkpoint each generation started from: what a replay needs.
+    INPUTS: SliceTopic<InputsHeader, u8> {
+        name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }
 }
 

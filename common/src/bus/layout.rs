@@ -1,10 +1,13 @@
-//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields; and what a payload
-//! holds, field by field, for whoever shows it.
+//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields; what a payload
+//! holds, field by field, for whoever shows it; and how it is written where there is no shared memory.
 
-use super::payload::{Payload, type_name};
+use super::{
+    cdr::{Decoder, Encoder},
+    payload::{Payload, type_name},
+};
 
 /// A payload, or a part of one, whose layout is known.
-pub trait Layout: Sized {
+pub trait Layout: Copy {
     /// What it is made of.
     fn kind() -> Kind;
 
@@ -14,6 +17,27 @@ pub trait Layout: Sized {
     /// What an array of them holds.
     fn array(array: &[Self]) -> Value {
         Value::Array(array.iter().map(Self::value).collect())
+    }
+
+    /// Write it, field by field.
+    fn encode(&self, to: &mut Encoder<'_>);
+
+    /// Read what [`Layout::encode`] wrote; none where that is too short.
+    fn decode(from: &mut Decoder<'_>) -> Option<Self>;
+
+    /// Write all of `items`, one after another.
+    fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
+        for item in items {
+            item.encode(to);
+        }
+    }
+
+    /// Read into all of `items`.
+    fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
+        for item in items {
+            *item = Self::decode(from)?;
+        }
+        Some(())
     }
 }
 
@@ -34,6 +58,38 @@ pub enum Value {
     Array(Vec<Self>),
     /// Its fields by their names, in their order.
     Struct(Vec<(&'static str, Self)>),
+}
+
+/// `sample` as a message of its own.
+pub fn encode_sample<P: Layout>(sample: &P, bytes: &mut Vec<u8>) {
+    sample.encode(&mut Encoder::new(bytes));
+}
+
+/// `header` and `slice` as a message of their own.
+pub fn encode_slice<H: Layout, T: Layout>(header: &H, slice: &[T], bytes: &mut Vec<u8>) {
+    let mut to = Encoder::new(bytes);
+    header.encode(&mut to);
+    (slice.len() as u32).encode(&mut to);
+    T::encode_all(slice, &mut to);
+}
+
+/// The sample of a message; none if it holds another.
+#[must_use]
+pub fn decode_sample<P: Layout>(message: &[u8]) -> Option<P> {
+    P::decode(&mut Decoder::new(message)?)
+}
+
+/// The header and slice of a message; none if it holds others.
+#[must_use]
+pub fn decode_slice<H: Layout, T: Layout + Default>(message: &[u8]) -> Option<(H, Vec<T>)> {
+    let mut from = Decoder::new(message)?;
+    let header = H::decode(&mut from)?;
+    let count = u32::decode(&mut from)? as usize;
+    // Each takes a byte at least: the length may be anything.
+    let count = (count <= from.left()).then_some(count)?;
+    let mut slice = vec![T::default(); count];
+    T::decode_all(&mut slice, &mut from)?;
+    Some((header, slice))
 }
 
 /// What a field is.
@@ -95,6 +151,14 @@ macro_rules! numbers {
             fn value(&self) -> Value {
                 Value::$value((*self).into())
             }
+
+            fn encode(&self, to: &mut Encoder<'_>) {
+                to.number(self.to_le_bytes());
+            }
+
+            fn decode(from: &mut Decoder<'_>) -> Option<Self> {
+                from.number().map(Self::from_le_bytes)
+            }
         }
     )*};
 }
@@ -114,15 +178,42 @@ impl Layout for u8 {
         let text = array.split(|&byte| byte == 0).next().unwrap_or_default();
         Value::Text(String::from_utf8_lossy(text).into_owned())
     }
+
+    fn encode(&self, to: &mut Encoder<'_>) {
+        to.bytes(&[*self]);
+    }
+
+    fn decode(from: &mut Decoder<'_>) -> Option<Self> {
+        from.bytes(1)?.first().copied()
+    }
+
+    fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
+        to.bytes(items);
+    }
+
+    fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
+        items.copy_from_slice(from.bytes(items.len())?);
+        Some(())
+    }
 }
 
-impl<T: Layout, const N: usize> Layout for [T; N] {
+impl<T: Layout + Default, const N: usize> Layout for [T; N] {
     fn kind() -> Kind {
         Kind::Array(Box::new(T::kind()), N)
     }
 
     fn value(&self) -> Value {
         T::array(self)
+    }
+
+    fn encode(&self, to: &mut Encoder<'_>) {
+        T::encode_all(self, to);
+    }
+
+    fn decode(from: &mut Decoder<'_>) -> Option<Self> {
+        let mut items = [T::default(); N];
+        T::decode_all(&mut items, from)?;
+        Some(items)
     }
 }
 
@@ -144,7 +235,49 @@ macro_rules! layouts {
                     (stringify!($field), $crate::bus::Layout::value(&self.$field))
                 ),*])
             }
+
+            fn encode(&self, to: &mut $crate::bus::cdr::Encoder<'_>) {
+                $($crate::bus::Layout::encode(&self.$field, to);)*
+            }
+
+            fn decode(from: &mut $crate::bus::cdr::Decoder<'_>) -> Option<Self> {
+                Some(Self {
+                    $($field: $crate::bus::Layout::decode(from)?),*
+                })
+            }
         }
     )*};
 }
 pub(crate) use layouts;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{FieldCell, FieldHeader, LinkSample};
+
+    #[test]
+    fn a_sample_is_read_as_it_was_written_and_none_from_half_of_it() {
+        let mut link = LinkSample {
+            losses: 7,
+            ..LinkSample::default()
+        };
+        link.latency_histogram[3] = 11;
+        let mut message = Vec::new();
+        encode_sample(&link, &mut message);
+        assert_eq!(decode_sample(&message), Some(link));
+        message.pop();
+        assert_eq!(decode_sample::<LinkSample>(&message), None);
+    }
+
+    #[test]
+    fn a_slice_is_read_as_it_was_written_and_none_where_its_length_is_a_lie() {
+        let cells = [FieldCell::default(); 3];
+        let mut message = Vec::new();
+        encode_slice(&FieldHeader::default(), &cells, &mut message);
+        let read = decode_slice::<FieldHeader, FieldCell>(&message);
+        assert_eq!(read, Some((FieldHeader::default(), cells.to_vec())));
+        let length = message.len() - 3 * 12 - 4;
+        message[length..length + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert_eq!(decode_slice::<FieldHeader, FieldCell>(&message), None);
+    }
+}

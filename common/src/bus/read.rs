@@ -33,6 +33,18 @@ impl Bus {
     /// # Errors
     /// As [`Bus::writer`].
     pub fn reader<P: Payload + Stamped>(&self, topic: &Topic<P>) -> Result<Reader<P>, BusError> {
+        self.reader_that_keeps(topic, topic.spec.limits.buffer)
+    }
+
+    /// Read `topic`; of samples that are not taken, the newest `buffer` are kept.
+    ///
+    /// # Errors
+    /// As [`Bus::writer`].
+    pub(super) fn reader_that_keeps<P: Payload + Stamped>(
+        &self,
+        topic: &Topic<P>,
+        buffer: usize,
+    ) -> Result<Reader<P>, BusError> {
         let spec = topic.spec;
         let service = struct_service::<P>(&self.node, spec)?
             .open()
@@ -40,6 +52,7 @@ impl Bus {
         self.leave_places(spec, service.dynamic_config().number_of_subscribers())?;
         let subscriber = service
             .subscriber_builder()
+            .buffer_size(buffer)
             .create()
             .map_err(reading(spec))?;
         Ok(Reader {
@@ -57,6 +70,18 @@ impl Bus {
         &self,
         topic: &SliceTopic<H, T>,
     ) -> Result<SliceReader<H, T>, BusError> {
+        self.slice_reader_that_keeps(topic, topic.spec.limits.buffer)
+    }
+
+    /// As [`Bus::reader_that_keeps`].
+    ///
+    /// # Errors
+    /// As [`Bus::writer`].
+    pub(super) fn slice_reader_that_keeps<H: Payload + Stamped, T: Payload>(
+        &self,
+        topic: &SliceTopic<H, T>,
+        buffer: usize,
+    ) -> Result<SliceReader<H, T>, BusError> {
         let spec = topic.spec;
         let service = slice_service::<H, T>(&self.node, spec)?
             .open()
@@ -64,6 +89,7 @@ impl Bus {
         self.leave_places(spec, service.dynamic_config().number_of_subscribers())?;
         let subscriber = service
             .subscriber_builder()
+            .buffer_size(buffer)
             .create()
             .map_err(reading(spec))?;
         Ok(SliceReader {
@@ -234,6 +260,14 @@ impl<P: Payload + Stamped> Reader<P> {
         self.authors.follow(author);
     }
 
+    /// Give the samples of every generation, from now on: an older one's may still be on their way when the next one's
+    /// come.
+    #[must_use]
+    pub fn of_all_generations(mut self) -> Self {
+        self.authors.admitted = Admitted::All;
+        self
+    }
+
     /// What was ignored.
     #[must_use]
     pub const fn ignored(&self) -> Ignored {
@@ -295,6 +329,13 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
     /// As [`Reader::follow`].
     pub const fn follow(&mut self, author: Author) {
         self.authors.follow(author);
+    }
+
+    /// As [`Reader::of_all_generations`].
+    #[must_use]
+    pub fn of_all_generations(mut self) -> Self {
+        self.authors.admitted = Admitted::All;
+        self
     }
 
     /// The next sample; as [`Reader::take`].

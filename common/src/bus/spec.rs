@@ -23,6 +23,15 @@ pub enum Rate {
     WhenItHappens,
 }
 
+/// Whether a recording keeps a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Logged {
+    /// Always.
+    Yes,
+    /// Where fields are asked for: they are larger than all else together.
+    WithFields,
+}
+
 /// What the table says of a topic.
 #[derive(Debug)]
 pub struct Spec {
@@ -32,6 +41,8 @@ pub struct Spec {
     pub writer: &'static str,
     /// How often.
     pub rate: Rate,
+    /// Whether a recording keeps it.
+    pub logged: Logged,
     /// Depth of history and buffers, number of readers.
     pub limits: Limits,
     /// What it means.
@@ -57,6 +68,8 @@ impl Spec {
 pub struct Limits {
     /// Samples a reader that falls behind still gets; then the oldest are dropped.
     pub buffer: usize,
+    /// The same of a reader that keeps everything ([`crate::bus::EncodedReader`]).
+    pub recorder_buffer: usize,
     /// Samples a reader may hold at once.
     pub borrowed: usize,
     /// Readers at once, stages, dashboards and loggers among them. Consumers leave three places free.
@@ -67,14 +80,28 @@ impl Limits {
     /// For topics of one small struct.
     pub const SMALL: Self = Self {
         buffer: 128,
+        recorder_buffer: 1024,
         borrowed: 2,
         readers: 16,
+    };
+    /// For what a replay needs whole: a recorder that the machine keeps waiting for a tenth of a second loses nothing.
+    pub const DEEP: Self = Self {
+        buffer: 1024,
+        recorder_buffer: 1024,
+        borrowed: 2,
+        readers: 8,
     };
     /// For slices of a whole map.
     pub const MAP: Self = Self {
         buffer: 4,
+        recorder_buffer: 256,
         borrowed: 2,
         readers: 12,
+    };
+    /// For slices that are most of a whole map each.
+    pub const WHOLE_MAP: Self = Self {
+        recorder_buffer: 8,
+        ..Self::MAP
     };
     /// Writers at once. One is meant; a kill while starting can leak a place for good.
     pub(super) const WRITERS: usize = 16;

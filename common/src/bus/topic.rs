@@ -9,9 +9,11 @@ use iceoryx2::{
 };
 
 use super::{
+    encoded::{EncodedReader, SampleReader, SliceSampleReader},
     error::{BusError, refused},
     layout::{Kind, Layout},
-    payload::{Payload, type_name},
+    make::Bus,
+    payload::{Payload, Stamped, type_name},
     spec::{Limits, Rate, Spec},
 };
 
@@ -62,6 +64,11 @@ pub trait AnyTopic: Sync + CreateServices {
     fn payload(&self) -> String;
     /// What each sample is: a struct; or a header, and what a slice is made of.
     fn layout(&self) -> (Kind, Option<Kind>);
+    /// Read it, every generation's samples, without knowing what they are.
+    ///
+    /// # Errors
+    /// As [`Bus::reader`].
+    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError>;
     /// After how long its writer publishes it again when nothing changes; zero where the table does not say.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
@@ -87,7 +94,7 @@ pub trait CreateServices {
     fn create(&self, node: &BusNode) -> Result<Box<dyn Any>, BusError>;
 }
 
-impl<P: Payload + Layout> AnyTopic for Topic<P> {
+impl<P: Payload + Stamped + Layout> AnyTopic for Topic<P> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
@@ -98,6 +105,13 @@ impl<P: Payload + Layout> AnyTopic for Topic<P> {
 
     fn layout(&self) -> (Kind, Option<Kind>) {
         (P::kind(), None)
+    }
+
+    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
+        Ok(Box::new(SampleReader(
+            bus.reader_that_keeps(self, self.spec.limits.recorder_buffer)?
+                .of_all_generations(),
+        )))
     }
 }
 
@@ -110,7 +124,7 @@ impl<P: Payload> CreateServices for Topic<P> {
     }
 }
 
-impl<H: Payload + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
+impl<H: Payload + Stamped + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
@@ -121,6 +135,13 @@ impl<H: Payload + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
 
     fn layout(&self) -> (Kind, Option<Kind>) {
         (H::kind(), Some(T::kind()))
+    }
+
+    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
+        Ok(Box::new(SliceSampleReader(
+            bus.slice_reader_that_keeps(self, self.spec.limits.recorder_buffer)?
+                .of_all_generations(),
+        )))
     }
 }
 
@@ -140,7 +161,7 @@ macro_rules! samples_service {
             .service_builder(&service_name($spec)?)
             .publish_subscribe::<$payload>()
             .user_header::<$header>()
-            .subscriber_max_buffer_size($spec.limits.buffer)
+            .subscriber_max_buffer_size($spec.limits.recorder_buffer)
             .subscriber_max_borrowed_samples($spec.limits.borrowed)
             .max_subscribers($spec.limits.readers)
             .max_publishers(Limits::WRITERS)

@@ -159,6 +159,21 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         &mut self,
         tick: u64,
         time: MissionTime,
+        header: H,
+        cells: impl ExactSizeIterator<Item = T>,
+    ) -> Result<(), BusError> {
+        self.publish_quietly(tick, time, header, cells)?;
+        wake(&self.notifier, self.topic)
+    }
+
+    /// As [`SliceWriter::publish`], and wakes nobody: for readers that something else wakes.
+    ///
+    /// # Errors
+    /// As [`SliceWriter::publish`].
+    pub fn publish_quietly(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
         mut header: H,
         cells: impl ExactSizeIterator<Item = T>,
     ) -> Result<(), BusError> {
@@ -172,7 +187,15 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         sample
             .write_from_fn(|_| cells.next().unwrap_or_default())
             .send()
-            .map_err(refused("publish on", self.topic))?;
+            .map(drop)
+            .map_err(refused("publish on", self.topic))
+    }
+
+    /// Wake the readers of what was published quietly.
+    ///
+    /// # Errors
+    /// When the middleware refuses.
+    pub fn wake(&self) -> Result<(), BusError> {
         wake(&self.notifier, self.topic)
     }
 

@@ -287,7 +287,31 @@ pub struct SurroundingsSample {
     pub tilt_ad: [u16; 2],
 }
 
+wire_enum! {
+    /// Which way bytes went.
+    Direction, unknown = Received {
+        /// From the robot.
+        Received = 0,
+        /// To the robot.
+        Sent = 1,
+    }
+}
+
+/// Topic `wire`, header; the slice is the bytes of one datagram, or of one read from a connection or serial line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.WireHeader")]
+#[repr(C)]
+pub struct WireHeader {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// Reading of the machine's monotonic clock in the step that took or gave them, nanoseconds.
+    pub machine_ns: u64,
+    /// A [`Direction`].
+    pub direction: u8,
+}
+
 layouts! {
+    WireHeader { stamp machine_ns direction }
     RangeSample { stamp range_m status raw_cm infrared_ad }
     WheelSample { stamp left_counts right_counts left_counts_per_s right_counts_per_s restarts }
     LinkSample { stamp connected action cause at_rest frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }

@@ -440,7 +440,20 @@ pub struct FaultSample {
     pub although_real: u8,
 }
 
+/// Topic `inputs`, header; the slice is a piece of what [`crate::inputs`] describes. Pieces of a generation follow each other by
+/// their sequence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.InputsHeader")]
+#[repr(C)]
+pub struct InputsHeader {
+    /// Which sample.
+    pub stamp: Stamp,
+    /// The stage.
+    pub stage: Name,
+}
+
 layouts! {
+    InputsHeader { stamp stage }
     HealthSample { stamp stage pid state turns last_fault fault_answer }
     DirectiveSample { stamp epoch order reason }
     TickLimitSample { stamp last_tick holds_from_tick epoch }

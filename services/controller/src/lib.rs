@@ -5,5 +5,6 @@
 //! | [`step`] | the whole of it, pure: one `guidance` sample to one `command` |
 //! | [`shell`] | wires it to the topics |
 
+pub mod replay;
 pub mod shell;
 pub mod step;

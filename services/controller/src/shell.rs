@@ -2,13 +2,14 @@
 
 use common::{
     bus::{Reader, Writer},
+    inputs::InputLog,
     samples::{CommandSample, GuidanceSample},
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
     topics,
 };
 
-use crate::step::Controller;
+use crate::{replay::Input, step::Controller};
 
 /// The controller process.
 #[derive(Debug)]
@@ -16,6 +17,7 @@ pub struct Shell {
     guidance: Reader<GuidanceSample>,
     command: Writer<CommandSample>,
     controller: Controller,
+    inputs: InputLog,
     progress: Progress,
 }
 
@@ -28,6 +30,7 @@ impl Process for Shell {
                 .bus
                 .writer(&topics::COMMAND, context.generation.number)?,
             controller: Controller::new(&context.run.mission),
+            inputs: InputLog::begin(context, &())?,
             progress: Progress::default(),
         })
     }
@@ -37,9 +40,11 @@ impl Process for Shell {
             return Ok(self.progress);
         };
         let (tick, time) = (guidance.stamp.tick, guidance.stamp.time());
-        let command = self.controller.step(&guidance, time);
-        self.command.publish(tick, time, command)?;
         self.progress = Progress { tick, time };
+        self.inputs.note(&Input { guidance }, self.progress)?;
+        let command = self.controller.step(&guidance, time);
+        self.inputs.publish(self.progress)?;
+        self.command.publish(tick, time, command)?;
         Ok(self.progress)
     }
 }

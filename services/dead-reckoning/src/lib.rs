@@ -7,5 +7,6 @@
 //! | [`shell`] | wires it to the topics, saves its state |
 
 pub mod covariance;
+pub mod replay;
 pub mod shell;
 pub mod step;

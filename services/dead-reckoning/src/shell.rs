@@ -5,6 +5,7 @@ use std::path::Path;
 use common::{
     bus::{Reader, Writer},
     checkpoint::{Checkpoint, CheckpointError},
+    inputs::InputLog,
     run,
     samples::{PoseSample, WheelSample},
     shell::{Context, Process, Progress, StageError},
@@ -12,7 +13,10 @@ use common::{
     topics,
 };
 
-use crate::step::{DeadReckoning, Reckoned, State};
+use crate::{
+    replay::Input,
+    step::{DeadReckoning, Reckoned, State},
+};
 
 /// Room for the encoded state, bytes: it is under 300.
 const CHECKPOINT_CAPACITY: usize = 512;
@@ -32,6 +36,7 @@ pub struct Shell {
     wheels: Reader<WheelSample>,
     pose: Writer<PoseSample>,
     checkpoint: Checkpoint,
+    inputs: InputLog,
     reckoning: DeadReckoning,
     progress: Progress,
 }
@@ -41,6 +46,7 @@ impl Process for Shell {
         let mut reckoning = DeadReckoning::new(&context.run.mission);
         let (checkpoint, saved) =
             Checkpoint::open::<State>(&context.checkpoint_file(), CHECKPOINT_CAPACITY)?;
+        let inputs = InputLog::begin(context, &saved)?;
         if let Some(state) = saved {
             match reckoning.restore(state) {
                 Ok(()) => tracing::info!(?state, "pose restored"),
@@ -54,6 +60,7 @@ impl Process for Shell {
                 .bus
                 .writer(&topics::POSE, context.generation.number)?,
             checkpoint,
+            inputs,
             reckoning,
             progress: Progress::default(),
         })
@@ -62,6 +69,8 @@ impl Process for Shell {
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(wheels) = self.wheels.take()? {
             let (tick, time) = (wheels.stamp.tick, wheels.stamp.time());
+            self.progress = Progress { tick, time };
+            self.inputs.note(&Input { wheels }, self.progress)?;
             let Reckoned { pose, rejected } = self.reckoning.step(&wheels, time);
             if rejected {
                 tracing::warn!(
@@ -70,7 +79,7 @@ impl Process for Shell {
                 );
             }
             self.checkpoint.save(self.reckoning.state())?;
-            self.progress = Progress { tick, time };
+            self.inputs.publish(self.progress)?;
             self.pose.publish(tick, time, pose)?;
         }
         Ok(self.progress)

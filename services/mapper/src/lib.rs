@@ -20,6 +20,7 @@ mod fault;
 mod inflation;
 mod infrared_model;
 mod reading;
+pub mod replay;
 pub mod shell;
 mod sonar_model;
 pub mod step;

@@ -7,6 +7,7 @@ use common::{
     bus::{Reader, SliceWriter},
     clock::MissionTime,
     grid::Part,
+    inputs::InputLog,
     journal::Journal,
     samples::{DirectiveSample, FaultKind, GridHeader, PoseSample, RangeSample},
     shell::{Context, Process, Progress, StageError},
@@ -14,7 +15,10 @@ use common::{
     topics,
 };
 
-use crate::step::{Belief, Change, Input, Mapper};
+use crate::{
+    replay::{Entry, Start, sample_of},
+    step::{Belief, Change, Input, Mapper},
+};
 
 /// Mission time after which the whole map is published again.
 const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
@@ -27,6 +31,7 @@ pub struct Shell {
     directive: Reader<DirectiveSample>,
     grid: SliceWriter<GridHeader, u8>,
     journal: Journal,
+    inputs: InputLog,
     mapper: Mapper,
     latest_range: Option<RangeSample>,
     last_keyframe: Option<MissionTime>,
@@ -38,6 +43,13 @@ impl Process for Shell {
         let mut mapper = Mapper::new(&context.run.mission);
         let (journal, saved) =
             Journal::open::<Belief, Input>(&context.checkpoint_file(), mapper.saved_bytes())?;
+        let inputs = InputLog::begin(
+            context,
+            &Start {
+                belief: saved.state.as_ref(),
+                inputs: &saved.entries,
+            },
+        )?;
         if let Some(Err(foreign)) = saved.state.map(|belief| mapper.restore(belief)) {
             tracing::warn!("{foreign}");
         }
@@ -59,6 +71,7 @@ impl Process for Shell {
                 .bus
                 .slice_writer(&topics::GRID, generation, mapper.frame().area())?,
             journal,
+            inputs,
             mapper,
             latest_range: None,
             last_keyframe: None,
@@ -78,7 +91,7 @@ impl Process for Shell {
             self.take(Input::Forget { epoch })?;
         }
         if self.grid.has_new_reader() {
-            self.publish_whole()?;
+            self.publish_again()?;
         }
         Ok(self.progress)
     }
@@ -86,6 +99,8 @@ impl Process for Shell {
     /// A belief that is wrong is wrong in its journal, too.
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
         let input = Input::Fault(fault);
+        self.inputs
+            .note(&Entry::Step(input, self.progress), self.progress)?;
         self.mapper.step(input, self.progress.time);
         self.journal.append(&input)?;
         Ok(true)
@@ -95,7 +110,7 @@ impl Process for Shell {
     fn idle(&mut self) -> Result<(), StageError> {
         let due = |last| self.progress.time.since(last) >= KEYFRAME_EVERY;
         if self.last_keyframe.is_none_or(due) {
-            self.publish_whole()?;
+            self.publish_again()?;
         }
         if self.journal.is_long() {
             self.journal.snapshot(self.mapper.state())?;
@@ -107,6 +122,8 @@ impl Process for Shell {
 impl Shell {
     /// Step, save what happened, publish what changed.
     fn take(&mut self, input: Input) -> Result<(), StageError> {
+        self.inputs
+            .note(&Entry::Step(input, self.progress), self.progress)?;
         let change = self.mapper.step(input, self.progress.time);
         if change == Change::None {
             return Ok(());
@@ -120,7 +137,7 @@ impl Shell {
                 let version = self.mapper.state().version();
                 self.publish(Part::of(self.mapper.frame(), window, version))
             }
-            Change::Whole => self.publish_whole(),
+            Change::Whole => self.publish(self.whole()),
             Change::None => Ok(()),
         }
     }
@@ -139,17 +156,24 @@ impl Shell {
         Ok(self.latest_range.filter(|range| range.stamp.tick == tick))
     }
 
-    fn publish_whole(&mut self) -> Result<(), StageError> {
-        self.last_keyframe = Some(self.progress.time);
-        let version = self.mapper.state().version();
-        self.publish(Part::whole(self.mapper.frame(), version))
+    /// Publish the whole map although nothing changed.
+    fn publish_again(&mut self) -> Result<(), StageError> {
+        self.inputs
+            .note(&Entry::Again(self.progress), self.progress)?;
+        self.publish(self.whole())
+    }
+
+    fn whole(&self) -> Part {
+        Part::whole(self.mapper.frame(), self.mapper.state().version())
     }
 
     fn publish(&mut self, part: Part) -> Result<(), StageError> {
         let Progress { tick, time } = self.progress;
-        let header = self.mapper.header(part);
-        let cells = self.mapper.state().cells();
-        let cells = self.mapper.frame().cells_of(part.window(), cells);
+        if part.is_keyframe() {
+            self.last_keyframe = Some(time);
+        }
+        let (header, cells) = sample_of(&self.mapper, part);
+        self.inputs.publish(self.progress)?;
         self.grid.publish(tick, time, header, cells)?;
         Ok(())
     }

@@ -20,11 +20,11 @@ const NICE: i32 = 10;
 
 /// What the thread is given.
 #[derive(Debug)]
-struct Order {
-    job: Job,
-    cancellation: Cancellation,
+pub(crate) struct Order {
+    pub(crate) job: Job,
+    pub(crate) cancellation: Cancellation,
     /// Do not start from the field before: whether that was finished is a matter of timing.
-    afresh: bool,
+    pub(crate) afresh: bool,
 }
 
 /// A solver on a thread of its own. Dropping it cancels what runs and waits for the thread.
@@ -120,13 +120,13 @@ impl BackgroundSolver {
 
 /// The thread's own: a solver with its set-up, and the field solved last, where the next one starts.
 #[derive(Default)]
-struct Worker {
+pub(crate) struct Worker {
     solver: Solver,
     last: Option<Field>,
 }
 
 impl Worker {
-    fn solve(&mut self, order: Order) -> Solved {
+    pub(crate) fn solve(&mut self, order: Order) -> Solved {
         let Order {
             job: Job { number, domain, .. },
             cancellation,

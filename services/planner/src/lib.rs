@@ -12,6 +12,7 @@ mod arcs;
 pub mod background_solver;
 mod fault;
 mod near_echoes;
+pub mod replay;
 pub mod shell;
 pub mod step;
 mod unheard_faces;

@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use common::{
-    bus::{Reader, SliceReader, SliceWriter, Writer},
+    bus::{Reader, SliceReader, SliceWriter, Writer, encode_slice},
     clock::{MissionClock, MissionTime},
     grid::Part,
+    inputs::InputLog,
     samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -16,6 +17,7 @@ use harmonic::SolveError;
 
 use crate::{
     background_solver::BackgroundSolver,
+    replay::{Entry, Taken},
     step::{Input, Planner, Solved, Work},
 };
 
@@ -28,6 +30,9 @@ pub struct Shell {
     field: SliceWriter<FieldHeader, FieldCell>,
     planner: Planner,
     background: BackgroundSolver,
+    inputs: InputLog,
+    /// A grid sample, encoded.
+    encoded: Vec<u8>,
     /// On a clock of ticks, the tick at which the job that runs is swapped in.
     swap_at: Option<u64>,
     in_ticks: bool,
@@ -64,6 +69,8 @@ impl Process for Shell {
                 .slice_writer(&topics::FIELD, generation, longest)?,
             planner: Planner::new(mission),
             background,
+            inputs: InputLog::begin(context, &())?,
+            encoded: Vec::new(),
             swap_at: None,
             in_ticks: matches!(context.run.clock, MissionClock::Ticks { .. }),
             latest_pose: None,
@@ -90,6 +97,7 @@ impl Process for Shell {
 
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
         let robot = self.latest_pose.unwrap_or_default().pose().position;
+        self.note(Taken::Fault(fault, robot))?;
         Ok(self.work(Input::Fault { fault, robot })?.changed())
     }
 
@@ -130,6 +138,11 @@ impl Shell {
         Ok(swapped)
     }
 
+    fn note(&mut self, taken: Taken<'_>) -> Result<(), StageError> {
+        let at = self.progress;
+        self.inputs.note(&Entry { taken, at }, at)
+    }
+
     /// An input that may change the field.
     fn work(&mut self, input: Input<'_>) -> Result<Work, StageError> {
         let outcome = self.planner.step(input, self.progress.time);
@@ -140,6 +153,7 @@ impl Shell {
 
     /// Begin the full solve that is called for, if one is.
     fn begin_background_solve(&mut self) -> Result<(), StageError> {
+        self.note(Taken::Lull)?;
         let outcome = self.planner.step(Input::Lull, self.progress.time);
         if let Some(job) = outcome.map_err(no_field)?.job {
             let (number, urgent) = (job.number, job.urgent);
@@ -152,6 +166,8 @@ impl Shell {
 
     fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
         let took_ns = solved.took_ns;
+        let cancelled = matches!(solved.result, Err(SolveError::Cancelled));
+        self.note(Taken::Solved(solved.number, cancelled))?;
         let swapped = self.work(Input::Solved(solved))? == Work::SwappedIn;
         if swapped {
             self.full_solve_ns = took_ns;
@@ -164,6 +180,11 @@ impl Shell {
         let mut asked = false;
         while let Some(grid) = self.grid.take()? {
             let GridHeader { stamp, part, .. } = *grid.header();
+            self.encoded.clear();
+            encode_slice(grid.header(), &grid, &mut self.encoded);
+            let at = self.progress;
+            let taken = Taken::Grid(&self.encoded);
+            self.inputs.note(&Entry { taken, at }, at)?;
             let began = Instant::now();
             let work = self.work(Input::Grid {
                 header: grid.header(),
@@ -204,13 +225,20 @@ impl Shell {
             return Ok(());
         };
         let Progress { tick, time } = self.progress;
+        let (full_solve_ns, local_update_ns) = (self.full_solve_ns, self.local_update_ns);
+        self.note(Taken::Pose {
+            pose,
+            full_solve_ns,
+            local_update_ns,
+        })?;
         let outcome = self.planner.step(Input::Pose(&pose), time);
         if let Some(guidance) = outcome.map_err(no_field)?.guidance {
             let guidance = GuidanceSample {
-                full_solve_ns: self.full_solve_ns,
-                local_update_ns: self.local_update_ns,
+                full_solve_ns,
+                local_update_ns,
                 ..guidance
             };
+            self.inputs.publish(self.progress)?;
             self.guidance.publish(tick, time, guidance)?;
         }
         self.answered = Some(tick);
@@ -256,6 +284,8 @@ impl Shell {
         };
         let header = FieldHeader { part, ..header };
         let Progress { tick, time } = self.progress;
+        self.note(Taken::Field(part))?;
+        self.inputs.publish(self.progress)?;
         let window = frame.cells_of(part.window(), &cells);
         self.field.publish(tick, time, header, window)?;
         self.published = cells;

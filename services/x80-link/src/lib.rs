@@ -25,6 +25,7 @@ pub mod lateness;
 pub mod obedience;
 pub mod odometry;
 pub mod presence;
+pub mod replay;
 pub mod restart;
 pub mod senses;
 pub mod shell;

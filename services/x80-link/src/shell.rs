@@ -1,12 +1,13 @@
 //! The wire, `command`, `directive` and `tick_limit` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
 use common::{
-    bus::{Reader, Writer},
+    bus::{Reader, SliceWriter, Writer},
     clock::{MissionClock, Pace, monotonic_ns},
+    inputs::InputLog,
     latency::Histogram,
     samples::{
         Cause, CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order,
-        PowerSample, RangeSample, SurroundingsSample, TickLimitSample, WheelSample,
+        PowerSample, RangeSample, SurroundingsSample, TickLimitSample, WheelSample, WireHeader,
     },
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -15,19 +16,12 @@ use common::{
 
 use crate::{
     failsafe::{self, Charge, Decision},
+    replay::{Carried, Entry, Taken, WIRE_PIECE},
     step::{Effect, Event, Input, Link, State},
     telemetry::BatteryChange,
     transport::{Transport, TransportError},
     writers::Writers,
 };
-
-/// The newest telemetry that is not published yet.
-#[derive(Debug, Default)]
-struct Pending {
-    infrared: Option<InfraredSample>,
-    power: Option<PowerSample>,
-    surroundings: Option<SurroundingsSample>,
-}
 
 /// Where it goes.
 #[derive(Debug)]
@@ -48,8 +42,10 @@ pub struct Shell {
     range: Writer<RangeSample>,
     wheels: Writer<WheelSample>,
     state: Writer<LinkSample>,
+    wire: SliceWriter<WireHeader, u8>,
+    inputs: InputLog,
     /// What nobody in the pipeline waits for: published when it has a lull.
-    pending: Pending,
+    carried: Carried,
     /// Opened once the link works.
     telemetry: Option<Telemetry>,
     clock: MissionClock,
@@ -57,7 +53,6 @@ pub struct Shell {
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
-    progress: Progress,
 }
 
 impl Process for Shell {
@@ -77,6 +72,7 @@ impl Process for Shell {
             },
             next_tick: context.generation.first_tick,
         };
+        let inputs = InputLog::begin(context, &state)?;
         link.restore(state)
             .map_err(|foreign| StageError::Other(foreign.to_string()))?;
         let mut command = context.bus.reader(&topics::COMMAND)?;
@@ -90,14 +86,17 @@ impl Process for Shell {
             range: context.bus.writer(&topics::RANGE, generation)?,
             wheels: context.bus.writer(&topics::WHEELS, generation)?,
             state: context.bus.writer(&topics::LINK, generation)?,
-            pending: Pending::default(),
+            wire: context
+                .bus
+                .slice_writer(&topics::WIRE, generation, WIRE_PIECE)?,
+            inputs,
+            carried: Carried::default(),
             telemetry: None,
             clock: run.clock,
             link,
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
-            progress: Progress::default(),
         })
     }
 
@@ -121,20 +120,26 @@ impl Process for Shell {
             let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
                 break;
             };
+            let now = self.clock.at(self.link.state().next_tick, now_ns);
+            let at = self.carried.progress;
+            let taken = Taken::Datagram(bytes);
+            let entry = Entry::Step(taken, now_ns, now);
+            self.inputs.note(&entry, at)?;
+            self.carried.received(bytes, now_ns);
             let input = Input {
                 event: Event::Datagram(bytes),
                 machine_ns: now_ns,
             };
-            let now = self.clock.at(self.link.state().next_tick, now_ns);
             let effects = self.link.step(input, now);
-            self.carry_out(effects)?;
+            self.carry_out(effects, now_ns)?;
         }
         self.tend()?;
         self.take(Event::Quiet, monotonic_ns())?;
         if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
             self.state()?;
         }
-        Ok(self.progress)
+        self.publish_wire()?;
+        Ok(self.carried.progress)
     }
 
     fn after_ready(&mut self, context: &Context) -> Result<(), StageError> {
@@ -151,23 +156,35 @@ impl Process for Shell {
         let Some(telemetry) = &mut self.telemetry else {
             return Ok(());
         };
-        let Progress { tick, time } = self.progress;
-        if let Some(infrared) = self.pending.infrared.take() {
+        let carried = &mut self.carried;
+        if !carried.has_telemetry() {
+            return Ok(());
+        }
+        self.inputs.note(&Entry::Telemetry, carried.progress)?;
+        self.inputs.publish(carried.progress)?;
+        let Progress { tick, time } = carried.progress;
+        if let Some(infrared) = carried.infrared.take() {
             telemetry.infrared.publish(tick, time, infrared)?;
         }
-        if let Some(power) = self.pending.power.take() {
+        if let Some(power) = carried.power.take() {
             telemetry.power.publish(tick, time, power)?;
         }
-        if let Some(surroundings) = self.pending.surroundings.take() {
+        if let Some(surroundings) = carried.surroundings.take() {
             telemetry.surroundings.publish(tick, time, surroundings)?;
         }
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), StageError> {
+        let machine_ns = monotonic_ns();
         for bytes in self.link.final_stops() {
             self.transport.send(&bytes).map_err(wire_broke)?;
+            self.carried.sent(&bytes, machine_ns);
         }
+        let at = self.carried.progress;
+        self.inputs.note(&Entry::Stop(machine_ns), at)?;
+        self.inputs.publish(at)?;
+        self.publish_wire()?;
         tracing::info!("stop sent to the robot");
         Ok(())
     }
@@ -224,21 +241,44 @@ impl Shell {
 
     fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
         let now = self.clock.at(self.link.state().next_tick, machine_ns);
+        let entry = Entry::Step(Taken::of(&event), machine_ns, now);
+        self.inputs.note(&entry, self.carried.progress)?;
         let effects = self.link.step(Input { event, machine_ns }, now);
-        self.carry_out(effects)
+        self.carry_out(effects, machine_ns)
     }
 
-    fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
+    /// Publish the bytes that came and went, once nobody waits.
+    fn publish_wire(&mut self) -> Result<(), StageError> {
+        if self.carried.wire.is_empty() {
+            return Ok(());
+        }
+        self.inputs.publish(self.carried.progress)?;
+        for (at, header, bytes) in self.carried.wire.drain(..) {
+            for piece in bytes.chunks(WIRE_PIECE) {
+                self.wire
+                    .publish_quietly(at.tick, at.time, header, piece.iter().copied())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn carry_out(&mut self, effects: Vec<Effect>, machine_ns: u64) -> Result<(), StageError> {
+        if !effects.is_empty() {
+            self.inputs.publish(self.carried.progress)?;
+        }
         for effect in effects {
             match effect {
-                Effect::Send(bytes) => self.transport.send(&bytes).map_err(wire_broke)?,
+                Effect::Send(bytes) => {
+                    self.transport.send(&bytes).map_err(wire_broke)?;
+                    self.carried.sent(&bytes, machine_ns);
+                }
                 Effect::Tick {
                     tick,
                     time,
                     range,
                     wheels,
                 } => {
-                    self.progress = Progress { tick, time };
+                    self.carried.progress = Progress { tick, time };
                     self.range.publish(tick, time, range)?;
                     self.wheels.publish(tick, time, wheels)?;
                 }
@@ -283,9 +323,9 @@ impl Shell {
                 Effect::AskedForStreams => {
                     tracing::info!("the robot is asked for its streams again");
                 }
-                Effect::Infrared(sample) => self.pending.infrared = Some(sample),
-                Effect::Power(sample) => self.pending.power = Some(sample),
-                Effect::Surroundings(sample) => self.pending.surroundings = Some(sample),
+                Effect::Infrared(sample) => self.carried.infrared = Some(sample),
+                Effect::Power(sample) => self.carried.power = Some(sample),
+                Effect::Surroundings(sample) => self.carried.surroundings = Some(sample),
                 Effect::Battery(change) => log_battery(&change),
             }
         }
@@ -335,7 +375,7 @@ impl Shell {
             latency_histogram: *self.latency.counts(),
             ..LinkSample::default()
         };
-        let Progress { tick, time } = self.progress;
+        let Progress { tick, time } = self.carried.progress;
         self.state.publish(tick, time, sample)?;
         Ok(())
     }

@@ -10,6 +10,7 @@
 //! | `schedule` | which stage gets which signal when, seeded |
 //! | `mission` | one mission, undisturbed and attacked |
 //! | `attack`, `subscriptions` | the attacker of one mission; what it reads from the bus |
+//! | `replays` | the missions' recordings, replayed |
 //! | `resources`, `leftovers` | what a process holds; what outlived a mission |
 //! | [`Report`] | the result of all missions |
 //! | [`robot_fault`] | THE table of the ways in which a robot lies to its link |
@@ -26,6 +27,7 @@ mod liar;
 mod mission;
 mod options;
 mod proxy;
+mod replays;
 mod report;
 mod resources;
 pub mod robot_fault;

@@ -32,11 +32,15 @@ pub(crate) fn command(
     seed: u64,
     pace: &str,
     out: &Path,
+    records: bool,
 ) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
     command.args(["--robot", &options.robot.to_string()]);
     command.args(["--seed", &seed.to_string(), "--out"]);
     command.arg(out);
+    if !records {
+        command.arg("--no-record");
+    }
     for setting in &options.set {
         command.args(["--set", setting]);
     }
@@ -44,9 +48,12 @@ pub(crate) fn command(
 }
 
 /// Go on with the run whose supervisor was hit.
-fn resume(directory: &Path) -> Result<Command, ChaosError> {
+fn resume(directory: &Path, records: bool) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
+    if !records {
+        command.arg("--no-record");
+    }
     child(command, directory)
 }
 
@@ -69,7 +76,7 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
 /// The summary of the mission without an attack, to compare with.
 pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
     let directory = options.directory.join("undisturbed");
-    let output = command(options, seed, "max", &directory)?
+    let output = command(options, seed, "max", &directory, false)?
         .output()
         .map_err(system("start a mission"))?;
     fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
@@ -92,7 +99,13 @@ pub(crate) fn attack(
         .supervisor
         .then(|| robot(options, seed, &files.join("robot")))
         .transpose()?;
-    let mut start = command(options, seed, &options.pace.to_string(), &directory)?;
+    let mut start = command(
+        options,
+        seed,
+        &options.pace.to_string(),
+        &directory,
+        options.replay,
+    )?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
@@ -112,7 +125,7 @@ pub(crate) fn attack(
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
-        start = resume(&directory)?;
+        start = resume(&directory, options.replay)?;
     };
     let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
     let kills = report.kills() - before;
@@ -136,7 +149,11 @@ pub(crate) fn attack(
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - number(undisturbed, "pose_error_m");
     }
-    if report.add_mission(&end) {
+    let mut right = report.add_mission(&end);
+    if options.replay {
+        right &= report.replays().add(seed, &directory);
+    }
+    if right {
         fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
     }
     Ok(())

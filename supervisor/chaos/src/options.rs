@@ -27,6 +27,8 @@ pub struct Options {
     pub supervisor: bool,
     /// Whether some hits freeze supervisor and stages together, as a machine does that stands still for a moment.
     pub freeze_all: bool,
+    /// Whether missions are recorded, and every generation of every stage replayed.
+    pub replay: bool,
     /// Where the run directories go; emptied mission by mission.
     pub directory: PathBuf,
 }

@@ -9,7 +9,7 @@ use std::{
 use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
-use crate::{resources::Resources, schedule::Kind};
+use crate::{replays::Replays, resources::Resources, schedule::Kind};
 use supervisor::stages::TABLE;
 
 /// What is hit where supervisor and stages are frozen together.
@@ -39,6 +39,9 @@ pub struct Report {
     pub leftovers: usize,
     /// The most that a supervisor held more at its end than when its robot began to drive.
     supervisor_growth: Resources,
+    /// What became of the missions' recordings, if they were replayed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    replays: Option<Replays>,
     took_s: f64,
     #[serde(skip)]
     began: Instant,
@@ -87,6 +90,7 @@ impl Report {
             longest_stopping_time_s: 0.0,
             leftovers: 0,
             supervisor_growth: Resources::default(),
+            replays: None,
             took_s: 0.0,
             began: Instant::now(),
         }
@@ -151,6 +155,11 @@ impl Report {
         self.wrong.len() == before
     }
 
+    /// What becomes of the missions' recordings.
+    pub(crate) fn replays(&mut self) -> &mut Replays {
+        self.replays.get_or_insert_default()
+    }
+
     /// A supervisor held `first` when its robot began to drive, and `last` at its end.
     pub fn add_growth(&mut self, first: Resources, last: Resources) {
         let most = &mut self.supervisor_growth;
@@ -164,7 +173,8 @@ impl Report {
 
     /// Whether every mission reached the target without a touch and knew its pose. The files of one that did not stay.
     pub fn is_right(&self) -> bool {
-        self.wrong.is_empty()
+        let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
+        self.wrong.is_empty() && replayed
     }
 
     /// Whether every mission did, and left nothing behind.
@@ -273,6 +283,10 @@ impl fmt::Display for Report {
         writeln!(
             to,
             "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"
-        )
+        )?;
+        match &self.replays {
+            Some(replays) => write!(to, "{replays}"),
+            None => Ok(()),
+        }
     }
 }

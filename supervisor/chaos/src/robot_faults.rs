@@ -104,7 +104,7 @@ fn start(
     robot: SocketAddr,
     directory: &Path,
 ) -> Result<Process, ChaosError> {
-    let mut start = mission::command(options, seed, "1", directory)?;
+    let mut start = mission::command(options, seed, "1", directory, false)?;
     start.args(["--set", &format!("robot.address='udp://{robot}'")]);
     Process::spawn(start).map_err(system("start a mission"))
 }

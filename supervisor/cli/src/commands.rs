@@ -30,9 +30,13 @@ pub(crate) mod missions;
 pub(crate) mod operate;
 pub(crate) mod other_user;
 mod python;
+pub(crate) mod record;
+#[cfg(feature = "tools")]
+pub(crate) mod replay;
 #[cfg(feature = "tools")]
 pub(crate) mod replay_log;
 pub(crate) mod run;
+mod run_recorder;
 pub(crate) mod runs;
 #[cfg(feature = "simulator")]
 pub(crate) mod sim;

@@ -24,10 +24,12 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 #[cfg(feature = "simulator")]
 use commands::sim;
 #[cfg(feature = "tools")]
-use commands::{chaos, command_line, evaluate, experiments, field, latency, replay_log, top};
+use commands::{
+    chaos, command_line, evaluate, experiments, field, latency, replay, replay_log, top,
+};
 use commands::{
     check, echo, exit_code, fault, help, hz, install, list, logs, missions, operate, other_user,
-    run, runs, stage, status, tables,
+    record, run, runs, stage, status, tables,
 };
 
 /// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
@@ -63,6 +65,11 @@ enum Command {
     Experiments(experiments::Arguments),
     #[cfg(feature = "tools")]
     ReplayLog(replay_log::Arguments),
+    Record(record::Arguments),
+    #[cfg(feature = "tools")]
+    Replay(replay::Arguments),
+    #[cfg(feature = "tools")]
+    Diff(replay::Diff),
     Status(status::Arguments),
     #[cfg(feature = "tools")]
     Top(top::Arguments),
@@ -136,6 +143,11 @@ fn main() -> ExitCode {
         Command::Experiments(arguments) => experiments::main(&arguments),
         #[cfg(feature = "tools")]
         Command::ReplayLog(arguments) => replay_log::main(&arguments),
+        Command::Record(arguments) => record::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Replay(arguments) => replay::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Diff(arguments) => replay::diff(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Top(arguments) => top::main(&arguments),

@@ -21,8 +21,9 @@ use crate::{
     orphans,
 };
 
-/// Shared memory that the topics of small structs take, measured, and as much again.
-const SMALL_TOPICS_BYTES: u64 = 16 << 20;
+/// Shared memory that the topics of small structs take, measured, and as much again; and what a recorder that is
+/// frozen keeps from being used again: a page or more for each piece of `inputs` of five stages, and grids.
+const SMALL_TOPICS_BYTES: u64 = (16 << 20) + (32 << 20);
 /// Shared memory a cell of the map takes: a byte in `grid` and twelve in `field`, in each of the samples
 /// that are under way at once when readers keep up.
 const CELL_BYTES: u64 = 8 * 13;
@@ -179,6 +180,7 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // Without a configuration no process can join.
     remove_file(&domain.middleware_config())?;
     remove_file(&domain.run_link())?;
+    remove_file(&domain.run_directory())?;
     let directory = domain.directory();
     let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
     for entry in configs.flatten() {

@@ -46,9 +46,11 @@ pub struct Finished {
     pub resets: u64,
 }
 
-/// Carry out a run. `show` is called a few times a second.
+/// Carry out a run. `attach` is called once, when the robot's bus is there and no stage has started: for consumers that are
+/// to miss nothing. `show` is called a few times a second.
 pub fn run(
     options: &Options,
+    attach: &mut dyn FnMut(),
     show: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<Finished, SupervisorError> {
     let mut signals =
@@ -58,7 +60,7 @@ pub fn run(
     last_resort::watch(heard, turns.clone());
     let domain = Domain::of(options.robot.clone());
     let mut lock = DomainLock::acquire(domain, options.mission.grid_frame().area())?;
-    let mut supervisor = Supervisor::start(options, &lock, turns.clone())?;
+    let mut supervisor = Supervisor::start(options, &lock, turns.clone(), attach)?;
     let ending = loop {
         match supervisor.drive(&mut signals, show) {
             Ok(Some(ending)) => break Ok(ending),

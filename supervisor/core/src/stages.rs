@@ -6,11 +6,12 @@ use std::{path::Path, time::Duration};
 
 use common::{
     mission::Mission,
+    replay::Begin,
     shell::run_stage,
     start::{StageError, Start},
     topics::{
         AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
-        SURROUNDINGS, TICK_LIMIT, WHEELS,
+        SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
 };
 
@@ -32,6 +33,8 @@ pub struct Stage {
     pub while_down: &'static str,
     /// What its process does.
     pub run: fn(&Start) -> Result<(), StageError>,
+    /// Replays a generation of it.
+    pub replay: Begin,
 }
 
 /// How long a stage may take.
@@ -99,11 +102,20 @@ pub static TABLE: [Stage; 5] = [
         name: "x80-link",
         inputs: &[&DIRECTIVE, &TICK_LIMIT],
         feedback: &[&COMMAND],
-        outputs: &[&RANGE, &WHEELS, &LINK, &INFRARED, &POWER, &SURROUNDINGS],
+        outputs: &[
+            &RANGE,
+            &WHEELS,
+            &LINK,
+            &INFRARED,
+            &POWER,
+            &SURROUNDINGS,
+            &WIRE,
+        ],
         deadlines: DEADLINES,
         per_million_cells: Duration::ZERO,
         while_down: "stands when its timed command ends",
         run: run_stage::<x80_link::shell::Shell>,
+        replay: x80_link::replay::begin,
     },
     Stage {
         name: "dead-reckoning",
@@ -114,6 +126,7 @@ pub static TABLE: [Stage; 5] = [
         per_million_cells: Duration::ZERO,
         while_down: "stopped by the link when the command is stale",
         run: run_stage::<dead_reckoning::shell::Shell>,
+        replay: dead_reckoning::replay::begin,
     },
     Stage {
         name: "mapper",
@@ -124,6 +137,7 @@ pub static TABLE: [Stage; 5] = [
         per_million_cells: MAPPER_MILLION_CELLS,
         while_down: "stopped by the link when the command is stale",
         run: run_stage::<mapper::shell::Shell>,
+        replay: mapper::replay::begin,
     },
     Stage {
         name: PLANNER,
@@ -134,6 +148,7 @@ pub static TABLE: [Stage; 5] = [
         per_million_cells: PLANNER_MILLION_CELLS,
         while_down: "stopped by the link when the command is stale",
         run: run_stage::<planner::shell::Shell>,
+        replay: planner::replay::begin,
     },
     Stage {
         name: "controller",
@@ -144,6 +159,7 @@ pub static TABLE: [Stage; 5] = [
         per_million_cells: Duration::ZERO,
         while_down: "stopped by the link when the command is stale",
         run: run_stage::<controller::shell::Shell>,
+        replay: controller::replay::begin,
     },
 ];
 

@@ -113,6 +113,7 @@ impl<'a> Supervisor<'a> {
         options: &'a Options,
         lock: &DomainLock,
         turns: Turns,
+        attach: &mut dyn FnMut(),
     ) -> Result<Self, SupervisorError> {
         let directory = &options.directory;
         let mission = &options.mission;
@@ -157,6 +158,9 @@ impl<'a> Supervisor<'a> {
             turns,
             service: ServiceManager::of_environment(),
         };
+        let link = Domain::of(options.robot.clone()).run_directory();
+        symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
+        attach();
         supervisor.publish_state()?;
         supervisor.stages.start_all(supervisor.first_tick());
         if options.starter == Starter::External {

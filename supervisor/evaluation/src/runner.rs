@@ -236,7 +236,7 @@ fn mission(
     } = job;
     let own = std::process::id();
     let directory = plan.directory.join(format!("run-{worker}"));
-    let mut command = firsthand(&["run", "--json"]);
+    let mut command = firsthand(&["run", "--json", "--no-record"]);
     command.arg(plan.mission_file(trial));
     command.args(["--robot", &format!("evaluate{own}-{worker}")]);
     command.args(["--seed", &seed.to_string(), "--parent", &own.to_string()]);

@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals: as a machine that stands still.
     #[arg(long)]
     freeze_all: bool,
+    /// Record the missions, and replay every generation of every stage: it must be bit-equal.
+    #[arg(long)]
+    replay: bool,
     /// Mission time, R times wall-clock.
     #[arg(long, default_value = "4")]
     pace: Pace,
@@ -164,6 +167,7 @@ fn options(
         seed: arguments.seed,
         startup: arguments.include_startup,
         freeze_all: arguments.freeze_all,
+        replay: arguments.replay,
         directory,
     })
 }

@@ -38,6 +38,7 @@ static GUIDE: &[Page] = guide! {
     "at-the-prompt",
     "attach",
     "deploy",
+    "recordings",
     "break-it",
     "field-tool",
     "evaluate-worlds",

@@ -29,6 +29,9 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Record the missions meanwhile, as `run` does.
+    #[arg(long)]
+    record: bool,
     /// One line of JSON.
     #[arg(long)]
     json: bool,
@@ -129,6 +132,9 @@ fn measure_ticks(arguments: &Arguments, robot: &RobotName) -> Result<Ticks, Fail
     let (robot, pace) = (robot.to_string(), arguments.pace.to_string());
     let mut command = process::firsthand(&["run", &arguments.mission, "--json", "--pace", &pace]);
     command.args(["--robot", &robot, "--out"]).arg(&directory);
+    if !arguments.record {
+        command.arg("--no-record");
+    }
     for setting in &arguments.set {
         command.args(["--set", setting]);
     }

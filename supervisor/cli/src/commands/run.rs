@@ -6,7 +6,7 @@ use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
 use console::robots::SUPERVISOR_LOG;
 
-use super::{Failure, directories, missions, print_text};
+use super::{Failure, directories, missions, print_text, run_recorder::RunRecorder};
 #[cfg(feature = "tools")]
 use crate::run_picture;
 use crate::{
@@ -66,6 +66,9 @@ pub(crate) struct Arguments {
     /// Start no stages: systemd does, or you do, with `firsthand stage NAME --robot R`.
     #[arg(long)]
     watch_only: bool,
+    /// Record nothing; else everything but fields goes into recording.mcap in the run's directory.
+    #[arg(long)]
+    no_record: bool,
     /// End with one line of JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -187,7 +190,19 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let summary_file = prepare(&options).inspect_err(|_| made_for_nothing())?;
     let mut console = Console::new(&options);
-    let finished = match supervisor::run(&options, &mut |progress| console.show(progress)) {
+    let mut recorder = None;
+    let mut attach = || {
+        if !arguments.no_record {
+            recorder = RunRecorder::start(&options);
+        }
+    };
+    let ran = supervisor::run(&options, &mut attach, &mut |progress| {
+        console.show(progress);
+    });
+    if let Some(recorder) = recorder {
+        recorder.end();
+    }
+    let finished = match ran {
         Ok(finished) => finished,
         Err(error) => {
             made_for_nothing();

@@ -5,7 +5,7 @@ use std::{fmt::Write as _, process::ExitCode};
 use clap::Args;
 use common::{
     faults,
-    topics::{self, AnyTopic, Rate},
+    topics::{self, AnyTopic, Logged, Rate},
 };
 use x80_link::failsafe;
 
@@ -58,8 +58,9 @@ pub(crate) fn faults(_: &FaultArguments) -> Result<ExitCode, Failure> {
 
 /// The topics as a Markdown table.
 fn topic_table() -> String {
-    let mut table =
-        String::from("| topic | payload | written by | rate | meaning |\n|---|---|---|---|---|\n");
+    let mut table = String::from(
+        "| topic | payload | written by | rate | logged | meaning |\n|---|---|---|---|---|---|\n",
+    );
     for topic in topics::TABLE {
         let spec = topic.spec();
         let rate = match spec.rate {
@@ -80,10 +81,14 @@ fn topic_table() -> String {
                 )
             }
         };
+        let logged = match spec.logged {
+            Logged::Yes => "yes",
+            Logged::WithFields => "with `--fields`",
+        };
         // Writing to a String cannot fail.
         let _ = writeln!(
             table,
-            "| `{}` | `{}` | {} | {rate} | {} |",
+            "| `{}` | `{}` | {} | {rate} | {logged} | {} |",
             spec.name,
             topic.payload(),
             spec.writer,

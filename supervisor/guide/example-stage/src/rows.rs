@@ -7,7 +7,7 @@
 use common::{
     bus::{Topic, ZeroCopySend},
     samples::{Stamp, Stamped},
-    topics::{Limits, Rate, Spec},
+    topics::{Limits, Logged, Rate, Spec},
 };
 
 /// Topic `distance`: how far the robot has driven.
@@ -38,5 +38,6 @@ pub static DISTANCE: Topic<DistanceSample> = Topic::new(&Spec {
     writer: "odometer",
     rate: Rate::EachTick,
     limits: Limits::SMALL,
+    logged: Logged::Yes,
     meaning: "Metres driven and seconds in motion.",
 });

@@ -1,0 +1,74 @@
+//! How a payload is written outside shared memory: the little-endian CDR of ROS 2 (OMG DDS-XTYPES 1.3, XCDR version 1), for
+//! which every reader of recordings has a decoder. Numbers are aligned to their own size, counted from the first byte
+//! after the header; structs and arrays have no bytes of their own; a slice begins with its length, a `u32`.
+
+/// Before every message: little-endian CDR, no options.
+pub const HEADER: [u8; 4] = [0, 1, 0, 0];
+
+/// Writes numbers one after another.
+#[derive(Debug)]
+pub struct Encoder<'a> {
+    bytes: &'a mut Vec<u8>,
+    origin: usize,
+}
+
+impl<'a> Encoder<'a> {
+    /// Append a message to `bytes`.
+    pub fn new(bytes: &'a mut Vec<u8>) -> Self {
+        bytes.extend_from_slice(&HEADER);
+        let origin = bytes.len();
+        Self { bytes, origin }
+    }
+
+    /// A number of N bytes.
+    pub(super) fn number<const N: usize>(&mut self, number: [u8; N]) {
+        let past = (self.bytes.len() - self.origin) % N;
+        if past != 0 {
+            self.bytes.extend_from_slice(&[0; 8][..N - past]);
+        }
+        self.bytes.extend_from_slice(&number);
+    }
+
+    pub(super) fn bytes(&mut self, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+    }
+}
+
+/// Reads numbers one after another. What is too short gives none.
+#[derive(Clone, Debug)]
+pub struct Decoder<'a> {
+    rest: &'a [u8],
+    length: usize,
+}
+
+impl<'a> Decoder<'a> {
+    /// Of a message; none if it is not of this encoding.
+    #[must_use]
+    pub fn new(message: &'a [u8]) -> Option<Self> {
+        let rest = message.strip_prefix(&HEADER)?;
+        Some(Self {
+            rest,
+            length: rest.len(),
+        })
+    }
+
+    /// A number of N bytes.
+    pub(super) fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let past = (self.length - self.rest.len()) % N;
+        let padding = if past == 0 { 0 } else { N - past };
+        let (number, rest) = self.rest.get(padding..)?.split_first_chunk()?;
+        self.rest = rest;
+        Some(*number)
+    }
+
+    pub(super) fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (bytes, rest) = self.rest.split_at_checked(count)?;
+        self.rest = rest;
+        Some(bytes)
+    }
+
+    /// Bytes that are left.
+    pub(super) const fn left(&self) -> usize {
+        self.rest.len()
+    }
+}

@@ -1,0 +1,117 @@
+//! What a replay drives instead of a process: a stage's step, fed with the inputs of one generation, giving what that
+//! generation must have published.
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::{
+    bus::{Layout, SliceTopic, Stamp, Stamped, Topic, encode_sample, encode_slice},
+    clock::MissionTime,
+    run::Run,
+    topics::AnyTopic as _,
+};
+
+/// A sample that a generation published, or must have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// On which topic.
+    pub topic: &'static str,
+    /// The sample as a message of its own (see [`crate::bus::cdr`]), the stamp's generation and sequence 0.
+    pub message: Vec<u8>,
+}
+
+impl Output {
+    /// `sample` of `topic`, published for `tick` at mission `time`.
+    #[must_use]
+    pub fn of<P: Stamped + Layout>(
+        topic: &Topic<P>,
+        tick: u64,
+        time: MissionTime,
+        mut sample: P,
+    ) -> Self
+    where
+        Topic<P>: crate::topics::AnyTopic,
+    {
+        *sample.stamp_mut() = stamp(tick, time);
+        let mut message = Vec::new();
+        encode_sample(&sample, &mut message);
+        let topic = topic.spec().name;
+        Self { topic, message }
+    }
+
+    /// `header` with `slice` of `topic`, published for `tick` at mission `time`.
+    #[must_use]
+    pub fn of_slice<H: Stamped + Layout, T: Layout>(
+        topic: &SliceTopic<H, T>,
+        tick: u64,
+        time: MissionTime,
+        mut header: H,
+        slice: &[T],
+    ) -> Self
+    where
+        SliceTopic<H, T>: crate::topics::AnyTopic,
+    {
+        *header.stamp_mut() = stamp(tick, time);
+        let mut message = Vec::new();
+        encode_slice(&header, slice, &mut message);
+        let topic = topic.spec().name;
+        Self { topic, message }
+    }
+}
+
+const fn stamp(tick: u64, time: MissionTime) -> Stamp {
+    Stamp {
+        tick,
+        stamp_ns: time.0,
+        generation: 0,
+        sequence: 0,
+    }
+}
+
+/// An entry of a generation's inputs cannot be taken.
+#[derive(Debug, Error)]
+pub enum ReplayError {
+    /// It is not of this program.
+    #[error("not an entry of this version of the stage ({0}); replay with the version that ran")]
+    Foreign(#[from] postcard::Error),
+    /// It holds another sample than it should.
+    #[error("an entry holds no sample of topic {0:?}; replay with the version that ran")]
+    Sample(&'static str),
+}
+
+/// One generation of a stage, replayed.
+pub trait Replay {
+    /// Take the body of the next entry of its inputs. Gives what the process published because of it, in order.
+    ///
+    /// # Errors
+    /// When it is not an entry of this stage.
+    fn take(&mut self, entry: &[u8]) -> Result<Vec<Output>, ReplayError>;
+
+    /// The entry in words, for a reader who looks for what went in.
+    ///
+    /// # Errors
+    /// When it is not an entry of this stage.
+    fn describe(&self, entry: &[u8]) -> Result<String, ReplayError>;
+}
+
+/// What the replay of a generation begins with.
+#[derive(Clone, Copy, Debug)]
+pub struct Beginning<'a> {
+    /// The run.
+    pub run: &'a Run,
+    /// The body of the first entry of its inputs.
+    pub start: &'a [u8],
+    /// Whether `field` samples are compared: they take longer than all else.
+    pub fields: bool,
+}
+
+/// Begins the replay of a generation of one stage.
+pub type Begin = fn(Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError>;
+
+/// The body of an entry.
+///
+/// # Errors
+/// When it is another.
+pub fn entry<'a, E: Deserialize<'a>>(body: &'a [u8]) -> Result<E, ReplayError> {
+    Ok(postcard::from_bytes(body)?)
+}

@@ -1,0 +1,169 @@
+//! The planner without its process: the same step, fed with what it took. The jobs of the background solver are solved
+//! again: where each starts from follows from the order of the entries.
+
+use std::collections::VecDeque;
+
+use common::{
+    bus::decode_slice,
+    grid::Part,
+    inputs,
+    replay::{Beginning, Output, Replay, ReplayError, entry},
+    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+    shell::Progress,
+    step::Step as _,
+    topics,
+};
+use glam::DVec2;
+use harmonic::{Cancellation, SolveError};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    background_solver::{Order, Worker},
+    step::{Input, Outcome, Planner, Solved},
+};
+
+/// What the planner does, and at which tick.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Entry<'a> {
+    /// What.
+    #[serde(borrow)]
+    pub taken: Taken<'a>,
+    /// The tick that it is at.
+    pub at: Progress,
+}
+
+/// What the planner does.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Taken<'a> {
+    /// The step takes a sample of `grid`, a message of its own here.
+    Grid(#[serde(with = "serde_bytes")] &'a [u8]),
+    /// The step takes the pose of the tick.
+    Pose {
+        /// The pose.
+        #[serde(with = "inputs::sample")]
+        pose: PoseSample,
+        /// What `guidance` says besides what the step gives: wall-clock of the last full solve, nanoseconds.
+        full_solve_ns: u64,
+        /// Likewise of the last local update.
+        local_update_ns: u64,
+    },
+    /// The step is asked for a job.
+    Lull,
+    /// The step takes the result of the job with this number; whether that was cancelled.
+    Solved(u64, bool),
+    /// The step takes a fault for the robot here, metres.
+    Fault(FaultKind, DVec2),
+    /// This part of the policy is published.
+    Field(#[serde(with = "inputs::sample")] Part),
+}
+
+struct Generation {
+    planner: Planner,
+    worker: Worker,
+    /// Begun, and their results not taken yet, oldest first.
+    jobs: VecDeque<Order>,
+    fields: bool,
+}
+
+/// Begin the replay of a generation.
+///
+/// # Errors
+/// Those of [`common::replay::Begin`].
+pub fn begin(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
+    Ok(Box::new(Generation {
+        planner: Planner::new(&beginning.run.mission),
+        worker: Worker::default(),
+        jobs: VecDeque::new(),
+        fields: beginning.fields,
+    }))
+}
+
+impl Generation {
+    /// The result of job `number`, as the background solver gave it.
+    fn solved(&mut self, number: u64, cancelled: bool) -> Solved {
+        let none = Solved {
+            number,
+            result: Err(SolveError::Cancelled),
+            took_ns: 0,
+        };
+        // Results come in the order of the jobs.
+        while let Some(order) = self.jobs.pop_front() {
+            if order.job.number == number {
+                if cancelled {
+                    order.cancellation.cancel();
+                }
+                return self.worker.solve(order);
+            }
+        }
+        none
+    }
+
+    fn field(&self, part: Part, at: Progress) -> Option<Output> {
+        let (header, frame, cells) = self.planner.policy().filter(|_| self.fields)?;
+        let header = FieldHeader { part, ..header };
+        let window: Vec<_> = frame.cells_of(part.window(), &cells).collect();
+        let (tick, time) = (at.tick, at.time);
+        let topic = &topics::FIELD;
+        Some(Output::of_slice(topic, tick, time, header, &window))
+    }
+}
+
+impl Replay for Generation {
+    fn take(&mut self, body: &[u8]) -> Result<Vec<Output>, ReplayError> {
+        let Entry { taken, at } = entry(body)?;
+        let Progress { tick, time } = at;
+        let outcome = match taken {
+            Taken::Grid(message) => {
+                let Some((header, cells)) = decode_slice::<GridHeader, u8>(message) else {
+                    return Err(ReplayError::Sample("grid"));
+                };
+                let (header, cells) = (&header, &cells[..]);
+                self.planner.step(Input::Grid { header, cells }, time)
+            }
+            Taken::Pose {
+                pose,
+                full_solve_ns,
+                local_update_ns,
+            } => {
+                let outcome = self.planner.step(Input::Pose(&pose), time);
+                let guidance = outcome.ok().and_then(|outcome| outcome.guidance);
+                let published = guidance.map(|guidance| {
+                    let guidance = GuidanceSample {
+                        full_solve_ns,
+                        local_update_ns,
+                        ..guidance
+                    };
+                    Output::of(&topics::GUIDANCE, tick, time, guidance)
+                });
+                return Ok(published.into_iter().collect());
+            }
+            Taken::Lull => self.planner.step(Input::Lull, time),
+            Taken::Solved(number, cancelled) => {
+                let solved = self.solved(number, cancelled);
+                self.planner.step(Input::Solved(solved), time)
+            }
+            Taken::Fault(fault, robot) => self.planner.step(Input::Fault { fault, robot }, time),
+            Taken::Field(part) => return Ok(self.field(part, at).into_iter().collect()),
+        };
+        // Where there is no field the process ended.
+        if let Ok(Outcome { job: Some(job), .. }) = outcome {
+            self.jobs.push_back(Order {
+                job,
+                cancellation: Cancellation::new(),
+                afresh: !self.jobs.is_empty(),
+            });
+        }
+        Ok(Vec::new())
+    }
+
+    fn describe(&self, body: &[u8]) -> Result<String, ReplayError> {
+        let Entry { taken, at } = entry(body)?;
+        Ok(match taken {
+            Taken::Grid(message) => match decode_slice::<GridHeader, u8>(message) {
+                Some((GridHeader { stamp, part, .. }, _)) => format!("Grid {stamp:?} {part:?}"),
+                None => return Err(ReplayError::Sample("grid")),
+            },
+            taken => format!("{taken:?} {at:?}"),
+        })
+    }
+}

@@ -1,0 +1,73 @@
+//! `firsthand record`: everything on a robot's bus into a file.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::Args;
+use common::{
+    domain::{Domain, RobotName},
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+    topics::{self, AnyTopic},
+};
+use recording::{Options, recorder::Happened};
+
+use super::{Failure, print_text};
+use crate::progress_line::write_stderr;
+
+/// Record what a robot's processes publish, from run to run, until Ctrl-C. `run` starts one by itself.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Name of the robot; it need not run yet.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// The file; the robot's next run goes into F-2.mcap beside it.
+    #[arg(long, value_name = "F.mcap", default_value = "recording.mcap")]
+    out: PathBuf,
+    /// Only these topics, by their names and with commas between: `pose,range`. A replay needs `inputs`.
+    #[arg(long, value_name = "TOPICS", value_delimiter = ',')]
+    topics: Option<Vec<String>>,
+    /// Fields, too: they are larger than all else together.
+    #[arg(long)]
+    fields: bool,
+    /// The directory of the one run to record.
+    #[arg(long, hide = true)]
+    run_directory: Option<PathBuf>,
+}
+
+fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
+    let found = topics::TABLE.iter().find(|topic| topic.spec().name == name);
+    found.copied().ok_or_else(|| {
+        format!("no topic is called {name:?}; `firsthand topics` prints the table of topics")
+    })
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let chosen = arguments.topics.as_ref();
+    let chosen = chosen.map(|names| names.iter().map(|name| topic(name)).collect());
+    let options = Options {
+        domain: Domain::of(arguments.robot.clone()),
+        out: arguments.out.clone(),
+        topics: chosen.transpose()?,
+        fields: arguments.fields,
+        run: arguments.run_directory.clone(),
+    };
+    let tell = |happened: Happened<'_>| {
+        let said = match happened {
+            Happened::Attached(file) => print_text(&format!(
+                "recording {} into {}\n",
+                arguments.robot,
+                file.display()
+            )),
+            Happened::Complete(file, lost) => print_text(&format!(
+                "{}: complete, {lost} samples lost\n",
+                file.display()
+            )),
+        };
+        if let Err(error) = said {
+            write_stderr(&format!("firsthand: cannot say so: {error}\n"));
+        }
+    };
+    let mut tell = tell;
+    recording::record(&options, &mut || signals.came(), &mut tell)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,199 @@
+//! Writing the file.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    fs::{self, File},
+    io::{self, BufWriter},
+    path::{Path, PathBuf},
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
+
+use common::{
+    bus::Stamp,
+    topics::{AnyTopic, Spec},
+};
+use mcap::{
+    Compression, WriteOptions, Writer,
+    records::{MessageHeader, Metadata},
+};
+
+use crate::{error::RecordingError, foxglove, schema};
+
+/// A chunk is written when it has so many bytes, and [`CHUNK_EVERY`].
+const CHUNK_BYTES: u64 = 1 << 19;
+/// What a recorder that is killed loses at most.
+const CHUNK_EVERY: Duration = Duration::from_secs(1);
+/// The name of the metadata record that says what was recorded.
+pub(crate) const RUN: &str = "run";
+
+/// A recording that is written.
+pub(crate) struct RecordingFile {
+    writer: Writer<BufWriter<File>>,
+    path: PathBuf,
+    channels: HashMap<&'static str, u16>,
+    /// Nanoseconds since 1970.
+    began_ns: u64,
+    chunk_began: Instant,
+}
+
+/// Nanoseconds since 1970.
+pub(crate) fn now_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| since.as_nanos() as u64)
+}
+
+impl RecordingFile {
+    /// Make the file, which must not exist, `about` a run, with a channel for each of `topics`. It gets its name when all of that
+    /// is written: whatever is called so can be read.
+    pub(crate) fn create(
+        path: &Path,
+        topics: &[&'static dyn AnyTopic],
+        about: BTreeMap<String, String>,
+    ) -> Result<Self, RecordingError> {
+        let named = |source| RecordingError::File {
+            action: "make",
+            file: path.to_path_buf(),
+            source,
+        };
+        if path.exists() {
+            return Err(named(io::ErrorKind::AlreadyExists.into()));
+        }
+        let mut unfinished = path.as_os_str().to_owned();
+        unfinished.push(".new");
+        let file = File::create(&unfinished).map_err(named)?;
+        let options = WriteOptions::new()
+            .profile("")
+            .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Lz4))
+            .chunk_size(Some(CHUNK_BYTES))
+            // A chunk is written in one piece when it is whole, and never touched again.
+            .disable_seeking(true);
+        let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
+        let mut recording = Self {
+            writer,
+            path: path.to_path_buf(),
+            channels: HashMap::new(),
+            began_ns: now_ns(),
+            chunk_began: Instant::now(),
+        };
+        for topic in topics {
+            let schema::Schema { name, text } = schema::of(*topic);
+            let spec = topic.spec();
+            let about = BTreeMap::from([
+                ("writer".to_owned(), spec.writer.to_owned()),
+                ("meaning".to_owned(), spec.meaning.trim().to_owned()),
+            ]);
+            recording.add(spec.name, &name, "ros2msg", &text, "cdr", &about)?;
+        }
+        for &(topic, name) in foxglove::CHANNELS {
+            let schema = foxglove::schema(name);
+            recording.add(topic, name, "jsonschema", &schema, "json", &BTreeMap::new())?;
+        }
+        recording.metadata(about)?;
+        fs::rename(&unfinished, path).map_err(named)?;
+        Ok(recording)
+    }
+
+    fn add(
+        &mut self,
+        topic: &'static str,
+        schema: &str,
+        language: &str,
+        text: &str,
+        encoding: &str,
+        about: &BTreeMap<String, String>,
+    ) -> Result<(), RecordingError> {
+        let failed = failed(&self.path);
+        let schema = self.writer.add_schema(schema, language, text.as_bytes());
+        let added =
+            schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, about));
+        self.channels.insert(topic, added.map_err(failed)?);
+        Ok(())
+    }
+
+    /// Keep `message`, a sample of a topic.
+    pub(crate) fn sample(
+        &mut self,
+        spec: &Spec,
+        stamp: &Stamp,
+        message: &[u8],
+    ) -> Result<(), RecordingError> {
+        let published = self.began_ns.saturating_add(stamp.stamp_ns);
+        self.write(spec.name, stamp.sequence, published, message)
+    }
+
+    /// Keep `json`, of mission time `stamp_ns` if it has one.
+    pub(crate) fn json(
+        &mut self,
+        topic: &'static str,
+        stamp_ns: Option<u64>,
+        json: &serde_json::Value,
+    ) -> Result<(), RecordingError> {
+        let published = stamp_ns.map_or_else(now_ns, |stamp| self.began_ns.saturating_add(stamp));
+        self.write(topic, 0, published, json.to_string().as_bytes())
+    }
+
+    /// When mission time was 0, as publish times have it, nanoseconds since 1970.
+    pub(crate) const fn began_ns(&self) -> u64 {
+        self.began_ns
+    }
+
+    fn write(
+        &mut self,
+        topic: &'static str,
+        sequence: u32,
+        publish_time: u64,
+        message: &[u8],
+    ) -> Result<(), RecordingError> {
+        // A topic that was not asked for.
+        let Some(&channel_id) = self.channels.get(topic) else {
+            return Ok(());
+        };
+        let header = MessageHeader {
+            channel_id,
+            sequence,
+            log_time: now_ns(),
+            publish_time,
+        };
+        let written = self.writer.write_to_known_channel(&header, message);
+        written.map_err(failed(&self.path))
+    }
+
+    /// Say what is recorded.
+    fn metadata(&mut self, metadata: BTreeMap<String, String>) -> Result<(), RecordingError> {
+        let name = RUN.to_owned();
+        let record = Metadata { name, metadata };
+        let written = self.writer.write_metadata(&record);
+        written.map_err(failed(&self.path))?;
+        self.flush()
+    }
+
+    /// Write what came, if that was not done for [`CHUNK_EVERY`].
+    pub(crate) fn flush_if_due(&mut self) -> Result<(), RecordingError> {
+        if self.chunk_began.elapsed() >= CHUNK_EVERY {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), RecordingError> {
+        self.chunk_began = Instant::now();
+        self.writer.flush().map_err(failed(&self.path))
+    }
+
+    /// Write the rest, and the summary by which readers find their way.
+    pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
+        self.writer.finish().map(drop).map_err(failed(&self.path))
+    }
+}
+
+fn failed(path: &Path) -> impl FnOnce(mcap::McapError) -> RecordingError + use<> {
+    let file = path.to_path_buf();
+    move |error| {
+        let problem = match error {
+            mcap::McapError::Io(error) => error.to_string(),
+            other => other.to_string(),
+        };
+        RecordingError::Write { file, problem }
+    }
+}

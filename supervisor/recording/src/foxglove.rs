@@ -1,0 +1,286 @@
+//! What viewers draw, in Foxglove's schemas as JSON (<https://docs.foxglove.dev/docs/sdk/schemas>): the pose, the safety map,
+//! the sonar's cone with the trajectory, log lines.
+
+use common::{
+    bus::{decode_sample, decode_slice},
+    grid::Replica,
+    kinematics::Pose2,
+    mission::Mission,
+    samples::{GridHeader, PoseSample, RangeSample, RangeStatus},
+    topics::{self, AnyTopic as _},
+};
+use serde_json::{Value, json};
+
+/// Channels and their schemas.
+pub(crate) const CHANNELS: &[(&str, &str)] = &[
+    ("foxglove/pose", "foxglove.PoseInFrame"),
+    ("foxglove/grid", "foxglove.Grid"),
+    ("foxglove/scene", "foxglove.SceneUpdate"),
+    ("log", "foxglove.Log"),
+    ("recorder", "firsthand.Recorder"),
+];
+
+/// The frame of the mission: all coordinates are in it.
+const FRAME: &str = "mission";
+/// Mission time between scenes and between maps, nanoseconds.
+const EVERY_NS: u64 = 1_000_000_000;
+/// Points of the trajectory that are drawn; of a longer one every second, fourth ... is.
+const TRAJECTORY: usize = 1000;
+
+/// Viewers know the schemas by their names; what each is made of is published at the address above.
+pub(crate) fn schema(name: &str) -> String {
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": name,
+        "type": "object",
+    })
+    .to_string()
+}
+
+/// What has been seen so far.
+pub(crate) struct Drawn {
+    mission: Option<Mission>,
+    grid: Replica<u8>,
+    grid_ns: Option<u64>,
+    scene_ns: Option<u64>,
+    pose: Pose2,
+    trajectory: Vec<[f64; 2]>,
+    /// Every so manyth pose is kept.
+    stride: usize,
+    poses: usize,
+}
+
+/// A message: channel, mission time, content.
+type Drawing = (&'static str, u64, Value);
+
+impl Drawn {
+    pub(crate) fn new(mission: Option<Mission>) -> Self {
+        Self {
+            mission,
+            grid: Replica::default(),
+            grid_ns: None,
+            scene_ns: None,
+            pose: Pose2::default(),
+            trajectory: Vec::new(),
+            stride: 1,
+            poses: 0,
+        }
+    }
+
+    /// What is drawn because of a `message` of `topic`; mission time 0 is `began_ns` since 1970.
+    pub(crate) fn take(&mut self, topic: &str, message: &[u8], began_ns: u64) -> Option<Drawing> {
+        if topic == topics::POSE.spec().name {
+            return Some(self.pose(&decode_sample(message)?, began_ns));
+        }
+        if topic == topics::RANGE.spec().name {
+            return self.scene(&decode_sample(message)?, began_ns);
+        }
+        if topic == topics::GRID.spec().name {
+            let (header, cells) = decode_slice(message)?;
+            return self.grid(&header, &cells, began_ns);
+        }
+        None
+    }
+
+    fn pose(&mut self, sample: &PoseSample, began_ns: u64) -> Drawing {
+        self.pose = sample.pose();
+        if self.poses.is_multiple_of(self.stride) {
+            self.trajectory.push([sample.x_m, sample.y_m]);
+        }
+        self.poses += 1;
+        if self.trajectory.len() >= TRAJECTORY {
+            let mut index = 0;
+            self.trajectory.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+            self.stride *= 2;
+        }
+        let stamp_ns = sample.stamp.stamp_ns;
+        let pose = json!({
+            "timestamp": time(began_ns + stamp_ns),
+            "frame_id": FRAME,
+            "pose": pose(sample.x_m, sample.y_m, sample.heading_rad),
+        });
+        ("foxglove/pose", stamp_ns, pose)
+    }
+
+    fn grid(&mut self, header: &GridHeader, cells: &[u8], began_ns: u64) -> Option<Drawing> {
+        let _ = self.grid.apply(&header.part, cells);
+        let stamp_ns = header.stamp.stamp_ns;
+        let frame = self.grid.frame()?;
+        if !is_due(&mut self.grid_ns, stamp_ns) {
+            return None;
+        }
+        let side = frame.resolution_m;
+        let half = f64::from(frame.cells / 2) * side + side / 2.0;
+        let grid = json!({
+            "timestamp": time(began_ns + stamp_ns),
+            "frame_id": FRAME,
+            "pose": pose(frame.centre.x - half, frame.centre.y - half, 0.0),
+            "column_count": frame.cells,
+            "cell_size": {"x": side, "y": side},
+            "row_stride": frame.cells,
+            "cell_stride": 1,
+            // 1: UINT8, a `CellState`.
+            "fields": [{"name": "state", "offset": 0, "type": 1}],
+            "data": base64(self.grid.cells()),
+        });
+        Some(("foxglove/grid", stamp_ns, grid))
+    }
+
+    fn scene(&mut self, range: &RangeSample, began_ns: u64) -> Option<Drawing> {
+        let stamp_ns = range.stamp.stamp_ns;
+        if !is_due(&mut self.scene_ns, stamp_ns) {
+            return None;
+        }
+        let entity = |id: &str, points: Vec<[f64; 2]>, [r, g, b]: [f64; 3]| {
+            let points: Vec<_> = points
+                .iter()
+                .map(|[x, y]| json!({"x": x, "y": y, "z": 0.0}))
+                .collect();
+            json!({
+                "timestamp": time(began_ns + stamp_ns),
+                "frame_id": FRAME,
+                "id": id,
+                "lifetime": {"sec": 0, "nsec": 0},
+                "frame_locked": false,
+                // 0: LINE_STRIP, a pixel and a half wide.
+                "lines": [{
+                    "type": 0,
+                    "pose": pose(0.0, 0.0, 0.0),
+                    "thickness": 1.5,
+                    "scale_invariant": true,
+                    "points": points,
+                    "color": {"r": r, "g": g, "b": b, "a": 1.0},
+                }],
+            })
+        };
+        let mut entities = vec![entity(
+            "trajectory",
+            self.trajectory.clone(),
+            [0.0, 0.3, 0.8],
+        )];
+        if let Some(mission) = &self.mission {
+            let cone = cone(mission, self.pose, range);
+            entities.push(entity("sonar", cone, [0.9, 0.5, 0.0]));
+        }
+        let scene = json!({"deletions": [], "entities": entities});
+        Some(("foxglove/scene", stamp_ns, scene))
+    }
+}
+
+/// The outline of what the front sonar saw: from the sensor to both ends of the arc, and along it.
+fn cone(mission: &Mission, robot: Pose2, range: &RangeSample) -> Vec<[f64; 2]> {
+    /// Half the angle in which the data sheet promises echoes, degrees.
+    const HALF_CONE_DEG: f64 = 15.0;
+    /// Pieces of the arc.
+    const PIECES: i32 = 8;
+    let mount = mission.sonar.mount();
+    let at = mount.on(robot);
+    let reach = match RangeStatus::from_byte(range.status) {
+        RangeStatus::Measured => range.range_m,
+        _ => 0.0,
+    };
+    let half = HALF_CONE_DEG.to_radians();
+    let arc = (-PIECES / 2..=PIECES / 2).map(|piece| {
+        let bearing = at.heading + half * 2.0 * f64::from(piece) / f64::from(PIECES);
+        [
+            at.position.x + reach * bearing.cos(),
+            at.position.y + reach * bearing.sin(),
+        ]
+    });
+    let sensor = [at.position.x, at.position.y];
+    [sensor].into_iter().chain(arc).chain([sensor]).collect()
+}
+
+/// A line of the log of `process`, now.
+pub(crate) fn log(process: &str, line: &str, now_ns: u64) -> Value {
+    // The numbers of foxglove.LogLevel; lines without a level say why a process ended.
+    let level = ["DEBUG", "INFO", "WARN", "ERROR"]
+        .iter()
+        .position(|level| line.split_whitespace().take(3).any(|word| word == *level));
+    json!({
+        "timestamp": time(now_ns),
+        "level": level.map_or(4, |level| level + 1),
+        "message": line,
+        "name": process,
+        "file": "",
+        "line": 0,
+    })
+}
+
+fn is_due(last: &mut Option<u64>, now: u64) -> bool {
+    let due = last.is_none_or(|last| now.saturating_sub(last) >= EVERY_NS || now < last);
+    if due {
+        *last = Some(now);
+    }
+    due
+}
+
+fn time(ns: u64) -> Value {
+    json!({"sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000})
+}
+
+fn pose(x: f64, y: f64, heading: f64) -> Value {
+    let (sin, cos) = (heading / 2.0).sin_cos();
+    json!({
+        "position": {"x": x, "y": y, "z": 0.0},
+        "orientation": {"x": 0.0, "y": 0.0, "z": sin, "w": cos},
+    })
+}
+
+/// As JSON carries bytes (RFC 4648).
+fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let [a, b, c] = [0, 1, 2].map(|index| u32::from(three.get(index).copied().unwrap_or(0)));
+        let bits = a << 16 | b << 8 | c;
+        for digit in 0..4 {
+            let past_the_end = digit > three.len();
+            let index = (bits >> (18 - 6 * digit)) as usize & 63;
+            text.push(if past_the_end {
+                '='
+            } else {
+                char::from(ALPHABET[index])
+            });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_written_as_rfc_4648_has_them() {
+        let of = |text: &str| base64(text.as_bytes());
+        assert_eq!(of(""), "");
+        assert_eq!(of("f"), "Zg==");
+        assert_eq!(of("fo"), "Zm8=");
+        assert_eq!(of("foo"), "Zm9v");
+        assert_eq!(of("foobar"), "Zm9vYmFy");
+    }
+
+    #[test]
+    fn a_long_trajectory_is_thinned_and_stays_bounded() {
+        let mut drawn = Drawn::new(None);
+        for tick in 0..10_000_u64 {
+            let mut sample = PoseSample::default();
+            sample.x_m = tick as f64;
+            drawn.pose(&sample, 0);
+            assert!(drawn.trajectory.len() < TRAJECTORY);
+        }
+        assert!(drawn.trajectory.len() > TRAJECTORY / 4);
+        assert!(drawn.trajectory.last().unwrap()[0] > 9_900.0);
+    }
+
+    #[test]
+    fn a_log_line_has_the_level_it_names() {
+        let level = |line: &str| log("mapper", line, 0)["level"].as_u64();
+        assert_eq!(level("12.5  WARN missed a grid version"), Some(3));
+        assert_eq!(level("mapper: cannot open"), Some(4));
+    }
+}

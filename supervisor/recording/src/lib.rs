@@ -1,0 +1,66 @@
+//! Recordings: everything on a robot's bus in one file, written by a consumer like any other, read by reports and replays.
+//!
+//! # The file
+//! MCAP, in chunks compressed with LZ4; each chunk is written whole, at least once a second. A recorder that is killed
+//! leaves a file that ends after its last whole chunk.
+//!
+//! - A channel for each topic of the table that its column `logged` names, under the topic's name. A message is one
+//!   sample, whole, in the CDR encoding of ROS 2; its schema is the text of a ROS 2 message (`ros2msg`), made from the
+//!   topic's layout. Of a topic of slices a message is the `header` and its `elements`.
+//! - Channels for viewers, in Foxglove's schemas as JSON: `foxglove/pose` (`foxglove.PoseInFrame`), `foxglove/grid`
+//!   (`foxglove.Grid`), `foxglove/scene` (`foxglove.SceneUpdate`: the sonar's cone and the trajectory), `log`
+//!   (`foxglove.Log`: what the stages and the supervisor wrote into their logs).
+//! - A channel `recorder` (JSON): how many samples of each topic the recorder lost so far, whenever that grows.
+//! - A metadata record `run`: robot, mission, seed, build, machine, and `run_toml`, the run as its stages were given it.
+//!
+//! The log time of a message is when the recorder took it, nanoseconds since 1970. The publish time is the start of
+//! the recording plus the sample's mission time. The sequence of a message is its sample's.
+//!
+//! A new run of the robot begins a new file: `F.mcap`, `F-2.mcap`.
+//!
+//! # Reading
+//! ```no_run
+//! use common::topics;
+//! use recording::{End, Recording};
+//!
+//! let recording = Recording::open("recording.mcap".as_ref())?;
+//! println!("{} with seed {}", recording.run().mission.name, recording.run().mission.seed);
+//! if let End::Cut { after, problem } = recording.end() {
+//!     println!("cut off after {:.1} s: {problem}", after.as_secs_f64());
+//! }
+//! for pose in recording.samples(&topics::POSE)? {
+//!     let pose = pose?;
+//!     println!("{:.3} {:.3}", pose.sample.x_m, pose.sample.y_m);
+//! }
+//! for grid in recording.slices(&topics::GRID)? {
+//!     let grid = grid?;
+//!     println!("version {}: {} cells", grid.header.part.version, grid.elements.len());
+//! }
+//! # Ok::<(), recording::RecordingError>(())
+//! ```
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`schema`] | the schema of a topic, made from its layout |
+//! | `file` | writing the file |
+//! | `foxglove` | what viewers draw |
+//! | `log_files` | lines that the processes of a run append to their logs |
+//! | `losses` | which samples did not come |
+//! | [`recorder`] | the consumer |
+//! | [`reader`] | reading the file |
+//! | `error` | what can go wrong |
+
+mod error;
+mod file;
+mod foxglove;
+mod log_files;
+mod losses;
+pub mod reader;
+pub mod recorder;
+pub mod schema;
+
+pub use self::{
+    error::RecordingError,
+    reader::{End, Message, Recording, Sample, SliceSample},
+    recorder::{Options, record},
+};

@@ -1,0 +1,114 @@
+//! Lines that the processes of a run append to their logs, in the run directory.
+
+use std::{
+    collections::HashMap,
+    fs::{self, File},
+    io::Read as _,
+    os::unix::fs::FileExt as _,
+    path::{Path, PathBuf},
+};
+
+/// Bytes that are taken of one log at once.
+const AT_ONCE: usize = 1 << 16;
+
+/// Follows the logs of one run.
+#[derive(Debug)]
+pub(crate) struct LogFiles {
+    directory: PathBuf,
+    /// How far each was read, and the line that is not whole yet.
+    read: HashMap<PathBuf, (u64, Vec<u8>)>,
+}
+
+impl LogFiles {
+    /// From their beginning, or only what is appended from now on.
+    pub(crate) fn follow(directory: &Path, from_the_beginning: bool) -> Self {
+        let mut files = Self {
+            directory: directory.to_path_buf(),
+            read: HashMap::new(),
+        };
+        if !from_the_beginning {
+            for file in files.files() {
+                let length = file.metadata().map_or(0, |file| file.len());
+                files.read.insert(file, (length, Vec::new()));
+            }
+        }
+        files
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let entries = fs::read_dir(&self.directory)
+            .into_iter()
+            .flatten()
+            .flatten();
+        let files = entries.map(|entry| entry.path());
+        files
+            .filter(|file| file.extension().is_some_and(|extension| extension == "log"))
+            .collect()
+    }
+
+    /// Give `each` the process and the text of every line that was appended. What cannot be read now is tried again.
+    pub(crate) fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
+        for file in self.files() {
+            let process = file
+                .file_stem()
+                .map(|name| name.to_string_lossy().into_owned());
+            let (at, partial) = self.read.entry(file.clone()).or_default();
+            let Ok(log) = File::open(&file) else {
+                continue;
+            };
+            let mut bytes = vec![0; AT_ONCE];
+            let Ok(length) = log.read_at(&mut bytes, *at) else {
+                continue;
+            };
+            *at += length as u64;
+            partial.extend_from_slice(&bytes[..length]);
+            let whole = partial.iter().rposition(|&byte| byte == b'\n');
+            let Some(whole) = whole.or((partial.len() > AT_ONCE).then(|| partial.len() - 1)) else {
+                continue;
+            };
+            let lines: Vec<u8> = partial.drain(..=whole).collect();
+            for line in String::from_utf8_lossy(&lines).lines() {
+                each(process.as_deref().unwrap_or_default(), line);
+            }
+        }
+    }
+}
+
+/// The text of `file`; what is longer than `most` bytes is cut off.
+pub(crate) fn text(file: &Path, most: u64) -> Option<String> {
+    let mut text = String::new();
+    File::open(file)
+        .ok()?
+        .take(most)
+        .read_to_string(&mut text)
+        .ok()?;
+    Some(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write as _;
+
+    #[test]
+    fn each_whole_line_is_given_once() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("mapper.log");
+        let mut log = File::options()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .unwrap();
+        let mut files = LogFiles::follow(directory.path(), true);
+        let mut take = || {
+            let mut lines = Vec::new();
+            files.take(&mut |process, line| lines.push(format!("{process}: {line}")));
+            lines
+        };
+        log.write_all(b"one\ntw").unwrap();
+        assert_eq!(take(), ["mapper: one"]);
+        log.write_all(b"o\n").unwrap();
+        assert_eq!(take(), ["mapper: two"]);
+        assert!(take().is_empty());
+    }
+}

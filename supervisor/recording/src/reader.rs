@@ -1,0 +1,426 @@
+//! Reading the file. It is outside: nothing in it is believed, and no more is held than one chunk.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, BufReader, Read as _},
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use common::{
+    bus::{Layout, Payload, SliceTopic, Stamped, Topic, decode_sample, decode_slice},
+    run::Run,
+    topics::AnyTopic,
+};
+use mcap::{
+    McapError,
+    records::{MessageHeader, Record},
+    sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
+};
+
+use crate::{error::RecordingError, file::RUN};
+
+/// No record or chunk of ours is longer, bytes.
+const LONGEST_RECORD: usize = 1 << 28;
+
+/// How a file ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// As its recorder meant it.
+    Complete,
+    /// Its recorder was killed, or its disk was full: it ends after the last whole chunk.
+    Cut {
+        /// From the first message to the last that is there.
+        after: Duration,
+        /// What is wrong with what follows.
+        problem: String,
+    },
+}
+
+/// A recording: of one run, or a part of one.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    path: PathBuf,
+    about: BTreeMap<String, String>,
+    run: Run,
+    end: End,
+    counts: BTreeMap<String, u64>,
+    lost: BTreeMap<String, u64>,
+    bounds: Option<(u64, u64)>,
+}
+
+/// A message of any topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Its topic.
+    pub topic: Arc<str>,
+    /// When the recorder took it, nanoseconds since 1970.
+    pub log_ns: u64,
+    /// The number of the sample among those of its writer.
+    pub sequence: u32,
+    /// In the topic's encoding.
+    pub data: Vec<u8>,
+}
+
+/// A sample of a topic of structs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<P> {
+    /// When the recorder took it, nanoseconds since 1970.
+    pub log_ns: u64,
+    /// The sample.
+    pub sample: P,
+}
+
+/// A sample of a topic of slices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SliceSample<H, T> {
+    /// When the recorder took it, nanoseconds since 1970.
+    pub log_ns: u64,
+    /// The header.
+    pub header: H,
+    /// The slice.
+    pub elements: Vec<T>,
+}
+
+impl Recording {
+    /// Read what `path` says of itself, and how it ends: all of it is read once, and none is held.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is no recording of a run.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let mut records = Records::open(path)?;
+        let mut about = None;
+        let mut counts = BTreeMap::new();
+        let mut lost = BTreeMap::new();
+        let mut bounds: Option<(u64, u64)> = None;
+        let problem = loop {
+            match records.next() {
+                Ok(Some(Found::Metadata(name, entries))) if name == RUN => {
+                    about.get_or_insert(entries);
+                }
+                Ok(Some(Found::Metadata(..))) => {}
+                Ok(Some(Found::Message(header, data))) => {
+                    let topic = records.topic(&header)?;
+                    if &*topic == "recorder" {
+                        lost = losses(&data).unwrap_or(lost);
+                    }
+                    *counts.entry(topic.to_string()).or_default() += 1;
+                    let time = header.log_time;
+                    let (from, to) = bounds.unwrap_or((time, time));
+                    bounds = Some((from.min(time), to.max(time)));
+                }
+                Ok(None) => break None,
+                Err(Stop::Cut(problem)) => break Some(problem),
+                Err(Stop::Error(error)) => return Err(error),
+            }
+        };
+        let foreign = |problem: String| RecordingError::Foreign {
+            file: path.to_path_buf(),
+            problem,
+        };
+        let Some(about) = about else {
+            let problem =
+                problem.unwrap_or_else(|| "it does not say of which run it is".to_owned());
+            return Err(foreign(problem));
+        };
+        let run = about.get("run_toml").map_or("", String::as_str);
+        let run = toml::from_str(run)
+            .map_err(|error| foreign(format!("its run is unknown: {}", error.message())))?;
+        let after = bounds.map_or(0, |(from, to)| to - from);
+        Ok(Self {
+            path: path.to_path_buf(),
+            about,
+            run,
+            end: problem.map_or(End::Complete, |problem| End::Cut {
+                after: Duration::from_nanos(after),
+                problem,
+            }),
+            counts,
+            lost,
+            bounds,
+        })
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The run, as its stages were given it: mission, clock, robot.
+    #[must_use]
+    pub const fn run(&self) -> &Run {
+        &self.run
+    }
+
+    /// The run as TOML.
+    #[must_use]
+    pub fn run_text(&self) -> &str {
+        self.about("run_toml")
+    }
+
+    /// Which build recorded it.
+    #[must_use]
+    pub fn build(&self) -> &str {
+        self.about("build")
+    }
+
+    /// On which machine.
+    #[must_use]
+    pub fn machine(&self) -> &str {
+        self.about("machine")
+    }
+
+    fn about(&self, key: &str) -> &str {
+        self.about.get(key).map_or("", String::as_str)
+    }
+
+    /// How it ends.
+    #[must_use]
+    pub const fn end(&self) -> &End {
+        &self.end
+    }
+
+    /// Messages of each topic.
+    #[must_use]
+    pub const fn counts(&self) -> &BTreeMap<String, u64> {
+        &self.counts
+    }
+
+    /// Samples of each topic that the recorder says it lost.
+    #[must_use]
+    pub const fn lost(&self) -> &BTreeMap<String, u64> {
+        &self.lost
+    }
+
+    /// When the first and the last message were taken, nanoseconds since 1970; none without messages.
+    #[must_use]
+    pub const fn bounds_ns(&self) -> Option<(u64, u64)> {
+        self.bounds
+    }
+
+    /// The messages of the topics that `wanted` names, in the order of the file; all without names. They end where the file
+    /// is cut.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn messages(&self, wanted: &[&str]) -> Result<Messages, RecordingError> {
+        Ok(Messages {
+            records: Some(Records::open(&self.path)?),
+            wanted: wanted.iter().map(|&topic| topic.to_owned()).collect(),
+        })
+    }
+
+    /// The samples of `topic`, in the order of the file.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn samples<P: Payload + Stamped + Layout>(
+        &self,
+        topic: &'static Topic<P>,
+    ) -> Result<impl Iterator<Item = Result<Sample<P>, RecordingError>> + use<P>, RecordingError>
+    {
+        let file = self.path.clone();
+        let messages = self.messages(&[topic.spec().name])?;
+        Ok(messages.map(move |message| {
+            let Message {
+                log_ns,
+                data,
+                topic,
+                ..
+            } = message?;
+            let sample = decode_sample(&data).ok_or_else(|| foreign(&file, &topic))?;
+            Ok(Sample { log_ns, sample })
+        }))
+    }
+
+    /// The headers and slices of `topic`, in the order of the file.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn slices<H: Payload + Stamped + Layout, T: Payload + Layout>(
+        &self,
+        topic: &'static SliceTopic<H, T>,
+    ) -> Result<
+        impl Iterator<Item = Result<SliceSample<H, T>, RecordingError>> + use<H, T>,
+        RecordingError,
+    > {
+        let file = self.path.clone();
+        let messages = self.messages(&[topic.spec().name])?;
+        Ok(messages.map(move |message| {
+            let Message {
+                log_ns,
+                data,
+                topic,
+                ..
+            } = message?;
+            let decoded = decode_slice(&data).ok_or_else(|| foreign(&file, &topic))?;
+            let (header, elements) = decoded;
+            Ok(SliceSample {
+                log_ns,
+                header,
+                elements,
+            })
+        }))
+    }
+}
+
+fn foreign(file: &Path, topic: &str) -> RecordingError {
+    RecordingError::Message {
+        file: file.to_path_buf(),
+        topic: topic.to_owned(),
+    }
+}
+
+/// What a message of the recorder itself says.
+fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
+    #[derive(serde::Deserialize)]
+    struct Recorder {
+        lost: BTreeMap<String, u64>,
+    }
+    let recorder: Recorder = serde_json::from_slice(message).ok()?;
+    Some(recorder.lost)
+}
+
+/// The messages of some topics, in the order of the file.
+#[derive(Debug)]
+pub struct Messages {
+    /// None once all were given.
+    records: Option<Records>,
+    wanted: Vec<String>,
+}
+
+impl Iterator for Messages {
+    type Item = Result<Message, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let records = self.records.as_mut()?;
+            match records.next() {
+                Ok(Some(Found::Message(header, data))) => match records.topic(&header) {
+                    Ok(topic) => {
+                        let wanted = &self.wanted;
+                        if wanted.is_empty() || wanted.iter().any(|name| **name == *topic) {
+                            return Some(Ok(Message {
+                                topic,
+                                log_ns: header.log_time,
+                                sequence: header.sequence,
+                                data,
+                            }));
+                        }
+                    }
+                    Err(error) => {
+                        self.records = None;
+                        return Some(Err(error));
+                    }
+                },
+                Ok(Some(Found::Metadata(..))) => {}
+                Ok(None) | Err(Stop::Cut(_)) => self.records = None,
+                Err(Stop::Error(error)) => {
+                    self.records = None;
+                    return Some(Err(error));
+                }
+            }
+        }
+    }
+}
+
+/// What is read of a file.
+enum Found {
+    Metadata(String, BTreeMap<String, String>),
+    Message(MessageHeader, Vec<u8>),
+}
+
+/// Why reading ends before the end.
+enum Stop {
+    /// Nothing after this is whole.
+    Cut(String),
+    Error(RecordingError),
+}
+
+/// The records of a file, one after another.
+struct Records {
+    path: PathBuf,
+    file: BufReader<File>,
+    reader: LinearReader,
+    channels: BTreeMap<u16, Arc<str>>,
+}
+
+impl std::fmt::Debug for Records {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        to.debug_struct("Records")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Records {
+    fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::open(path).map_err(|source| RecordingError::File {
+            action: "read",
+            file: path.to_path_buf(),
+            source,
+        })?;
+        // Nothing of a chunk is believed before all of it was checked.
+        let options = LinearReaderOptions::default()
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LONGEST_RECORD);
+        Ok(Self {
+            path: path.to_path_buf(),
+            file: BufReader::new(file),
+            reader: LinearReader::new_with_options(options),
+            channels: BTreeMap::new(),
+        })
+    }
+
+    fn topic(&self, header: &MessageHeader) -> Result<Arc<str>, RecordingError> {
+        let known = self.channels.get(&header.channel_id).cloned();
+        known.ok_or_else(|| RecordingError::Foreign {
+            file: self.path.clone(),
+            problem: format!("channel {} is not declared", header.channel_id),
+        })
+    }
+
+    /// The next record that matters; none at the end of a complete file.
+    fn next(&mut self) -> Result<Option<Found>, Stop> {
+        while let Some(event) = self.reader.next_event() {
+            let cut = |error: McapError| Stop::Cut(error.to_string());
+            match event.map_err(cut)? {
+                LinearReadEvent::ReadRequest(length) => {
+                    let buffer = self.reader.insert(length);
+                    let read = loop {
+                        match self.file.read(buffer) {
+                            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                            read => break read,
+                        }
+                    };
+                    let read = read.map_err(|source| {
+                        Stop::Error(RecordingError::File {
+                            action: "read",
+                            file: self.path.clone(),
+                            source,
+                        })
+                    })?;
+                    self.reader.notify_read(read);
+                }
+                LinearReadEvent::Record { data, opcode } => {
+                    match mcap::parse_record(opcode, data).map_err(cut)? {
+                        Record::Channel(channel) => {
+                            self.channels.insert(channel.id, channel.topic.into());
+                        }
+                        Record::Metadata(found) => {
+                            return Ok(Some(Found::Metadata(found.name, found.metadata)));
+                        }
+                        Record::Message { header, data } => {
+                            return Ok(Some(Found::Message(header, data.into_owned())));
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+}

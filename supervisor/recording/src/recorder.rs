@@ -1,0 +1,323 @@
+//! The consumer: attaches to a robot at any time, keeps what is published, follows the robot from run to run.
+//!
+//! It holds nothing but the chunk that is written next: when the disk is slow or the machine busy, samples that no longer
+//! fit in the bus's buffers are lost to it and counted, and no stage waits.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, BusError, EncodedReader, Logged},
+    domain::Domain,
+    follower::{Follower, News},
+    run::{self, Run},
+    topics::{self, AnyTopic},
+};
+
+use crate::{
+    error::RecordingError,
+    file::{RecordingFile, now_ns},
+    foxglove::{self, Drawn},
+    log_files::{self, LogFiles},
+    losses::Losses,
+};
+
+/// Samples come at least so often to the recorder, whatever wakes it.
+const POLL: Duration = Duration::from_millis(10);
+/// How often logs are looked at.
+const LOGS_EVERY: Duration = Duration::from_millis(250);
+/// No run file is longer, bytes.
+const LONGEST_RUN_FILE: u64 = 1 << 24;
+/// Niceness of the process: stages that answer the robot go first.
+const NICE: i32 = 5;
+
+/// What to record, and where.
+#[derive(Clone)]
+pub struct Options {
+    /// The robot.
+    pub domain: Domain,
+    /// The file; that of the robot's next run is called `F-2.mcap`.
+    pub out: PathBuf,
+    /// The topics; none for those that the table logs.
+    pub topics: Option<Vec<&'static dyn AnyTopic>>,
+    /// Whether topics that are logged with fields are kept, too.
+    pub fields: bool,
+    /// The directory of the one run that is recorded; none to find it, and to follow the robot from run to run.
+    pub run: Option<PathBuf>,
+}
+
+impl Options {
+    fn topics(&self) -> Vec<&'static dyn AnyTopic> {
+        let logged = |topic: &&&'static dyn AnyTopic| match topic.spec().logged {
+            Logged::Yes => true,
+            Logged::WithFields => self.fields,
+        };
+        match &self.topics {
+            Some(topics) => topics.clone(),
+            None => topics::TABLE.iter().filter(logged).copied().collect(),
+        }
+    }
+}
+
+/// What happens, for who started the recorder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Happened<'a> {
+    /// It is attached, and nothing from now on is missed; into this file.
+    Attached(&'a Path),
+    /// A file is complete; so many samples were lost to it.
+    Complete(&'a Path, u64),
+}
+
+/// The readers of one bus.
+type Readers = Vec<(&'static dyn AnyTopic, Box<dyn EncodedReader>)>;
+
+/// Record until `stop` says so; of one run, until that ends.
+///
+/// # Errors
+/// When a file cannot be made or written, or a bus that is there cannot be used.
+pub fn record(
+    options: &Options,
+    stop: &mut dyn FnMut() -> bool,
+    tell: &mut dyn FnMut(Happened<'_>),
+) -> Result<(), RecordingError> {
+    // Where that is refused they share the processor.
+    let _ = rustix::process::nice(NICE);
+    let chosen = options.topics();
+    let open = |bus: &Bus| -> Result<Readers, BusError> {
+        let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.encoded_reader(bus)?));
+        chosen.iter().map(read).collect()
+    };
+    let domain = options.domain.clone();
+    // The end of a tick; and the start of a generation, which may be killed at once.
+    let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
+        .also_on([&topics::INPUTS as &'static dyn AnyTopic]);
+    let mut current: Option<CurrentRun> = None;
+    let mut files = 0;
+    let mut supervisor = None;
+    loop {
+        let stopped = stop();
+        let news = match follower.wait(if stopped { Duration::ZERO } else { POLL })? {
+            News::Here => Some(true),
+            News::Gone => Some(false),
+            News::Samples(_) | News::Nothing => None,
+        };
+        if news == Some(true) {
+            let holder = options.domain.supervisor().ok().flatten();
+            // Another supervisor goes on with the run, and starts a recorder of its own.
+            if options.run.is_some() && supervisor.is_some() && supervisor != holder {
+                if let Some(mut ended) = current.take() {
+                    ended.finish(tell)?;
+                }
+                return Ok(());
+            }
+            supervisor = holder;
+            let run = find_run(options);
+            // A bus that was made anew within the run goes into the same file.
+            if let Some(mut ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
+                ended.finish(tell)?;
+            }
+            match &mut current {
+                Some(current) => current.losses.begin_again(),
+                None => {
+                    files += 1;
+                    let file = numbered(&options.out, files);
+                    current = Some(CurrentRun::begin(options, &chosen, &file, run)?);
+                }
+            }
+            if let Some(current) = &current {
+                tell(Happened::Attached(&current.path));
+            }
+        }
+        if let Some(run) = &mut current {
+            if let Some(readers) = follower.topics() {
+                run.take(readers)?;
+            }
+            run.take_logs(stopped)?;
+            run.file()?.flush_if_due()?;
+        }
+        let run_over = news == Some(false) && !is_supervised(&options.domain);
+        if (stopped || run_over)
+            && let Some(mut ended) = current.take()
+        {
+            ended.finish(tell)?;
+        }
+        if stopped || run_over && options.run.is_some() {
+            return Ok(());
+        }
+    }
+}
+
+fn is_supervised(domain: &Domain) -> bool {
+    domain.supervisor().map_or(true, |holder| holder.is_some())
+}
+
+/// The directory of the run that is under way.
+fn find_run(options: &Options) -> Option<PathBuf> {
+    let link = options.domain.run_directory();
+    options.run.clone().or_else(|| fs::read_link(link).ok())
+}
+
+/// `F.mcap`, `F-2.mcap`, ...
+fn numbered(out: &Path, number: u32) -> PathBuf {
+    if number <= 1 {
+        return out.to_path_buf();
+    }
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    out.with_file_name(format!("{stem}-{number}.mcap"))
+}
+
+/// The run that is recorded.
+struct CurrentRun {
+    path: PathBuf,
+    directory: Option<PathBuf>,
+    /// None once it is complete.
+    file: Option<RecordingFile>,
+    drawn: Drawn,
+    losses: Losses,
+    logs: Option<LogFiles>,
+    logs_taken: Instant,
+    message: Vec<u8>,
+}
+
+impl CurrentRun {
+    fn begin(
+        options: &Options,
+        topics: &[&'static dyn AnyTopic],
+        path: &Path,
+        directory: Option<PathBuf>,
+    ) -> Result<Self, RecordingError> {
+        let run_file = directory.as_ref().map(|run| run.join(run::FILE_NAME));
+        let text = run_file.and_then(|file| log_files::text(&file, LONGEST_RUN_FILE));
+        let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
+        let mut about = BTreeMap::from([
+            ("robot", options.domain.robot.to_string()),
+            ("build", build()),
+            ("machine", machine()),
+            ("run_toml", text.unwrap_or_default()),
+        ]);
+        if let Some(run) = &run {
+            about.insert("mission", run.mission.name.clone());
+            about.insert("seed", run.mission.seed.to_string());
+        }
+        let about = about.into_iter();
+        let about = about.map(|(key, value)| (key.to_owned(), value)).collect();
+        let file = RecordingFile::create(path, topics, about)?;
+        let whole = options.run.is_some();
+        let logs = directory.as_ref();
+        let logs = logs.map(|directory| LogFiles::follow(directory, whole));
+        Ok(Self {
+            path: path.to_path_buf(),
+            directory,
+            file: Some(file),
+            drawn: Drawn::new(run.map(|run| run.mission)),
+            losses: Losses::default(),
+            logs,
+            logs_taken: Instant::now(),
+            message: Vec::new(),
+        })
+    }
+
+    fn is_of(&self, run: Option<&Path>) -> bool {
+        self.directory.as_deref() == run
+    }
+
+    fn file(&mut self) -> Result<&mut RecordingFile, RecordingError> {
+        self.file.as_mut().ok_or_else(|| RecordingError::Write {
+            file: self.path.clone(),
+            problem: "it is complete".to_owned(),
+        })
+    }
+
+    /// Keep what was published.
+    fn take(&mut self, readers: &mut Readers) -> Result<(), RecordingError> {
+        let Some(file) = &mut self.file else {
+            return Ok(());
+        };
+        for (topic, reader) in readers {
+            let spec = topic.spec();
+            loop {
+                self.message.clear();
+                let Some(stamp) = reader.take(&mut self.message)? else {
+                    break;
+                };
+                self.losses.came(spec, &stamp, &self.message);
+                file.sample(spec, &stamp, &self.message)?;
+                let began = file.began_ns();
+                if let Some((channel, stamp_ns, json)) =
+                    self.drawn.take(spec.name, &self.message, began)
+                {
+                    file.json(channel, Some(stamp_ns), &json)?;
+                }
+            }
+        }
+        if let Some(lost) = self.losses.grown() {
+            file.json("recorder", None, &serde_json::json!({"lost": lost}))?;
+        }
+        Ok(())
+    }
+
+    fn take_logs(&mut self, now: bool) -> Result<(), RecordingError> {
+        if !now && self.logs_taken.elapsed() < LOGS_EVERY {
+            return Ok(());
+        }
+        self.logs_taken = Instant::now();
+        let (Some(file), Some(logs)) = (&mut self.file, &mut self.logs) else {
+            return Ok(());
+        };
+        let mut written = Ok(());
+        logs.take(&mut |process, line| {
+            let json = foxglove::log(process, line, now_ns());
+            if written.is_ok() {
+                written = file.json("log", None, &json);
+            }
+        });
+        written
+    }
+
+    fn finish(&mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<(), RecordingError> {
+        self.take_logs(true)?;
+        if let Some(file) = self.file.take() {
+            file.finish()?;
+            tell(Happened::Complete(&self.path, self.losses.total()));
+        }
+        Ok(())
+    }
+}
+
+/// The build: its version, and a checksum of this very executable.
+fn build() -> String {
+    let crc = fs::read("/proc/self/exe").map_or(0, |bytes| crc32fast::hash(&bytes));
+    format!("{}, executable crc32 {crc:08x}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The machine: its name, system and processors.
+fn machine() -> String {
+    let text = |file| fs::read_to_string(file).unwrap_or_default();
+    let (name, system) = (
+        text("/proc/sys/kernel/hostname"),
+        text("/proc/sys/kernel/osrelease"),
+    );
+    let processors = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
+    format!(
+        "{}, Linux {} {}, {processors} processors",
+        name.trim(),
+        system.trim(),
+        std::env::consts::ARCH
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_of_the_next_run_has_the_next_number() {
+        let out = Path::new("/tmp/a.mcap");
+        assert_eq!(numbered(out, 1), Path::new("/tmp/a.mcap"));
+        assert_eq!(numbered(out, 2), Path::new("/tmp/a-2.mcap"));
+    }
+}

@@ -1,0 +1,138 @@
+//! The schema of a topic, made from its layout: the text of a ROS 2 message, and those of the messages in it.
+
+use common::{
+    bus::{Kind, Structure},
+    topics::AnyTopic,
+};
+
+/// What a schema is called and says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schema {
+    /// `firsthand/msg/Pose`.
+    pub name: String,
+    /// Field by field, then the messages in it.
+    pub text: String,
+}
+
+/// Between messages.
+const RULE: &str =
+    "================================================================================\n";
+
+/// The schema of the messages of `topic`.
+#[must_use]
+pub fn of(topic: &dyn AnyTopic) -> Schema {
+    let (header, element) = topic.layout();
+    let mut parts = Vec::new();
+    let (name, text) = match (header, element) {
+        (Kind::Struct(sample), None) => (
+            sample.name.to_owned(),
+            format!(
+                "# {}\n{}",
+                topic.spec().meaning.trim(),
+                fields(&sample, &mut parts)
+            ),
+        ),
+        (header, element) => {
+            let name = match &header {
+                Kind::Struct(header) => header.name.trim_end_matches("Header").to_owned(),
+                _ => topic.spec().name.to_owned(),
+            };
+            let mut text = format!("# {}\n", topic.spec().meaning.trim());
+            text += &format!("{} header\n", kind(&header, &mut parts));
+            if let Some(element) = element {
+                text += &format!("{}[] elements\n", kind(&element, &mut parts));
+            }
+            (name, text)
+        }
+    };
+    let mut text = text;
+    let mut written: Vec<&'static str> = Vec::new();
+    while let Some(part) = parts.pop() {
+        if written.contains(&part.name) {
+            continue;
+        }
+        written.push(part.name);
+        let body = fields(&part, &mut parts);
+        text += &format!("{RULE}MSG: {}\n{body}", part.name.replace('.', "/"));
+    }
+    Schema {
+        name: name.replacen('.', "/msg/", 1),
+        text,
+    }
+}
+
+fn fields(structure: &Structure, parts: &mut Vec<Structure>) -> String {
+    let fields = structure.fields.iter();
+    fields
+        .map(|field| format!("{} {}\n", kind(&field.kind, parts), field.name))
+        .collect()
+}
+
+fn kind(of: &Kind, parts: &mut Vec<Structure>) -> String {
+    match of {
+        Kind::Number(name) => number(name).to_owned(),
+        // A schema has no arrays of arrays: one after another they are one array.
+        Kind::Array(inner, length) => match &**inner {
+            Kind::Array(inner, more) => kind(&Kind::Array(inner.clone(), length * more), parts),
+            inner => format!("{}[{length}]", kind(inner, parts)),
+        },
+        Kind::Struct(structure) => {
+            parts.push(structure.clone());
+            structure.name.replace('.', "/")
+        }
+    }
+}
+
+/// The name of a number in messages.
+fn number(rust: &str) -> &str {
+    match rust {
+        "u8" => "uint8",
+        "u16" => "uint16",
+        "u32" => "uint32",
+        "u64" => "uint64",
+        "i32" => "int32",
+        "f32" => "float32",
+        "f64" => "float64",
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::topics;
+
+    #[test]
+    fn a_schema_lists_the_fields_of_the_layout_in_their_order() {
+        let schema = of(&topics::STALLS);
+        assert_eq!(schema.name, "firsthand/msg/Stall");
+        let first: Vec<_> = schema.text.lines().skip(1).take(3).collect();
+        assert_eq!(
+            first,
+            ["firsthand/Stamp stamp", "float64 x_m", "float64 y_m"]
+        );
+        assert!(schema.text.contains("MSG: firsthand/Stamp\nuint64 tick\n"));
+    }
+
+    #[test]
+    fn a_schema_of_slices_has_the_header_and_the_elements() {
+        let schema = of(&topics::GRID);
+        assert_eq!(schema.name, "firsthand/msg/Grid");
+        assert!(
+            schema
+                .text
+                .contains("firsthand/GridHeader header\nuint8[] elements\n")
+        );
+        assert_eq!(schema.text.matches("MSG: firsthand/ClearBeam").count(), 1);
+    }
+
+    #[test]
+    fn no_schema_holds_a_type_that_messages_do_not_have() {
+        for topic in topics::TABLE {
+            for line in of(*topic).text.lines() {
+                let known = ["uint", "int32", "float", "firsthand/", "#", "=", "MSG: "];
+                assert!(known.iter().any(|start| line.starts_with(start)), "{line}");
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The entries of a generation's inputs, from their pieces: see [`common::inputs`].
+
+use common::inputs::LONGEST_ENTRY;
+
+/// Puts pieces together.
+#[derive(Debug, Default)]
+pub(crate) struct Pieces {
+    next: u32,
+    bytes: Vec<u8>,
+    /// So many of the bytes were given.
+    given: usize,
+}
+
+/// Pieces that do not follow each other, or hold no entries.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Broken {
+    /// The recording has no piece before this number.
+    NoBeginning(u32),
+    /// So many pieces after this number are missing.
+    Missing(u32, u32),
+    /// An entry of this many bytes.
+    NoEntry(usize),
+}
+
+impl std::fmt::Display for Broken {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoBeginning(piece) => write!(
+                to,
+                "its first {piece} pieces of `inputs` are not recorded; was the recorder attached when it started?"
+            ),
+            Self::Missing(after, count) => write!(
+                to,
+                "{count} pieces of `inputs` are missing after piece {after}: the recorder lost them"
+            ),
+            Self::NoEntry(bytes) => write!(to, "its `inputs` hold an entry of {bytes} bytes"),
+        }
+    }
+}
+
+impl Pieces {
+    /// The next piece came.
+    pub(crate) fn push(&mut self, sequence: u32, piece: &[u8]) -> Result<(), Broken> {
+        if sequence != self.next {
+            return Err(if self.next == 0 {
+                Broken::NoBeginning(sequence)
+            } else {
+                Broken::Missing(self.next - 1, sequence.saturating_sub(self.next))
+            });
+        }
+        self.next = sequence.wrapping_add(1);
+        self.bytes.drain(..self.given);
+        self.given = 0;
+        self.bytes.extend_from_slice(piece);
+        Ok(())
+    }
+
+    /// The body of the next whole entry.
+    pub(crate) fn entry(&mut self) -> Result<Option<Vec<u8>>, Broken> {
+        let rest = &self.bytes[self.given..];
+        let Some((length, rest)) = rest.split_first_chunk() else {
+            return Ok(None);
+        };
+        let length = u32::from_le_bytes(*length) as usize;
+        if length > LONGEST_ENTRY {
+            return Err(Broken::NoEntry(length));
+        }
+        let Some(body) = rest.get(..length) else {
+            return Ok(None);
+        };
+        let body = body.to_vec();
+        self.given += 4 + length;
+        Ok(Some(body))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_come_out_whole_wherever_the_pieces_were_cut() {
+        let entries: [&[u8]; 3] = [b"first", b"", b"the third"];
+        let mut stream = Vec::new();
+        for entry in entries {
+            stream.extend_from_slice(&(entry.len() as u32).to_le_bytes());
+            stream.extend_from_slice(entry);
+        }
+        for size in 1..=stream.len() {
+            let mut pieces = Pieces::default();
+            let mut found = Vec::new();
+            for (sequence, piece) in stream.chunks(size).enumerate() {
+                pieces.push(sequence as u32, piece).unwrap();
+                while let Some(entry) = pieces.entry().unwrap() {
+                    found.push(entry);
+                }
+            }
+            assert_eq!(found, entries);
+        }
+    }
+
+    #[test]
+    fn a_piece_that_is_missing_is_told() {
+        let mut pieces = Pieces::default();
+        assert_eq!(pieces.push(2, b""), Err(Broken::NoBeginning(2)));
+        pieces.push(0, b"").unwrap();
+        assert_eq!(pieces.push(4, b""), Err(Broken::Missing(0, 3)));
+        let mut pieces = Pieces::default();
+        pieces.push(0, &u32::MAX.to_le_bytes()).unwrap();
+        assert!(pieces.entry().is_err());
+    }
+}

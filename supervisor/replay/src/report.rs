@@ -1,0 +1,157 @@
+//! What a replay found.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::Serialize;
+
+/// What a replay found.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// By stage.
+    pub stages: BTreeMap<&'static str, StageReport>,
+    /// The first difference by tick.
+    pub difference: Option<Difference>,
+    /// Where the recording was cut off, seconds after its first message; none if it is complete.
+    pub cut_after_s: Option<f64>,
+}
+
+/// What a replay found of one stage.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct StageReport {
+    /// Generations whose outputs are equal to the bit.
+    pub equal: u64,
+    /// Generations with a difference.
+    pub different: u64,
+    /// Generations that took nothing: they ended before.
+    pub without_step: u64,
+    /// Generations that were not replayed: which, and why.
+    pub not_replayed: BTreeMap<u32, String>,
+    /// Inputs that steps took.
+    pub inputs: u64,
+    /// Samples that were compared.
+    pub compared: u64,
+    /// Samples that were computed and not recorded.
+    pub unrecorded: u64,
+}
+
+/// What became of one generation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// Equal to the bit.
+    Equal,
+    /// It took nothing.
+    WithoutStep,
+    /// It differs.
+    Different,
+    /// It was not replayed, and why.
+    NotReplayed(String),
+}
+
+/// The first difference of a generation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// The stage.
+    pub stage: &'static str,
+    /// The generation.
+    pub generation: u32,
+    /// The tick.
+    pub tick: u64,
+    /// The topic.
+    pub topic: String,
+    /// The field; of a slice, with its index.
+    pub field: String,
+    /// What was recorded.
+    pub recorded: String,
+    /// What the replay computed.
+    pub computed: String,
+    /// What the step had just taken.
+    pub inputs: Vec<String>,
+}
+
+impl Report {
+    /// Generations of all stages that are equal to the bit.
+    #[must_use]
+    pub fn equal(&self) -> u64 {
+        self.stages.values().map(|stage| stage.equal).sum()
+    }
+
+    /// Generations of all stages that were not replayed.
+    #[must_use]
+    pub fn not_replayed(&self) -> usize {
+        let stages = self.stages.values();
+        stages.map(|stage| stage.not_replayed.len()).sum()
+    }
+
+    /// Keep `difference` if none before it is of an earlier tick.
+    pub(crate) fn differs(&mut self, difference: Difference) {
+        let later = |first: &Difference| first.tick > difference.tick;
+        if self.difference.as_ref().is_none_or(later) {
+            self.difference = Some(difference);
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            to,
+            "{:<16} {:>11} {:>9} {:>12} {:>12} {:>9} {:>9} {:>10}",
+            "stage",
+            "bit-equal",
+            "different",
+            "without step",
+            "not replayed",
+            "inputs",
+            "compared",
+            "unrecorded"
+        )?;
+        for (stage, found) in &self.stages {
+            writeln!(
+                to,
+                "{stage:<16} {:>11} {:>9} {:>12} {:>12} {:>9} {:>9} {:>10}",
+                found.equal,
+                found.different,
+                found.without_step,
+                found.not_replayed.len(),
+                found.inputs,
+                found.compared,
+                found.unrecorded
+            )?;
+        }
+        for (stage, found) in &self.stages {
+            for (generation, why) in &found.not_replayed {
+                writeln!(
+                    to,
+                    "{stage} generation {generation} was not replayed: {why}"
+                )?;
+            }
+        }
+        if let Some(after) = self.cut_after_s {
+            writeln!(to, "the recording is cut off after {after:.1} s")?;
+        }
+        match &self.difference {
+            None => Ok(()),
+            Some(difference) => write!(to, "{difference}"),
+        }
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            to,
+            "first difference: tick {}, {} of {} generation {}, field {}\n  recorded {}\n  computed {}",
+            self.tick,
+            self.topic,
+            self.stage,
+            self.generation,
+            self.field,
+            self.recorded,
+            self.computed
+        )?;
+        for input in &self.inputs {
+            writeln!(to, "  from     {input}")?;
+        }
+        Ok(())
+    }
+}

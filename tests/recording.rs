@@ -1,0 +1,225 @@
+//! Runs recorded through real processes, opened, replayed to the bit; recorders killed.
+
+use std::{
+    io::{BufRead as _, BufReader},
+    path::{Path, PathBuf},
+    process::Stdio,
+};
+
+use common::{poll, samples::name_str, topics};
+use recording::{End, Recording};
+use replay::{Options, Report, replay};
+use rustix::process::Signal;
+
+use crate::support::{PATIENCE, Run, STAGES, assert_nothing_left, firsthand, output};
+
+fn open(directory: &Path) -> Recording {
+    Recording::open(&directory.join("run/recording.mcap")).unwrap()
+}
+
+fn replayed(recording: &Recording) -> Report {
+    replay(recording, &Options::default()).unwrap()
+}
+
+/// Every generation of every stage is bit-equal, or ended before it took anything; the number of those that took something.
+fn assert_all_equal(report: &Report) -> u64 {
+    assert_eq!(report.difference, None, "{report}");
+    assert_eq!(report.not_replayed(), 0, "{report}");
+    report.equal()
+}
+
+#[test]
+fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() {
+    let run = Run::start("rec-whole", "open-room", &["--pace", "4"]);
+    let (code, summary, directory) = run.finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    let recording = open(directory.path());
+    assert_eq!(recording.end(), &End::Complete);
+    assert_eq!(recording.run().mission.name, "open-room");
+    assert!(recording.lost().is_empty(), "{:?}", recording.lost());
+    let poses = recording.samples(&topics::POSE).unwrap();
+    let ticks: Vec<u64> = poses.map(|pose| pose.unwrap().sample.stamp.tick).collect();
+    let expected: Vec<u64> = (0..ticks.len() as u64).collect();
+    assert_eq!(ticks, expected);
+    let mut grids = recording.slices(&topics::GRID).unwrap();
+    let first = grids.next().unwrap().unwrap();
+    assert!(first.header.part.is_keyframe());
+    assert_eq!(
+        first.elements.len(),
+        recording.run().mission.grid_frame().area()
+    );
+    assert!(recording.counts()["log"] > 5);
+    assert!(recording.counts()["wire"] > 2 * ticks.len() as u64);
+
+    let report = replayed(&recording);
+    assert_eq!(assert_all_equal(&report), 5);
+    for stage in STAGES {
+        // On a loaded machine not every tick is answered.
+        let least = ticks.len() as u64 / 2;
+        assert!(report.stages[stage].compared > least, "{report}");
+    }
+    let parting = replay::diff::diff(&recording, &recording).unwrap();
+    assert_eq!(parting.first, None);
+    assert_eq!(parting.ticks, ticks.len() as u64);
+    assert_nothing_left("rec-whole");
+}
+
+#[test]
+fn every_generation_replays_to_the_bit_when_each_stage_is_killed_in_mid_mission() {
+    let mut run = Run::start("rec-kills", "obstacle-course", &["--pace", "4"]);
+    run.wait_until_under_way(2.0);
+    for stage in STAGES {
+        run.kill_and_await_successor(stage, Signal::KILL);
+    }
+    let (_, summary, directory) = run.finish_in();
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    let recording = open(directory.path());
+    let deaths = recording.samples(&topics::DEATHS).unwrap();
+    let killed: Vec<String> = deaths
+        .map(|death| name_str(&death.unwrap().sample.stage).to_owned())
+        .collect();
+    assert_eq!(killed[..5], STAGES);
+    let report = replayed(&recording);
+    assert!(assert_all_equal(&report) >= 10, "{report}");
+    assert_nothing_left("rec-kills");
+}
+
+/// Kill a recorder of `robot` that has written for so many answers of `status`; its file.
+fn killed_recorder(run: &mut Run, file: PathBuf, answers: usize) -> PathBuf {
+    let mut recorder = firsthand(&["record", "--robot", &run.robot, "--out"])
+        .arg(&file)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut attached = String::new();
+    let said = recorder.stdout.take().unwrap();
+    let attaches = poll::is_readable(&said, PATIENCE).unwrap();
+    assert!(attaches, "the robot is gone");
+    BufReader::new(said).read_line(&mut attached).unwrap();
+    assert!(attached.starts_with("recording"), "{attached}");
+    for _ in 0..answers {
+        run.status();
+    }
+    recorder.kill().unwrap();
+    recorder.wait().unwrap();
+    file
+}
+
+#[test]
+fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was() {
+    let mut run = Run::start("rec-shot", "obstacle-course", &["--pace", "2"]);
+    run.wait_until_under_way(1.0);
+    let directory = tempfile::tempdir().unwrap();
+    let (mut read, mut cut) = (0, 0);
+    for shot in 0..10 {
+        if !run.is_running() {
+            break;
+        }
+        let file = directory.path().join(format!("{shot}.mcap"));
+        let file = killed_recorder(&mut run, file, shot * 2);
+        let recording = Recording::open(&file).unwrap();
+        if recording.end() == &End::Complete {
+            // The mission ended before: the machine is very loaded.
+            break;
+        }
+        cut += 1;
+        let messages = recording.messages(&[]).unwrap();
+        let messages: Vec<_> = messages.map(Result::unwrap).collect();
+        let counted: u64 = recording.counts().values().sum();
+        assert_eq!(messages.len() as u64, counted);
+        read += messages.len();
+    }
+    assert!(cut >= 5, "{cut} recorders were killed");
+    assert!(read > 0, "none of them lived to its first chunk");
+    let (code, summary, directory) = run.finish_in();
+    assert_eq!(
+        (code, &summary["outcome"]),
+        (Some(0), &"reached".into()),
+        "{summary}"
+    );
+    let restarts = summary["restarts"].as_object().unwrap();
+    assert!(restarts.values().all(|times| times == 0), "{summary}");
+    // The run's own recorder was not touched by that.
+    assert_eq!(assert_all_equal(&replayed(&open(directory.path()))), 5);
+    assert_nothing_left("rec-shot");
+}
+
+/// Seconds of a mission, committed.
+fn golden() -> Recording {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/golden/open-room.mcap"
+    );
+    Recording::open(file.as_ref()).unwrap()
+}
+
+/// After a change that is meant, record it again, from the top of the tree:
+/// `firsthand run open-room --timeout 8 --robot x80 --out /tmp/golden`, then copy `recording.mcap` from there.
+#[test]
+fn the_golden_recording_replays_to_the_bit() {
+    let report = replayed(&golden());
+    assert_eq!(assert_all_equal(&report), 5);
+    assert!(report.stages["planner"].compared > 20, "{report}");
+}
+
+#[test]
+fn a_constant_that_changes_makes_a_replay_fail_with_stage_tick_topic_field_and_inputs() {
+    let recording = golden();
+    let mut run = recording.run().clone();
+    run.mission.controller.speed_m_s = Some(run.mission.speed_m_s() * 1.01);
+    let options = Options {
+        run: Some(run),
+        ..Options::default()
+    };
+    let report = replay(&recording, &options).unwrap();
+    let difference = report.difference.as_ref().unwrap();
+    assert_eq!(
+        (difference.stage, &*difference.topic),
+        ("controller", "command")
+    );
+    let speeds = ["left_rad_s", "right_rad_s", "v_m_s"];
+    assert!(speeds.contains(&&*difference.field), "{difference}");
+    assert_ne!(difference.recorded, difference.computed);
+    assert!(
+        difference
+            .inputs
+            .iter()
+            .any(|input| input.contains("guidance")),
+        "{difference}"
+    );
+    assert_eq!(report.stages["controller"].different, 1);
+    assert_eq!(report.stages["mapper"].equal, 1);
+}
+
+#[test]
+fn replay_and_diff_print_what_they_found_and_exit_with_1_on_a_difference() {
+    let golden = golden();
+    let file = golden.path().to_str().unwrap();
+    let replayed = output(&["replay", file, "--stage", "mapper,planner", "--json"]);
+    assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
+    let report: serde_json::Value = serde_json::from_slice(&replayed.stdout).unwrap();
+    assert_eq!(report["stages"]["planner"]["equal"], 1, "{report}");
+    assert!(report["stages"].get("controller").is_none(), "{report}");
+    let same = output(&["diff", file, file]);
+    assert_eq!(same.status.code(), Some(0), "{same:?}");
+
+    let other = ["--seed", "9", "--timeout", "8"];
+    let (_, _, directory) = Run::start("rec-other", "open-room", &other).finish_in();
+    let other = directory.path().join("run/recording.mcap");
+    let parted = output(&["diff", file, other.to_str().unwrap()]);
+    assert_eq!(parted.status.code(), Some(1), "{parted:?}");
+    let said = String::from_utf8(parted.stdout).unwrap();
+    assert!(
+        said.contains("they part at tick") && said.contains("run: + "),
+        "{said}"
+    );
+
+    let nothing = output(&["replay", "Cargo.toml"]);
+    let said = String::from_utf8(nothing.stderr).unwrap();
+    assert!(
+        said.contains("no recording of firsthand") || said.contains("cannot read"),
+        "{said}"
+    );
+    let unknown = output(&["replay", file, "--stage", "wheel"]);
+    assert_eq!(unknown.status.code(), Some(1));
+}
