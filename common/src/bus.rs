@@ -39,7 +39,7 @@ mod write;
 
 pub(crate) use self::layout::{kind_of, layouts};
 pub use self::{
-    encoded::EncodedReader,
+    encoded::{EncodedReader, EncodedTopic},
     error::BusError,
     layout::{
         Field, Kind, Layout, Structure, decode_sample, decode_slice, encode_sample, encode_slice,

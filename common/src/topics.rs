@@ -14,7 +14,8 @@ use crate::samples::{
 };
 
 pub use crate::bus::{
-    AnyTopic, EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, SliceTopic, Spec, Topic,
+    AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, Rate, SUPERVISOR, SliceTopic,
+    Spec, Topic,
 };
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
@@ -55,6 +56,8 @@ macro_rules! topics {
         )*
         /// Every topic, in the order of the pipeline.
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
+        /// The same, to be read without knowing what they carry.
+        pub static ENCODED: &[&dyn EncodedTopic] = &[$(&$id),*];
     };
 }
 

@@ -65,8 +65,12 @@ impl<T: Copy + PartialEq> Replica<T> {
         let Some((held_frame, held)) = self.state else {
             return Applied::Missed;
         };
-        let nothing = version == held && window.area() == 0;
-        let follows = nothing || held.checked_add(1) == Some(version);
+        // An empty window changes nothing: that of a later version comes after one that is missing.
+        let follows = if window.area() == 0 {
+            version == held
+        } else {
+            held.checked_add(1) == Some(version)
+        };
         if held_frame != frame || !follows {
             self.state = None;
             return Applied::Missed;

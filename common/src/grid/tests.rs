@@ -52,6 +52,17 @@ fn a_replica_follows_windows_and_drops_the_map_when_one_is_missing() {
 }
 
 #[test]
+fn a_window_that_is_missing_is_noticed_although_the_next_one_is_empty() {
+    let frame = frame(4);
+    let mut replica = Replica::default();
+    replica.apply(&Part::whole(frame, 1), &[0_u8; 16]);
+    // The window of version 2 was lost; its version is published again, without a change.
+    let again = Part::of(frame, Window::default(), 2);
+    assert_eq!(replica.apply(&again, &[]), Applied::Missed);
+    assert_eq!(replica.version(), 0);
+}
+
+#[test]
 fn a_keyframe_that_changes_one_cell_is_told_as_that_window() {
     let frame = frame(4);
     let mut replica = Replica::default();
