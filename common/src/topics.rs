@@ -14,8 +14,8 @@ use crate::samples::{
 };
 
 pub use crate::bus::{
-    AnyTopic, EVERY_STAGE, Limits, Logged, OPERATOR, Rate, ReadableTopic, SUPERVISOR, SliceTopic,
-    Spec, Topic,
+    AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, Rate, ReadableTopic, SUPERVISOR,
+    SliceTopic, Spec, Topic,
 };
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
@@ -58,6 +58,8 @@ macro_rules! topics {
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
         /// The same, for consumers that read a topic by its name.
         pub static READABLE: &[&dyn ReadableTopic] = &[$(&$id),*];
+        /// The same, to be read without knowing what they carry.
+        pub static ENCODED: &[&dyn EncodedTopic] = &[$(&$id),*];
     };
 }
 

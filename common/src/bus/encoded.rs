@@ -3,9 +3,34 @@
 use super::{
     error::BusError,
     layout::{Layout, encode_sample, encode_slice},
+    make::Bus,
     payload::{Payload, Stamp, Stamped},
     read::{Reader, SliceReader},
+    topic::{AnyTopic, SliceTopic, Topic},
 };
+
+/// A topic that can be read without knowing what it carries.
+pub trait EncodedTopic: AnyTopic {
+    /// Read it, every generation's samples.
+    ///
+    /// # Errors
+    /// As [`Bus::reader`].
+    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError>;
+}
+
+impl<P: Payload + Stamped + Layout> EncodedTopic for Topic<P> {
+    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
+        let reader = bus.reader_that_keeps(self, self.spec().limits.recorder_buffer)?;
+        Ok(Box::new(SampleReader(reader.of_all_generations())))
+    }
+}
+
+impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedTopic for SliceTopic<H, T> {
+    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
+        let reader = bus.slice_reader_that_keeps(self, self.spec().limits.recorder_buffer)?;
+        Ok(Box::new(SliceSampleReader(reader.of_all_generations())))
+    }
+}
 
 /// Reads a topic, whatever it carries.
 pub trait EncodedReader {
@@ -18,7 +43,7 @@ pub trait EncodedReader {
 }
 
 /// Of structs.
-pub(super) struct SampleReader<P: Payload>(pub(super) Reader<P>);
+struct SampleReader<P: Payload>(Reader<P>);
 
 impl<P: Payload + Stamped + Layout> EncodedReader for SampleReader<P> {
     fn take(&mut self, bytes: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {
@@ -31,7 +56,7 @@ impl<P: Payload + Stamped + Layout> EncodedReader for SampleReader<P> {
 }
 
 /// Of headers with slices.
-pub(super) struct SliceSampleReader<H: Payload, T: Payload>(pub(super) SliceReader<H, T>);
+struct SliceSampleReader<H: Payload, T: Payload>(SliceReader<H, T>);
 
 impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedReader for SliceSampleReader<H, T> {
     fn take(&mut self, bytes: &mut Vec<u8>) -> Result<Option<Stamp>, BusError> {

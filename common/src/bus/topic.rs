@@ -9,11 +9,9 @@ use iceoryx2::{
 };
 
 use super::{
-    encoded::{EncodedReader, SampleReader, SliceSampleReader},
     error::{BusError, refused},
     layout::{Kind, Layout},
-    make::Bus,
-    payload::{Payload, Stamped, type_name},
+    payload::{Payload, type_name},
     spec::{Limits, Rate, Spec},
 };
 
@@ -64,11 +62,6 @@ pub trait AnyTopic: Sync + CreateServices {
     fn payload(&self) -> String;
     /// What each sample is: a struct; or a header, and what a slice is made of.
     fn layout(&self) -> (Kind, Option<Kind>);
-    /// Read it, every generation's samples, without knowing what they are.
-    ///
-    /// # Errors
-    /// As [`Bus::reader`].
-    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError>;
     /// After how long its writer publishes it again when nothing changes; zero where the table does not say.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
@@ -94,7 +87,7 @@ pub trait CreateServices {
     fn create(&self, node: &BusNode) -> Result<Box<dyn Any>, BusError>;
 }
 
-impl<P: Payload + Stamped + Layout> AnyTopic for Topic<P> {
+impl<P: Payload + Layout> AnyTopic for Topic<P> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
@@ -105,13 +98,6 @@ impl<P: Payload + Stamped + Layout> AnyTopic for Topic<P> {
 
     fn layout(&self) -> (Kind, Option<Kind>) {
         (P::kind(), None)
-    }
-
-    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
-        Ok(Box::new(SampleReader(
-            bus.reader_that_keeps(self, self.spec.limits.recorder_buffer)?
-                .of_all_generations(),
-        )))
     }
 }
 
@@ -124,7 +110,7 @@ impl<P: Payload> CreateServices for Topic<P> {
     }
 }
 
-impl<H: Payload + Stamped + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
+impl<H: Payload + Layout, T: Payload + Layout> AnyTopic for SliceTopic<H, T> {
     fn spec(&self) -> &'static Spec {
         self.spec
     }
@@ -135,13 +121,6 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> AnyTopic for SliceTopic
 
     fn layout(&self) -> (Kind, Option<Kind>) {
         (H::kind(), Some(T::kind()))
-    }
-
-    fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
-        Ok(Box::new(SliceSampleReader(
-            bus.slice_reader_that_keeps(self, self.spec.limits.recorder_buffer)?
-                .of_all_generations(),
-        )))
     }
 }
 

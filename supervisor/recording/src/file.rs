@@ -10,7 +10,7 @@ use std::{
 
 use common::{
     bus::Stamp,
-    topics::{AnyTopic, Spec},
+    topics::{EncodedTopic, Spec},
 };
 use mcap::{
     Compression, WriteOptions, Writer,
@@ -47,7 +47,7 @@ impl RecordingFile {
     /// is written: whatever is called so can be read.
     pub(crate) fn create(
         path: &Path,
-        topics: &[&'static dyn AnyTopic],
+        topics: &[&'static dyn EncodedTopic],
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
         let named = |source| RecordingError::File {

@@ -268,8 +268,10 @@ mod tests {
     fn a_long_trajectory_is_thinned_and_stays_bounded() {
         let mut drawn = Drawn::new(None);
         for tick in 0..10_000_u64 {
-            let mut sample = PoseSample::default();
-            sample.x_m = tick as f64;
+            let sample = PoseSample {
+                x_m: tick as f64,
+                ..PoseSample::default()
+            };
             drawn.pose(&sample, 0);
             assert!(drawn.trajectory.len() < TRAJECTORY);
         }

@@ -15,7 +15,7 @@ use common::{
     domain::Domain,
     follower::{Follower, News},
     run::{self, Run},
-    topics::{self, AnyTopic},
+    topics::{self, EncodedTopic},
 };
 
 use crate::{
@@ -43,7 +43,7 @@ pub struct Options {
     /// The file; that of the robot's next run is called `F-2.mcap`.
     pub out: PathBuf,
     /// The topics; none for those that the table logs.
-    pub topics: Option<Vec<&'static dyn AnyTopic>>,
+    pub topics: Option<Vec<&'static dyn EncodedTopic>>,
     /// Whether topics that are logged with fields are kept, too.
     pub fields: bool,
     /// The directory of the one run that is recorded; none to find it, and to follow the robot from run to run.
@@ -51,14 +51,14 @@ pub struct Options {
 }
 
 impl Options {
-    fn topics(&self) -> Vec<&'static dyn AnyTopic> {
-        let logged = |topic: &&&'static dyn AnyTopic| match topic.spec().logged {
+    fn topics(&self) -> Vec<&'static dyn EncodedTopic> {
+        let logged = |topic: &&&'static dyn EncodedTopic| match topic.spec().logged {
             Logged::Yes => true,
             Logged::WithFields => self.fields,
         };
         match &self.topics {
             Some(topics) => topics.clone(),
-            None => topics::TABLE.iter().filter(logged).copied().collect(),
+            None => topics::ENCODED.iter().filter(logged).copied().collect(),
         }
     }
 }
@@ -73,7 +73,7 @@ pub enum Happened<'a> {
 }
 
 /// The readers of one bus.
-type Readers = Vec<(&'static dyn AnyTopic, Box<dyn EncodedReader>)>;
+type Readers = Vec<(&'static dyn EncodedTopic, Box<dyn EncodedReader>)>;
 
 /// Record until `stop` says so; of one run, until that ends.
 ///
@@ -88,13 +88,13 @@ pub fn record(
     let _ = rustix::process::nice(NICE);
     let chosen = options.topics();
     let open = |bus: &Bus| -> Result<Readers, BusError> {
-        let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.encoded_reader(bus)?));
+        let read = |topic: &&'static dyn EncodedTopic| Ok((*topic, topic.encoded_reader(bus)?));
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
     // The end of a tick; and the start of a generation, which may be killed at once.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
-        .also_on([&topics::INPUTS as &'static dyn AnyTopic]);
+        .also_on([&topics::INPUTS as &'static dyn topics::AnyTopic]);
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
@@ -186,7 +186,7 @@ struct CurrentRun {
 impl CurrentRun {
     fn begin(
         options: &Options,
-        topics: &[&'static dyn AnyTopic],
+        topics: &[&'static dyn EncodedTopic],
         path: &Path,
         directory: Option<PathBuf>,
     ) -> Result<Self, RecordingError> {

@@ -6,7 +6,8 @@ use clap::Args;
 use common::{
     domain::{Domain, RobotName},
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
-    topics::{self, AnyTopic},
+    start::become_child,
+    topics::{self, EncodedTopic},
 };
 use recording::{Options, recorder::Happened};
 
@@ -31,10 +32,15 @@ pub(crate) struct Arguments {
     /// The directory of the one run to record.
     #[arg(long, hide = true)]
     run_directory: Option<PathBuf>,
+    /// End when this process, the parent, ends.
+    #[arg(long, hide = true)]
+    supervisor: Option<u32>,
 }
 
-fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
-    let found = topics::TABLE.iter().find(|topic| topic.spec().name == name);
+fn topic(name: &str) -> Result<&'static dyn EncodedTopic, String> {
+    let found = topics::ENCODED
+        .iter()
+        .find(|topic| topic.spec().name == name);
     found.copied().ok_or_else(|| {
         format!("no topic is called {name:?}; `firsthand topics` prints the table of topics")
     })
@@ -42,6 +48,9 @@ fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    if let Some(supervisor) = arguments.supervisor {
+        become_child("recorder", supervisor)?;
+    }
     let chosen = arguments.topics.as_ref();
     let chosen = chosen.map(|names| names.iter().map(|name| topic(name)).collect());
     let options = Options {

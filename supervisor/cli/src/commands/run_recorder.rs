@@ -40,6 +40,7 @@ impl RunRecorder {
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
         command.arg("--out").arg(free_file(options));
         command.arg("--run-directory").arg(directory);
+        command.args(["--supervisor", &std::process::id().to_string()]);
         command.stdout(Stdio::piped()).stderr(log);
         let mut process = Process::spawn(command)?;
         let said = process.take_stdout();
