@@ -210,6 +210,10 @@ fn work(
 ) -> Result<(), StageError> {
     let ticks_follow_at_once = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
+    if ticks_follow_at_once {
+        // What it does between ticks belongs to the tick it has taken, not to the next.
+        process.idle()?;
+    }
     heartbeat.beat(HealthState::Ready, progress)?;
     process.after_ready(context)?;
     let simulated = context.run.mission.robot.address.is_none();

@@ -3,7 +3,7 @@
 //!
 //! The link begins no tick later than the newest [`TickLimitSample`] says, which is [`LEAD`] ticks after the last one that
 //! was looked at for a stall. So a stall of tick T leaves the pipeline at rest after tick T + [`LEAD`], on any machine. There
-//! the recovery step is carried out, and the limit rises once the planner and the controller have answered to it.
+//! the recovery step is carried out, and the limit rises once the planner and, after a reset, the controller have answered to it.
 //! At the pace of the wall nothing waits, and a recovery step is carried out at once.
 
 use std::time::{Duration, Instant};
@@ -24,8 +24,10 @@ pub(crate) struct Published {
     pub tick: Option<u64>,
     /// Commands.
     pub commands: u64,
-    /// The planner's generation that gave the newest guidance, and the epoch it knew.
-    pub guidance: (u32, u64),
+    /// The planner's generation that beat last, and the tick of the newest grid that it has followed.
+    pub planner: (u32, u64),
+    /// The epoch that the newest guidance knew.
+    pub epoch: u64,
     /// The epoch of the newest grid.
     pub grid_epoch: u64,
     /// Whether the grid changed when that epoch began: the planner does not answer to one that did not.
@@ -116,13 +118,16 @@ impl Lead {
     }
 }
 
-/// Whether planner and controller have answered to the recovery step of `stall`.
+/// Whether the stages have answered to the recovery step of `stall`.
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {
-        RecoveryStep::Replan => commanded && now.guidance.0 != before.guidance.0,
+        // It has no pose to answer to before the next tick: that it has a field is enough.
+        RecoveryStep::Replan => {
+            now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + LEAD
+        }
         RecoveryStep::Forget => {
-            let guided = commanded && now.guidance.1 >= stall.epoch;
+            let guided = commanded && now.epoch >= stall.epoch;
             now.grid_epoch >= stall.epoch && (guided || !now.grid_changed)
         }
         RecoveryStep::GiveUp => true,
@@ -154,12 +159,11 @@ mod tests {
         let at_rest = Published {
             tick: Some(14),
             commands: 15,
-            guidance: (1, 0),
+            planner: (1, 14),
             ..Published::default()
         };
         let replanned = Published {
-            commands: 16,
-            guidance: (2, 0),
+            planner: (2, 14),
             ..at_rest
         };
         let reset = Published {
@@ -169,7 +173,7 @@ mod tests {
         };
         let steered = Published {
             commands: 16,
-            guidance: (1, 1),
+            epoch: 1,
             ..reset
         };
         let unchanged = Published {
@@ -179,7 +183,7 @@ mod tests {
         use RecoveryStep::{Forget, Replan};
         #[rustfmt::skip]
         let rows = [
-            (Replan, at_rest, false), (Replan, Published { commands: 15, ..replanned }, false), (Replan, replanned, true),
+            (Replan, at_rest, false), (Replan, Published { planner: (2, 0), ..at_rest }, false), (Replan, replanned, true),
             (Forget, at_rest, false), (Forget, reset, false), (Forget, steered, true), (Forget, unchanged, true),
         ];
         for (recovery, published, answered) in rows {

@@ -51,6 +51,8 @@ pub struct Record {
     pub command: Option<CommandSample>,
     /// Commands so far.
     commands: u64,
+    /// The generation and tick of the planner's newest heartbeat.
+    planner: (u32, u64),
     /// The epoch of the newest grid, and whether the grid changed when it began.
     grid_epoch: u64,
     grid_changed: bool,
@@ -129,6 +131,9 @@ impl Observer {
         let mut roster_changed = false;
         while let Some(health) = self.health.take()? {
             roster_changed |= stages.on_health(&health);
+            if name_str(&health.stage) == crate::stages::PLANNER {
+                self.record.planner = (health.stamp.generation, health.stamp.tick);
+            }
         }
         let record = &mut self.record;
         // The command of a tick is read before the samples it was computed from, so that these are in the record when
@@ -250,7 +255,8 @@ impl Record {
         Published {
             tick: self.command.map(|command| command.stamp.tick),
             commands: self.commands,
-            guidance: guidance.map_or((0, 0), |it| (it.stamp.generation, it.epoch)),
+            planner: self.planner,
+            epoch: guidance.map_or(0, |guidance| guidance.epoch),
             grid_epoch: self.grid_epoch,
             grid_changed: self.grid_changed,
         }
