@@ -23,11 +23,11 @@ mod mission_progress;
 pub(crate) mod missions;
 pub(crate) mod operate;
 pub(crate) mod other_user;
-#[cfg(feature = "tools")]
 mod python;
 pub(crate) mod record;
 #[cfg(feature = "tools")]
 pub(crate) mod replay;
+#[cfg(feature = "tools")]
 pub(crate) mod replay_log;
 pub(crate) mod run;
 mod run_recorder;
