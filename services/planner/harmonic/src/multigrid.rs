@@ -271,7 +271,7 @@ impl<R: Real> Multigrid<R> {
         let progress = self.pass(self.sweeps, true, tolerance);
         if self.is_large() {
             let Grid { width, height, .. } = self.finest.grid;
-            let few = progress.unconverged <= width * height / FEW;
+            let few = progress.unsettled <= width * height / FEW;
             self.sweeps = if few { SWEEPS_FOR_FEW } else { SWEEPS };
         }
         self.correct();
@@ -281,7 +281,7 @@ impl<R: Real> Multigrid<R> {
     /// As [`cycle`](Self::cycle), but without the coarser levels if all cells had converged; says whether they had. For small
     /// maps, whose coarser levels cost more than the finest. End with [`smooth`](Self::smooth), not [`finish`](Self::finish).
     pub(crate) fn cycle_unless_converged(&mut self, tolerance: f64) -> bool {
-        let converged = self.pass(1, true, tolerance).unconverged == 0;
+        let converged = self.pass(1, true, tolerance).unsettled == 0;
         if !converged {
             self.correct();
         }

@@ -49,7 +49,7 @@ pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Stor
         for cycle in 0..CYCLES {
             cancellation.check()?;
             // The first cycles have not reached every cell yet, and what is zero does not change.
-            if levels.cycle(TOLERANCE).unconverged == 0 && cycle >= 4 {
+            if levels.cycle(TOLERANCE).unsettled == 0 && cycle >= 4 {
                 break;
             }
         }

@@ -14,6 +14,7 @@
 mod machine;
 mod others;
 mod real;
+mod wavefront;
 
 use std::{path::Path, time::Instant};
 
@@ -41,6 +42,12 @@ fn main() {
     let quick = asked("quick");
     if asked("updates") {
         return update_table(quick);
+    }
+    if asked("accuracy") {
+        return accuracy_table();
+    }
+    if asked("warm") {
+        return warm_table();
     }
     machine_table(quick);
     full_table(quick);
@@ -321,4 +328,76 @@ fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
             blocked: true,
         })
         .collect()
+}
+
+fn warm_table() {
+    println!("{:<10} {:>5} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}", "map","N","k","scratch","near p50","near p99","wave","update p50");
+    for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
+        for n in [120, 280, 512, 1024] {
+            for length in [f64::INFINITY, 7.0] {
+            let base = Map::generate(kind, n, n, 1).domain().expect("a valid map").with_screening(&Screening::cells(length)).expect("a screening");
+            let mut solver = Solver::default();
+            let scratch = fastest(8, || { solver.solve(&base, &Cancellation::new()).expect("a field"); });
+            let mut random = Random::new(9);
+            let mut field = solver.solve(&base, &Cancellation::new()).expect("a field");
+            let mut other = (base.clone(), field.clone());
+            let mut domain = base.clone();
+            let (mut times, mut local) = (Vec::new(), Vec::new());
+            let mut last: Vec<Change> = Vec::new();
+            while times.len() < 60 {
+                let (col, row) = (random.below(n - 8) + 2, random.below(n - 8) + 2);
+                let changes = if times.len() % 2 == 1 { last.iter().map(|c| Change { blocked: false, ..*c }).collect() } else { block(&domain, col, row) };
+                if changes.is_empty() { continue; }
+                let start = Instant::now();
+                domain.apply(&changes).expect("ok");
+                field = solver.solve_near(&domain, &field, &Cancellation::new()).expect("a field");
+                times.push(start.elapsed().as_secs_f64() * 1e3);
+                let start = Instant::now();
+                let _ = solver.update(&mut other.0, &mut other.1, &changes, &Cancellation::new()).expect("a field");
+                local.push(start.elapsed().as_secs_f64() * 1e3);
+                last = changes;
+            }
+            times.sort_by(f64::total_cmp); local.sort_by(f64::total_cmp);
+            let (wave, _) = wavefront::time(&base, 10);
+            println!("{:<10} {n:>5} {length:>9} {scratch:>9.3} {:>9.3} {:>9.3} {wave:>9.3} {:>9.3}", format!("{kind:?}"), times[30], times[58], local[30]);
+        }}
+    }
+}
+
+fn accuracy_table() {
+    let kinds = [
+        Kind::Empty,
+        Kind::Drums,
+        Kind::Office,
+        Kind::Trap,
+        Kind::Maze { corridor: 8 },
+        Kind::Maze { corridor: 32 },
+        Kind::Maze { corridor: 64 },
+        Kind::Noise { density: 0.1 },
+        Kind::Noise { density: 0.35 },
+    ];
+    println!("{:<26} {:>4} {:>6} {:<14} {:>8} {:>8} {:>8} {:>8}", "map", "N", "length", "method", "p50", "p99", "clear", "max");
+    for kind in kinds {
+        for n in [120, 300, 512] {
+            for length in [f64::INFINITY, 20.0, 7.0] {
+                if length.is_finite() && n > 300 { continue; }
+                let mut worst = harmonic::testing::Angles::default();
+                let mut method = "";
+                let mut residual = 0.0_f64;
+                for seed in 0..if n == 512 { 1 } else { 3 } {
+                    let domain = Map::generate(kind, n, n, seed).domain().expect("a valid map").with_screening(&Screening::cells(length)).expect("ok");
+                    let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
+                    let exact = harmonic::testing::exact(&domain).expect("a field");
+                    let angles = harmonic::testing::Angles::between(&field, &exact, |_| true);
+                    worst.p50 = worst.p50.max(angles.p50);
+                    worst.p99 = worst.p99.max(angles.p99);
+                    worst.max = worst.max.max(angles.max);
+                    worst.clear_max = worst.clear_max.max(angles.clear_max);
+                    residual = residual.max(field.verification().worst_residual);
+                    method = field.verification().method.name();
+                }
+                println!("{:<26} {n:>4} {length:>6} {method:<14} {:>8.4} {:>8.4} {:>8.3} {:>8.2} {residual:.1e}", format!("{kind:?}"), worst.p50, worst.p99, worst.clear_max, worst.max);
+            }
+        }
+    }
 }

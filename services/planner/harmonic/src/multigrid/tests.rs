@@ -205,7 +205,7 @@ fn a_solve_on_a_large_map_leaves_nothing_behind_for_the_next() {
     levels.set_up_rows(&domain, 0..150);
     let mut solve = || {
         levels.start(domain.target());
-        let converged = (0..60).any(|_| levels.cycle(1e-6).unconverged == 0);
+        let converged = (0..60).any(|_| levels.cycle(1e-6).unsettled == 0);
         levels.finish();
         let mut u = Vec::new();
         levels.read(domain.target(), -1.0, &mut u);

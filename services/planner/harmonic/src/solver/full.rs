@@ -19,7 +19,7 @@ use crate::verification::{self, Check, Verification};
 
 /// Coarse corrections above this fraction of u mean that a cell has not converged. The next cycle reduces them by a factor
 /// of three or more, which leaves directions well within a degree.
-const TOLERANCE: f64 = 5e-3;
+const TOLERANCE: f64 = 0.02;
 
 /// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count as unconverged.
 const FIRST_CHECK: usize = 4;
@@ -197,7 +197,7 @@ impl<R: Real> Prepared<R> {
         }
         for cycle in 1.. {
             cancellation.check()?;
-            let converged = levels.cycle(TOLERANCE).unconverged == 0;
+            let converged = levels.cycle(TOLERANCE).unsettled == 0;
             let last = cycle == most_cycles;
             if !(last || (converged && cycle >= next_check)) {
                 continue;
