@@ -180,7 +180,10 @@ fn untrue(case: &Case, full: &Field) -> (usize, usize) {
             let cell = Cell::new(col, row);
             if let Some(right) = full.direction(cell).filter(|_| case.field.is_trusted(cell)) {
                 trusted += 1;
-                let off = case.field.direction(cell).map_or(180.0, |it| angle(it, right));
+                let off = case
+                    .field
+                    .direction(cell)
+                    .map_or(180.0, |it| angle(it, right));
                 untrue += usize::from(off > 10.0);
             }
         }
@@ -212,7 +215,10 @@ fn trusted_after_single_changes(kinds: &[Kind]) -> (f64, f64) {
         }
     }
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
-    (share(untrue_cells, trusted_cells), share(trusted_cells, cells))
+    (
+        share(untrue_cells, trusted_cells),
+        share(trusted_cells, cells),
+    )
 }
 
 #[test]
@@ -354,7 +360,10 @@ fn updates_in_windows_with_a_full_solve_behind_each_are_trusted_where_they_are_r
             case.field = solved;
             assert_eq!(follow(&case.field), 1.0, "{kind:?}, update {step}");
         }
-        assert!(untrue_cells * 1000 <= trusted_cells, "{kind:?}: {untrue_cells} of {trusted_cells}");
+        assert!(
+            untrue_cells * 1000 <= trusted_cells,
+            "{kind:?}: {untrue_cells} of {trusted_cells}"
+        );
         let exact = exact(&case.domain).expect("a field");
         let angles = Angles::between(&case.field, &exact, |_| true);
         assert!(angles.clear_max < 1.0, "{kind:?}: {angles:?}");
@@ -551,7 +560,8 @@ fn changes_one_beside_the_other_are_updated_together_without_a_full_solve_betwee
 
 /// A later patch may lie on the way by which paths regain the height they lose in an earlier one.
 #[test]
-fn many_updates_in_windows_without_a_full_solve_between_leave_no_cycle_or_say_that_a_passage_closed() {
+fn many_updates_in_windows_without_a_full_solve_between_leave_no_cycle_or_say_that_a_passage_closed()
+ {
     for seed in 0..LONG_SEEDS {
         for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
             let mut case = Case::new(&Map::generate(kind, 320, 320, seed));
@@ -561,7 +571,11 @@ fn many_updates_in_windows_without_a_full_solve_between_leave_no_cycle_or_say_th
                 if case.update(&changes) == Verdict::PassageClosed {
                     break;
                 }
-                assert_eq!(follow(&case.field), 1.0, "{kind:?}, seed {seed}, update {step}");
+                assert_eq!(
+                    follow(&case.field),
+                    1.0,
+                    "{kind:?}, seed {seed}, update {step}"
+                );
             }
         }
     }

@@ -14,7 +14,10 @@ const MOST_STEPS: usize = 16;
 /// the patch of `window`, the last, may lie on their way. Followed one by one, the highest first, so a path that joins an
 /// earlier one ascends too.
 pub(super) fn all_ascend(field: &Field, window: &mut Window) -> bool {
-    let entries = field.patches().iter().flat_map(|patch| &patch.rim().entries);
+    let entries = field
+        .patches()
+        .iter()
+        .flat_map(|patch| &patch.rim().entries);
     let mut cells: Vec<Cell> = entries.copied().collect();
     cells.sort_by(|&a, &b| {
         let order = field.u(b).partial_cmp(&field.u(a));

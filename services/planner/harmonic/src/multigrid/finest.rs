@@ -272,7 +272,8 @@ impl<R: Real> Finest<R> {
             let bound = if square > flat { square } else { flat };
             let turned = (dx * cy - dy * cx).size() > tolerance * bound;
             let reversed = dx * cx + dy * cy + half * bound < R::default();
-            unsettled += u32::from((turned | reversed | (own.size() > largest)) & (u[x] > R::default()));
+            unsettled +=
+                u32::from((turned | reversed | (own.size() > largest)) & (u[x] > R::default()));
         }
         unsettled as usize
     }

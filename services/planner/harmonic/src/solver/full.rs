@@ -143,6 +143,7 @@ impl Full {
             if check.holds() {
                 let verification = Verification {
                     worst_residual: check.worst_residual,
+                    worst_tile: check.worst_tile,
                     method,
                     reachable: check.reachable,
                 };

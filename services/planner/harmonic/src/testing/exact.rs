@@ -21,12 +21,19 @@ pub fn exact(domain: &Domain) -> Result<Field, SolveError> {
     let pass = BreadthFirst::from_target(domain, &cancellation)?;
     let tree = Tree::of(&pass, &cancellation)?;
     let mut workspace = Workspace::default();
-    let mut store =
-        multifrontal::solve(domain, &pass, &tree, u64::MAX, &mut workspace, &cancellation)?;
+    let mut store = multifrontal::solve(
+        domain,
+        &pass,
+        &tree,
+        u64::MAX,
+        &mut workspace,
+        &cancellation,
+    )?;
     multifrontal::relax(domain, &pass, &mut store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
     let verification = Verification {
         worst_residual: check.worst_residual,
+        worst_tile: check.worst_tile,
         method: Method::Multifrontal,
         reachable: check.reachable,
     };
