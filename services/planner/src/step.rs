@@ -25,9 +25,10 @@ use crate::fault::lead_astray;
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 
-/// Maps of at most this many cells (362 a side) are solved in full at once where a local update is not enough: that takes
-/// some milliseconds, and a run is the same each time. When the background solver is done depends on the machine.
-const SMALL: usize = 1 << 17;
+/// Maps of at most this many cells (1024 a side) are solved whole at once where the robot has no direction to trust after a
+/// local update: that takes some ten milliseconds, and a run is the same each time. On larger ones it waits for the
+/// background solver.
+const AT_ONCE: usize = 1 << 20;
 
 /// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
@@ -47,16 +48,19 @@ enum Advisor {
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
+    tolerance_m: f64,
     screening: Screening,
     advisor: Advisor,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
     live: Option<Live>,
-    /// A full solve is called for: the field was brought up to date as well as that goes.
+    /// A full solve is called for: the field was updated in a window.
     solve_advised: bool,
     /// Until then the field is not to be followed: a passage closed or opened.
     unsafe_until_solved: bool,
+    /// The robot waits for a full solve.
+    urgent: bool,
     /// Broken on purpose: no direction is given, wherever the robot is.
     on_a_saddle: bool,
     running: Option<Running>,
@@ -77,6 +81,15 @@ struct Live {
 const BESIDE_M: f64 = 0.12;
 
 impl Live {
+    /// Whether the field's direction for a robot at `position` is one to follow; where it gives none, there is nothing to
+    /// trust.
+    fn is_trusted(&self, position: DVec2) -> bool {
+        let at = self.frame.to_cells(position);
+        let cell = self.frame.cell_at(position).map(field_cell);
+        !matches!(self.field.guidance(at.x, at.y), Guidance::Along(_))
+            || cell.is_some_and(|cell| self.field.is_trusted(cell))
+    }
+
     /// Whether the field leads to a cell beside `target`, and the robot has come there.
     fn is_beside_the_target(&self, target: DVec2, robot: DVec2) -> bool {
         let aim = grid_cell(self.domain.target());
@@ -104,6 +117,7 @@ impl Step for Planner {
     fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
+            tolerance_m: mission.arrival_tolerance_m,
             screening: screening(mission),
             advisor: match (mission.method, Arcs::new(mission)) {
                 (Method::Evidential, Some(arcs)) => Advisor::Steer(arcs),
@@ -118,6 +132,7 @@ impl Step for Planner {
             live: None,
             solve_advised: false,
             unsafe_until_solved: false,
+            urgent: false,
             on_a_saddle: false,
             running: None,
             jobs: 0,
@@ -139,10 +154,13 @@ impl Step for Planner {
     fn step(&mut self, input: Input<'_>, _: MissionTime) -> Result<Outcome, SolveError> {
         Ok(match input {
             Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
-            Input::Pose(pose) => Outcome {
-                guidance: Some(self.guide(pose)),
-                ..Outcome::default()
-            },
+            Input::Pose(pose) => {
+                self.solve_for(pose)?;
+                Outcome {
+                    guidance: Some(self.guide(pose)),
+                    ..Outcome::default()
+                }
+            }
             Input::Lull => Outcome {
                 job: self.begin_job(),
                 ..Outcome::default()
@@ -193,10 +211,13 @@ impl Planner {
         Ok(Work::FullSolve)
     }
 
-    /// The cell that the field is to lead to: the target's, or with the evidential method the free one next to it.
+    /// The cell that the field is to lead to: the target's, or a free one near it where that one cannot be entered or, by the
+    /// evidential method, the body does not fit.
     fn aim(&self, frame: &GridFrame) -> Option<grid::Cell> {
         match self.advisor {
-            Advisor::Follow => frame.cell_at(self.target),
+            Advisor::Follow => {
+                aim::cell_with_a_way_in(frame, self.grid.cells(), self.target, self.tolerance_m)
+            }
             Advisor::LookFirst(_) | Advisor::Steer(_) => {
                 aim::cell(frame, self.grid.cells(), self.target)
             }
@@ -227,9 +248,8 @@ impl Planner {
             &changes,
             &Cancellation::default(),
         )?;
-        if verdict != Verdict::Accurate && live.frame.area() <= SMALL {
-            live.field = self.solver.solve(&live.domain, &Cancellation::default())?;
-            self.full_solves += 1;
+        if verdict == Verdict::Solved {
+            self.solved();
             return Ok(Work::FullSolve);
         }
         self.local_updates += 1;
@@ -237,9 +257,36 @@ impl Planner {
         Ok(Work::LocalUpdate)
     }
 
+    /// Every update in a window is followed by a full solve.
     fn heed(&mut self, verdict: Verdict) {
-        self.solve_advised |= verdict != Verdict::Accurate;
+        self.solve_advised |= verdict != Verdict::Solved;
         self.unsafe_until_solved |= verdict == Verdict::PassageClosed;
+    }
+
+    /// The live field was solved whole: what was called for is done, and what still runs is stale.
+    fn solved(&mut self) {
+        self.full_solves += 1;
+        self.solve_advised = false;
+        self.unsafe_until_solved = false;
+        self.running = None;
+    }
+
+    /// Solve the map whole, where it is small enough, if a robot at `pose` has no direction to trust.
+    fn solve_for(&mut self, pose: &PoseSample) -> Result<(), SolveError> {
+        let Some(live) = &mut self.live else {
+            return Ok(());
+        };
+        let waits = self.unsafe_until_solved || !live.is_trusted(pose.pose().position);
+        self.urgent = waits;
+        if waits && live.frame.area() <= AT_ONCE {
+            let before = &live.field;
+            live.field = self
+                .solver
+                .solve_near(&live.domain, before, &Cancellation::default())?;
+            self.urgent = false;
+            self.solved();
+        }
+        Ok(())
     }
 
     /// The full solve for the background solver, if one is called for. One runs at a time and is
@@ -256,7 +303,7 @@ impl Planner {
         let domain = self.live.as_ref()?.domain.clone();
         self.solve_advised = false;
         self.jobs += 1;
-        let (number, urgent) = (self.jobs, self.unsafe_until_solved);
+        let (number, urgent) = (self.jobs, self.unsafe_until_solved || self.urgent);
         self.running = Some(Running {
             number,
             urgent,
@@ -333,6 +380,9 @@ impl Planner {
                 match live.field.guidance(at.x, at.y) {
                     _ if live.is_beside_the_target(self.target, pose.position) => {
                         (GuidanceStatus::AtTarget, pose.axis())
+                    }
+                    Guidance::Along(_) if !live.is_trusted(pose.position) => {
+                        (GuidanceStatus::Waiting, DVec2::ZERO)
                     }
                     Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
                     Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
