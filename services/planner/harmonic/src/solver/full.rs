@@ -9,7 +9,7 @@ use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::field::Field;
 use crate::method::Method;
-use crate::multifrontal::{self, BreadthFirst, Tree};
+use crate::multifrontal::{self, BreadthFirst, Budget, Tree};
 use crate::multigrid::Multigrid;
 use crate::multigrid_bands;
 use crate::real::Real;
@@ -86,7 +86,8 @@ impl Full {
             ..
         } = task;
         cancellation.check()?;
-        let mut plan = plan(domain, settings.memory_limit, cancellation)?;
+        let budget = Budget::of(domain, settings.memory_limit);
+        let mut plan = plan(domain, &budget, cancellation)?;
         let mut failed = Check::default();
         for method in plan.methods {
             let (store, check) = match method {
@@ -115,8 +116,8 @@ impl Full {
                     let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
                         planned
                     } else {
-                        let pass = BreadthFirst::from_target(domain, cancellation)?;
-                        let tree = Tree::of(&pass, cancellation)?;
+                        let pass = BreadthFirst::from_target(domain, &budget, cancellation)?;
+                        let tree = Tree::of(&pass, &budget, cancellation)?;
                         (pass, tree)
                     };
                     observe(Phase::SetUp);
@@ -124,7 +125,7 @@ impl Full {
                         domain,
                         &pass,
                         &tree,
-                        settings.memory_limit,
+                        &budget,
                         &mut self.multifrontal,
                         cancellation,
                     )?;

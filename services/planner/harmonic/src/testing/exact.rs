@@ -9,7 +9,7 @@ use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::field::Field;
 use crate::method::Method;
-use crate::multifrontal::{self, BreadthFirst, Tree, Workspace};
+use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
 use crate::verification::{self, Verification};
 
 /// The field of `domain` by multifrontal factorisation: exact but for the rounding of `f64`, on maps of any shape.
@@ -18,17 +18,12 @@ use crate::verification::{self, Verification};
 /// Those of a solve.
 pub fn exact(domain: &Domain) -> Result<Field, SolveError> {
     let cancellation = Cancellation::new();
-    let pass = BreadthFirst::from_target(domain, &cancellation)?;
-    let tree = Tree::of(&pass, &cancellation)?;
+    let budget = Budget::of(domain, u64::MAX);
+    let pass = BreadthFirst::from_target(domain, &budget, &cancellation)?;
+    let tree = Tree::of(&pass, &budget, &cancellation)?;
     let mut workspace = Workspace::default();
-    let mut store = multifrontal::solve(
-        domain,
-        &pass,
-        &tree,
-        u64::MAX,
-        &mut workspace,
-        &cancellation,
-    )?;
+    let mut store =
+        multifrontal::solve(domain, &pass, &tree, &budget, &mut workspace, &cancellation)?;
     multifrontal::relax(domain, &pass, &mut store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
     let verification = Verification {
