@@ -339,16 +339,20 @@ impl<R: Real> Multigrid<R> {
     /// Interpolates the last coarse correction to the finest level, for u to be read, and smoothes the error that leaves from
     /// cell to cell: near a saddle point the direction depends on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
-        self.pass(1, false, 0.0);
-        self.smooth();
+        self.pass(1 + SMOOTHING, false, 0.0);
+        self.clear_correction();
     }
 
     /// Relaxes without a correction.
     pub(crate) fn smooth(&mut self) {
+        self.clear_correction();
+        self.pass(SMOOTHING, false, 0.0);
+    }
+
+    fn clear_correction(&mut self) {
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
         }
-        self.pass(SMOOTHING, false, 0.0);
     }
 
     fn pass(&mut self, sweeps: usize, descend: bool, tolerance: f64) -> Progress {

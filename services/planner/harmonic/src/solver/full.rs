@@ -185,13 +185,9 @@ impl<R: Real> Prepared<R> {
         match near {
             Some(near) if near.fits(domain) => {
                 let width = domain.width();
-                let mut plain = vec![0.0; width];
                 levels.start_near(domain.target(), |row, guess| {
-                    near.store()
-                        .read_row_wide(row * width..(row + 1) * width, -R::TOP, &mut plain);
-                    for (guess, &u) in guess.iter_mut().zip(&plain) {
-                        *guess = R::of(u);
-                    }
+                    let cells = row * width..(row + 1) * width;
+                    near.store().read_row_as(cells, -R::TOP, guess);
                 });
                 next_check = FIRST_CHECK_NEAR;
             }
