@@ -75,6 +75,11 @@ impl Check {
         }
     }
 
+    /// The largest residual as a multiple of the limit.
+    pub(crate) fn excess(&self) -> f64 {
+        self.worst_residual / RESIDUAL_LIMIT
+    }
+
     /// Whether the field may be handed out.
     pub(crate) fn holds(&self) -> bool {
         self.local_maxima == 0

@@ -16,7 +16,7 @@ use crate::screening::Coefficients;
 use crate::store::Store;
 use crate::verification::check_framed;
 
-/// Coarse corrections above this fraction of u mean that a cell has not converged.
+/// A cell whose direction a coarse correction turns by more than this, radians, has not settled.
 const TOLERANCE: f64 = 1e-3;
 
 /// Cycles before a window is given up.
@@ -168,7 +168,7 @@ impl Window {
             self.inflow.iter().copied(),
         );
         // The first cycle has no coarse correction yet to judge convergence by.
-        self.levels.cycle(TOLERANCE);
+        self.levels.cycle(None);
         let mut cycles = 1;
         while cycles < CYCLES {
             let converged =
@@ -180,7 +180,7 @@ impl Window {
             }
             // The correction converged before the residual did.
             for _ in 0..CYCLES_MORE {
-                self.levels.cycle(TOLERANCE);
+                self.levels.cycle(None);
             }
         }
         Err(WindowError::NotConverged)

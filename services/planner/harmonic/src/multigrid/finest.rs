@@ -161,7 +161,7 @@ impl<R: Real> Finest<R> {
         next: &mut Coarse<R>,
         sweeps: usize,
         descend: bool,
-        tolerance: R,
+        tolerance: Option<R>,
     ) -> Progress {
         let Grid {
             columns: n,
@@ -188,7 +188,9 @@ impl<R: Real> Finest<R> {
         for y in 0..rows + sweeps + 2 {
             if y < rows {
                 join_row(&next.grid, &next.u, y + 1, lower);
-                progress.unsettled += self.unsettled(y, upper, lower, tolerance);
+                if let Some(tolerance) = tolerance {
+                    progress.unsettled += self.unsettled(y, upper, lower, tolerance);
+                }
                 self.correct_black(y, upper, lower);
                 std::mem::swap(upper, lower);
             }
