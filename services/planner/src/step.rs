@@ -1,10 +1,11 @@
 //! The stage, pure: follow the `grid`, keep the field right, answer for a pose.
 
 mod input;
+mod live;
 
 use common::{
     clock::MissionTime,
-    grid::{self, Applied, CellState, GridFrame, Replica, Window},
+    grid::{self, Applied, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
     samples::{
@@ -14,14 +15,14 @@ use common::{
 };
 use glam::DVec2;
 use harmonic::{
-    Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, SolveError, Solver,
-    Verdict,
+    Cancellation, Cell, Change, Domain, Guidance, Screening, Settings, SolveError, Solver, Verdict,
 };
 
 use crate::active_sensing::{ActiveSensing, Advice, View};
 use crate::aim;
 use crate::arcs::Arcs;
 use crate::fault::lead_astray;
+use live::{Live, cell_policy, changes_in, field_cell, is_hazard};
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 
@@ -67,35 +68,6 @@ pub struct Planner {
     jobs: u64,
     full_solves: u64,
     local_updates: u64,
-}
-
-/// The live field and the domain it is of.
-#[derive(Debug)]
-struct Live {
-    frame: GridFrame,
-    domain: Domain,
-    field: Field,
-}
-
-/// As near as this to the middle of the cell that is aimed at beside the target, the robot has arrived, metres.
-const BESIDE_M: f64 = 0.12;
-
-impl Live {
-    /// Whether the field's direction for a robot at `position` is one to follow; where it gives none, there is nothing to
-    /// trust.
-    fn is_trusted(&self, position: DVec2) -> bool {
-        let at = self.frame.to_cells(position);
-        let cell = self.frame.cell_at(position).map(field_cell);
-        !matches!(self.field.guidance(at.x, at.y), Guidance::Along(_))
-            || cell.is_some_and(|cell| self.field.is_trusted(cell))
-    }
-
-    /// Whether the field leads to a cell beside `target`, and the robot has come there.
-    fn is_beside_the_target(&self, target: DVec2, robot: DVec2) -> bool {
-        let aim = grid_cell(self.domain.target());
-        let own = self.frame.cell_at(target) == Some(aim);
-        !own && self.frame.centre_of(aim).distance(robot) <= BESIDE_M
-    }
 }
 
 /// The job that the background solver runs.
@@ -326,7 +298,7 @@ impl Planner {
     /// nothing. When it cannot be brought up to date the live field stays.
     fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let (mut domain, mut field) = match solved.result {
-            Ok(solved) => solved,
+            Ok(solved) => *solved,
             Err(SolveError::Cancelled) => return Ok(Work::None),
             Err(error) => return Err(error),
         };
@@ -477,49 +449,6 @@ fn screening(mission: &Mission) -> Screening {
             length,
             cell: mission.grid_frame().resolution_m,
         })
-}
-
-fn cell_policy(field: &Field, col: usize, row: usize) -> FieldCell {
-    let cell = Cell::new(col, row);
-    let [ex, ey] = field.direction(cell).unwrap_or_default();
-    FieldCell {
-        ex: ex as f32,
-        ey: ey as f32,
-        log2_u: field.u(cell).log2() as f32,
-    }
-}
-
-/// Cells of `window` that are hazard now and were not when `domain` was solved, and the other way round.
-fn changes_in(domain: &Domain, frame: &GridFrame, window: Window, cells: &[u8]) -> Vec<Change> {
-    let mut changes = Vec::new();
-    for row in window.row..window.row + window.height {
-        for col in window.col..window.col + window.width {
-            let cell = grid::Cell { col, row };
-            let blocked = is_hazard(cells[frame.index(cell)]);
-            let cell = field_cell(cell);
-            if blocked != domain.is_blocked(cell) {
-                changes.push(Change { cell, blocked });
-            }
-        }
-    }
-    changes
-}
-
-/// A cell of the grid as the field library names it: the one place where one becomes the other.
-const fn field_cell(cell: grid::Cell) -> Cell {
-    Cell::new(cell.col as usize, cell.row as usize)
-}
-
-/// The reverse of [`field_cell`].
-const fn grid_cell(cell: Cell) -> grid::Cell {
-    grid::Cell {
-        col: cell.col as u32,
-        row: cell.row as u32,
-    }
-}
-
-const fn is_hazard(cell: u8) -> bool {
-    CellState::from_byte(cell).is_hazard()
 }
 
 #[cfg(test)]

@@ -169,7 +169,8 @@ fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
         solver.solve(domain, &cancellation).expect("a field");
     });
     let field = solver.solve(domain, &cancellation).expect("a field");
-    let (wavefront, _) = wavefront::time(domain, runs(cells));
+    let (wavefront, reached) = wavefront::time(domain, runs(cells));
+    assert_eq!(reached, field.verification().reachable, "cells reached");
     let dijkstra = with_dijkstra.then(|| others::dijkstra(domain));
     let faer = with_faer.then(|| others::sparse_cholesky(domain));
     let show = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.2}"));
