@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::plan::plan;
+use super::plan::{plan, plan_near};
 use super::settings::{Phase, Settings};
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
@@ -92,7 +92,11 @@ impl Full {
         } = task;
         cancellation.check()?;
         let budget = Budget::of(domain, settings.memory_limit);
-        let mut plan = plan(domain, &budget, cancellation)?;
+        let near = task.near.filter(|near| near.fits(domain));
+        let mut plan = match near.and_then(plan_near) {
+            Some(plan) => plan,
+            None => plan(domain, &budget, cancellation)?,
+        };
         let mut failed = Check::default();
         for method in plan.methods {
             let (store, check) = match method {
