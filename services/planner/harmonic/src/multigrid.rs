@@ -45,8 +45,9 @@ const VISITED_TWICE: usize = 1;
 /// On maps whose longer side is at most this, the second visit and the second sweep save fewer cycles than they cost.
 const SMALL_SIDE: usize = 128;
 
-/// Full sweeps in a pass over the finest level of a large map: the second reads no more from memory.
-const SWEEPS: usize = 2;
+/// Full sweeps in a pass over the finest level of a large map: all but the first read no more from memory, and dead ends a few
+/// cells wide, which the coarser levels do not resolve, need them.
+const SWEEPS: usize = 3;
 
 /// Levels end when neither side is longer.
 const COARSEST_SIDE: usize = 5;
