@@ -164,6 +164,9 @@ fn a_mission_whose_robot_stalls_gives_the_same_summary_to_the_bit() {
     let closed = [
         "--set",
         "world.wall=[{points=[[1.5,-2],[1.5,2],[-1.5,2],[-1.5,-2],[1.5,-2]]}]",
+        // Long enough to find all four walls.
+        "--timeout",
+        "300",
     ];
     let summary = || numbers(support::run("stalls", "open-room", &closed).1);
     let one = summary();

@@ -2,7 +2,8 @@
 //!
 //! The target is a point in the world, and the robot's pose drifts against the world: by the time it comes near, the
 //! target may be believed to lie where the body cannot be. Then the field leads to the free cell next to it, and there
-//! the robot has arrived: no nearer place is free.
+//! the robot has arrived: no nearer place is free. By the paper's method the target's own cell is never marked, but margins
+//! may fall on all cells around it; then the field leads to a free cell from which the target counts as reached.
 
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
@@ -22,6 +23,31 @@ pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cel
     let reach = (REACH_M / frame.resolution_m) as u32;
     let nearest = around(frame, own, reach)
         .filter(|cell| distance(cell) <= REACH_M && around(frame, *cell, 1).all(is_free))
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.or_else(|| cell_with_a_way_in(frame, cells, target, REACH_M))
+}
+
+/// The free cell nearest to `target`, no farther from it than `reach_m`, that has a free neighbour; the target's own where
+/// there is none, none outside the map.
+pub(crate) fn cell_with_a_way_in(
+    frame: &GridFrame,
+    cells: &[u8],
+    target: DVec2,
+    reach_m: f64,
+) -> Option<Cell> {
+    let own = frame.cell_at(target)?;
+    let is_free = |cell: Cell| !CellState::from_byte(cells[frame.index(cell)]).is_hazard();
+    let can_be_entered = |cell: Cell| {
+        let beside = |next: &Cell| next.col == cell.col || next.row == cell.row;
+        let mut next = around(frame, cell, 1).filter(beside);
+        is_free(cell) && next.any(|next| next != cell && is_free(next))
+    };
+    if can_be_entered(own) {
+        return Some(own);
+    }
+    let distance = |cell: &Cell| frame.centre_of(*cell).distance(target);
+    let nearest = around(frame, own, (reach_m / frame.resolution_m) as u32)
+        .filter(|cell| distance(cell) <= reach_m && can_be_entered(*cell))
         .min_by(|a, b| distance(a).total_cmp(&distance(b)));
     nearest.or(Some(own))
 }
@@ -69,6 +95,21 @@ mod tests {
     fn a_target_in_a_wall_is_approached_from_the_side_that_is_nearer() {
         let aim = aim(DVec2::new(0.5, 0.0), |at| (0.43..0.72).contains(&at.x)).unwrap();
         assert!(aim.distance(DVec2::new(0.35, 0.0)) < 1e-6, "{aim}");
+    }
+
+    #[test]
+    fn a_target_whose_neighbours_are_margins_is_approached_by_a_free_cell_within_the_tolerance() {
+        let target = DVec2::new(0.5, 0.0);
+        let mut cells = vec![CellState::Free as u8; FRAME.area()];
+        let own = FRAME.cell_at(target).unwrap();
+        for cell in around(&FRAME, own, 1).filter(|cell| *cell != own) {
+            cells[FRAME.index(cell)] = CellState::Sensed as u8;
+        }
+        for (reach_m, off_m) in [(0.15, 0.1), (0.05, 0.0)] {
+            let cell = cell_with_a_way_in(&FRAME, &cells, target, reach_m).unwrap();
+            let off = FRAME.centre_of(cell).distance(target);
+            assert!((off - off_m).abs() < 1e-6, "{off} m within {reach_m} m");
+        }
     }
 
     #[test]

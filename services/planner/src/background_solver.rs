@@ -143,7 +143,7 @@ impl Worker {
         }
         Solved {
             number,
-            result: solved.map(|field| (domain, field)),
+            result: solved.map(|field| Box::new((domain, field))),
             took_ns: began.elapsed().as_nanos() as u64,
         }
     }

@@ -198,7 +198,7 @@ impl Shell {
                 }
                 Work::FullSolve => {
                     self.full_solve_ns = took_ns;
-                    tracing::info!(took_us = took_ns / 1000, "full solve");
+                    tracing::debug!(took_us = took_ns / 1000, "full solve");
                 }
                 Work::LocalUpdate => self.local_update_ns = took_ns,
                 Work::None | Work::SwappedIn | Work::Broken => {}

@@ -1,10 +1,11 @@
 //! The stage, pure: follow the `grid`, keep the field right, answer for a pose.
 
 mod input;
+mod live;
 
 use common::{
     clock::MissionTime,
-    grid::{self, Applied, CellState, GridFrame, Replica, Window},
+    grid::{self, Applied, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
     samples::{
@@ -14,20 +15,21 @@ use common::{
 };
 use glam::DVec2;
 use harmonic::{
-    Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, SolveError, Solver,
-    Verdict,
+    Cancellation, Cell, Change, Domain, Guidance, Screening, Settings, SolveError, Solver, Verdict,
 };
 
 use crate::active_sensing::{ActiveSensing, Advice, View};
 use crate::aim;
 use crate::arcs::Arcs;
 use crate::fault::lead_astray;
+use live::{Live, cell_policy, changes_in, field_cell, is_hazard};
 
 pub use input::{Input, Job, Outcome, Solved, Work};
 
-/// Maps of at most this many cells (362 a side) are solved in full at once where a local update is not enough: that takes
-/// some milliseconds, and a run is the same each time. When the background solver is done depends on the machine.
-const SMALL: usize = 1 << 17;
+/// Maps of at most this many cells (1024 a side) are solved whole at once where the robot has no direction to trust after a
+/// local update: that takes some ten milliseconds, and a run is the same each time. On larger ones it waits for the
+/// background solver.
+const AT_ONCE: usize = 1 << 20;
 
 /// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;
@@ -47,42 +49,25 @@ enum Advisor {
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
+    tolerance_m: f64,
     screening: Screening,
     advisor: Advisor,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
     live: Option<Live>,
-    /// A full solve is called for: the field was brought up to date as well as that goes.
+    /// A full solve is called for: the field was updated in a window.
     solve_advised: bool,
     /// Until then the field is not to be followed: a passage closed or opened.
     unsafe_until_solved: bool,
+    /// The robot waits for a full solve.
+    urgent: bool,
     /// Broken on purpose: no direction is given, wherever the robot is.
     on_a_saddle: bool,
     running: Option<Running>,
     jobs: u64,
     full_solves: u64,
     local_updates: u64,
-}
-
-/// The live field and the domain it is of.
-#[derive(Debug)]
-struct Live {
-    frame: GridFrame,
-    domain: Domain,
-    field: Field,
-}
-
-/// As near as this to the middle of the cell that is aimed at beside the target, the robot has arrived, metres.
-const BESIDE_M: f64 = 0.12;
-
-impl Live {
-    /// Whether the field leads to a cell beside `target`, and the robot has come there.
-    fn is_beside_the_target(&self, target: DVec2, robot: DVec2) -> bool {
-        let aim = grid_cell(self.domain.target());
-        let own = self.frame.cell_at(target) == Some(aim);
-        !own && self.frame.centre_of(aim).distance(robot) <= BESIDE_M
-    }
 }
 
 /// The job that the background solver runs.
@@ -104,6 +89,7 @@ impl Step for Planner {
     fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
+            tolerance_m: mission.arrival_tolerance_m,
             screening: screening(mission),
             advisor: match (mission.method, Arcs::new(mission)) {
                 (Method::Evidential, Some(arcs)) => Advisor::Steer(arcs),
@@ -118,6 +104,7 @@ impl Step for Planner {
             live: None,
             solve_advised: false,
             unsafe_until_solved: false,
+            urgent: false,
             on_a_saddle: false,
             running: None,
             jobs: 0,
@@ -139,10 +126,13 @@ impl Step for Planner {
     fn step(&mut self, input: Input<'_>, _: MissionTime) -> Result<Outcome, SolveError> {
         Ok(match input {
             Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
-            Input::Pose(pose) => Outcome {
-                guidance: Some(self.guide(pose)),
-                ..Outcome::default()
-            },
+            Input::Pose(pose) => {
+                self.solve_for(pose)?;
+                Outcome {
+                    guidance: Some(self.guide(pose)),
+                    ..Outcome::default()
+                }
+            }
             Input::Lull => Outcome {
                 job: self.begin_job(),
                 ..Outcome::default()
@@ -193,10 +183,13 @@ impl Planner {
         Ok(Work::FullSolve)
     }
 
-    /// The cell that the field is to lead to: the target's, or with the evidential method the free one next to it.
+    /// The cell that the field is to lead to: the target's, or a free one near it where that one cannot be entered or, by the
+    /// evidential method, the body does not fit.
     fn aim(&self, frame: &GridFrame) -> Option<grid::Cell> {
         match self.advisor {
-            Advisor::Follow => frame.cell_at(self.target),
+            Advisor::Follow => {
+                aim::cell_with_a_way_in(frame, self.grid.cells(), self.target, self.tolerance_m)
+            }
             Advisor::LookFirst(_) | Advisor::Steer(_) => {
                 aim::cell(frame, self.grid.cells(), self.target)
             }
@@ -227,9 +220,8 @@ impl Planner {
             &changes,
             &Cancellation::default(),
         )?;
-        if verdict != Verdict::Accurate && live.frame.area() <= SMALL {
-            live.field = self.solver.solve(&live.domain, &Cancellation::default())?;
-            self.full_solves += 1;
+        if verdict == Verdict::Solved {
+            self.solved();
             return Ok(Work::FullSolve);
         }
         self.local_updates += 1;
@@ -237,9 +229,36 @@ impl Planner {
         Ok(Work::LocalUpdate)
     }
 
+    /// Every update in a window is followed by a full solve.
     fn heed(&mut self, verdict: Verdict) {
-        self.solve_advised |= verdict != Verdict::Accurate;
+        self.solve_advised |= verdict != Verdict::Solved;
         self.unsafe_until_solved |= verdict == Verdict::PassageClosed;
+    }
+
+    /// The live field was solved whole: what was called for is done, and what still runs is stale.
+    fn solved(&mut self) {
+        self.full_solves += 1;
+        self.solve_advised = false;
+        self.unsafe_until_solved = false;
+        self.running = None;
+    }
+
+    /// Solve the map whole, where it is small enough, if a robot at `pose` has no direction to trust.
+    fn solve_for(&mut self, pose: &PoseSample) -> Result<(), SolveError> {
+        let Some(live) = &mut self.live else {
+            return Ok(());
+        };
+        let waits = self.unsafe_until_solved || !live.is_trusted(pose.pose().position);
+        self.urgent = waits;
+        if waits && live.frame.area() <= AT_ONCE {
+            let before = &live.field;
+            live.field = self
+                .solver
+                .solve_near(&live.domain, before, &Cancellation::default())?;
+            self.urgent = false;
+            self.solved();
+        }
+        Ok(())
     }
 
     /// The full solve for the background solver, if one is called for. One runs at a time and is
@@ -256,7 +275,7 @@ impl Planner {
         let domain = self.live.as_ref()?.domain.clone();
         self.solve_advised = false;
         self.jobs += 1;
-        let (number, urgent) = (self.jobs, self.unsafe_until_solved);
+        let (number, urgent) = (self.jobs, self.unsafe_until_solved || self.urgent);
         self.running = Some(Running {
             number,
             urgent,
@@ -279,7 +298,7 @@ impl Planner {
     /// nothing. When it cannot be brought up to date the live field stays.
     fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let (mut domain, mut field) = match solved.result {
-            Ok(solved) => solved,
+            Ok(solved) => *solved,
             Err(SolveError::Cancelled) => return Ok(Work::None),
             Err(error) => return Err(error),
         };
@@ -333,6 +352,9 @@ impl Planner {
                 match live.field.guidance(at.x, at.y) {
                     _ if live.is_beside_the_target(self.target, pose.position) => {
                         (GuidanceStatus::AtTarget, pose.axis())
+                    }
+                    Guidance::Along(_) if !live.is_trusted(pose.position) => {
+                        (GuidanceStatus::Waiting, DVec2::ZERO)
                     }
                     Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
                     Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
@@ -427,49 +449,6 @@ fn screening(mission: &Mission) -> Screening {
             length,
             cell: mission.grid_frame().resolution_m,
         })
-}
-
-fn cell_policy(field: &Field, col: usize, row: usize) -> FieldCell {
-    let cell = Cell::new(col, row);
-    let [ex, ey] = field.direction(cell).unwrap_or_default();
-    FieldCell {
-        ex: ex as f32,
-        ey: ey as f32,
-        log2_u: field.u(cell).log2() as f32,
-    }
-}
-
-/// Cells of `window` that are hazard now and were not when `domain` was solved, and the other way round.
-fn changes_in(domain: &Domain, frame: &GridFrame, window: Window, cells: &[u8]) -> Vec<Change> {
-    let mut changes = Vec::new();
-    for row in window.row..window.row + window.height {
-        for col in window.col..window.col + window.width {
-            let cell = grid::Cell { col, row };
-            let blocked = is_hazard(cells[frame.index(cell)]);
-            let cell = field_cell(cell);
-            if blocked != domain.is_blocked(cell) {
-                changes.push(Change { cell, blocked });
-            }
-        }
-    }
-    changes
-}
-
-/// A cell of the grid as the field library names it: the one place where one becomes the other.
-const fn field_cell(cell: grid::Cell) -> Cell {
-    Cell::new(cell.col as usize, cell.row as usize)
-}
-
-/// The reverse of [`field_cell`].
-const fn grid_cell(cell: Cell) -> grid::Cell {
-    grid::Cell {
-        col: cell.col as u32,
-        row: cell.row as u32,
-    }
-}
-
-const fn is_hazard(cell: u8) -> bool {
-    CellState::from_byte(cell).is_hazard()
 }
 
 #[cfg(test)]

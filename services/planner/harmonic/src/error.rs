@@ -76,14 +76,18 @@ pub enum SolveError {
     Cancelled,
     /// No method could finish within the memory allowed.
     #[error(
-        "no iterative method converged and the multifrontal factorisation would need {needed} bytes, {allowed} are \
-         allowed: raise `Settings::memory_limit` or use larger cells"
+        "no iterative method converged on the map of {width} x {height} cells and the multifrontal factorisation would need \
+         at least {needed} bytes, {allowed} are allowed: raise `Settings::memory_limit` or use larger cells"
     )]
     TooCostly {
-        /// Bytes the factorisation would need.
+        /// Bytes the factorisation would need, at least.
         needed: u64,
         /// Bytes the settings allow.
         allowed: u64,
+        /// Columns of the map.
+        width: usize,
+        /// Rows of the map.
+        height: usize,
     },
     /// No method produced a field that passes verification; the field is not handed out.
     #[error(

@@ -40,16 +40,19 @@
 //! # Verification
 //! No field is handed out unless every cell was checked: the relative residual of its equation is at most 2e-4, and one of
 //! its neighbours has a larger u. The first is relative to u of that cell, since a norm over the map says nothing about
-//! cells where u is 1e-50; the second makes steepest ascent end at the target. [`Field::verification`] tells what was
-//! found; a solve that cannot be verified ends in [`SolveError::Unverified`].
+//! cells where u is 1e-50; the second makes steepest ascent end at the target. And in every tile of 64 x 64 cells the sum of
+//! the residuals is at most a hundredth of what bends the field there: small residuals of one sign would turn all directions
+//! of a hall. Angles are not bounded by that; they are measured against exact solutions on thousands of maps.
+//! [`Field::verification`] tells what was found; a solve that cannot be verified ends in [`SolveError::Unverified`].
 //!
-//! # Local updates and their limits
-//! When a few cells become blocked or free, [`Solver::update`] solves again in a window around them, in a fraction of a
-//! millisecond whatever the size of the map. A change alters u everywhere downstream, so the window cannot be right
-//! everywhere: steepest ascent still ends at the target, directions near the change are right, and the [`Verdict`] says
-//! whether those far away are, or whether a passage was closed, in which case the field must not be followed. Every
-//! local update is provisional: follow it by a full solve, on another thread if need be ([`Solver::solve_near`] starts from
-//! the field at hand, [`Cancellation`] stops it).
+//! # Updates
+//! When a few cells become blocked or free, [`Solver::update`] solves the whole map again, starting from the field at hand, up
+//! to [`Settings::whole_up_to`] cells: no direction is ever older than the map. On larger maps it solves in a window around
+//! the change, in a fraction of a millisecond whatever the size of the map. A change alters u everywhere downstream, so the
+//! window cannot be right everywhere: steepest ascent still ends at the target, and [`Field::is_trusted`] says of any cell
+//! whether its direction is near that of a full solve. The [`Verdict`] says which of both was done, or that a passage was
+//! closed, in which case the field must not be followed. Every update in a window is provisional: follow it by a full solve,
+//! on another thread if need be ([`Solver::solve_near`] starts from the field at hand, [`Cancellation`] stops it).
 //!
 //! # Units and frames
 //! Cells are named by column and row from 0; arrays are row-major. Positions are continuous in units of a cell, with the
@@ -71,7 +74,7 @@
 //! // An obstacle appears; the field is brought up to date.
 //! let obstacle = [Change { cell: Cell::new(10, 5), blocked: true }];
 //! let verdict = solver.update(&mut domain, &mut field, &obstacle, &Cancellation::new())?;
-//! assert_eq!(verdict, Verdict::Accurate);
+//! assert_eq!(verdict, Verdict::Solved);
 //! assert!(field.is_blocked(Cell::new(10, 5)));
 //! # Ok::<(), harmonic::SolveError>(())
 //! ```

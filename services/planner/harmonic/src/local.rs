@@ -1,17 +1,24 @@
 //! Local updates: the field in a window around newly blocked and newly freed cells, solved again.
 //!
-//! A change alters u everywhere downstream of it, so a local update cannot be right everywhere. It is right near the
-//! change, steepest ascent still ends at the target from every cell, and it reports when that is not enough:
+//! A change alters u everywhere downstream of it, so a local update cannot be right everywhere. Steepest ascent still ends at
+//! the target from every cell; where directions may be trusted until a full solve, the field computes from what the
+//! windows' rims tell ([`mod@trust`]).
 //! - [`window`] solves for u in a window, between inflow and outflow at its rim.
-//! - [`mod@estimate`] estimates from the rim how far off directions beyond it are; the window grows until that is small.
-//! - [`paths`] checks that paths of steepest ascent through the window still ascend, where the estimate cannot tell.
+//! - [`mod@estimate`] reads from the rim how far off directions beyond it are; the window grows until that is small.
+//! - [`paths`] checks that paths of steepest ascent through windows still ascend.
 //!
-//! A [`Patch`] keeps u of each window before its update. Across the outflow rim ratios of u stay as they were, and windows
-//! that would touch are solved again as one, from u before any of them. So outside all windows steepest ascent climbs u of
-//! the last full solve, and it leaves each window at a higher u, by that measure, than it enters: it ends at the target.
+//! # Why steepest ascent ends at the target
+//! A [`Patch`] keeps u of its window before the update. Call u of the last full solve, without any patch, the base. Patches
+//! do not touch (windows that would touch are solved again as one), and across an outflow edge the ratio of u stays
+//! that of the base. A cycle of steepest ascent would pass cells outside all patches, since u climbs inside each. Take the
+//! one of them with the largest base u. Its next cell is either outside too, with a larger base u; or it enters a patch at
+//! a cell whose u is above its own, from where u climbs until the path leaves across an inflow edge to a cell of larger base
+//! u; or it enters at a cell whose u is now below its own, and such paths are followed, those of all patches after every
+//! update, until they are outside all patches at a larger base u. So there is no such cell, and no cycle.
 
 mod estimate;
 mod paths;
+mod trust;
 mod window;
 
 use crate::cell::Change;
@@ -24,14 +31,15 @@ use window::{Window, WindowError};
 
 /// What an update did, and whether its field may be followed.
 ///
-/// It speaks of this update alone: what an earlier one advised, or closed, holds until a full solve.
+/// It speaks of this update alone: what an earlier one closed holds until a full solve.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[must_use]
 pub enum Verdict {
-    /// The field is right: a full solve would change no direction that matters.
-    Accurate,
-    /// The field leads to the target from everywhere; a full solve would give better directions far away.
-    FullSolveAdvised,
+    /// The whole map was solved, or nothing changed: every direction is verified.
+    Solved,
+    /// A window was solved: steepest ascent leads to the target from everywhere, and directions may be trusted where
+    /// [`Field::is_trusted`] says so. A full solve must follow.
+    Provisional,
     /// The change closed (or opened) a passage: do not follow the field before a full solve.
     PassageClosed,
 }
@@ -58,9 +66,6 @@ const UPSTREAM_ANGLE: f64 = 0.3;
 
 /// Ratios of u on the outflow rim, after to before, beyond which a passage was closed or opened.
 const OUTFLOW_RATIO: (f64, f64) = (0.02, 50.0);
-
-/// Maps of at most this many cells are solved in full where a window is not enough: that takes a millisecond.
-const SMALL: usize = 1 << 14;
 
 /// The outcome of growing a window.
 enum Growth {
@@ -130,7 +135,6 @@ impl LocalUpdate {
             area: bounds(changes)?,
             rects: vec![bounds(changes)?],
         };
-        let small = domain.blocked().len() <= SMALL;
         let mut least = 0;
         // Where a window is not enough, a larger one may be.
         while let Some(reach) = region.place_window(domain, field, least) {
@@ -146,31 +150,21 @@ impl LocalUpdate {
             };
             let closed = estimate.outflow_ratio.0 < OUTFLOW_RATIO.0
                 || estimate.outflow_ratio.1 > OUTFLOW_RATIO.1;
-            if closed && small {
-                return None;
-            }
             let window = &mut self.windows[window];
             let (wide, high) = window.size();
             least = wide.min(high) + 1;
-            let patch = window.write(domain, field.store_mut(), region.area);
+            let patch = window.write(domain, field.store_mut(), region.area, estimate.rim);
             field.patches_mut().push(patch);
             if closed {
                 return Some(Verdict::PassageClosed);
             }
-            if paths::all_ascend(field, window, estimate.ascents_to_check) {
-                return Some(if estimate.angle > ANGLE {
-                    Verdict::FullSolveAdvised
-                } else {
-                    Verdict::Accurate
-                });
+            if paths::all_ascend(field, window) {
+                return Some(Verdict::Provisional);
             }
             if choose(domain, &region.area, least).is_none() {
-                return (!small).then_some(Verdict::PassageClosed);
+                return Some(Verdict::PassageClosed);
             }
             // The larger window touches the patch just written and undoes it.
-        }
-        if small {
-            return None;
         }
         // No window is enough. Blocked cells must still be blocked in the field.
         for rect in region.rects {

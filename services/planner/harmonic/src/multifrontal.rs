@@ -12,10 +12,12 @@
 //! - [`back_substitution`]: from the factors to u.
 //! - [`gauss_seidel`]: corrects the cells that `f64` factors cannot reach.
 //! - [`breadth_first`]: the order of the cells.
+//! - [`budget`]: the memory all this may take.
 //! - [`workspace`]: the factors, and memory kept between solves.
 
 mod back_substitution;
 mod breadth_first;
+mod budget;
 mod dense;
 mod gauss_seidel;
 mod tree;
@@ -27,6 +29,7 @@ use crate::error::SolveError;
 use crate::screening::Coefficients;
 use crate::store::Store;
 pub(crate) use breadth_first::BreadthFirst;
+pub(crate) use budget::Budget;
 pub(crate) use gauss_seidel::relax;
 pub(crate) use tree::Tree;
 pub(crate) use workspace::Workspace;
@@ -36,16 +39,11 @@ pub(crate) fn solve(
     domain: &Domain,
     pass: &BreadthFirst,
     tree: &Tree,
-    memory_limit: u64,
+    budget: &Budget,
     workspace: &mut Workspace,
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
-    if tree.cost.bytes > memory_limit {
-        return Err(SolveError::TooCostly {
-            needed: tree.cost.bytes,
-            allowed: memory_limit,
-        });
-    }
+    budget.ask(tree.cost.bytes)?;
     let solved = factor(domain, pass, tree, workspace, cancellation)
         .and_then(|()| back_substitution::substitute(domain, pass, tree, workspace, cancellation));
     workspace.trim();

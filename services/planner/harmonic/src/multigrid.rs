@@ -45,13 +45,9 @@ const VISITED_TWICE: usize = 1;
 /// On maps whose longer side is at most this, the second visit and the second sweep save fewer cycles than they cost.
 const SMALL_SIDE: usize = 128;
 
-/// Full sweeps in a pass over the finest level of a large map: the second reads no more from memory.
-const SWEEPS: usize = 2;
-
-/// The same where no more than one cell in `FEW` has not converged: those lie in dead ends a few cells wide, which the
-/// coarser levels do not resolve.
-const SWEEPS_FOR_FEW: usize = 6;
-const FEW: usize = 64;
+/// Full sweeps in a pass over the finest level of a large map: all but the first read no more from memory, and dead ends a few
+/// cells wide, which the coarser levels do not resolve, need them.
+const SWEEPS: usize = 3;
 
 /// Levels end when neither side is longer.
 const COARSEST_SIDE: usize = 5;
@@ -266,13 +262,12 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// One cycle; corrections above `tolerance` times u count as unconverged.
-    pub(crate) fn cycle(&mut self, tolerance: f64) -> Progress {
+    /// One cycle; a cell whose direction its correction turns by more than `tolerance`, radians, counts as unsettled. None
+    /// are counted without one.
+    pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> Progress {
         let progress = self.pass(self.sweeps, true, tolerance);
         if self.is_large() {
-            let Grid { width, height, .. } = self.finest.grid;
-            let few = progress.unconverged <= width * height / FEW;
-            self.sweeps = if few { SWEEPS_FOR_FEW } else { SWEEPS };
+            self.sweeps = SWEEPS;
         }
         self.correct();
         progress
@@ -281,7 +276,7 @@ impl<R: Real> Multigrid<R> {
     /// As [`cycle`](Self::cycle), but without the coarser levels if all cells had converged; says whether they had. For small
     /// maps, whose coarser levels cost more than the finest. End with [`smooth`](Self::smooth), not [`finish`](Self::finish).
     pub(crate) fn cycle_unless_converged(&mut self, tolerance: f64) -> bool {
-        let converged = self.pass(1, true, tolerance).unconverged == 0;
+        let converged = self.pass(1, true, Some(tolerance)).unsettled == 0;
         if !converged {
             self.correct();
         }
@@ -339,21 +334,25 @@ impl<R: Real> Multigrid<R> {
     /// Interpolates the last coarse correction to the finest level, for u to be read, and smoothes the error that leaves from
     /// cell to cell: near a saddle point the direction depends on the last digits. Cycles may follow.
     pub(crate) fn finish(&mut self) {
-        self.pass(1, false, 0.0);
-        self.smooth();
+        self.pass(1 + SMOOTHING, false, None);
+        self.clear_correction();
     }
 
     /// Relaxes without a correction.
     pub(crate) fn smooth(&mut self) {
+        self.clear_correction();
+        self.pass(SMOOTHING, false, None);
+    }
+
+    fn clear_correction(&mut self) {
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
         }
-        self.pass(SMOOTHING, false, 0.0);
     }
 
-    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: f64) -> Progress {
+    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: Option<f64>) -> Progress {
         let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
-        let tolerance = R::of(tolerance);
+        let tolerance = tolerance.map(R::of);
         self.simd.run(
             #[inline(always)]
             || finest.pass(next, sweeps, descend, tolerance),

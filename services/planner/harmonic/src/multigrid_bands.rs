@@ -14,7 +14,7 @@ use crate::real::Real;
 use crate::scaled::{Scaled, pow2};
 use crate::store::{BLOCKED, Store};
 
-/// Coarse corrections above this fraction of u mean that a cell has not converged. Stricter than for a solve that is
+/// A cell whose direction a coarse correction turns by more than this, radians, has not settled. Stricter than for a solve that is
 /// continued where it fails verification.
 const TOLERANCE: f64 = 3e-4;
 
@@ -49,12 +49,12 @@ pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Stor
         for cycle in 0..CYCLES {
             cancellation.check()?;
             // The first cycles have not reached every cell yet, and what is zero does not change.
-            if levels.cycle(TOLERANCE).unconverged == 0 && cycle >= 4 {
+            if levels.cycle(Some(TOLERANCE)).unsettled == 0 && cycle >= 4 {
                 break;
             }
         }
         // One more, for the residuals.
-        levels.cycle(TOLERANCE);
+        levels.cycle(None);
         levels.finish();
         let mut resolved = 0_usize;
         levels.unload(|row, values| {

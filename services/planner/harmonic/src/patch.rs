@@ -1,5 +1,6 @@
 //! A rectangle of cells whose u a local update replaced, with u before it.
 
+use crate::cell::Cell;
 use crate::scaled::Scaled;
 use crate::store::Store;
 
@@ -48,6 +49,19 @@ impl Rect {
     }
 }
 
+/// What the solution of a window tells at its rim.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rim {
+    /// Cells outside from which steepest ascent enters the window at a cell whose u is now lower than theirs.
+    pub entries: Vec<Cell>,
+    /// Largest |u after / u before - 1| on the outflow rim.
+    pub deviation: f64,
+    /// Largest u before on the outflow rim; zero if nothing flows out.
+    pub largest: Scaled,
+    /// Estimated error of directions at the inflow rim, radians.
+    pub upstream: f64,
+}
+
 /// A local update: where, and u there before it.
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
@@ -58,6 +72,7 @@ pub(crate) struct Patch {
     unknowns: Vec<bool>,
     /// Row-major over `rect`, as stored.
     before: Vec<(f64, i32)>,
+    rim: Rim,
 }
 
 impl Patch {
@@ -66,8 +81,8 @@ impl Patch {
         rect: Rect,
         changed: Rect,
         unknowns: Vec<bool>,
-        store: &Store,
-        map_width: usize,
+        rim: Rim,
+        (store, map_width): (&Store, usize),
     ) -> Self {
         let mut before = Vec::with_capacity(rect.width * rect.height);
         for row in rect.row..rect.row + rect.height {
@@ -79,7 +94,12 @@ impl Patch {
             changed,
             unknowns,
             before,
+            rim,
         }
+    }
+
+    pub(crate) fn rim(&self) -> &Rim {
+        &self.rim
     }
 
     pub(crate) fn rect(&self) -> &Rect {

@@ -90,13 +90,14 @@ impl Solver {
         )
     }
 
-    /// Applies `changes` to `domain` and brings its `field` up to date: in a window around them, or by a full solve where
-    /// the map is small or the window would be half of it.
+    /// Applies `changes` to `domain` and brings its `field` up to date: by a full solve that starts from it on maps of up to
+    /// [`Settings::whole_up_to`] cells, else in a window around the changes, or by a full solve where the window would be half
+    /// of the map.
     ///
     /// `field` may be older than `domain`: a change counts if the cell is not yet so in the field. So when a field solved in
-    /// the background is swapped in, update it with all changes since that solve began. Every local update is
-    /// provisional, whatever its verdict: follow it by a full solve ([`solve_near`](Self::solve_near)) while the
-    /// updated field is in use.
+    /// the background is swapped in, update it with all changes since that solve began. An update in a window is
+    /// provisional: follow it by a full solve ([`solve_near`](Self::solve_near)), and until then trust the directions only
+    /// where [`Field::is_trusted`] says so.
     ///
     /// # Errors
     /// [`SolveError::Outside`], [`SolveError::TargetBlocked`] and [`SolveError::ForeignField`], with neither domain nor
@@ -120,12 +121,19 @@ impl Solver {
             .filter(|change| field.is_blocked(change.cell) != change.blocked)
             .collect();
         if changes.is_empty() {
-            return Ok(Verdict::Accurate);
+            let whole = field.patches().is_empty();
+            return Ok(if whole {
+                Verdict::Solved
+            } else {
+                Verdict::Provisional
+            });
         }
-        if let Some(verdict) = self.local.update(domain, field, &changes) {
+        if domain.blocked().len() > self.settings.whole_up_to
+            && let Some(verdict) = self.local.update(domain, field, &changes)
+        {
             return Ok(verdict);
         }
         *field = self.solve_near(domain, field, cancellation)?;
-        Ok(Verdict::Accurate)
+        Ok(Verdict::Solved)
     }
 }

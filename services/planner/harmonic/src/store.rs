@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::real::Real;
 use crate::scaled::{Scaled, pow2};
 
 /// u of a blocked cell in the stores: any negative number would do, the accessors hide it.
@@ -121,13 +122,21 @@ impl Store {
         }
     }
 
-    /// u of a run of cells in units of 2^`reference`, 0 where that is below what an `f64` holds.
-    pub(crate) fn read_row_wide(&self, cells: Range<usize>, reference: i32, into: &mut [f64]) {
+    /// u of a run of cells in units of 2^`reference`, 0 where that is below what an `R` holds.
+    pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
+        if let Self::Single { values, exponent } = self
+            && *exponent == reference
+        {
+            for (to, &u) in into.iter_mut().zip(&values[cells]) {
+                *to = R::of(f64::from(u.max(0.0)));
+            }
+            return;
+        }
         for (to, index) in into.iter_mut().zip(cells) {
             let (value, exponent) = self.raw(index);
             let shift = exponent.saturating_sub(reference);
             // In two steps: the factor may be out of range where the product is not.
-            *to = value.max(0.0) * pow2(shift / 2) * pow2(shift - shift / 2);
+            *to = R::of(value.max(0.0) * pow2(shift / 2) * pow2(shift - shift / 2));
         }
     }
 

@@ -106,7 +106,7 @@ pub struct Solved {
     /// The job's number.
     pub number: u64,
     /// Its map, and the field of it.
-    pub result: Result<(Domain, Field), SolveError>,
+    pub result: Result<Box<(Domain, Field)>, SolveError>,
     /// How long it took, nanoseconds of wall-clock; nothing is decided by it.
     pub took_ns: u64,
 }

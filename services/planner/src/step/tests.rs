@@ -1,5 +1,8 @@
 use super::*;
-use common::{grid::Part, samples::ClearBeam};
+use common::{
+    grid::{CellState, Part},
+    samples::ClearBeam,
+};
 use std::path::Path;
 
 fn mission() -> Mission {
@@ -50,6 +53,12 @@ fn at(x_m: f64, y_m: f64) -> PoseSample {
     }
 }
 
+/// What the planner answers to a pose.
+fn answer(planner: &mut Planner, pose: &PoseSample) -> GuidanceSample {
+    let outcome = planner.step(Input::Pose(pose), MissionTime::default());
+    outcome.unwrap().guidance.unwrap()
+}
+
 /// The field of a job.
 fn solve(number: u64, domain: Domain) -> Solved {
     let field = Solver::default()
@@ -57,7 +66,7 @@ fn solve(number: u64, domain: Domain) -> Solved {
         .unwrap();
     Solved {
         number,
-        result: Ok((domain, field)),
+        result: Ok(Box::new((domain, field))),
         took_ns: 0,
     }
 }
@@ -105,13 +114,10 @@ fn a_wall_that_appears_turns_the_guidance_aside() {
     // Open only above y = 1.
     let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
     let (header, cells) = keyframe(2, wall);
-    assert_eq!(
-        planner.take_grid(&header, &cells).unwrap(),
-        Work::LocalUpdate
-    );
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::FullSolve);
     let guidance = planner.guide(&at(0.3, 0.0));
     assert!(guidance.ey > 0.7, "{guidance:?}");
-    assert_eq!((guidance.full_solves, guidance.local_updates), (1, 1));
+    assert_eq!((guidance.full_solves, guidance.local_updates), (2, 0));
 }
 
 #[test]
@@ -263,9 +269,9 @@ fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
     }
 }
 
-/// A room of 200 x 200 cells with a wall across it and a gap in the wall.
+/// A room with a wall across it and a gap in the wall, of more cells than are solved at once.
 fn large_room(version: u64, gap_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
-    let mission = mission_of(400);
+    let mission = mission_of(LARGE);
     let hazard = |at: DVec2| {
         let wall = (at.x - 0.8).abs() < 0.03;
         let far_gap = (1.0..1.4).contains(&at.y);
@@ -274,6 +280,42 @@ fn large_room(version: u64, gap_closed: bool) -> (Mission, GridHeader, Vec<u8>) 
     };
     let (header, cells) = keyframe_of(mission.grid_frame(), version, hazard);
     (mission, header, cells)
+}
+
+/// Cells a side of a map that the background solver solves.
+const LARGE: u32 = 1100;
+
+#[test]
+fn an_update_in_a_window_calls_for_a_full_solve_and_a_robot_that_cannot_trust_it_waits() {
+    let (mission, header, cells) = large_room(1, false);
+    let mut planner = Planner::new(&mission);
+    planner.take_grid(&header, &cells).unwrap();
+    let before = answer(&mut planner, &at(0.0, 0.0));
+    assert_eq!(status(&before), GuidanceStatus::Along);
+    // A post on the way, far ahead.
+    let frame = mission.grid_frame();
+    let mut part = header;
+    part.part.version = 2;
+    let mut with_post = cells.clone();
+    for col in 0..8 {
+        for row in 0..8 {
+            let corner = frame.cell_at(DVec2::new(0.5, 0.0)).unwrap();
+            let cell = grid::Cell {
+                col: corner.col + col,
+                row: corner.row + row,
+            };
+            with_post[frame.index(cell)] = 1;
+        }
+    }
+    let work = planner.take_grid(&part, &with_post).unwrap();
+    assert_eq!(work, Work::LocalUpdate);
+    let behind = answer(&mut planner, &at(0.0, 0.0));
+    assert_eq!(status(&behind), GuidanceStatus::Waiting);
+    let job = planner.begin_job().unwrap();
+    assert!(job.urgent);
+    planner.swap_in(solve(job.number, job.domain)).unwrap();
+    let after = answer(&mut planner, &at(0.0, 0.0));
+    assert_eq!(status(&after), GuidanceStatus::Along);
 }
 
 #[test]

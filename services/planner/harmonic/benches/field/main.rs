@@ -2,8 +2,7 @@
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
 //! is the least of several runs. `cargo bench -p harmonic --features bench -- quick` leaves out the large maps, `-- updates` all but the
-//! local updates.
-//! `-- --maps DIR` adds the PGM maps of a directory.
+//! updates. `-- accuracy` measures angles instead of times. `-- --maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -11,14 +10,17 @@
     reason = "a program for the developer's terminal"
 )]
 
+mod accuracy;
 mod machine;
 mod others;
 mod real;
+mod updates;
+mod wavefront;
 
 use std::{path::Path, time::Instant};
 
-use harmonic::testing::{Kind, Map, Random};
-use harmonic::{Cancellation, Cell, Change, Domain, Phase, Screening, Solver, Verdict};
+use harmonic::testing::{Kind, Map};
+use harmonic::{Cancellation, Cell, Change, Domain, Phase, Screening, Solver};
 
 /// Milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
@@ -40,15 +42,40 @@ fn main() {
     let asked = |word: &str| std::env::args().any(|argument| argument == word);
     let quick = asked("quick");
     if asked("updates") {
-        return update_table(quick);
+        return updates::table(quick);
+    }
+    if asked("accuracy") {
+        accuracy::angle_table();
+        return accuracy::sequence_table(sequence_maps());
     }
     machine_table(quick);
     full_table(quick);
-    if let Some(directory) = std::env::args().skip_while(|it| it != "--maps").nth(1) {
-        real_table(Path::new(&directory));
+    if let Some(directory) = maps_directory() {
+        for (name, domain) in real::load_all(Path::new(&directory)) {
+            full_row(&name, &domain, true, false);
+        }
     }
     screening_table();
-    update_table(quick);
+    updates::table(quick);
+}
+
+/// A map without walls, one with, and the largest of those in a directory, where one is given.
+fn sequence_maps() -> Vec<(String, Domain)> {
+    let generated = [Kind::Empty, Kind::Office].map(|kind| {
+        let domain = Map::generate(kind, 512, 512, 1).domain();
+        (format!("{kind:?} 512"), domain.expect("a valid map"))
+    });
+    let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
+    let largest = real
+        .into_iter()
+        .flatten()
+        .max_by_key(|(_, domain)| domain.blocked().len());
+    generated.into_iter().chain(largest).collect()
+}
+
+/// What `--maps` names.
+fn maps_directory() -> Option<String> {
+    std::env::args().skip_while(|it| it != "--maps").nth(1)
 }
 
 fn machine_table(quick: bool) {
@@ -72,19 +99,19 @@ fn machine_table(quick: bool) {
 
 fn full_table(quick: bool) {
     println!(
-        "\nFull solves without screening: set-up + solve + verification, ms, and as sweeps of the same grid"
+        "\nFull solves without screening: set-up + solve + verification, ms, and as multiples of a wavefront's time"
     );
     println!(
-        "{:<24} {:>9} {:<14} {:>9} {:>7} {:>9} {:>7} {:>9} {:>9} {:>8} {:>9}",
+        "{:<24} {:>9} {:<14} {:>9} {:>9} {:>9} {:>6} {:>6} {:>9} {:>8} {:>9}",
         "map",
         "cells",
         "method",
         "scratch",
-        "sweeps",
         "target",
-        "sweeps",
-        "dijkstra",
+        "wavefront",
         "x",
+        "x",
+        "dijkstra",
         "faer",
         "log10 u"
     );
@@ -98,6 +125,8 @@ fn full_table(quick: bool) {
         Kind::Maze { corridor: 8 },
         Kind::Maze { corridor: 16 },
         Kind::Maze { corridor: 32 },
+        Kind::Maze { corridor: 64 },
+        Kind::Noise { density: 0.35 },
         Kind::Serpentine { corridor: 1 },
         Kind::Serpentine { corridor: 8 },
         Kind::Serpentine { corridor: 24 },
@@ -119,22 +148,9 @@ fn full_table(quick: bool) {
     }
 }
 
-/// Public maps, where a directory of them is given: every PGM in it.
-fn real_table(directory: &Path) {
-    let entries = std::fs::read_dir(directory).expect("a directory of maps");
-    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|file| file.extension().is_some_and(|extension| extension == "pgm"));
-    files.sort();
-    for file in files {
-        let name = file.file_stem().unwrap_or_default().to_string_lossy();
-        full_row(&name, &real::load(&file), true, false);
-    }
-}
-
 /// One map: times from scratch and with the set-up kept, beside those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let cells = domain.blocked().len();
-    let sweep = machine::sweep(cells.isqrt());
     let cancellation = Cancellation::new();
     // Memory is kept, the set-up is not: the map before was another.
     let (width, height) = (domain.width(), domain.height());
@@ -153,17 +169,18 @@ fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
         solver.solve(domain, &cancellation).expect("a field");
     });
     let field = solver.solve(domain, &cancellation).expect("a field");
+    let (wavefront, reached) = wavefront::time(domain, runs(cells));
+    assert_eq!(reached, field.verification().reachable, "cells reached");
     let dijkstra = with_dijkstra.then(|| others::dijkstra(domain));
     let faer = with_faer.then(|| others::sparse_cholesky(domain));
     let show = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.2}"));
     println!(
-        "{name:<24} {:>9} {:<14} {scratch:>9.3} {:>7.0} {target:>9.3} {:>7.0} {:>9} {:>9} {:>8} {:>9.1}",
+        "{name:<24} {:>9} {:<14} {scratch:>9.3} {target:>9.3} {wavefront:>9.3} {:>6.2} {:>6.2} {:>9} {:>8} {:>9.1}",
         format!("{width}x{height}"),
         field.verification().method.name(),
-        scratch / sweep,
-        target / sweep,
+        scratch / wavefront,
+        target / wavefront,
         show(dijkstra),
-        show(dijkstra.map(|time| scratch / time)),
         show(faer),
         field.log10_u_min(),
     );
@@ -217,102 +234,7 @@ fn screening_table() {
     }
 }
 
-fn update_table(quick: bool) {
-    println!("\nLocal updates: 3 x 3 blocks placed at random, up to three between full solves, us");
-    println!(
-        "{:<28} {:>5} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7}  verdicts",
-        "map", "N", "least", "p50", "p90", "p99", "x least", "x p50", "radius"
-    );
-    let sides: &[usize] = if quick {
-        &[256, 512]
-    } else {
-        &[256, 512, 1024, 2048, 4096]
-    };
-    for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
-        let mut first = None;
-        for &n in sides {
-            let updates = random_updates(kind, n, 200);
-            let mut times: Vec<f64> = updates.iter().map(|update| update.time).collect();
-            times.sort_by(f64::total_cmp);
-            let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
-            let (least, middle) = *first.get_or_insert((at(0.0), at(0.5)));
-            let mut radii: Vec<usize> = updates.iter().map(|update| update.radius).collect();
-            radii.sort_unstable();
-            let count = |verdict| updates.iter().filter(|u| u.verdict == verdict).count();
-            println!(
-                "{:<28} {n:>5} {:>7.0} {:>7.0} {:>7.0} {:>7.0} {:>7.2} {:>7.2} {:>7}  {} accurate, {} full solve advised, {} passage closed",
-                format!("{kind:?}"),
-                at(0.0),
-                at(0.5),
-                at(0.9),
-                at(0.99),
-                at(0.0) / least,
-                at(0.5) / middle,
-                radii[radii.len() / 2],
-                count(Verdict::Accurate),
-                count(Verdict::FullSolveAdvised),
-                count(Verdict::PassageClosed),
-            );
-        }
-    }
-}
-
-/// One timed update.
-struct Update {
-    /// Microseconds.
-    time: f64,
-    /// Cells from the block to the farthest one beside it whose u changed, at most [`FARTHEST`].
-    radius: usize,
-    verdict: Verdict,
-}
-
-/// Where the search for changed cells ends.
-const FARTHEST: usize = 128;
-
-fn random_updates(kind: Kind, n: usize, count: usize) -> Vec<Update> {
-    let base = Map::generate(kind, n, n, 1).domain().expect("a valid map");
-    let mut solver = Solver::default();
-    let field = solver.solve(&base, &Cancellation::new()).expect("a field");
-    let mut random = Random::new(9);
-    let mut updates = Vec::new();
-    let (mut domain, mut live) = (base.clone(), field.clone());
-    while updates.len() < count {
-        let (col, row) = (random.below(n - 8) + 2, random.below(n - 8) + 2);
-        let changes = block(&domain, col, row);
-        if changes.is_empty() || !live.is_reachable(Cell::new(col, row)) {
-            continue;
-        }
-        let start = Instant::now();
-        let verdict = solver
-            .update(&mut domain, &mut live, &changes, &Cancellation::new())
-            .expect("an update");
-        let time = start.elapsed().as_secs_f64() * 1e6;
-        let changed = |distance: &usize| {
-            // Beyond the map u is zero, before and after.
-            [
-                Cell::new(col.wrapping_sub(*distance), row),
-                Cell::new(col + distance, row),
-                Cell::new(col, row.wrapping_sub(*distance)),
-                Cell::new(col, row + distance),
-            ]
-            .into_iter()
-            .any(|cell| live.u(cell) != field.u(cell))
-        };
-        let radius = (0..FARTHEST).rev().find(changed).unwrap_or(0);
-        updates.push(Update {
-            time,
-            radius,
-            verdict,
-        });
-        // As the full solve behind it would.
-        if updates.len() % 3 == 0 {
-            (domain, live) = (base.clone(), field.clone());
-        }
-    }
-    updates
-}
-
-fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
+pub(crate) fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
     (row..row + 3)
         .flat_map(|row| (col..col + 3).map(move |col| Cell::new(col, row)))
         .filter(|&cell| cell != domain.target() && !domain.is_blocked(cell))

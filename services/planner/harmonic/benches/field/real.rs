@@ -1,14 +1,27 @@
 //! Maps of real places, a cell a pixel.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use harmonic::{Cell, Domain};
 
 /// As the ROS map_server reads them: darker than this is not free.
 const FREE_FROM: u8 = 206;
 
+/// The maps in the PGMs of a directory, by name.
+pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
+    let entries = std::fs::read_dir(directory).expect("a directory of maps");
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "pgm"));
+    files.sort();
+    let named = |file: &PathBuf| {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        (name.into_owned(), load(file))
+    };
+    files.iter().map(named).collect()
+}
+
 /// The map in a PGM, its target the free cell nearest to the middle.
-pub(crate) fn load(file: &Path) -> Domain {
+fn load(file: &Path) -> Domain {
     let grey = image::open(file).expect("a PGM").into_luma8();
     let (width, height) = (grey.width() as usize, grey.height() as usize);
     let mut blocked: Vec<bool> = grey.iter().map(|&grey| grey < FREE_FROM).collect();

@@ -1,7 +1,7 @@
 //! Error estimate of a local update: how far off directions outside its window are.
 
 use super::window::Window;
-use crate::cell::Cell;
+use crate::patch::Rim;
 
 /// What the solution of a window tells of the field outside it.
 #[derive(Clone, Debug)]
@@ -12,9 +12,8 @@ pub(super) struct ErrorEstimate {
     pub upstream: f64,
     /// The smallest and the largest ratio of u after to u before on the outflow rim.
     pub outflow_ratio: (f64, f64),
-    /// Cells outside the window from which steepest ascent enters it at a cell whose u is now lower than theirs: whether it
-    /// leaves the window again at a higher u must be checked.
-    pub ascents_to_check: Vec<Cell>,
+    /// What is kept of the rim with the patch.
+    pub rim: Rim,
 }
 
 /// The estimate for a window that was just solved.
@@ -23,8 +22,9 @@ pub(super) fn estimate(window: &Window) -> ErrorEstimate {
         angle: 0.0,
         upstream: 0.0,
         outflow_ratio: (f64::INFINITY, 0.0),
-        ascents_to_check: Vec::new(),
+        rim: Rim::default(),
     };
+    let mut largest = 0.0_f32;
     // The largest tangent of an angle; its arc is taken once, at the end.
     let (mut slope, mut upstream) = (0.0_f64, 0.0_f64);
     for &f in &window.rim {
@@ -41,6 +41,8 @@ pub(super) fn estimate(window: &Window) -> ErrorEstimate {
                     found.outflow_ratio.0.min(ratio),
                     found.outflow_ratio.1.max(ratio),
                 );
+                found.rim.deviation = found.rim.deviation.max((ratio - 1.0).abs());
+                largest = largest.max(window.before[f]);
                 for next in along_rim(window, f, o) {
                     if window.before[next] > 0.0 && window.after[next] > 0.0 {
                         let other = f64::from(window.after[next]) / f64::from(window.before[next]);
@@ -48,7 +50,7 @@ pub(super) fn estimate(window: &Window) -> ErrorEstimate {
                     }
                 }
                 if window.after[f] < window.before[o] {
-                    found.ascents_to_check.push(window.map_cell(o));
+                    found.rim.entries.push(window.map_cell(o));
                 }
             } else {
                 upstream = upstream.max((1.0 - ratio).abs() * scale);
@@ -57,6 +59,8 @@ pub(super) fn estimate(window: &Window) -> ErrorEstimate {
     }
     found.angle = slope.max(upstream).atan();
     found.upstream = upstream.atan();
+    found.rim.upstream = found.upstream;
+    found.rim.largest = window.scaled(largest);
     found
 }
 

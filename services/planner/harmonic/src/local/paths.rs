@@ -9,10 +9,16 @@ use crate::field::Field;
 /// Steps after which a path counts as endless, as a multiple of the window's longer side.
 const MOST_STEPS: usize = 16;
 
-/// Whether the paths of steepest ascent from `cells`, all outside patches, leave the patches at a cell of higher u than the
-/// cell they start from, u being unchanged at both. Then no path can return to where it was. Followed one by one, the
-/// highest first, so a path that joins an earlier one ascends too.
-pub(super) fn all_ascend(field: &Field, window: &mut Window, mut cells: Vec<Cell>) -> bool {
+/// Whether the paths of steepest ascent that enter a patch at a cell of lower u all come to a cell outside patches whose u is
+/// higher than that of the cell they start from, u being unchanged at both. Those of earlier patches are followed again:
+/// the patch of `window`, the last, may lie on their way. Followed one by one, the highest first, so a path that joins an
+/// earlier one ascends too.
+pub(super) fn all_ascend(field: &Field, window: &mut Window) -> bool {
+    let entries = field
+        .patches()
+        .iter()
+        .flat_map(|patch| &patch.rim().entries);
+    let mut cells: Vec<Cell> = entries.copied().collect();
     cells.sort_by(|&a, &b| {
         let order = field.u(b).partial_cmp(&field.u(a));
         order.unwrap_or(Ordering::Equal)

@@ -10,12 +10,13 @@
 use crate::cell::Cell;
 use crate::domain::Domain;
 use crate::multigrid::Multigrid;
-use crate::patch::{Patch, Rect};
+use crate::patch::{Patch, Rect, Rim};
+use crate::scaled::Scaled;
 use crate::screening::Coefficients;
 use crate::store::Store;
 use crate::verification::check_framed;
 
-/// Coarse corrections above this fraction of u mean that a cell has not converged.
+/// A cell whose direction a coarse correction turns by more than this, radians, has not settled.
 const TOLERANCE: f64 = 1e-3;
 
 /// Cycles before a window is given up.
@@ -167,7 +168,7 @@ impl Window {
             self.inflow.iter().copied(),
         );
         // The first cycle has no coarse correction yet to judge convergence by.
-        self.levels.cycle(TOLERANCE);
+        self.levels.cycle(None);
         let mut cycles = 1;
         while cycles < CYCLES {
             let converged =
@@ -179,7 +180,7 @@ impl Window {
             }
             // The correction converged before the residual did.
             for _ in 0..CYCLES_MORE {
-                self.levels.cycle(TOLERANCE);
+                self.levels.cycle(None);
             }
         }
         Err(WindowError::NotConverged)
@@ -197,12 +198,18 @@ impl Window {
     }
 
     /// Writes u of the cells solved for to `store`; returns the patch with u before.
-    pub(super) fn write(&self, domain: &Domain, store: &mut Store, changed: Rect) -> Patch {
+    pub(super) fn write(
+        &self,
+        domain: &Domain,
+        store: &mut Store,
+        changed: Rect,
+        rim: Rim,
+    ) -> Patch {
         let mut unknown = Vec::with_capacity(self.width * self.height);
         for row in 1..=self.height {
             unknown.extend_from_slice(&self.unknown[row * self.stride + 1..][..self.width]);
         }
-        let patch = Patch::of(self.rect, changed, unknown, store, domain.width());
+        let patch = Patch::of(self.rect, changed, unknown, rim, (store, domain.width()));
         for row in 0..self.height {
             let start = (row + 1) * self.stride + 1;
             let first = (self.rect.row + row) * domain.width() + self.rect.col;
@@ -462,6 +469,11 @@ impl Window {
             (target.row - self.rect.row + 1) * self.stride + target.col - self.rect.col + 1
         };
         inside.then(|| f(target)).filter(|&f| self.unknown[f])
+    }
+
+    /// u read from `before` or `after`.
+    pub(super) fn scaled(&self, u: f32) -> Scaled {
+        Scaled::new(f64::from(u), self.reference)
     }
 
     /// The cell of the map at a place of the arrays that lies inside it.

@@ -1,5 +1,6 @@
 //! One breadth-first pass from the target over the free cells.
 
+use super::budget::Budget;
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
@@ -25,12 +26,16 @@ impl BreadthFirst {
     /// Visits `domain` from its target.
     ///
     /// # Errors
-    /// [`SolveError::Cancelled`].
+    /// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
     pub(crate) fn from_target(
         domain: &Domain,
+        budget: &Budget,
         cancellation: &Cancellation,
     ) -> Result<Self, SolveError> {
         let (width, height) = (domain.width(), domain.height());
+        // The place of each cell and the order of the free ones.
+        let entries = (width + 2) * (height + 2) + width * height;
+        budget.ask((entries * size_of::<u32>()) as u64)?;
         // One absent cell all around spares every visit the question whether a neighbour exists.
         const UNSEEN: u32 = u32::MAX - 1;
         let stride = width + 2;

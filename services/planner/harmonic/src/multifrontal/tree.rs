@@ -17,6 +17,7 @@ use std::cmp::Reverse;
 use std::ops::Range;
 
 use super::breadth_first::BreadthFirst;
+use super::budget::Budget;
 use crate::cancellation::Cancellation;
 use crate::error::SolveError;
 
@@ -95,9 +96,15 @@ impl Tree {
     /// The tree over all cells of `pass` but the target.
     ///
     /// # Errors
-    /// [`SolveError::Cancelled`].
-    pub(crate) fn of(pass: &BreadthFirst, cancellation: &Cancellation) -> Result<Self, SolveError> {
+    /// [`SolveError::Cancelled`], and [`SolveError::TooCostly`] as soon as it is known that the factorisation takes more
+    /// memory than `budget` has.
+    pub(crate) fn of(
+        pass: &BreadthFirst,
+        budget: &Budget,
+        cancellation: &Cancellation,
+    ) -> Result<Self, SolveError> {
         let shape = Shape::of(pass);
+        budget.ask(Builder::bytes(pass))?;
         let mut builder = Builder::new(pass);
         let mut stages = 0_usize;
         let distances = pass.levels.len() - 1;
@@ -111,6 +118,7 @@ impl Tree {
             while end > inner + 1 {
                 if stages.is_multiple_of(CHECKED_EVERY) {
                     cancellation.check()?;
+                    budget.ask(builder.tree.growing_bytes())?;
                 }
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
@@ -126,6 +134,7 @@ impl Tree {
         }
         let mut tree = builder.tree;
         tree.cost.bytes = tree.bytes(pass);
+        budget.ask(tree.cost.bytes)?;
         Ok(tree)
     }
 
@@ -149,17 +158,22 @@ impl Tree {
         })
     }
 
+    /// Bytes of what grows with every front, and of the weights that the factorisation will keep.
+    fn growing_bytes(&self) -> u64 {
+        let fronts = self.places.len() * size_of::<u32>() + self.fronts.len() * size_of::<Front>();
+        fronts as u64 + 8 * self.cost.weights as u64
+    }
+
     fn bytes(&self, pass: &BreadthFirst) -> u64 {
         // Places of the pass and slots, updates alive at once bounded by the largest few fronts.
-        let fixed =
-            pass.len() * 12 + self.places.len() * 4 + self.fronts.len() * size_of::<Front>();
+        let fixed = pass.len() * 12;
         let largest = self
             .fronts
             .iter()
             .map(|front| u64::from(front.own + front.boundary))
             .max()
             .unwrap_or(0);
-        fixed as u64 + 8 * self.cost.weights as u64 + 16 * largest * largest
+        fixed as u64 + self.growing_bytes() + 16 * largest * largest
     }
 }
 
@@ -196,12 +210,25 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
+    /// Fronts and places there is room for at first.
+    fn capacities(pass: &BreadthFirst) -> (usize, usize) {
+        (pass.len() / 4, pass.len() * 3)
+    }
+
+    /// Bytes that [`new`](Self::new) allocates.
+    fn bytes(pass: &BreadthFirst) -> u64 {
+        let (fronts, places) = Self::capacities(pass);
+        let numbers = places + pass.len();
+        (fronts * size_of::<Front>() + numbers * size_of::<u32>()) as u64
+    }
+
     fn new(pass: &'a BreadthFirst) -> Self {
+        let (fronts, places) = Self::capacities(pass);
         Self {
             pass,
             tree: Tree {
-                fronts: Vec::with_capacity(pass.len() / 4),
-                places: Vec::with_capacity(pass.len() * 3),
+                fronts: Vec::with_capacity(fronts),
+                places: Vec::with_capacity(places),
                 cost: Cost::default(),
             },
             pieces: Pieces::default(),
@@ -415,5 +442,35 @@ impl Pieces {
     fn members(&self, piece: usize) -> &[u32] {
         let start = if piece == 0 { 0 } else { self.ends[piece - 1] };
         &self.members[start as usize..self.ends[piece] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::Cell;
+    use crate::domain::Domain;
+
+    #[test]
+    fn a_factorisation_without_the_memory_it_needs_is_refused_before_it_is_allocated() {
+        let domain = Domain::new(60, 50, vec![false; 3000], Cell::new(7, 8)).unwrap();
+        let none = Cancellation::new();
+        let large = Budget::of(&domain, u64::MAX);
+        let pass = BreadthFirst::from_target(&domain, &large, &none).unwrap();
+        let needed = Tree::of(&pass, &large, &none).unwrap().cost.bytes;
+        let refused = |budget: &Budget| {
+            let pass = BreadthFirst::from_target(&domain, budget, &none);
+            pass.and_then(|pass| Tree::of(&pass, budget, &none)).err()
+        };
+        assert_eq!(refused(&Budget::of(&domain, needed)), None);
+        for allowed in [100, 30_000, 60_000, 100_000, needed - 1] {
+            let error = refused(&Budget::of(&domain, allowed)).unwrap();
+            assert!(
+                matches!(error, SolveError::TooCostly { needed: asked, width: 60, height: 50, .. }
+                    if (allowed + 1..=needed).contains(&asked)),
+                "{error}"
+            );
+            assert!(error.to_string().contains("memory_limit"), "{error}");
+        }
     }
 }

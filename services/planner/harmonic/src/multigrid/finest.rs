@@ -20,6 +20,13 @@ pub(super) struct Source<R> {
     pub value: R,
 }
 
+/// Relative change of u by a coarse correction above which a cell has not settled, whatever its direction.
+const LARGEST_CHANGE: f64 = 0.05;
+
+/// Changes of u over two cells, relative to u, times the map's longer side, below which a cell lies at a saddle point: there
+/// the tolerance is that of a cell with a change as large as this.
+const FLAT: f64 = 0.5;
+
 /// The cells of the map and their interpolation from the next level.
 #[derive(Debug)]
 pub(super) struct Finest<R> {
@@ -41,8 +48,9 @@ pub(super) struct Finest<R> {
 /// What a pass tells of the convergence.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
-    /// Black cells whose coarse correction was above the tolerance, relatively to their u.
-    pub unconverged: usize,
+    /// Even-even cells whose direction the coarse correction turned by more than the tolerance, or whose u it changed
+    /// by more than [`LARGEST_CHANGE`].
+    pub unsettled: usize,
 }
 
 impl<R: Real> Finest<R> {
@@ -153,7 +161,7 @@ impl<R: Real> Finest<R> {
         next: &mut Coarse<R>,
         sweeps: usize,
         descend: bool,
-        tolerance: R,
+        tolerance: Option<R>,
     ) -> Progress {
         let Grid {
             columns: n,
@@ -180,7 +188,10 @@ impl<R: Real> Finest<R> {
         for y in 0..rows + sweeps + 2 {
             if y < rows {
                 join_row(&next.grid, &next.u, y + 1, lower);
-                progress.unconverged += self.correct_black(y, upper, lower, tolerance);
+                if let Some(tolerance) = tolerance {
+                    progress.unsettled += self.unsettled(y, upper, lower, tolerance);
+                }
+                self.correct_black(y, upper, lower);
                 std::mem::swap(upper, lower);
             }
             // Every sweep follows the one before at a distance of one row.
@@ -237,28 +248,54 @@ impl<R: Real> Finest<R> {
         progress
     }
 
-    /// Adds the coarse correction to the black cells of row `y`; returns how many it moved by more than the tolerance.
+    /// Counts the even-even cells of row `y` that the coarse correction unsettles.
+    ///
+    /// Their differences of u, to the next even-even cell east and south, are those of one gradient; the correction's are
+    /// what it changes by, so the cross product of both is the angle it turns by.
     #[inline(always)]
-    fn correct_black(&mut self, y: usize, upper: &[R], lower: &[R], tolerance: R) -> usize {
+    fn unsettled(&self, y: usize, upper: &[R], lower: &[R], tolerance: R) -> usize {
+        let Grid {
+            columns: n, stride, ..
+        } = self.grid;
+        let o = self.grid.start(y);
+        let flat = R::of(FLAT / self.grid.width.max(self.grid.height) as f64);
+        let (flat, largest) = (flat * flat, R::of(LARGEST_CHANGE));
+        let (c, c_east, c_south) = (&upper[..n], &upper[1..=n], &lower[..n]);
+        let ee = &self.u[EE];
+        let (u, east, south) = (&ee[o..][..n], &ee[o + 1..][..n], &ee[o + stride..][..n]);
+        let half = R::of(0.5);
+        let mut unsettled = 0_u32;
+        for x in 0..n {
+            let scale = u[x].inverse();
+            let own = c[x] * scale;
+            let (dx, dy) = (east[x] * scale - R::ONE, south[x] * scale - R::ONE);
+            let (cx, cy) = (c_east[x] * scale - own, c_south[x] * scale - own);
+            let square = dx * dx + dy * dy;
+            let bound = if square > flat { square } else { flat };
+            let turned = (dx * cy - dy * cx).size() > tolerance * bound;
+            let reversed = dx * cx + dy * cy + half * bound < R::default();
+            unsettled +=
+                u32::from((turned | reversed | (own.size() > largest)) & (u[x] > R::default()));
+        }
+        unsettled as usize
+    }
+
+    /// Adds the coarse correction to the black cells of row `y`.
+    #[inline(always)]
+    fn correct_black(&mut self, y: usize, upper: &[R], lower: &[R]) {
         let n = self.grid.columns;
         let o = self.grid.start(y);
-        let mut unconverged = 0_u32;
         let (c, east, south) = (&upper[..n], &upper[1..=n], &lower[..n]);
         let (to_west, to_east) = (&self.west[o..][..n], &self.east[o..][..n]);
         let u = &mut self.u[OE][o..][..n];
         for x in 0..n {
-            let correction = to_west[x] * c[x] + to_east[x] * east[x];
-            u[x] += correction;
-            unconverged += u32::from(correction.size() > tolerance * u[x]);
+            u[x] += to_west[x] * c[x] + to_east[x] * east[x];
         }
         let (to_north, to_south) = (&self.north[o..][..n], &self.south[o..][..n]);
         let u = &mut self.u[EO][o..][..n];
         for x in 0..n {
-            let correction = to_north[x] * c[x] + to_south[x] * south[x];
-            u[x] += correction;
-            unconverged += u32::from(correction.size() > tolerance * u[x]);
+            u[x] += to_north[x] * c[x] + to_south[x] * south[x];
         }
-        unconverged as usize
     }
 
     /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes what each cell changes by.

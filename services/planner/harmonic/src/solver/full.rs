@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use super::plan::plan;
+use super::plan::{plan, plan_near};
 use super::settings::{Phase, Settings};
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::field::Field;
 use crate::method::Method;
-use crate::multifrontal::{self, BreadthFirst, Tree};
+use crate::multifrontal::{self, BreadthFirst, Budget, Tree};
 use crate::multigrid::Multigrid;
 use crate::multigrid_bands;
 use crate::real::Real;
@@ -17,18 +17,23 @@ use crate::screening::Coefficients;
 use crate::store::{BLOCKED, Store};
 use crate::verification::{self, Check, Verification};
 
-/// Coarse corrections above this fraction of u mean that a cell has not converged. The next cycle reduces them by a factor
-/// of three or more, which leaves directions well within a degree.
-const TOLERANCE: f64 = 5e-3;
+/// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
+/// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
+const TOLERANCE: f64 = 0.02;
 
-/// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count as unconverged.
-const FIRST_CHECK: usize = 4;
+/// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count
+/// as unsettled.
+const FIRST_CHECK: usize = 3;
 
-/// The same for a solve that starts from the field of a similar map.
+/// The same for a solve that starts from the field of a similar map: the first cycle has no correction to judge by.
 const FIRST_CHECK_NEAR: usize = 2;
 
-/// Cycles between a check that failed and the next.
-const BETWEEN_CHECKS: usize = 1;
+/// Cycles after which a cell still at zero is one whose u is below what the precision holds.
+const REACHED: usize = 6;
+
+/// What a cycle divides residuals by, or more, and most cycles between a check that failed and the next.
+const PER_CYCLE: f64 = 3.0;
+const BETWEEN_CHECKS: f64 = 4.0;
 
 /// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
 const SINGLE_CYCLES: usize = 60;
@@ -86,7 +91,12 @@ impl Full {
             ..
         } = task;
         cancellation.check()?;
-        let mut plan = plan(domain, settings.memory_limit, cancellation)?;
+        let budget = Budget::of(domain, settings.memory_limit);
+        let near = task.near.filter(|near| near.fits(domain));
+        let mut plan = match near.and_then(plan_near) {
+            Some(plan) => plan,
+            None => plan(domain, &budget, cancellation)?,
+        };
         let mut failed = Check::default();
         for method in plan.methods {
             let (store, check) = match method {
@@ -115,8 +125,8 @@ impl Full {
                     let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
                         planned
                     } else {
-                        let pass = BreadthFirst::from_target(domain, cancellation)?;
-                        let tree = Tree::of(&pass, cancellation)?;
+                        let pass = BreadthFirst::from_target(domain, &budget, cancellation)?;
+                        let tree = Tree::of(&pass, &budget, cancellation)?;
                         (pass, tree)
                     };
                     observe(Phase::SetUp);
@@ -124,7 +134,7 @@ impl Full {
                         domain,
                         &pass,
                         &tree,
-                        settings.memory_limit,
+                        &budget,
                         &mut self.multifrontal,
                         cancellation,
                     )?;
@@ -143,6 +153,7 @@ impl Full {
             if check.holds() {
                 let verification = Verification {
                     worst_residual: check.worst_residual,
+                    worst_tile: check.worst_tile,
                     method,
                     reachable: check.reachable,
                 };
@@ -183,13 +194,9 @@ impl<R: Real> Prepared<R> {
         match near {
             Some(near) if near.fits(domain) => {
                 let width = domain.width();
-                let mut plain = vec![0.0; width];
                 levels.start_near(domain.target(), |row, guess| {
-                    near.store()
-                        .read_row_wide(row * width..(row + 1) * width, -R::TOP, &mut plain);
-                    for (guess, &u) in guess.iter_mut().zip(&plain) {
-                        *guess = R::of(u);
-                    }
+                    let cells = row * width..(row + 1) * width;
+                    near.store().read_row_as(cells, -R::TOP, guess);
                 });
                 next_check = FIRST_CHECK_NEAR;
             }
@@ -197,9 +204,10 @@ impl<R: Real> Prepared<R> {
         }
         for cycle in 1.. {
             cancellation.check()?;
-            let converged = levels.cycle(TOLERANCE).unconverged == 0;
             let last = cycle == most_cycles;
-            if !(last || (converged && cycle >= next_check)) {
+            let judged = (cycle >= next_check).then_some(TOLERANCE);
+            let settled = levels.cycle(judged).unsettled == 0 && judged.is_some();
+            if !(last || settled) {
                 continue;
             }
             levels.finish();
@@ -209,11 +217,12 @@ impl<R: Real> Prepared<R> {
             observe(Phase::Solved);
             let check = verification::check(domain, &store, settings.threads);
             observe(Phase::Verified);
-            // All converged and some unreached: u goes below what this precision holds.
-            if check.holds() || check.unreached > 0 || last {
+            // All settled and some unreached: u goes below what this precision holds.
+            if check.holds() || (check.unreached > 0 && cycle >= REACHED) || last {
                 return Ok((store, check));
             }
-            next_check = cycle + BETWEEN_CHECKS;
+            let cycles = check.excess().ln() / PER_CYCLE.ln();
+            next_check = cycle + cycles.clamp(1.0, BETWEEN_CHECKS) as usize;
         }
         Err(SolveError::Cancelled)
     }

@@ -8,8 +8,9 @@
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
+use crate::field::Field;
 use crate::method::Method;
-use crate::multifrontal::{BreadthFirst, Tree};
+use crate::multifrontal::{BreadthFirst, Budget, Tree};
 
 /// Free space of this mean width, cells, is left to multigrid without a further look.
 const WIDE: f64 = 32.0;
@@ -41,13 +42,13 @@ pub(super) struct Plan {
     pub multifrontal: Option<(BreadthFirst, Tree)>,
 }
 
-/// The plan for `domain`; the multifrontal factorisation may take `memory_limit` bytes.
+/// The plan for `domain`; the multifrontal factorisation is in it only as the last resort where `budget` refuses it.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
 pub(super) fn plan(
     domain: &Domain,
-    memory_limit: u64,
+    budget: &Budget,
     cancellation: &Cancellation,
 ) -> Result<Plan, SolveError> {
     use Method::{Multifrontal, MultigridBands, MultigridDouble, MultigridSingle};
@@ -67,7 +68,19 @@ pub(super) fn plan(
             multifrontal: None,
         });
     }
-    let pass = BreadthFirst::from_target(domain, cancellation)?;
+    let pass = match BreadthFirst::from_target(domain, budget, cancellation) {
+        // The length of the ways is then not known: from single precision up, whatever holds.
+        Err(SolveError::TooCostly { .. }) => {
+            return Ok(Plan {
+                methods: costlier(
+                    MultigridSingle,
+                    &[MultigridDouble, MultigridBands, Multifrontal],
+                ),
+                multifrontal: None,
+            });
+        }
+        pass => pass?,
+    };
     let cells = pass.len() as f64;
     // Along a passage of width w, u falls like exp(-pi x / w). The runs along a passage count into the mean width too; on
     // mazes that makes it about 1.7 times too large.
@@ -88,9 +101,17 @@ pub(super) fn plan(
             multifrontal: None,
         });
     }
-    let tree = Tree::of(&pass, cancellation)?;
+    let tree = match Tree::of(&pass, budget, cancellation) {
+        Err(SolveError::TooCostly { .. }) => {
+            return Ok(Plan {
+                methods: multigrid,
+                multifrontal: None,
+            });
+        }
+        tree => tree?,
+    };
     let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
-    let methods = if tree.cost.bytes <= memory_limit && exact <= cost {
+    let methods = if exact <= cost {
         vec![Multifrontal]
     } else {
         multigrid
@@ -98,6 +119,17 @@ pub(super) fn plan(
     Ok(Plan {
         methods,
         multifrontal: Some((pass, tree)),
+    })
+}
+
+/// The plan for a map much like that of `near`, a field by multigrid: the same method, without a look at the map. `None` for
+/// other methods, whose cost is in the shape of the map.
+pub(super) fn plan_near(near: &Field) -> Option<Plan> {
+    use Method::{Multifrontal, MultigridBands, MultigridDouble, MultigridSingle};
+    let first = near.verification().method;
+    matches!(first, MultigridSingle | MultigridDouble).then(|| Plan {
+        methods: costlier(first, &[MultigridDouble, MultigridBands, Multifrontal]),
+        multifrontal: None,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-/// How a solver may work; what it computes does not depend on it.
+/// How a solver may work; what full solves compute does not depend on it.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Threads a solve may use; the result is the same to the bit. Only the verification of large maps uses more than
@@ -11,14 +11,21 @@ pub struct Settings {
     /// Bytes the multifrontal factorisation may take; a solve that needs more ends in
     /// [`SolveError::TooCostly`](crate::SolveError::TooCostly).
     pub memory_limit: u64,
+    /// Maps of at most this many cells are solved whole by every [`Solver::update`](crate::Solver::update); larger ones in a
+    /// window around what changed.
+    pub whole_up_to: usize,
 }
 
+/// 512 a side: a control period of 143 ms has room for such a solve many times over.
+const WHOLE_UP_TO: usize = 1 << 18;
+
 impl Default for Settings {
-    /// One thread and 2 GiB.
+    /// One thread, 2 GiB, maps of up to 512 x 512 cells solved whole.
     fn default() -> Self {
         Self {
             threads: NonZeroUsize::MIN,
             memory_limit: 2 << 30,
+            whole_up_to: WHOLE_UP_TO,
         }
     }
 }
