@@ -206,7 +206,7 @@ pub static TABLE: &[Rule] = &[
         name: "robot late",
         when: "it was lost and has just been found, or it acknowledges later than `robot.command_limit_s` what it is sent",
         action: Action::Stop,
-        until: "it is sent nothing for that time and 0.3 s, and acknowledges nothing late; tried every 2 s",
+        until: "it is sent nothing for that time and 0.4 s, and acknowledges nothing late; tried every 2 s",
         applies: |flags, _| flags.senses.late,
     },
     Rule {

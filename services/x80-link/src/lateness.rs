@@ -12,11 +12,9 @@ use common::{clock::Pace, mission::Mission};
 /// However fast mission time runs, processes are late by so much now and then.
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
 /// How long the window is beyond the limit, mission time: commands are sent every 0.2 s to a robot that stands.
-const WINDOW: Duration = Duration::from_millis(300);
+const WINDOW: Duration = Duration::from_millis(400);
 /// A late robot is asked again after this, mission time.
 const AGAIN: Duration = Duration::from_secs(2);
-/// So many late acknowledgements in a window are no accident of the machine.
-const LATE_ONES: u32 = 2;
 
 /// What is known of the robot's age.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,8 +36,7 @@ pub struct Lateness {
     window_ns: u64,
     again_ns: u64,
     sent_ns: u64,
-    late_ones: u32,
-    was_late: bool,
+    came_late: bool,
     state: State,
 }
 
@@ -54,8 +51,7 @@ impl Lateness {
             window_ns: 0,
             again_ns: 0,
             sent_ns: 0,
-            late_ones: 0,
-            was_late: false,
+            came_late: false,
             state: State::Timely,
         };
         new.set_pace(Pace::Rate(1.0));
@@ -83,7 +79,6 @@ impl Lateness {
     /// The robot does not answer: what it was is over.
     pub const fn lost(&mut self) {
         self.state = State::Timely;
-        self.was_late = false;
     }
 
     /// Something was sent to it.
@@ -94,7 +89,7 @@ impl Lateness {
     /// It acknowledged something.
     pub const fn acknowledged(&mut self, now_ns: u64) {
         if now_ns.saturating_sub(self.sent_ns) > self.limit_ns {
-            self.late_ones += 1;
+            self.came_late = true;
         }
     }
 
@@ -102,9 +97,7 @@ impl Lateness {
     pub const fn pass(&mut self, now_ns: u64) {
         match self.state {
             State::Asked(since) if now_ns.saturating_sub(since) >= self.window_ns => {
-                let enough = if self.was_late { 1 } else { LATE_ONES };
-                self.was_late = self.late_ones >= enough;
-                self.state = if self.was_late {
+                self.state = if self.came_late {
                     State::Late(now_ns)
                 } else {
                     State::Timely
@@ -128,7 +121,7 @@ impl Lateness {
     }
 
     const fn ask(&mut self, now_ns: u64) {
-        self.late_ones = 0;
+        self.came_late = false;
         self.state = State::Asked(now_ns);
     }
 }
@@ -177,10 +170,10 @@ mod tests {
         lateness.pass(13_000 * MS);
         assert!(lateness.asks());
         lateness.acknowledged(13_400 * MS);
-        lateness.pass(13_600 * MS);
-        assert!(lateness.doubted(), "one is enough then");
+        lateness.pass(13_700 * MS);
+        assert!(lateness.doubted());
         lateness.pass(16_000 * MS);
-        lateness.pass(16_600 * MS);
+        lateness.pass(16_700 * MS);
         assert!(!lateness.doubted());
     }
 }

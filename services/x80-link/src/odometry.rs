@@ -6,8 +6,11 @@
 //! (9 mm/s) is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for;
 //! real ones give 0.75 to 0.8. Intervals that speak against a wheel add up, those that speak for it count down twice as
 //! fast, up to a limit. A wheel that turns the other way speaks against itself twice as much, and from [`TURNS_AFTER`]
-//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`DOUBTED_AFTER`] the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it
-//! is at rest 0.2 s later. Intervals longer than two periods tell nothing, since commands may have been lost as well.
+//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`DOUBTED_AFTER`]
+//! the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it is at rest 0.2 s later. A wheel that is told to
+//! turn, this way or that, and does not count at all is doubted after [`STILL_AFTER`]: a controller whose pose turns the wrong
+//! way changes direction too often for the rest. Intervals longer than two periods tell nothing, since commands may have been
+//! lost as well.
 //!
 //! Counts that jump farther than wheels turn are disbelieved one by one ([`crate::restart`]); [`MOST_JUMPS`] of them
 //! within [`JUMPS_WITHIN`] are doubted, too.
@@ -30,6 +33,8 @@ const LEAST_TURN_SHARE: f64 = 0.25;
 const LEAST_SHARE: f64 = 0.25;
 /// So much evidence is enough: longer than a radio's commands are lost while its frames are heard.
 pub(crate) const DOUBTED_AFTER: Duration = Duration::from_millis(550);
+/// A wheel that counts nothing for so long while it is told to turn: commands may be lost before.
+pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
 /// So many counts that cannot be are too many.
 pub(crate) const MOST_JUMPS: usize = 3;
 /// Within this time.
@@ -93,6 +98,8 @@ struct Evidence {
     /// Since when in the same direction.
     since: MissionTime,
     against_s: f64,
+    /// How long it has counted nothing although it was told to turn.
+    still_s: f64,
 }
 
 impl Evidence {
@@ -112,6 +119,11 @@ impl Evidence {
         if asked < least || gap_s <= 0.0 {
             return;
         }
+        self.still_s = if counts.abs() <= 1.0 {
+            self.still_s + gap_s
+        } else {
+            0.0
+        };
         let share = counts * newest.signum() / (gap_s * asked);
         let opposite = share <= -LEAST_SHARE;
         let settled = if opposite { TURNS_AFTER } else { SETTLE };
@@ -210,7 +222,10 @@ impl Odometry {
         self.right.weigh(right, gap_s, least, now);
         let least = LEAST_TURN_M_S * self.counts_per_m;
         self.turn.weigh(right - left, gap_s, least, now);
-        let doubted = |evidence: &Evidence| evidence.against_s >= DOUBTED_AFTER.as_secs_f64();
+        let doubted = |evidence: &Evidence| {
+            evidence.against_s >= DOUBTED_AFTER.as_secs_f64()
+                || evidence.still_s >= STILL_AFTER.as_secs_f64()
+        };
         let all = [
             (&self.left, Doubt::Left),
             (&self.right, Doubt::Right),
@@ -269,6 +284,7 @@ impl Odometry {
     fn begin_anew(&mut self, now: MissionTime) {
         for evidence in [&mut self.left, &mut self.right, &mut self.turn] {
             evidence.since = now;
+            evidence.still_s = 0.0;
         }
     }
 }

@@ -181,6 +181,23 @@ fn one_dead_encoder_is_doubted_in_time_and_named() {
 }
 
 #[test]
+fn a_dead_encoder_is_doubted_though_the_direction_changes_with_every_tick_and_a_live_one_is_not() {
+    let to_and_fro = |tick: u32| {
+        if tick % 2 == 0 {
+            [400, -400]
+        } else {
+            [-400, 400]
+        }
+    };
+    let dead = drive(40, to_and_fro, never, |_, [left, _]| [left, 0]);
+    assert!(
+        matches!(dead, Some((after_s, Doubt::Right)) if after_s < 1.5),
+        "{dead:?}"
+    );
+    assert_eq!(drive(200, to_and_fro, never, honest), None);
+}
+
+#[test]
 fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
     in_time(drive(40, |_| [TURN, TURN], never, reversed), Doubt::Left);
