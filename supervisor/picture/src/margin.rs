@@ -14,7 +14,7 @@ use super::{
 };
 
 /// Text without fonts of its own; digits of one width where the font has them.
-const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
+pub(super) const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
      'DejaVu Sans', sans-serif";
 /// Characters of 12 px that surely fit across the sheet.
 const ACROSS: usize = 150;
@@ -36,11 +36,9 @@ pub(super) fn open(scene: &Scene<'_>) -> String {
          width=\"{WIDTH}\" height=\"{height}\" role=\"img\" font-family=\"{FONT}\" \
          font-size=\"12.5\" fill=\"{}\">\n\
          <title>{name}</title>\n<desc>{facts}</desc>\n\
-         <defs><clipPath id=\"plot\"><rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" \
-         width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\"/></clipPath>{}</defs>\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n",
+         {}<rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n",
         ink::TEXT,
-        world::HATCH
+        definitions()
     )
 }
 
@@ -92,7 +90,12 @@ fn facts(scene: &Scene<'_>) -> String {
 
 /// The frame of the plot with ticks in metres.
 pub(super) fn axes(view: &View) -> String {
-    let step = round_up(view.side_m() / 12.0);
+    axes_in(view, 1.0)
+}
+
+/// The same with text `size` times as large, and as much fewer ticks.
+fn axes_in(view: &View, size: f64) -> String {
+    let step = round_up(view.side_m() * size / 12.0);
     let digits = (-step.log10().floor()).max(0.0) as usize;
     let low = view.low();
     let bottom = PLOT_TOP + PLOT_SIDE;
@@ -113,9 +116,9 @@ pub(super) fn axes(view: &View) -> String {
             ticks.move_to(mark);
             ticks.line_to(mark + away);
             let (x, y, anchor) = if axis == 0 {
-                (mark.x, bottom + 20.0, "middle")
+                (mark.x, bottom + 8.0 + 12.0 * size, "middle")
             } else {
-                (PLOT_LEFT - 10.0, mark.y + 4.5, "end")
+                (PLOT_LEFT - 10.0, mark.y + 4.5 * size, "end")
             };
             // Adding 0 turns -0 into 0.
             let value = nth * step + 0.0;
@@ -133,14 +136,57 @@ pub(super) fn axes(view: &View) -> String {
     );
     format!(
         "{}<rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\" {style}/>\n\
-         <g fill=\"{quiet}\">\n{labels}\
+         <g fill=\"{quiet}\" font-size=\"{}\">\n{labels}\
          <text x=\"{}\" y=\"{}\" text-anchor=\"middle\">x, metres</text>\n\
-         <text transform=\"translate(20 {middle}) rotate(-90)\" text-anchor=\"middle\">y, metres</text>\n\
+         <text transform=\"translate({} {middle}) rotate(-90)\" text-anchor=\"middle\">y, metres</text>\n\
          </g>\n",
         ticks.element(&style),
+        Px(12.5 * size),
         PLOT_LEFT + PLOT_SIDE / 2.0,
-        bottom + 40.0,
+        Px(bottom + 12.0 + 28.0 * size),
+        Px(34.0 - 14.0 * size - 22.0 * (size - 1.0)),
         quiet = ink::QUIET
+    )
+}
+
+/// Text of a figure, in that of a picture.
+const LARGER: f64 = 1.75;
+/// Left edge of a figure, and its width.
+const FIGURE_LEFT: f64 = -32.0;
+const FIGURE_WIDTH: f64 = PLOT_LEFT + PLOT_SIDE + 24.0 - FIGURE_LEFT;
+
+/// The file of a figure: the plot, and its legend below it in two columns.
+pub(super) fn figure(scene: &Scene<'_>, plot: &str, view: &View, legend: &Legend<'_>) -> String {
+    let mut left = Column::at(DVec2::new(0.0, 16.0));
+    legend.motion_rows(&mut left);
+    legend.field_rows(&mut left);
+    let mut right = Column::at(DVec2::new(252.0, 16.0));
+    legend.hazard_rows(&mut right);
+    let rows = left.y.max(right.y) * LARGER;
+    let (top, below) = (PLOT_TOP - 16.0, PLOT_TOP + PLOT_SIDE + 78.0);
+    let height = below + rows - top;
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{FIGURE_LEFT} {top} {FIGURE_WIDTH} {height}\" \
+         width=\"{FIGURE_WIDTH}\" height=\"{height}\" role=\"img\" font-family=\"{FONT}\" font-size=\"12.5\" fill=\"{}\">\n\
+         <title>{}</title>\n<desc>{}</desc>\n{}\
+         <rect x=\"{FIGURE_LEFT}\" y=\"{top}\" width=\"{FIGURE_WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n\
+         {plot}{}<g transform=\"translate({PLOT_LEFT} {below}) scale({LARGER})\">\n{}{}</g>\n</svg>\n",
+        ink::TEXT,
+        escape(&scene.mission.name, ACROSS),
+        facts(scene),
+        definitions(),
+        axes_in(view, LARGER),
+        left.text,
+        right.text,
+    )
+}
+
+/// What the layers of the plot refer to.
+fn definitions() -> String {
+    format!(
+        "<defs><clipPath id=\"plot\"><rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" \
+         width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\"/></clipPath>{}</defs>\n",
+        world::HATCH
     )
 }
 
@@ -176,20 +222,21 @@ pub(super) struct Legend<'a> {
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
 /// From one row to the next.
 const ROW: f64 = 25.0;
-/// Middle of the symbols, and where their text starts.
-const SYMBOL: f64 = COLUMN + 19.0;
-const WORDS: f64 = COLUMN + 50.0;
+/// Middle of the symbols, and where their text starts, from the left edge of a column.
+const SYMBOL: f64 = 19.0;
+const WORDS: f64 = 50.0;
 
 impl Legend<'_> {
     /// The layer.
     pub(super) fn layer(&self) -> String {
-        let mut column = Column {
-            y: PLOT_TOP + 10.0,
-            text: String::new(),
-        };
-        column.heading("Motion");
+        let mut column = Column::at(DVec2::new(COLUMN, PLOT_TOP + 10.0));
         self.motion_rows(&mut column);
         self.hazard_rows(&mut column);
+        self.field_rows(&mut column);
+        column.text + &self.scale_bar()
+    }
+
+    fn field_rows(&self, column: &mut Column) {
         if self.guidance {
             column.heading("Field of that belief");
         }
@@ -209,12 +256,13 @@ impl Legend<'_> {
             });
         }
         if let Some(levels) = self.levels {
-            column.text += &colour_bar(levels, column.y);
+            column.text += &colour_bar(levels, column.x, column.y);
+            column.y += COLOUR_BAR;
         }
-        column.text + &self.scale_bar()
     }
 
     fn motion_rows(&self, column: &mut Column) {
+        column.heading("Motion");
         let line = |style: String| {
             move |at: DVec2| {
                 let mut path = Path::default();
@@ -303,26 +351,41 @@ impl Legend<'_> {
 
 /// A column of rows that grows downwards.
 struct Column {
+    x: f64,
     y: f64,
     text: String,
 }
 
 impl Column {
+    /// An empty one.
+    const fn at(corner: DVec2) -> Self {
+        Self {
+            x: corner.x,
+            y: corner.y,
+            text: String::new(),
+        }
+    }
+
     fn heading(&mut self, words: &str) {
         // The first one stands at the top of the plot, the others apart from what is above.
         if !self.text.is_empty() {
             self.y += 14.0;
         }
         self.text += &format!(
-            "<text x=\"{COLUMN}\" y=\"{}\" font-size=\"14\" font-weight=\"600\">{words}</text>\n",
+            "<text x=\"{}\" y=\"{}\" font-size=\"14\" font-weight=\"600\">{words}</text>\n",
+            Px(self.x),
             Px(self.y)
         );
         self.y += ROW;
     }
 
     fn row(&mut self, words: &str, symbol: impl FnOnce(DVec2) -> String) {
-        self.text += &symbol(DVec2::new(SYMBOL, self.y - 4.0));
-        self.text += &format!("<text x=\"{WORDS}\" y=\"{}\">{words}</text>\n", Px(self.y));
+        self.text += &symbol(DVec2::new(self.x + SYMBOL, self.y - 4.0));
+        self.text += &format!(
+            "<text x=\"{}\" y=\"{}\">{words}</text>\n",
+            Px(self.x + WORDS),
+            Px(self.y)
+        );
         self.y += ROW;
     }
 }
@@ -345,14 +408,17 @@ fn guidance_symbol(at: DVec2) -> String {
         + &head.element(&format!("fill=\"{colour}\""))
 }
 
+/// Height of the colour bar with its words.
+const COLOUR_BAR: f64 = 80.0;
+
 /// The bands with the values between them.
-fn colour_bar(levels: Levels, y: f64) -> String {
+fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
     const LENGTH: f64 = 216.0;
     let bands = levels.count + 1;
     let width = LENGTH / f64::from(bands);
-    let edge = |nth: u32| COLUMN + LENGTH - f64::from(nth) * width;
+    let edge = |nth: u32| left + LENGTH - f64::from(nth) * width;
     let mut text = format!(
-        "<text x=\"{COLUMN}\" y=\"{}\">log<tspan font-size=\"9\" dy=\"3\">2</tspan>\
+        "<text x=\"{left}\" y=\"{}\">log<tspan font-size=\"9\" dy=\"3\">2</tspan>\
          <tspan dx=\"3\" dy=\"-3\">u, where u is the chance that</tspan></text>\n",
         Px(y)
     );
@@ -361,7 +427,7 @@ fn colour_bar(levels: Levels, y: f64) -> String {
         (2.0, "target before a hazard"),
     ] {
         text += &format!(
-            "<text x=\"{COLUMN}\" y=\"{}\">{words}</text>\n",
+            "<text x=\"{left}\" y=\"{}\">{words}</text>\n",
             Px(y + nth * 17.0)
         );
     }
