@@ -9,7 +9,7 @@
 //! | `cells` | what was believed hazardous |
 //! | `world` | what is really there |
 //! | `motion` | trajectories, the robot at regular times, start, target |
-//! | `margin` | title, axes, legend, captions |
+//! | `margin`, `legend` | title, axes, captions; what the symbols mean |
 //! | `page`, `lattice` | the page that all draw on, and where cells are on it |
 //! | [`Scene`] | what is drawn |
 //!
@@ -25,6 +25,7 @@ mod bands;
 mod cells;
 mod chart;
 mod lattice;
+mod legend;
 mod map;
 mod margin;
 mod motion;
@@ -56,7 +57,7 @@ use self::{
     bands::Bands,
     cells::BelievedHazard,
     lattice::Lattice,
-    margin::Legend,
+    legend::Legend,
     motion::Motion,
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
