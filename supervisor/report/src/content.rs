@@ -116,6 +116,7 @@ impl Content {
         if is(&topics::POSE) {
             let pose = sample(message)?;
             self.measured.pose(&pose);
+            self.events.pose(&pose);
             self.poses.push(pose);
         } else if is(&topics::RANGE) {
             let range = sample(message)?;

@@ -6,7 +6,7 @@ use common::{
     samples::{
         Action, Cause, CommandSample, CommandState, DeathCause, DeathSample, DirectiveSample,
         FaultKind, FaultSample, GuidanceSample, HealthSample, HealthState, HoldReason, LinkSample,
-        Order, RequestKind, RequestSample, StallSample, Stamp, name_str,
+        Order, PoseSample, RequestKind, RequestSample, StallSample, Stamp, name_str,
     },
     topics::{EVERY_STAGE, OPERATOR, SUPERVISOR, TABLE},
 };
@@ -14,9 +14,11 @@ use picture::{Lane, Symbol};
 
 /// Events that are kept of a run at most; of later ones only their number.
 const MOST: usize = 2000;
+/// Of the failsafe, which may stop the robot for moments throughout a run; the others are not to be lost for it.
+const MOST_OF_FAILSAFE: usize = 500;
 
 /// Lanes that are no stages.
-const FAILSAFE: &str = "failsafe";
+pub(crate) const FAILSAFE: &str = "failsafe";
 const MAP: &str = "map";
 const STALLS: &str = "stalls";
 
@@ -48,6 +50,9 @@ pub(crate) struct Events {
     directive: Option<(u8, u8)>,
     arrived: bool,
     safety_events: u64,
+    of_failsafe: usize,
+    /// Mission time of the newest pose, seconds: a process that has just started knows none.
+    now_s: f64,
 }
 
 /// The stages, in the order of the pipeline.
@@ -65,16 +70,32 @@ fn stages() -> Vec<&'static str> {
 
 impl Events {
     fn add(&mut self, stamp: &Stamp, lane: &str, symbol: Symbol, text: String) {
-        if self.all.len() == MOST {
+        let is_failsafe = lane == FAILSAFE;
+        let (count, most) = if is_failsafe {
+            (self.of_failsafe, MOST_OF_FAILSAFE)
+        } else {
+            (self.all.len() - self.of_failsafe, MOST)
+        };
+        if count == most {
             self.left_out += 1;
             return;
         }
+        self.of_failsafe += usize::from(is_failsafe);
         self.all.push(Event {
-            time_s: stamp.time().seconds(),
+            time_s: self.time_s(stamp),
             lane: lane.to_owned(),
             symbol,
             text,
         });
+    }
+
+    fn time_s(&self, stamp: &Stamp) -> f64 {
+        stamp.time().seconds().max(self.now_s)
+    }
+
+    /// Time goes on.
+    pub(crate) fn pose(&mut self, pose: &PoseSample) {
+        self.now_s = self.now_s.max(pose.stamp.time().seconds());
     }
 
     fn add_span(&mut self, lane: &str, from: f64, to: f64) {
@@ -108,7 +129,7 @@ impl Events {
         self.add(&death.stamp, stage, Symbol::Death, text);
         // The name may be anything: no more are held than there are stages.
         if stages().contains(&stage) {
-            let time = death.stamp.time().seconds();
+            let time = self.time_s(&death.stamp);
             self.down
                 .entry(stage.to_owned())
                 .and_modify(|(_, dead)| *dead = generation)
@@ -126,14 +147,14 @@ impl Events {
             return;
         }
         self.down.remove(stage);
-        let time = health.stamp.time().seconds();
+        let time = self.time_s(&health.stamp);
         self.add_span(stage, since, time.max(since));
         let text = format!("generation {generation} is ready");
         self.add(&health.stamp, stage, Symbol::Ready, text);
     }
 
     pub(crate) fn link(&mut self, link: &LinkSample) {
-        let time = link.stamp.time().seconds();
+        let time = self.time_s(&link.stamp);
         match (self.stopped, link.stopped()) {
             (None, true) => self.stopped = Some(time),
             (Some(since), false) => {
@@ -230,10 +251,11 @@ impl Events {
                         .map(|(_, since)| [**since, duration_s.max(**since)]),
                 )
                 .collect(),
+            // Those of the failsafe are where its spans begin and end.
             marks: self
                 .all
                 .iter()
-                .filter(|event| event.lane == name)
+                .filter(|event| event.lane == name && name != FAILSAFE)
                 .map(|event| (event.time_s, event.symbol))
                 .collect(),
         };
@@ -291,7 +313,12 @@ mod tests {
         });
         // The last heartbeat of the dead one, read after its death.
         events.health(&health(3, 1));
-        events.health(&health(5, 2));
+        // A process that has just started knows no mission time yet.
+        events.pose(&PoseSample {
+            stamp: stamp(5, 1),
+            ..PoseSample::default()
+        });
+        events.health(&health(0, 2));
         events.health(&health(6, 2));
         let lanes = events.lanes(9.0);
         let planner = lanes.iter().find(|lane| lane.name == "planner").unwrap();

@@ -114,7 +114,7 @@ fn trajectory(content: &Content) -> Figure {
 
 fn timeline(content: &Content) -> Figure {
     let caption =
-        "Ends of processes, recoveries and other events. The list below says what each was.";
+        "Ends of processes, recoveries and other events; the list at the end says what each was.";
     let lanes = content.events.lanes(content.duration_s());
     let all = lanes.iter().flat_map(|lane| {
         let spans = lane.spans.iter().map(|[_, to]| *to);

@@ -4,17 +4,22 @@ use std::fmt::Write as _;
 
 use evaluation::page::{END, escaped, styled_head};
 
-use crate::{content::Content, events::Event, figures::Figure, metrics};
+use crate::{
+    content::Content,
+    events::{Event, FAILSAFE},
+    figures::Figure,
+    metrics,
+};
 
 /// Rows of the list of events; the time line shows more.
-const MOST_EVENTS: usize = 200;
+const MOST_EVENTS: usize = 100;
 /// Characters of a text that comes from the recording.
 const LONGEST: usize = 500;
 
 /// Nothing is wider than the page, and nothing is cut by the end of a sheet.
 const STYLE: &str = "body{max-width:46rem;overflow-wrap:anywhere}figure{display:block;width:auto;margin:1.5em 0;break-inside:avoid}\
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}figcaption{font-size:.9em;color:#323f4b;margin-top:.4em}\
-table{display:table;width:100%;font-size:.9em}td,th{overflow-wrap:anywhere;padding:.25em .5em}tr{break-inside:avoid}thead{display:table-header-group}\
+table{display:table;width:100%;font-size:.9em}td,th{overflow-wrap:normal;padding:.25em .5em}td:last-child{overflow-wrap:anywhere}tr{break-inside:avoid}thead{display:table-header-group}\
 .remark{border:2px solid #1f2933;padding:.5em .8em;font-weight:600}h2{break-after:avoid}\
 @page{margin:16mm}@media print{body{max-width:none;margin:0;padding:0;font-size:10.5pt}figure svg{max-height:210mm}}";
 
@@ -36,9 +41,6 @@ pub(crate) fn html(content: &Content, figures: &[Figure]) -> String {
             inline(&figure.svg),
             text(&figure.caption)
         );
-        if figure.name == "timeline" {
-            events(&mut page, content);
-        }
     }
     let stride = content.poses.stride();
     if stride > 1 {
@@ -57,7 +59,9 @@ pub(crate) fn html(content: &Content, figures: &[Figure]) -> String {
             text(metric.field)
         );
     }
-    page.push_str("</tbody></table>\n<h2>Run</h2>\n<table><tbody>\n");
+    page.push_str("</tbody></table>\n<h2>Events</h2>\n");
+    events(&mut page, content);
+    page.push_str("<h2>Run</h2>\n<table><tbody>\n");
     for (what, which) in &content.about {
         let _ = writeln!(page, "<tr><th>{what}</th><td>{}</td></tr>", text(which));
     }
@@ -77,16 +81,21 @@ fn outcome(content: &Content) -> String {
 }
 
 fn events(page: &mut String, content: &Content) {
-    let listed: Vec<&Event> = content
-        .events
-        .all
-        .iter()
-        .filter(|event| !event.text.is_empty())
+    // What is too much is left out of the failsafe's first: it may stop the robot for moments throughout a run.
+    let told = content.events.all.iter();
+    let told = told.filter(|event| !event.text.is_empty());
+    let (failsafe, others): (Vec<&Event>, Vec<_>) = told.partition(|event| event.lane == FAILSAFE);
+    let count = failsafe.len() + others.len();
+    let mut listed: Vec<_> = others
+        .into_iter()
+        .chain(failsafe)
+        .take(MOST_EVENTS)
         .collect();
+    listed.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     page.push_str(
         "<table><thead><tr><th>time, s</th><th>of</th><th>what</th></tr></thead><tbody>\n",
     );
-    for event in listed.iter().take(MOST_EVENTS) {
+    for event in &listed {
         let _ = writeln!(
             page,
             "<tr><td>{:.2}</td><td>{}</td><td>{}</td></tr>",
@@ -96,7 +105,7 @@ fn events(page: &mut String, content: &Content) {
         );
     }
     page.push_str("</tbody></table>\n");
-    let more = listed.len().saturating_sub(MOST_EVENTS) as u64;
+    let more = (count - listed.len()) as u64;
     let more = more.saturating_add(content.events.left_out);
     if more > 0 {
         let _ = writeln!(page, "<p>{more} more events are not listed.</p>");
