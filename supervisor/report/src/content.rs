@@ -115,9 +115,10 @@ impl Content {
         let is = |topic: &dyn AnyTopic| *message.topic == *topic.spec().name;
         if is(&topics::POSE) {
             let pose = sample(message)?;
-            self.measured.pose(&pose);
             self.events.pose(&pose);
-            self.poses.push(pose);
+            if self.measured.pose(&pose, &self.mission) {
+                self.poses.push(pose);
+            }
         } else if is(&topics::RANGE) {
             let range = sample(message)?;
             self.measured.range(&range, &self.mission);

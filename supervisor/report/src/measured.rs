@@ -16,6 +16,8 @@ pub(crate) struct Measured {
     /// Length of the believed way, metres.
     pub(crate) path_m: f64,
     last_pose: Option<PoseSample>,
+    /// v of the newest pose whose speeds could be told.
+    last_speed: Option<f64>,
     speed_change: f64,
     changes: u64,
     ranges: u64,
@@ -31,18 +33,26 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    pub(crate) fn pose(&mut self, pose: &PoseSample) {
+    /// Whether its speeds can be told: of ticks that were heard together, since the machine was late, a speed is a
+    /// way by next to no time.
+    pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) -> bool {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.time().seconds());
         self.path_m = pose.travelled_m;
-        if let Some(last) = self.last_pose.replace(*pose) {
-            let time = pose.stamp.time().seconds() - last.stamp.time().seconds();
-            let change = (pose.v_m_s - last.v_m_s).abs() / time;
-            if time > 0.0 && change.is_finite() {
-                self.speed_change += change;
+        let Some(last) = self.last_pose.replace(*pose) else {
+            self.last_speed = Some(pose.v_m_s);
+            return true;
+        };
+        let time = pose.stamp.time().seconds() - last.stamp.time().seconds();
+        let is_told = time * mission.robot.rate_hz > 0.5;
+        if is_told {
+            if let Some(before) = self.last_speed.filter(|before| before.is_finite()) {
+                self.speed_change += (pose.v_m_s - before).abs() / time;
                 self.changes += 1;
             }
+            self.last_speed = Some(pose.v_m_s);
         }
+        is_told
     }
 
     pub(crate) fn range(&mut self, range: &RangeSample, mission: &Mission) {

@@ -119,11 +119,12 @@ fn metrics_count_every_generation_and_every_sample() {
             latency_max_ns: histogram.max_ns(),
             ..LinkSample::default()
         });
-        content.measured.pose(&PoseSample {
+        let pose = PoseSample {
             stamp: stamp(tick, 1),
             v_m_s: tick as f64 * 0.5,
             ..PoseSample::default()
-        });
+        };
+        content.measured.pose(&pose, &content.mission);
         let range = RangeSample {
             range_m: 0.2,
             status: u8::from(tick == 0),
@@ -136,6 +137,14 @@ fn metrics_count_every_generation_and_every_sample() {
             ..CommandSample::default()
         });
     }
+    // Heard a microsecond after the last one.
+    let mut late = PoseSample {
+        stamp: stamp(2, 1),
+        v_m_s: 900.0,
+        ..PoseSample::default()
+    };
+    late.stamp.stamp_ns += 1000;
+    assert!(!content.measured.pose(&late, &content.mission));
     let counts: u32 = content.measured.latency().counts().iter().sum();
     assert_eq!(counts, 2);
     assert_eq!(content.measured.speed_change(), Some(0.5));
