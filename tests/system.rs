@@ -25,6 +25,7 @@ mod planners;
 mod recording;
 mod repeatability;
 mod replaced_bus;
+mod report;
 mod resume;
 mod robot_faults;
 mod screen;

@@ -35,6 +35,8 @@ pub(crate) mod record;
 pub(crate) mod replay;
 #[cfg(feature = "tools")]
 pub(crate) mod replay_log;
+#[cfg(feature = "tools")]
+pub(crate) mod report;
 pub(crate) mod run;
 mod run_recorder;
 pub(crate) mod runs;

@@ -25,7 +25,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use commands::sim;
 #[cfg(feature = "tools")]
 use commands::{
-    chaos, command_line, evaluate, experiments, field, latency, replay, replay_log, top,
+    chaos, command_line, evaluate, experiments, field, latency, replay, replay_log, report, top,
 };
 use commands::{
     check, echo, exit_code, fault, help, hz, install, list, logs, missions, operate, other_user,
@@ -70,6 +70,8 @@ enum Command {
     Replay(replay::Arguments),
     #[cfg(feature = "tools")]
     Diff(replay::Diff),
+    #[cfg(feature = "tools")]
+    Report(report::Arguments),
     Status(status::Arguments),
     #[cfg(feature = "tools")]
     Top(top::Arguments),
@@ -148,6 +150,8 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Diff(arguments) => replay::diff(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Report(arguments) => report::main(&arguments),
         Command::Status(arguments) => status::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Top(arguments) => top::main(&arguments),

@@ -3,10 +3,16 @@
 /// The page up to its first heading, which is `title`.
 #[must_use]
 pub fn head(title: &str) -> String {
+    styled_head(title, "")
+}
+
+/// The same with further rules of CSS.
+#[must_use]
+pub fn styled_head(title: &str, style: &str) -> String {
     let title = escaped(title);
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n"
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}</title>\n<style>{STYLE}{style}</style></head>\n<body>\n"
     )
 }
 

@@ -9,27 +9,34 @@
 //! | `cells` | what was believed hazardous |
 //! | `world` | what is really there |
 //! | `motion` | trajectories, the robot at regular times, start, target |
-//! | `margin` | title, axes, legend, captions |
+//! | `margin`, `legend` | title, axes, captions; what the symbols mean |
 //! | `page`, `lattice` | the page that all draw on, and where cells are on it |
 //! | [`Scene`] | what is drawn |
 //!
-//! `map` draws the field of a bare map with the same bands and lines, `raster` makes it a PNG.
+//! [`figure_svg`] is the same without title and captions, and with text that is read on a small page.
+//!
+//! `map` draws the field of a bare map with the same bands and lines, `raster` makes it a PNG. `chart` and `timeline` draw
+//! values and events against time; `plot` is what they have in common.
 //!
 //! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
 //! every input gives a valid file.
 
 mod bands;
 mod cells;
+mod chart;
 mod lattice;
+mod legend;
 mod map;
 mod margin;
 mod motion;
 mod page;
+mod plot;
 mod raster;
 mod scene;
 mod streamlines;
 #[cfg(test)]
 mod tests;
+mod timeline;
 mod world;
 
 use common::{
@@ -38,16 +45,19 @@ use common::{
 };
 
 pub use self::{
+    chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
+    plot::{Axis, Scale},
     raster::png,
     scene::{Facts, Scene},
+    timeline::{Lane, Symbol, Timeline},
 };
 
 use self::{
     bands::Bands,
     cells::BelievedHazard,
     lattice::Lattice,
-    margin::Legend,
+    legend::Legend,
     motion::Motion,
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
@@ -68,7 +78,32 @@ fn has_isolated_cells(
 }
 
 /// `scene` as the text of an SVG file.
+#[must_use]
 pub fn svg(scene: &Scene<'_>) -> String {
+    drawn(scene, |view, plot, legend| {
+        [
+            margin::open(scene),
+            plot,
+            margin::title(scene),
+            margin::axes(view),
+            legend.layer(),
+            margin::captions(scene),
+            "</svg>\n".to_owned(),
+        ]
+        .concat()
+    })
+}
+
+/// `scene` as a figure: no title, no captions, the legend below, and text that is read where the figure is small.
+#[must_use]
+pub fn figure_svg(scene: &Scene<'_>) -> String {
+    drawn(scene, |view, plot, legend| {
+        margin::figure(scene, &plot, view, legend)
+    })
+}
+
+/// The plot of `scene` and what explains it, put together by `sheet`.
+fn drawn(scene: &Scene<'_>, sheet: impl FnOnce(&View, String, &Legend<'_>) -> String) -> String {
     let view = View::of(&scene.mission.grid_frame());
     let field = scene
         .field
@@ -107,14 +142,5 @@ pub fn svg(scene: &Scene<'_>) -> String {
          {drawn}</g>\n",
         ink::NOWHERE
     );
-    [
-        margin::open(scene),
-        plot,
-        margin::title(scene),
-        margin::axes(&view),
-        legend.layer(),
-        margin::captions(scene),
-        "</svg>\n".to_owned(),
-    ]
-    .concat()
+    sheet(&view, plot, &legend)
 }

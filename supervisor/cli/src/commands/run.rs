@@ -199,6 +199,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let ran = supervisor::run(&options, &mut attach, &mut |progress| {
         console.show(progress);
     });
+    #[cfg(feature = "tools")]
+    let was_recorded = recorder.is_some();
     if let Some(recorder) = recorder {
         recorder.end();
     }
@@ -225,6 +227,10 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         // Drawn last, and without effect on the result.
         #[cfg(feature = "tools")]
         complain(draw(arguments, &options, &finished, &summary));
+        #[cfg(feature = "tools")]
+        if was_recorded {
+            complain(report_on(arguments, &options));
+        }
     }
     Ok(exit_code(&summary, &finished.ending))
 }
@@ -263,6 +269,18 @@ fn draw(
         return Ok(());
     }
     print_text(&format!("picture: {}\n", picture.display())).map_err(named)
+}
+
+/// Write the report of the run from its recording.
+#[cfg(feature = "tools")]
+fn report_on(arguments: &Arguments, options: &Options) -> Result<(), String> {
+    let page = report::write(&options.directory, None)
+        .map_err(|error| format!("no report of this run: {error}"))?;
+    if arguments.json {
+        return Ok(());
+    }
+    print_text(&format!("report: {}\n", page.display()))
+        .map_err(|error| format!("cannot say where the report is: {error}"))
 }
 
 /// What only reports has failed: the mission's exit code stays.

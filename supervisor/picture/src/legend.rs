@@ -1,0 +1,268 @@
+//! What the legend says: every symbol of the plot, in words.
+
+use common::geometry::Shapes;
+use glam::DVec2;
+
+use super::{
+    bands::Levels,
+    cells::BelievedHazard,
+    motion::{self, Motion},
+    page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, Path, Px, View, ink, round_up},
+    streamlines::arrowhead,
+    world::Outline,
+};
+
+/// What the legend has to explain: only what is drawn.
+pub(super) struct Legend<'a> {
+    pub(super) view: &'a View,
+    pub(super) levels: Option<Levels>,
+    pub(super) guidance: bool,
+    /// Whether from some cells that were believed free the target cannot be reached.
+    pub(super) isolated: bool,
+    pub(super) hazard: Option<&'a BelievedHazard>,
+    pub(super) world: &'a Shapes,
+    pub(super) motion: &'a Motion<'a>,
+}
+
+/// Left edge of the legend.
+const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
+/// From one row to the next.
+const ROW: f64 = 25.0;
+/// Middle of the symbols, and where their text starts, from the left edge of a column.
+const SYMBOL: f64 = 19.0;
+const WORDS: f64 = 50.0;
+
+impl Legend<'_> {
+    /// The layer.
+    pub(super) fn layer(&self) -> String {
+        let mut column = Column::at(DVec2::new(COLUMN, PLOT_TOP + 10.0));
+        self.motion_rows(&mut column);
+        self.hazard_rows(&mut column);
+        self.field_rows(&mut column);
+        column.text + &self.scale_bar()
+    }
+
+    /// Rows about the field.
+    pub(super) fn field_rows(&self, column: &mut Column) {
+        if self.guidance {
+            column.heading("Field of that belief");
+        }
+        if self.guidance {
+            column.row("guidance E", guidance_symbol);
+        }
+        if self.isolated {
+            column.row("no way to the target", |at| {
+                patch(
+                    at,
+                    &format!(
+                        "fill=\"{}\" stroke=\"{}\" stroke-width=\"0.6\"",
+                        ink::NOWHERE,
+                        ink::QUIET
+                    ),
+                )
+            });
+        }
+        if let Some(levels) = self.levels {
+            column.text += &colour_bar(levels, column.x, column.y);
+            column.y += COLOUR_BAR;
+        }
+    }
+
+    /// Rows about the robot.
+    pub(super) fn motion_rows(&self, column: &mut Column) {
+        column.heading("Motion");
+        let line = |style: String| {
+            move |at: DVec2| {
+                let mut path = Path::default();
+                path.move_to(at - DVec2::X * 17.0);
+                path.line_to(at + DVec2::X * 17.0);
+                path.element(&style)
+            }
+        };
+        let body = |style: String| {
+            move |at: DVec2| {
+                let mut path = Path::default();
+                motion::add_body(&mut path, at, 9.0, 0.0);
+                path.element(&style)
+            }
+        };
+        if self.motion.has_truth() {
+            column.row("true trajectory", line(motion::truth_line()));
+        }
+        if self.motion.has_belief() {
+            column.row("believed trajectory", line(motion::believed_line()));
+        }
+        if let Some(seconds) = self.motion.period_s() {
+            column.row(
+                &format!("robot, every {seconds} s"),
+                body(motion::BODY.to_owned()),
+            );
+        }
+        if self.motion.has_truth() || self.motion.has_belief() {
+            column.row("robot at the end", body(motion::final_body()));
+        }
+        if self.motion.has_covariance() {
+            column.row("95 % of the believed end", |at: DVec2| {
+                let mut path = Path::default();
+                path.circle(at, 9.0);
+                path.element(&motion::region_style())
+            });
+        }
+        column.row("start", motion::start_mark);
+        column.row("target, tolerance", |at| motion::target(at, 9.5));
+    }
+
+    /// Rows about hazards, believed and real.
+    pub(super) fn hazard_rows(&self, column: &mut Column) {
+        let cell = |colour: &'static str| move |at: DVec2| patch(at, &format!("fill=\"{colour}\""));
+        if let Some(hazard) = self.hazard {
+            column.heading("Believed hazardous");
+            if hazard.has_sensed() {
+                column.row("sensed, with margin", cell(ink::SENSED));
+            }
+            if hazard.has_known() {
+                column.row("known beforehand", cell(ink::KNOWN));
+            }
+            if hazard.has_perimeter() {
+                column.row("perimeter", cell(ink::PERIMETER));
+            }
+        }
+        if !self.world.is_empty() {
+            column.heading("Really there");
+            for outline in Outline::ALL
+                .into_iter()
+                .filter(|outline| outline.is_in(self.world))
+            {
+                column.row(outline.name(), |at| patch(at, &outline.solid()));
+            }
+        }
+    }
+
+    /// A round length of a sixth to a third of the plot, in the lower corner.
+    fn scale_bar(&self) -> String {
+        let length = round_up(self.view.side_m() / 8.0);
+        let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
+        let mut bar = Path::default();
+        bar.move_to(DVec2::new(COLUMN, y - 8.0));
+        bar.line_to(DVec2::new(COLUMN, y));
+        bar.line_to(DVec2::new(right, y));
+        bar.line_to(DVec2::new(right, y - 8.0));
+        bar.element(&format!(
+            "fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"",
+            ink::TEXT
+        )) + &format!(
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{length} m</text>\n",
+            Px((COLUMN + right) / 2.0),
+            Px(y - 7.0)
+        )
+    }
+}
+
+/// A column of rows that grows downwards.
+pub(super) struct Column {
+    x: f64,
+    /// Where the next row stands.
+    pub(super) y: f64,
+    /// The rows so far.
+    pub(super) text: String,
+}
+
+impl Column {
+    /// An empty one.
+    pub(super) const fn at(corner: DVec2) -> Self {
+        Self {
+            x: corner.x,
+            y: corner.y,
+            text: String::new(),
+        }
+    }
+
+    fn heading(&mut self, words: &str) {
+        // The first one stands at the top of the plot, the others apart from what is above.
+        if !self.text.is_empty() {
+            self.y += 14.0;
+        }
+        self.text += &format!(
+            "<text x=\"{}\" y=\"{}\" font-size=\"14\" font-weight=\"600\">{words}</text>\n",
+            Px(self.x),
+            Px(self.y)
+        );
+        self.y += ROW;
+    }
+
+    fn row(&mut self, words: &str, symbol: impl FnOnce(DVec2) -> String) {
+        self.text += &symbol(DVec2::new(self.x + SYMBOL, self.y - 4.0));
+        self.text += &format!(
+            "<text x=\"{}\" y=\"{}\">{words}</text>\n",
+            Px(self.x + WORDS),
+            Px(self.y)
+        );
+        self.y += ROW;
+    }
+}
+
+fn patch(at: DVec2, style: &str) -> String {
+    let mut path = Path::default();
+    let size = DVec2::new(30.0, 15.0);
+    path.rectangle(at - size / 2.0, size);
+    path.element(style)
+}
+
+fn guidance_symbol(at: DVec2) -> String {
+    let mut line = Path::default();
+    line.move_to(at - DVec2::X * 17.0);
+    line.line_to(at + DVec2::X * 17.0);
+    let mut head = Path::default();
+    head.polygon(arrowhead(at, DVec2::X));
+    let colour = ink::GUIDANCE;
+    line.element(&format!("stroke=\"{colour}\" stroke-width=\"1\""))
+        + &head.element(&format!("fill=\"{colour}\""))
+}
+
+/// Height of the colour bar with its words.
+const COLOUR_BAR: f64 = 80.0;
+
+/// The bands with the values between them.
+fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
+    const LENGTH: f64 = 216.0;
+    let bands = levels.count + 1;
+    let width = LENGTH / f64::from(bands);
+    let edge = |nth: u32| left + LENGTH - f64::from(nth) * width;
+    let mut text = format!(
+        "<text x=\"{left}\" y=\"{}\">log<tspan font-size=\"9\" dy=\"3\">2</tspan>\
+         <tspan dx=\"3\" dy=\"-3\">u, where u is the chance that</tspan></text>\n",
+        Px(y)
+    );
+    for (nth, words) in [
+        (1.0, "a random walk meets the"),
+        (2.0, "target before a hazard"),
+    ] {
+        text += &format!(
+            "<text x=\"{left}\" y=\"{}\">{words}</text>\n",
+            Px(y + nth * 17.0)
+        );
+    }
+    let top = y + 45.0;
+    for nth in 0..bands {
+        text += &format!(
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"13\" fill=\"{}\"/>\n",
+            Px(edge(nth + 1)),
+            Px(top),
+            Px(width),
+            levels.colour(nth)
+        );
+    }
+    // Labels at every so many levels: as many as their longest leaves room for.
+    let longest = format!("-{}", levels.step * f64::from(levels.count)).len() as f64;
+    let apart = ((longest * 7.0 + 14.0) / width).ceil().max(1.0) as usize;
+    for nth in (0..=levels.count).step_by(apart) {
+        let value = 0.0 - levels.step * f64::from(nth);
+        text += &format!(
+            "<text x=\"{}\" y=\"{}\" font-size=\"11\" text-anchor=\"middle\" fill=\"{}\">{value}</text>\n",
+            Px(edge(nth)),
+            Px(top + 27.0),
+            ink::QUIET
+        );
+    }
+    text
+}

@@ -1,0 +1,69 @@
+//! Samples of a bounded number.
+
+/// At most so many samples of a kind are kept.
+const MOST: usize = 20_000;
+
+/// Samples in the order in which they came. When there are too many, every second one is dropped, and from then on every
+/// second one is taken.
+#[derive(Clone, Debug)]
+pub(crate) struct Kept<T> {
+    items: Vec<T>,
+    seen: usize,
+    stride: usize,
+}
+
+impl<T> Default for Kept<T> {
+    fn default() -> Self {
+        Self {
+            items: Vec::new(),
+            seen: 0,
+            stride: 1,
+        }
+    }
+}
+
+impl<T> Kept<T> {
+    /// One came.
+    pub(crate) fn push(&mut self, item: T) {
+        if self.items.len() == MOST {
+            let mut nth = 0;
+            self.items.retain(|_| {
+                nth += 1;
+                nth % 2 == 1
+            });
+            self.stride = self.stride.saturating_mul(2);
+        }
+        if self.seen.is_multiple_of(self.stride) {
+            self.items.push(item);
+        }
+        self.seen = self.seen.saturating_add(1);
+    }
+
+    /// Those that are kept.
+    pub(crate) fn items(&self) -> &[T] {
+        &self.items
+    }
+
+    /// Of how many samples one is kept.
+    pub(crate) const fn stride(&self) -> usize {
+        self.stride
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_very_many_samples_a_bounded_number_is_kept_at_equal_steps() {
+        let mut kept = Kept::default();
+        (0..1_000_000).for_each(|nth| kept.push(nth));
+        assert!((MOST / 2..=MOST).contains(&kept.items().len()));
+        let step = kept.stride();
+        assert!(
+            kept.items()
+                .windows(2)
+                .all(|pair| pair[1] - pair[0] == step)
+        );
+    }
+}

@@ -1,0 +1,146 @@
+//! Metrics of the recording itself: of all samples, not of those that are drawn.
+
+use common::{
+    latency::Histogram,
+    mission::Mission,
+    samples::{CommandSample, GuidanceSample, LinkSample, PoseSample, RangeSample, RangeStatus},
+};
+
+/// What was counted so far.
+#[derive(Default)]
+pub(crate) struct Measured {
+    /// Poses.
+    pub(crate) ticks: u64,
+    /// Mission time of the newest pose, seconds.
+    pub(crate) time_s: f64,
+    /// Length of the believed way, metres.
+    pub(crate) path_m: f64,
+    last_pose: Option<PoseSample>,
+    /// v of the newest pose whose speeds could be told.
+    last_speed: Option<f64>,
+    speed_change: f64,
+    changes: u64,
+    ranges: u64,
+    unavailable: u64,
+    near: u64,
+    /// Hits on the map.
+    pub(crate) safety_events: u64,
+    wheels: Option<(f64, f64)>,
+    link: Option<LinkSample>,
+    latency: Histogram,
+    planner: Option<GuidanceSample>,
+    solves: [u64; 2],
+}
+
+impl Measured {
+    /// Whether its speeds can be told: of ticks that were heard together, since the machine was late, a speed is a
+    /// way by next to no time.
+    pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) -> bool {
+        self.ticks += 1;
+        self.time_s = self.time_s.max(pose.stamp.time().seconds());
+        self.path_m = pose.travelled_m;
+        let Some(last) = self.last_pose.replace(*pose) else {
+            self.last_speed = Some(pose.v_m_s);
+            return true;
+        };
+        let time = pose.stamp.time().seconds() - last.stamp.time().seconds();
+        let is_told = time * mission.robot.rate_hz > 0.5;
+        if is_told {
+            if let Some(before) = self.last_speed.filter(|before| before.is_finite()) {
+                self.speed_change += (pose.v_m_s - before).abs() / time;
+                self.changes += 1;
+            }
+            self.last_speed = Some(pose.v_m_s);
+        }
+        is_told
+    }
+
+    pub(crate) fn range(&mut self, range: &RangeSample, mission: &Mission) {
+        self.ranges += 1;
+        match RangeStatus::from_byte(range.status) {
+            RangeStatus::Measured | RangeStatus::AtContact => {
+                self.near += u64::from(range.range_m < mission.map_within_m());
+            }
+            RangeStatus::Nothing | RangeStatus::Invalid | RangeStatus::Absent => {
+                self.unavailable += 1;
+            }
+        }
+    }
+
+    pub(crate) fn command(&mut self, command: &CommandSample) {
+        let (left, right) = (command.left_rad_s, command.right_rad_s);
+        if left.is_finite() && right.is_finite() {
+            let (least, greatest) = self.wheels.unwrap_or((left, left));
+            self.wheels = Some((least.min(left).min(right), greatest.max(left).max(right)));
+        }
+    }
+
+    /// A process counts from 0.
+    pub(crate) fn link(&mut self, link: &LinkSample) {
+        let last = self.link.replace(*link);
+        if let Some(last) = last.filter(|last| last.stamp.generation != link.stamp.generation) {
+            self.latency
+                .add(&last.latency_histogram, last.latency_max_ns);
+        }
+    }
+
+    pub(crate) fn guidance(&mut self, guidance: &GuidanceSample) {
+        self.safety_events = self.safety_events.max(guidance.safety_events);
+        let last = self.planner.replace(*guidance);
+        if let Some(last) = last.filter(|last| last.stamp.generation != guidance.stamp.generation) {
+            self.solves = added(self.solves, &last);
+        }
+    }
+
+    /// Of all generations of the link.
+    pub(crate) fn latency(&self) -> Histogram {
+        let mut latency = self.latency.clone();
+        if let Some(last) = &self.link {
+            latency.add(&last.latency_histogram, last.latency_max_ns);
+        }
+        latency
+    }
+
+    /// Full solves and local updates of all generations of the planner.
+    pub(crate) fn solves(&self) -> [u64; 2] {
+        self.planner
+            .as_ref()
+            .map_or(self.solves, |last| added(self.solves, last))
+    }
+
+    /// The newest pose.
+    pub(crate) const fn last_pose(&self) -> Option<&PoseSample> {
+        self.last_pose.as_ref()
+    }
+
+    /// Mean of |dv/dt|, m/s^2.
+    pub(crate) fn speed_change(&self) -> Option<f64> {
+        share(self.speed_change, self.changes)
+    }
+
+    /// Share of the ticks in which the sonar gave no distance.
+    pub(crate) fn unavailable(&self) -> Option<f64> {
+        share(self.unavailable as f64, self.ranges)
+    }
+
+    /// Share of the ticks in which it measured less than hits are mapped within.
+    pub(crate) fn near(&self) -> Option<f64> {
+        share(self.near as f64, self.ranges)
+    }
+
+    /// The greatest commanded wheel speed less the least, rad/s.
+    pub(crate) fn wheel_range(&self) -> Option<f64> {
+        self.wheels.map(|(least, greatest)| greatest - least)
+    }
+}
+
+fn added([full, local]: [u64; 2], last: &GuidanceSample) -> [u64; 2] {
+    [
+        full.saturating_add(last.full_solves),
+        local.saturating_add(last.local_updates),
+    ]
+}
+
+fn share(sum: f64, count: u64) -> Option<f64> {
+    (count > 0).then(|| sum / count as f64)
+}

@@ -1,0 +1,71 @@
+//! Which recordings are of the run, and the summary beside them.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use common::run::Run;
+use recording::Recording;
+use serde_json::{Map, Value};
+
+use crate::error::ReportError;
+
+/// A summary takes 2 kB.
+const LARGEST_SUMMARY: u64 = 1 << 20;
+/// Parts of a run that are read at most: a run that is resumed begins another.
+const MOST_PARTS: usize = 1000;
+
+/// What a report is made of.
+pub(crate) struct Source {
+    /// Parts of the run, the first one first; never none.
+    pub(crate) files: Vec<PathBuf>,
+    is_run: bool,
+}
+
+impl Source {
+    /// The recordings of `run`: a run's directory, or one recording.
+    pub(crate) fn find(run: &Path) -> Result<Self, ReportError> {
+        if !run.is_dir() {
+            return Ok(Self {
+                files: vec![run.to_path_buf()],
+                is_run: false,
+            });
+        }
+        let first = run.join("recording.mcap");
+        let later = (2..=MOST_PARTS).map(|nth| run.join(format!("recording-{nth}.mcap")));
+        let files: Vec<_> = std::iter::once(first)
+            .chain(later)
+            .take_while(|file| file.exists())
+            .collect();
+        if files.is_empty() {
+            return Err(ReportError::NoRecording(run.to_path_buf()));
+        }
+        Ok(Self {
+            files,
+            is_run: true,
+        })
+    }
+
+    /// Where the report goes unless told otherwise.
+    pub(crate) fn default_out(&self) -> PathBuf {
+        let file = &self.files[0];
+        if self.is_run {
+            return file.with_file_name("report");
+        }
+        let mut name = file.file_stem().unwrap_or_default().to_owned();
+        name.push("-report");
+        file.with_file_name(name)
+    }
+}
+
+/// The summary of the run of `recording`, if it lies beside it.
+pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
+    let directory = recording.path().parent()?;
+    // The directory may be of another run, or of none.
+    let its = Run::load(directory).ok()?;
+    let file = directory.join("summary.json");
+    let is_its = its == *recording.run() && fs::metadata(&file).ok()?.len() <= LARGEST_SUMMARY;
+    let text = is_its.then(|| fs::read_to_string(&file).ok()).flatten()?;
+    serde_json::from_str(&text).ok()
+}
