@@ -183,7 +183,7 @@ fn one_dead_encoder_is_doubted_in_time_and_named() {
 #[test]
 fn a_dead_encoder_is_doubted_though_the_direction_changes_with_every_tick_and_a_live_one_is_not() {
     let to_and_fro = |tick: u32| {
-        if tick % 2 == 0 {
+        if tick.is_multiple_of(2) {
             [400, -400]
         } else {
             [-400, 400]
