@@ -7,6 +7,8 @@ use std::{
     io::{BufRead as _, BufReader, Read as _},
     path::Path,
     process::{Child, ChildStderr, ChildStdout, Command, Stdio},
+    sync::mpsc::{self, RecvTimeoutError},
+    thread,
 };
 
 use common::{bus::Kind, topics};
@@ -14,7 +16,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::support::{
-    Run, STAGES, assert_nothing_left, directory_of, firsthand, operate, output, run,
+    PATIENCE, Run, STAGES, assert_nothing_left, directory_of, firsthand, operate, output, run,
     signal_process, wait_for_status,
 };
 
@@ -62,9 +64,23 @@ impl Reading {
     }
 }
 
-/// What a command prints that must succeed.
+/// What a command prints that must end by itself, and succeed.
 fn printed(arguments: &[&str]) -> String {
-    let output = output(arguments);
+    let child = firsthand(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let pid = child.id();
+    let (ended, has_ended) = mpsc::channel::<()>();
+    let guard = thread::spawn(move || {
+        if has_ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+            signal_process(pid, Signal::KILL);
+        }
+    });
+    let output = child.wait_with_output().unwrap();
+    drop(ended);
+    guard.join().unwrap();
     assert!(output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stdout).unwrap()
 }
@@ -72,8 +88,10 @@ fn printed(arguments: &[&str]) -> String {
 #[test]
 fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     let robot = "con-echo";
-    let mut run = Run::start(robot, "open-room", &["--pace", "2"]);
-    run.wait_until_under_way(1.0);
+    // Slow enough that all is printed before it arrives.
+    let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
+    let mut run = Run::start(robot, "open-room", &slow);
+    run.wait_until_under_way(0.2);
     let poses = printed(&["echo", "pose", "--robot", robot, "--json", "-n", "3"]);
     let ticks: Vec<u64> = poses
         .lines()

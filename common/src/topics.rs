@@ -140,11 +140,12 @@ topics! {
     FAULTS: Topic<FaultSample> {
         name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
-    /// The bytes that the link received from the robot and sent to it.
+    /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
     WIRE: SliceTopic<WireHeader, u8> {
         name: "wire", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }
     /// What the step of every stage took, and the checkpoint each generation started from: what a replay needs.
+    /// Wakes nobody: a reader waits for `link`.
     INPUTS: SliceTopic<InputsHeader, u8> {
         name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }

@@ -114,17 +114,7 @@ fn events(page: &mut String, content: &Content) {
 
 /// Text from anywhere, where markup is read.
 fn text(of: &str) -> String {
-    let mut short: String = of
-        .chars()
-        .take(LONGEST)
-        .map(|character| {
-            if character.is_control() {
-                ' '
-            } else {
-                character
-            }
-        })
-        .collect();
+    let mut short: String = of.chars().take(LONGEST).collect();
     if short.len() < of.len() {
         short.push('…');
     }

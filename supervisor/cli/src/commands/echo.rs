@@ -7,7 +7,7 @@ use common::{
     bus::ReadableTopic,
     domain::{Domain, RobotName},
     follower::{Follower, News},
-    topics,
+    topics::{self, AnyTopic},
 };
 use console::sample_text;
 
@@ -40,7 +40,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let topic = readable(&arguments.topic)?;
     let mut stream = Stream::open()?;
     let domain = Domain::of(arguments.robot.clone());
-    let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus));
+    // What wakes nobody is there when the tick ends.
+    let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus))
+        .also_on([&topics::LINK as &'static dyn AnyTopic]);
     let mut waiting = Waiting::default();
     let mut left = arguments.number.unwrap_or(u64::MAX);
     while left > 0 && !stream.has_ended() {

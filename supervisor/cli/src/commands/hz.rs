@@ -95,6 +95,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         .iter()
         .skip(1)
         .map(|&topic| topic as &'static dyn AnyTopic);
+    // What wakes nobody is there when the tick ends.
+    let others = others.chain([&topics::LINK as &'static dyn AnyTopic]);
     let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);
     let mut waiting = Waiting::default();
     let mut left = arguments.number.unwrap_or(u64::MAX);
