@@ -13,7 +13,8 @@
 //! | `page`, `lattice` | the page that all draw on, and where cells are on it |
 //! | [`Scene`] | what is drawn |
 //!
-//! [`figure_svg`] is the same without title and captions, and with text that is read on a small page.
+//! [`figure_svg`] is the same without title and captions, and with text that is read on a small page; [`panels_svg`] puts
+//! plots of several moments side by side.
 //!
 //! `map` draws the field of a bare map with the same bands and lines, `raster` makes it a PNG. `chart` and `timeline` draw
 //! values and events against time; `plot` is what they have in common.
@@ -100,6 +101,16 @@ pub fn figure_svg(scene: &Scene<'_>) -> String {
     drawn(scene, |view, plot, legend| {
         margin::figure(scene, &plot, view, legend)
     })
+}
+
+/// Plots side by side, two in a row, each below its title. Without axes and legend: those of [`figure_svg`] of the same mission
+/// stand for them.
+#[must_use]
+pub fn panels_svg(title: &str, panels: &[(String, Scene<'_>)]) -> String {
+    let plots = panels
+        .iter()
+        .map(|(title, scene)| (&title[..], drawn(scene, |_, plot, _| plot)));
+    margin::panels(title, &plots.collect::<Vec<_>>())
 }
 
 /// The plot of `scene` and what explains it, put together by `sheet`.

@@ -177,6 +177,42 @@ pub(super) fn figure(scene: &Scene<'_>, plot: &str, view: &View, legend: &Legend
     )
 }
 
+/// Side of a plot among others, and from one to the next.
+const PANEL: f64 = 440.0;
+const PANELS_APART: f64 = 24.0;
+/// Above each plot, for its title.
+const PANEL_TOP: f64 = 34.0;
+
+/// The file of `plots` under their titles.
+pub(super) fn panels(title: &str, plots: &[(&str, String)]) -> String {
+    let rows = plots.len().div_ceil(2) as f64;
+    let width = 2.0 * PANEL + 3.0 * PANELS_APART;
+    let height = rows * (PANEL + PANEL_TOP) + PANELS_APART;
+    let mut drawn = String::new();
+    for (nth, (title, plot)) in plots.iter().enumerate() {
+        let left = PANELS_APART + (nth % 2) as f64 * (PANEL + PANELS_APART);
+        let top = PANEL_TOP + (nth / 2) as f64 * (PANEL + PANEL_TOP);
+        drawn += &format!(
+            "<text x=\"{left}\" y=\"{}\">{}</text>\n\
+             <svg x=\"{left}\" y=\"{top}\" width=\"{PANEL}\" height=\"{PANEL}\" \
+             viewBox=\"{PLOT_LEFT} {PLOT_TOP} {PLOT_SIDE} {PLOT_SIDE}\">\n{plot}</svg>\n\
+             <rect x=\"{left}\" y=\"{top}\" width=\"{PANEL}\" height=\"{PANEL}\" fill=\"none\" stroke=\"{}\" \
+             stroke-width=\"1.2\"/>\n",
+            top - 10.0,
+            escape(title, ACROSS),
+            ink::TEXT
+        );
+    }
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
+         role=\"img\" font-family=\"{FONT}\" font-size=\"21\" fill=\"{}\">\n<title>{}</title>\n{}\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n{drawn}</svg>\n",
+        ink::TEXT,
+        escape(title, ACROSS),
+        definitions(),
+    )
+}
+
 /// What the layers of the plot refer to.
 fn definitions() -> String {
     format!(

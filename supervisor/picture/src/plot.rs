@@ -13,12 +13,12 @@ pub(super) const RIGHT: f64 = WIDTH - 20.0;
 /// Text, px.
 const TEXT: f64 = 14.0;
 /// About the width of a character of the text.
-const CHARACTER: f64 = 7.6;
+const CHARACTER: f64 = 8.6;
 /// From one row of the legend to the next.
 const ROW: f64 = 21.0;
 /// Room of a symbol of the legend, and from one entry to the next.
 const SYMBOL: f64 = 38.0;
-const APART: f64 = 18.0;
+const APART: f64 = 24.0;
 /// Below the plot.
 const BELOW: f64 = 52.0;
 /// Characters that surely fit across the sheet.

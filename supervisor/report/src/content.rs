@@ -2,17 +2,16 @@
 
 use common::{
     bus::{Layout, decode_sample, decode_slice},
-    grid::Replica,
+    grid::{Applied, Replica},
     mission::Mission,
-    samples::{
-        CommandSample, FieldCell, FieldHeader, GridHeader, PoseSample, RangeSample, WheelSample,
-    },
+    samples::{CommandSample, GridHeader, PoseSample, RangeSample, WheelSample},
     topics::{self, AnyTopic},
 };
 use recording::{End, Message, Recording};
 use serde_json::{Map, Value};
 
 use crate::{
+    beliefs::Beliefs,
     error::ReportError,
     events::Events,
     kept::Kept,
@@ -35,7 +34,9 @@ pub(crate) struct Content {
     pub(crate) commands: Kept<CommandSample>,
     pub(crate) wheels: Kept<WheelSample>,
     pub(crate) grid: Replica<u8>,
-    pub(crate) field: Replica<FieldCell>,
+    /// What the mapper said of it last.
+    pub(crate) grid_header: GridHeader,
+    pub(crate) beliefs: Beliefs,
     pub(crate) events: Events,
     pub(crate) measured: Measured,
 }
@@ -74,7 +75,8 @@ impl Content {
             commands: Kept::default(),
             wheels: Kept::default(),
             grid: Replica::default(),
-            field: Replica::default(),
+            grid_header: GridHeader::default(),
+            beliefs: Beliefs::default(),
             events: Events::default(),
             measured: Measured::default(),
         }
@@ -140,10 +142,10 @@ impl Content {
             self.events.link(&link);
         } else if is(&topics::GRID) {
             let (header, cells) = decode_slice::<GridHeader, u8>(&message.data)?;
-            self.grid.apply(&header.part, &cells);
-        } else if is(&topics::FIELD) {
-            let (header, cells) = decode_slice::<FieldHeader, FieldCell>(&message.data)?;
-            self.field.apply(&header.part, &cells);
+            if self.grid.apply(&header.part, &cells) != Applied::Missed {
+                self.grid_header = header;
+                self.beliefs.push(&header, &self.grid);
+            }
         } else if is(&topics::HEALTH) {
             self.events.health(&sample(message)?);
         } else if is(&topics::DEATHS) {
@@ -177,7 +179,7 @@ impl Content {
 }
 
 /// What a report is made of.
-const TOPICS: [&dyn AnyTopic; 14] = [
+const TOPICS: [&dyn AnyTopic; 13] = [
     &topics::POSE,
     &topics::RANGE,
     &topics::WHEELS,
@@ -185,7 +187,6 @@ const TOPICS: [&dyn AnyTopic; 14] = [
     &topics::GUIDANCE,
     &topics::LINK,
     &topics::GRID,
-    &topics::FIELD,
     &topics::HEALTH,
     &topics::DEATHS,
     &topics::DIRECTIVE,

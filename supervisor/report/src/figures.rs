@@ -4,11 +4,11 @@ use common::{
     bus::Stamp,
     kinematics::Pose2,
     latency::BUCKETS,
-    samples::{CommandSample, PoseSample, RangeStatus, WheelSample},
+    samples::{CommandSample, FieldCell, PoseSample, RangeStatus, WheelSample},
 };
 use picture::{Axis, Chart, Facts, Mark, Scene, Series, Timeline};
 
-use crate::content::Content;
+use crate::{beliefs::Belief, content::Content};
 
 /// Buckets of the latency's histogram in an octave.
 const PER_OCTAVE: f64 = 8.0;
@@ -26,8 +26,9 @@ pub(crate) struct Figure {
 /// All figures, in the order of the page.
 pub(crate) fn all(content: &Content) -> Vec<Figure> {
     let [first, second] = wheels(content);
-    vec![
-        trajectory(content),
+    let mut all = vec![trajectory(content)];
+    all.extend(map_and_field(content));
+    all.extend([
         timeline(content),
         sonar(content),
         speed(content),
@@ -35,7 +36,8 @@ pub(crate) fn all(content: &Content) -> Vec<Figure> {
         first,
         second,
         latency(content),
-    ]
+    ]);
+    all
 }
 
 fn seconds(stamp: &Stamp) -> f64 {
@@ -71,20 +73,21 @@ fn over_time(
     }
 }
 
-fn trajectory(content: &Content) -> Figure {
-    let poses = content.poses.items();
-    let believed: Vec<Pose2> = poses.iter().map(PoseSample::pose).collect();
-    let last = content.measured.last_pose();
-    let (grid, field) = (&content.grid, &content.field);
-    let scene = Scene {
+/// What a picture shows of `belief`, its `field` and the `poses` until then.
+fn scene<'a>(
+    content: &'a Content,
+    belief: Option<&'a Belief>,
+    field: Option<&'a Vec<FieldCell>>,
+    poses: &'a [Pose2],
+) -> Scene<'a> {
+    Scene {
         mission: &content.mission,
-        grid: grid.frame().map(|frame| (frame, grid.cells())),
-        field: field.frame().map(|frame| (frame, field.cells())),
-        believed: &believed,
-        covariance: last.map(|pose| {
-            let [xx, xy, _, yy, ..] = pose.covariance;
-            [xx, xy, yy]
-        }),
+        grid: belief.map(|belief| (belief.frame, &belief.cells[..])),
+        field: belief
+            .zip(field)
+            .map(|(belief, field)| (belief.frame, &field[..])),
+        believed: poses,
+        covariance: None,
         truth: &[],
         facts: Facts {
             outcome: content.outcome().unwrap_or("unknown"),
@@ -96,20 +99,64 @@ fn trajectory(content: &Content) -> Figure {
             seed: content.simulated.then_some(content.mission.seed),
         },
         captions: &[],
-    };
-    let field = if field.frame().is_some() {
-        " over the guidance field of that belief"
+    }
+}
+
+fn path(poses: &[PoseSample]) -> Vec<Pose2> {
+    poses.iter().map(PoseSample::pose).collect()
+}
+
+fn trajectory(content: &Content) -> Figure {
+    let poses = path(content.poses.items());
+    let belief = Belief::of(&content.grid_header, &content.grid);
+    let field = belief
+        .as_ref()
+        .and_then(|belief| belief.field(&content.mission));
+    let mut scene = scene(content, belief.as_ref(), field.as_ref(), &poses);
+    scene.covariance = content.measured.last_pose().map(|pose| {
+        let [xx, xy, _, yy, ..] = pose.covariance;
+        [xx, xy, yy]
+    });
+    let over = if field.is_some() {
+        " over the guidance field of the map at the end"
     } else {
         ""
     };
     Figure {
         name: "trajectory",
         caption: format!(
-            "Trajectory by dead reckoning{field}, with what was believed hazardous at the end (areas) and what really stands \
+            "Trajectory by dead reckoning{over}, with what was believed hazardous at the end (areas) and what really stands \
              there (outlines)."
         ),
         svg: picture::figure_svg(&scene),
     }
+}
+
+/// Map and field on the way and at the end; none of a run in which no map was recorded on the way.
+fn map_and_field(content: &Content) -> Option<Figure> {
+    let end = Belief::of(&content.grid_header, &content.grid)?;
+    let mut beliefs = content.beliefs.on_the_way(content.duration_s());
+    if beliefs.is_empty() {
+        return None;
+    }
+    beliefs.push(&end);
+    let samples = content.poses.items();
+    let drawn = beliefs.iter().map(|belief| {
+        let until = samples.partition_point(|pose| seconds(&pose.stamp) <= belief.time_s);
+        (belief.field(&content.mission), path(&samples[..until]))
+    });
+    let drawn: Vec<_> = drawn.collect();
+    let panels = beliefs.iter().zip(&drawn).map(|(belief, (field, poses))| {
+        let title = format!("{:.0} s", belief.time_s);
+        (title, scene(content, Some(belief), field.as_ref(), poses))
+    });
+    Some(Figure {
+        name: "map-and-field",
+        caption: "Map, guidance field of that map, and trajectory, by mission time. Frame and symbols are those of the \
+                  trajectory's figure; levels of the field are each panel's own."
+            .to_owned(),
+        svg: picture::panels_svg("Map and field over time", &panels.collect::<Vec<_>>()),
+    })
 }
 
 fn timeline(content: &Content) -> Figure {

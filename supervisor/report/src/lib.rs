@@ -16,11 +16,13 @@
 //! | `content` | what is read of the recordings |
 //! | `events` | deaths, recoveries, and what else happened |
 //! | `measured` | metrics of the recording itself |
+//! | `beliefs` | the map at a few moments, and the field of each |
 //! | `metrics` | the table of metrics, under their field names |
 //! | `figures` | each figure |
 //! | `page` | the page |
 //! | `error` | what can go wrong |
 
+mod beliefs;
 mod content;
 mod error;
 mod events;

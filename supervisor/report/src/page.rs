@@ -21,7 +21,7 @@ const STYLE: &str = "body{max-width:46rem;overflow-wrap:anywhere}figure{display:
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}figcaption{font-size:.9em;color:#323f4b;margin-top:.4em}\
 table{display:table;width:100%;font-size:.9em}td,th{overflow-wrap:normal;padding:.25em .5em}td:last-child{overflow-wrap:anywhere}tr{break-inside:avoid}thead{display:table-header-group}\
 .remark{border:2px solid #1f2933;padding:.5em .8em;font-weight:600}h2{break-after:avoid}\
-@page{margin:16mm}@media print{body{max-width:none;margin:0;padding:0;font-size:10.5pt}figure svg{max-height:210mm}}";
+@page{margin:16mm}@media print{body{max-width:none;margin:0;padding:0;font-size:10.5pt}figure svg{max-height:175mm}}";
 
 /// The page of `content` with `figures`.
 pub(crate) fn html(content: &Content, figures: &[Figure]) -> String {

@@ -26,8 +26,9 @@ fn every_figure_has_its_axes_with_units_and_a_legend() {
     let expected = [
         (
             "trajectory",
-            ["x, metres", "y, metres", "target, tolerance"],
+            ["x, metres", "guidance E", "target, tolerance"],
         ),
+        ("map-and-field", ["2 s", "4 s", "6 s"]),
         ("timeline", ["mission time, s", "planner", "event"]),
         ("sonar", ["mission time, s", "range, m", "no distance"]),
         ("speed", ["mission time, s", "v, m/s", "commanded"]),
