@@ -6,6 +6,7 @@ use common::{
     bus::{Reader, Writer},
     checkpoint::{Checkpoint, CheckpointError},
     inputs::InputLog,
+    latency_budget::{Answers, Item, LatencyBudget},
     run,
     samples::{PoseSample, WheelSample},
     shell::{Context, Process, Progress, StageError},
@@ -39,6 +40,7 @@ pub struct Shell {
     inputs: InputLog,
     reckoning: DeadReckoning,
     progress: Progress,
+    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -63,6 +65,7 @@ impl Process for Shell {
             inputs,
             reckoning,
             progress: Progress::default(),
+            budget: context.budget.clone(),
         })
     }
 
@@ -70,8 +73,11 @@ impl Process for Shell {
         while let Some(wheels) = self.wheels.take()? {
             let (tick, time) = (wheels.stamp.tick, wheels.stamp.time());
             self.progress = Progress { tick, time };
+            self.budget.end(Item::Read);
             self.inputs.note(&Input { wheels }, self.progress)?;
+            self.budget.end(Item::Keep);
             let Reckoned { pose, rejected } = self.reckoning.step(&wheels, time);
+            self.budget.end(Item::Step);
             if rejected {
                 tracing::warn!(
                     tick,
@@ -80,7 +86,10 @@ impl Process for Shell {
             }
             self.checkpoint.save(self.reckoning.state())?;
             self.inputs.publish(self.progress)?;
-            self.pose.publish(tick, time, pose)?;
+            self.budget.end(Item::Keep);
+            self.pose.publish_quietly(tick, time, pose)?;
+            self.budget.published(tick, Answers::Inputs);
+            self.pose.wake()?;
         }
         Ok(self.progress)
     }

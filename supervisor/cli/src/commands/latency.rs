@@ -1,5 +1,6 @@
 //! `firsthand latency`: what a tick takes, compared with what the bus alone takes.
 
+mod budget;
 mod mission;
 mod regime;
 mod report;
@@ -11,6 +12,7 @@ use clap::Args;
 use common::{clock::Pace, domain::RobotName, latency::Histogram};
 
 use super::{Failure, missions, print_text};
+use budget::Budget;
 use mission::Mission;
 use regime::{Regime, parse_hz};
 use report::Report;
@@ -30,6 +32,9 @@ pub(crate) struct Arguments {
     /// How often both are measured, in turn: a shared machine has good and bad moments.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
+    /// Also what each stage does with its part of a tick: microseconds by stage and item.
+    #[arg(long)]
+    budget: bool,
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -79,15 +84,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         pace: regime.pace(rate_hz),
         record: arguments.record,
     };
+    let mut budget = arguments.budget.then(Budget::default);
     let mut hops = Histogram::default();
     let mut rounds = Vec::new();
     for _ in 0..arguments.rounds {
         let round = ipc_bench::measure(&robot, trips, regime.period())?;
         hops.add(round.counts(), round.max_ns());
-        rounds.push(mission.measure()?);
+        rounds.push(mission.measure(budget.as_mut())?);
     }
-    let report = Report::new(regime, &hops, u64::from(arguments.rounds) * trips, &rounds)
+    let mut report = Report::new(regime, &hops, u64::from(arguments.rounds) * trips, &rounds)
         .ok_or("nothing was measured; does the mission drive at all?")?;
+    report.budget = budget.map(Budget::rows);
     if arguments.json {
         print_text(&format!("{}\n", serde_json::to_string(&report)?))?;
     } else {

@@ -10,10 +10,11 @@ use std::{
 };
 
 use chaos::process_set::{ProcessSet, Used};
-use common::{clock::Pace, domain::RobotName};
+use common::{clock::Pace, domain::RobotName, latency_budget};
 use supervisor::process;
 
-use super::Failure;
+use super::budget::Budget;
+use crate::commands::Failure;
 
 /// The mission, as `run` is asked for it.
 pub(super) struct Mission<'a> {
@@ -59,8 +60,8 @@ impl Drop for Directory {
 }
 
 impl Mission<'_> {
-    /// Run it.
-    pub(super) fn measure(&self) -> Result<Ticks, Failure> {
+    /// Run it. Its stages measure their items only for a `budget`: that takes time itself.
+    pub(super) fn measure(&self, budget: Option<&mut Budget>) -> Result<Ticks, Failure> {
         let directory = Directory::make()?;
         let (robot, pace) = (self.robot.to_string(), self.pace.to_string());
         let mut command = process::firsthand(&["run", self.name, "--json", "--pace", &pace]);
@@ -70,6 +71,9 @@ impl Mission<'_> {
         }
         for setting in self.set {
             command.args(["--set", setting]);
+        }
+        if budget.is_some() {
+            command.env(latency_budget::ASKED_FOR, "1");
         }
         let run = command
             .stdout(Stdio::piped())
@@ -89,8 +93,11 @@ impl Mission<'_> {
         };
         // It has sent what it had.
         let _ = waiting.join();
-        let used = processes.used();
-        ticks(&output, used)
+        let ticks = ticks(&output, processes.used())?;
+        if let Some(budget) = budget {
+            budget.add(&directory.0)?;
+        }
+        Ok(ticks)
     }
 }
 

@@ -60,7 +60,7 @@ pub(super) fn parse_hz(text: &str) -> Result<f64, String> {
 }
 
 const SLOWEST_HZ: f64 = 0.1;
-/// The simulated robot's clock has no finer steps.
+/// A tick takes a good part of a millisecond: faster is back to back.
 const FASTEST_HZ: f64 = 1000.0;
 
 #[cfg(test)]

@@ -6,7 +6,11 @@ use chaos::process_set::Used;
 use common::latency::Histogram;
 use serde::Serialize;
 
-use super::{mission::Ticks, regime::Regime};
+use super::{
+    budget::{Row, Table},
+    mission::Ticks,
+    regime::Regime,
+};
 
 /// What was measured, microseconds.
 #[derive(Debug, Serialize)]
@@ -29,6 +33,9 @@ pub(super) struct Report {
     wakeups_per_s: Option<f64>,
     cpu_share: Option<f64>,
     pss_mib: Option<f64>,
+    /// By stage and item; none unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) budget: Option<Vec<Row>>,
 }
 
 impl Report {
@@ -65,6 +72,7 @@ impl Report {
             wakeups_per_s: used(|used| used.wakeups_per_s),
             cpu_share: used(|used| used.cpu_share),
             pss_mib: used(|used| used.pss_mib),
+            budget: None,
         })
     }
 }
@@ -107,6 +115,9 @@ impl fmt::Display for Report {
                 "the mission's processes, supervisor and simulated robot among them: {wakeups:.0} wakeups a second, \
                  {percent:.1} % of a core, PSS {pss:.0} MiB"
             )?;
+        }
+        if let Some(budget) = &self.budget {
+            write!(to, "\n{}", Table(budget))?;
         }
         Ok(())
     }
