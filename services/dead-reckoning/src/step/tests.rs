@@ -200,11 +200,11 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     let mut killed = reckoning("");
     killed.take(&wheels(0, 0, 0));
     killed.take(&wheels(1, 90, 110));
-    let saved = killed.state().clone();
+    let saved = *killed.state();
     let published = killed.take(&wheels(2, 190, 200));
     let successor = || {
         let mut successor = reckoning("");
-        successor.restore(saved.clone()).unwrap();
+        successor.restore(saved).unwrap();
         successor
     };
     // The link's last sample is still that of the tick.
