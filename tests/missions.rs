@@ -266,3 +266,47 @@ fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
     }
     assert_nothing_left("hops");
 }
+
+#[test]
+fn latency_at_a_rate_prints_ticks_and_bare_hops_at_that_rate_and_their_ratio() {
+    let mut arguments = vec!["latency", "--rate", "7", "--rounds", "1"];
+    arguments.extend(["--set", "timeout_s=5", "--robot", "hops-7hz"]);
+    let output = support::output(&arguments);
+    assert!(output.status.success(), "{output:?}");
+    let printed = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "at 7 Hz ",
+        "five bare hops between processes ",
+        "a tick, datagram in to datagram out ",
+        "ratio of the medians ",
+    ] {
+        let lines = printed.lines().filter(|printed| printed.starts_with(line));
+        assert_eq!(lines.count(), 1, "{line}: {printed}");
+    }
+    assert_nothing_left("hops-7hz");
+}
+
+#[test]
+fn a_latency_budget_has_every_item_of_every_stage() {
+    let mut arguments = vec!["latency", "--rounds", "1", "--budget", "--json"];
+    arguments.extend(["--robot", "tick-budget"]);
+    let output = support::output(&arguments);
+    assert!(output.status.success(), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["regime"], "back to back", "{report}");
+    let rows = report["budget"].as_array().unwrap();
+    for stage in support::STAGES {
+        assert!(
+            rows.iter().any(|row| row["stage"] == stage),
+            "{stage}: {report}"
+        );
+    }
+    for (number, row) in rows.iter().enumerate() {
+        for cell in row["cells"].as_array().unwrap() {
+            // What the robot sent, and when, is not known here.
+            let known = number > 0 || cell["item"] != "wake";
+            assert_eq!(cell["p50_us"].as_f64().is_some(), known, "{row}");
+        }
+    }
+    assert_nothing_left("tick-budget");
+}

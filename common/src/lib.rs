@@ -9,6 +9,7 @@
 //! | [`kinematics`] | equations (1)-(3) and their inverses |
 //! | [`infrared`], [`sonar`] | THE mounting of the infrared rangers; of an ultrasonic one, (19) |
 //! | [`latency`] | a histogram that fits in a sample |
+//! | [`latency_budget`] | what a stage's process does with its part of a tick |
 //! | [`address`] | where a robot answers, and over which transport |
 //! | [`wire`] | the X80's protocol: frames and messages |
 //! | [`ground_truth`] | what a simulated robot writes about itself |
@@ -49,6 +50,7 @@ pub mod inputs;
 pub mod journal;
 pub mod kinematics;
 pub mod latency;
+pub mod latency_budget;
 pub mod lock_holders;
 pub mod making;
 pub mod mission;

@@ -19,6 +19,7 @@ use crate::{
     clock::{MissionClock, MissionTime},
     external,
     faults::{Asked, Requests},
+    latency_budget::{self, LatencyBudget},
     poll,
     run::{self, Run},
     samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
@@ -45,6 +46,8 @@ pub struct Context {
     pub bus: Bus,
     /// What wakes the process; the stage adds its inputs.
     pub waiter: Waiter,
+    /// The stage tells it when the items of a tick end.
+    pub budget: LatencyBudget,
 }
 
 impl Context {
@@ -179,12 +182,23 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
         run,
         bus,
         waiter,
+        budget: LatencyBudget::from_environment(),
     };
     let mut process = P::open(&mut context)?;
     tracing::info!(generation = number, "ready");
     let worked = work(&mut process, &mut heartbeat, &context, &mut stop);
     // Whatever went wrong, the stage is stopped in order: the link then stops the robot.
     let stopped = process.stop();
+    let Generation {
+        stage, directory, ..
+    } = &context.generation;
+    let file = latency_budget::file(directory, stage, number);
+    if let Err(error) = context.budget.save(&file) {
+        tracing::warn!(
+            "cannot save the times of ticks in {}: {error}",
+            file.display()
+        );
+    }
     tracing::info!("stopped");
     worked.and(stopped)
 }
@@ -221,7 +235,9 @@ fn work(
     let mut busy = true;
     while !stop.came() {
         let patience = if busy { TICK_OVER } else { heartbeat.period };
+        context.budget.waits();
         let came = context.waiter.wait(patience)?;
+        context.budget.awake();
         progress = process.turn()?;
         if ticks_follow_at_once || busy && !came {
             process.idle()?;

@@ -100,7 +100,16 @@ impl<P: Payload + Stamped> Writer<P> {
     ///
     /// # Errors
     /// When no memory is left to loan, which slack in the limits rules out unless a reader misbehaves.
-    pub fn publish(
+    pub fn publish(&mut self, tick: u64, time: MissionTime, payload: P) -> Result<(), BusError> {
+        self.publish_quietly(tick, time, payload)?;
+        self.wake()
+    }
+
+    /// As [`Writer::publish`], and wakes nobody yet: [`Writer::wake`] does.
+    ///
+    /// # Errors
+    /// As [`Writer::publish`].
+    pub fn publish_quietly(
         &mut self,
         tick: u64,
         time: MissionTime,
@@ -109,7 +118,15 @@ impl<P: Payload + Stamped> Writer<P> {
         *payload.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
         self.publisher
             .send_copy(payload)
-            .map_err(refused("publish on", self.topic))?;
+            .map(drop)
+            .map_err(refused("publish on", self.topic))
+    }
+
+    /// Wake the readers of what was published quietly.
+    ///
+    /// # Errors
+    /// When the middleware refuses.
+    pub fn wake(&self) -> Result<(), BusError> {
         wake(&self.notifier, self.topic)
     }
 }

@@ -3,6 +3,7 @@
 use common::{
     bus::{Reader, Writer},
     inputs::InputLog,
+    latency_budget::{Answers, Item, LatencyBudget},
     samples::{CommandSample, GuidanceSample},
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -19,6 +20,7 @@ pub struct Shell {
     controller: Controller,
     inputs: InputLog,
     progress: Progress,
+    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -32,6 +34,7 @@ impl Process for Shell {
             controller: Controller::new(&context.run.mission),
             inputs: InputLog::begin(context, &())?,
             progress: Progress::default(),
+            budget: context.budget.clone(),
         })
     }
 
@@ -41,10 +44,16 @@ impl Process for Shell {
         };
         let (tick, time) = (guidance.stamp.tick, guidance.stamp.time());
         self.progress = Progress { tick, time };
+        self.budget.end(Item::Read);
         self.inputs.note(&Input { guidance }, self.progress)?;
+        self.budget.end(Item::Keep);
         let command = self.controller.step(&guidance, time);
+        self.budget.end(Item::Step);
         self.inputs.publish(self.progress)?;
-        self.command.publish(tick, time, command)?;
+        self.budget.end(Item::Keep);
+        self.command.publish_quietly(tick, time, command)?;
+        self.budget.published(tick, Answers::Inputs);
+        self.command.wake()?;
         Ok(self.progress)
     }
 }

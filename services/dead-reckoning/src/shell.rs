@@ -1,4 +1,10 @@
-//! `wheels` in, `pose` out, the state saved before the pose is published.
+//! `wheels` in, `pose` out, then the state saved: the tick does not wait for the file.
+//!
+//! A process killed between the two has published a pose that its state does not hold. That is safe: the counts are
+//! cumulative and the link's last sample stays on the bus, so the successor computes the same pose again from the state
+//! before, or, where the next tick has come, the way of both ticks from the counts of the second. Where the counts
+//! begin, at the first tick or when the robot began them anew, the state before says nothing of them: there it is saved
+//! first. A run that is resumed after all its processes were killed just there counts that tick again.
 
 use std::path::Path;
 
@@ -6,6 +12,7 @@ use common::{
     bus::{Reader, Writer},
     checkpoint::{Checkpoint, CheckpointError},
     inputs::InputLog,
+    latency_budget::{Answers, Item, LatencyBudget},
     run,
     samples::{PoseSample, WheelSample},
     shell::{Context, Process, Progress, StageError},
@@ -39,6 +46,7 @@ pub struct Shell {
     inputs: InputLog,
     reckoning: DeadReckoning,
     progress: Progress,
+    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -63,6 +71,7 @@ impl Process for Shell {
             inputs,
             reckoning,
             progress: Progress::default(),
+            budget: context.budget.clone(),
         })
     }
 
@@ -70,17 +79,30 @@ impl Process for Shell {
         while let Some(wheels) = self.wheels.take()? {
             let (tick, time) = (wheels.stamp.tick, wheels.stamp.time());
             self.progress = Progress { tick, time };
+            self.budget.end(Item::Read);
             self.inputs.note(&Input { wheels }, self.progress)?;
+            self.budget.end(Item::Keep);
+            let first = self.reckoning.state().newest().is_none();
             let Reckoned { pose, rejected } = self.reckoning.step(&wheels, time);
+            self.budget.end(Item::Step);
             if rejected {
                 tracing::warn!(
                     tick,
                     "the encoder counts began anew or jumped; the pose stays"
                 );
             }
-            self.checkpoint.save(self.reckoning.state())?;
+            let counts_begin = first || rejected;
+            if counts_begin {
+                self.checkpoint.save(self.reckoning.state())?;
+            }
             self.inputs.publish(self.progress)?;
-            self.pose.publish(tick, time, pose)?;
+            self.budget.end(Item::Keep);
+            self.pose.publish_quietly(tick, time, pose)?;
+            self.budget.published(tick, Answers::Inputs);
+            self.pose.wake()?;
+            if !counts_begin {
+                self.checkpoint.save(self.reckoning.state())?;
+            }
         }
         Ok(self.progress)
     }

@@ -9,6 +9,7 @@ use common::{
     grid::Part,
     inputs::InputLog,
     journal::Journal,
+    latency_budget::{Answers, Item, LatencyBudget},
     samples::{DirectiveSample, FaultKind, GridHeader, PoseSample, RangeSample},
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -36,6 +37,7 @@ pub struct Shell {
     latest_range: Option<RangeSample>,
     last_keyframe: Option<MissionTime>,
     progress: Progress,
+    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -77,6 +79,7 @@ impl Process for Shell {
             last_keyframe: None,
             // Of no tick that is open: what is published before the first pose answers nobody.
             progress: Progress::default(),
+            budget: context.budget.clone(),
         })
     }
 
@@ -122,9 +125,12 @@ impl Process for Shell {
 impl Shell {
     /// Step, save what happened, publish what changed.
     fn take(&mut self, input: Input) -> Result<(), StageError> {
+        self.budget.end(Item::Read);
         self.inputs
             .note(&Entry::Step(input, self.progress), self.progress)?;
+        self.budget.end(Item::Keep);
         let change = self.mapper.step(input, self.progress.time);
+        self.budget.end(Item::Step);
         if change == Change::None {
             return Ok(());
         }
@@ -174,7 +180,10 @@ impl Shell {
         }
         let (header, cells) = sample_of(&self.mapper, part);
         self.inputs.publish(self.progress)?;
-        self.grid.publish(tick, time, header, cells)?;
+        self.budget.end(Item::Keep);
+        self.grid.publish_quietly(tick, time, header, cells)?;
+        self.budget.published(tick, Answers::Inputs);
+        self.grid.wake()?;
         Ok(())
     }
 }

@@ -7,6 +7,7 @@ use common::{
     clock::{MissionClock, MissionTime},
     grid::Part,
     inputs::InputLog,
+    latency_budget::{Answers, Item, LatencyBudget},
     samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -48,6 +49,7 @@ pub struct Shell {
     change_published: Option<MissionTime>,
     keyframe_published: Option<MissionTime>,
     progress: Progress,
+    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -83,6 +85,7 @@ impl Process for Shell {
             change_published: None,
             keyframe_published: None,
             progress: Progress::default(),
+            budget: context.budget.clone(),
         })
     }
 
@@ -180,17 +183,20 @@ impl Shell {
         let mut asked = false;
         while let Some(grid) = self.grid.take()? {
             let GridHeader { stamp, part, .. } = *grid.header();
+            self.budget.end(Item::Read);
             self.encoded.clear();
             encode_slice(grid.header(), &grid, &mut self.encoded);
             let at = self.progress;
             let taken = Taken::Grid(&self.encoded);
             self.inputs.note(&Entry { taken, at }, at)?;
+            self.budget.end(Item::Keep);
             let began = Instant::now();
             let work = self.work(Input::Grid {
                 header: grid.header(),
                 cells: &grid,
             })?;
             let took_ns = began.elapsed().as_nanos() as u64;
+            self.budget.end(Item::Step);
             match work {
                 Work::Missed => {
                     tracing::warn!(version = part.version, "missed a grid version");
@@ -226,12 +232,15 @@ impl Shell {
         };
         let Progress { tick, time } = self.progress;
         let (full_solve_ns, local_update_ns) = (self.full_solve_ns, self.local_update_ns);
+        self.budget.end(Item::Read);
         self.note(Taken::Pose {
             pose,
             full_solve_ns,
             local_update_ns,
         })?;
+        self.budget.end(Item::Keep);
         let outcome = self.planner.step(Input::Pose(&pose), time);
+        self.budget.end(Item::Step);
         if let Some(guidance) = outcome.map_err(no_field)?.guidance {
             let guidance = GuidanceSample {
                 full_solve_ns,
@@ -239,7 +248,10 @@ impl Shell {
                 ..guidance
             };
             self.inputs.publish(self.progress)?;
-            self.guidance.publish(tick, time, guidance)?;
+            self.budget.end(Item::Keep);
+            self.guidance.publish_quietly(tick, time, guidance)?;
+            self.budget.published(tick, Answers::Inputs);
+            self.guidance.wake()?;
         }
         self.answered = Some(tick);
         Ok(())

@@ -5,6 +5,7 @@ use common::{
     clock::{MissionClock, Pace, monotonic_ns},
     inputs::InputLog,
     latency::Histogram,
+    latency_budget::{Answers, Item, LatencyBudget},
     samples::{
         Cause, CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order,
         PowerSample, RangeSample, SurroundingsSample, TickLimitSample, WheelSample, WireHeader,
@@ -53,6 +54,7 @@ pub struct Shell {
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
+    budget: LatencyBudget,
 }
 
 impl Process for Shell {
@@ -97,6 +99,7 @@ impl Process for Shell {
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
+            budget: context.budget.clone(),
         })
     }
 
@@ -116,6 +119,8 @@ impl Process for Shell {
             self.take(Event::Command(&command), monotonic_ns())?;
         }
         loop {
+            // A tick begins with its datagram.
+            self.budget.awake();
             let now_ns = monotonic_ns();
             let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
                 break;
@@ -124,13 +129,16 @@ impl Process for Shell {
             let at = self.carried.progress;
             let taken = Taken::Datagram(bytes);
             let entry = Entry::Step(taken, now_ns, now);
+            self.budget.end(Item::Read);
             self.inputs.note(&entry, at)?;
             self.carried.received(bytes, now_ns);
+            self.budget.end(Item::Keep);
             let input = Input {
                 event: Event::Datagram(bytes),
                 machine_ns: now_ns,
             };
             let effects = self.link.step(input, now);
+            self.budget.end(Item::Step);
             self.carry_out(effects, now_ns)?;
         }
         self.tend()?;
@@ -242,8 +250,11 @@ impl Shell {
     fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
         let now = self.clock.at(self.link.state().next_tick, machine_ns);
         let entry = Entry::Step(Taken::of(&event), machine_ns, now);
+        self.budget.end(Item::Read);
         self.inputs.note(&entry, self.carried.progress)?;
+        self.budget.end(Item::Keep);
         let effects = self.link.step(Input { event, machine_ns }, now);
+        self.budget.end(Item::Step);
         self.carry_out(effects, machine_ns)
     }
 
@@ -265,6 +276,7 @@ impl Shell {
     fn carry_out(&mut self, effects: Vec<Effect>, machine_ns: u64) -> Result<(), StageError> {
         if !effects.is_empty() {
             self.inputs.publish(self.carried.progress)?;
+            self.budget.end(Item::Keep);
         }
         for effect in effects {
             match effect {
@@ -280,9 +292,13 @@ impl Shell {
                 } => {
                     self.carried.progress = Progress { tick, time };
                     self.range.publish(tick, time, range)?;
-                    self.wheels.publish(tick, time, wheels)?;
+                    self.wheels.publish_quietly(tick, time, wheels)?;
+                    self.budget.published(tick, Answers::Inputs);
+                    self.wheels.wake()?;
                 }
                 Effect::Answered { began_ns } => {
+                    self.budget
+                        .published(self.carried.progress.tick, Answers::Feedback);
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);
                     self.latency.record(self.latency_ns);
                     self.state()?;

@@ -58,7 +58,8 @@ pub enum IpcBenchError {
     Place(String),
 }
 
-/// Send `trips` samples around the forwarders, one every `period`, or one behind the other.
+/// Send `trips` samples around the forwarders, one every `period`, or one behind the other; those that warm up, always
+/// one behind the other.
 pub fn measure(
     robot: &RobotName,
     trips: u64,
@@ -100,7 +101,8 @@ pub fn measure(
         if trip >= WARM_UP {
             latencies.record(monotonic_ns() - sent_ns);
         }
-        if let Some(rest) = period.and_then(|period| period.checked_sub(began.elapsed())) {
+        let pause = period.filter(|_| trip >= WARM_UP);
+        if let Some(rest) = pause.and_then(|period| period.checked_sub(began.elapsed())) {
             waiter.wait(rest)?;
         }
     }

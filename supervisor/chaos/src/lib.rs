@@ -17,6 +17,7 @@
 //! | `robot_faults`, `proxy`, `liar` | missions of such robots; the wire, and what becomes of the bytes on it |
 //! | [`Ledger`] | how long each moved after that |
 //! | [`ipc_bench`] | five bare hops on the bus |
+//! | [`process_set`] | what a process and all that it started use |
 
 mod attack;
 mod error;
@@ -26,6 +27,7 @@ mod leftovers;
 mod liar;
 mod mission;
 mod options;
+pub mod process_set;
 mod proxy;
 mod replays;
 mod report;

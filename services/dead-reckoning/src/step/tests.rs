@@ -194,3 +194,29 @@ fn equation_3_of_a_car_by_hand() {
     close(pose.heading_rad, 0.0);
     close(pose.x_m, 0.1 * PI);
 }
+
+#[test]
+fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose() {
+    let mut killed = reckoning("");
+    killed.take(&wheels(0, 0, 0));
+    killed.take(&wheels(1, 90, 110));
+    let saved = *killed.state();
+    let published = killed.take(&wheels(2, 190, 200));
+    let successor = || {
+        let mut successor = reckoning("");
+        successor.restore(saved).unwrap();
+        successor
+    };
+    // The link's last sample is still that of the tick.
+    let mut again = successor();
+    assert_eq!(again.take(&wheels(2, 190, 200)), published);
+    assert_eq!(again.state(), killed.state());
+    // The next one has come meanwhile: nothing of the way is lost.
+    let (got, want) = (
+        successor().take(&wheels(3, 280, 310)),
+        killed.take(&wheels(3, 280, 310)),
+    );
+    close(got.heading_rad, want.heading_rad);
+    close(got.travelled_m, want.travelled_m);
+    assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 1e-3);
+}
