@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use common::{
+    clock::MissionTime,
     ground_truth::GroundTruthTick,
     samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
     topics::{self, AnyTopic as _, SUPERVISOR},
@@ -19,10 +20,12 @@ use supervisor::{
 
 use crate::{
     error::{ChaosError, system},
-    options::Options,
+    kind::Kind,
+    recovery::{PendingRecovery, StartupHit},
     report::{EVERYTHING, Report},
     resources::Resources,
-    schedule::{Kind, Schedule},
+    series::Series,
+    signals::{Row, rounded_ms},
     subscriptions::{POLL, Subscriptions},
 };
 
@@ -31,54 +34,22 @@ const NEWEST: u32 = u32::MAX;
 /// Signals to one stage within the window of the hold rule. One that dies more often is held until an operator releases
 /// it, and here there is none. A signal may be followed by one in the start-up, and each may be counted late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
-/// A stage that was hit, until its successor works.
-struct PendingRecovery {
-    stage: &'static str,
-    kind: Kind,
-    generation: u32,
-    at: Instant,
-    ready: bool,
-    startup_hit: StartupHit,
-}
-
-impl PendingRecovery {
-    /// Of that generation of `stage`, hit now.
-    fn new(stage: &'static str, kind: Kind, generation: u32, startup_hit: StartupHit) -> Self {
-        Self {
-            stage,
-            kind,
-            generation,
-            at: Instant::now(),
-            ready: false,
-            startup_hit,
-        }
-    }
-}
-
-/// Whether the successor is to be hit in its first milliseconds.
-#[derive(Clone, Copy)]
-enum StartupHit {
-    /// No.
-    None,
-    /// So long after its start.
-    After(Duration),
-    /// It has started, and is hit then.
-    At {
-        when: Instant,
-        process: u32,
-        generation: u32,
-    },
-}
 
 /// What the attacker knows of a mission.
 #[derive(Default)]
 pub(crate) struct Attack {
+    /// Seed of the mission.
+    seed: u64,
+    /// Of the newest sample.
+    time: Option<MissionTime>,
     entries: Vec<RosterEntry>,
     supervisor: u32,
     /// It was hit: what it and its stages still publish is no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     pending: Vec<PendingRecovery>,
+    /// Signals of which no more is measured.
+    measured: Vec<Row>,
     /// Generations that were frozen alone: those may be taken for hung.
     frozen: Vec<(&'static str, u32)>,
     /// Stages that were hit lately, and when.
@@ -89,14 +60,20 @@ pub(crate) struct Attack {
 }
 
 impl Attack {
+    /// Of the mission with that seed.
+    pub(crate) fn new(seed: u64) -> Self {
+        Self {
+            seed,
+            ..Self::default()
+        }
+    }
+
     /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
     pub(crate) fn run(
         &mut self,
-        options: &Options,
+        series: &mut Series<'_>,
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
-        schedule: &mut Schedule,
-        report: &mut Report,
         patience: Duration,
     ) -> Result<(), ChaosError> {
         let began = Instant::now();
@@ -105,18 +82,20 @@ impl Attack {
         self.entries.clear();
         self.resources = None;
         // The stages of a supervisor that was hit go with it.
-        self.pending.retain(|recovery| recovery.stage == SUPERVISOR);
+        let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
+        let ended = self.pending.extract_if(.., is_stage);
+        self.measured.extend(ended.map(|recovery| recovery.row));
         let mut subscriptions = loop {
             if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
                 return Ok(());
             }
-            match Subscriptions::join(options, child.id()) {
+            match Subscriptions::join(series.options, child.id()) {
                 Ok(Some(subscriptions)) => break subscriptions,
                 // Not up yet.
                 Ok(None) | Err(_) => std::thread::park_timeout(POLL),
             }
         };
-        let mut next = Instant::now() + schedule.pause();
+        let mut next = Instant::now() + series.schedule.pause();
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
             // A hit that is overdue waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
@@ -125,20 +104,50 @@ impl Attack {
             if let Some(robot) = &mut robot {
                 robot.poll()?;
             }
-            self.read(&mut subscriptions, report)?;
+            self.read(&mut subscriptions, &mut series.report)?;
             self.schedule_startup_hits();
-            self.hit_starting(report);
-            let enough = report.kills() >= options.kills;
-            if Instant::now() >= next && self.driving && !enough {
-                let pause = schedule.pause();
-                self.hit(options, schedule, report);
+            self.hit_starting(&mut series.report);
+            if Instant::now() >= next && self.driving && !series.is_over() {
+                let pause = series.schedule.pause();
+                self.hit(series);
                 next = Instant::now() + pause;
             }
+            self.keep_measured(series, robot.as_deref())?;
         }
         if let Some([first, last]) = self.resources {
-            report.add_growth(first, last);
+            series.report.add_growth(first, last);
         }
         Ok(())
+    }
+
+    /// Keep the signals of which no more is measured.
+    fn keep_measured(
+        &mut self,
+        series: &mut Series<'_>,
+        robot: Option<&Simulator>,
+    ) -> Result<(), ChaosError> {
+        for mut row in std::mem::take(&mut self.measured) {
+            row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
+            series.keep(&row)?;
+        }
+        Ok(())
+    }
+
+    /// The mission is over: nothing more is measured.
+    pub(crate) fn end(
+        &mut self,
+        series: &mut Series<'_>,
+        robot: Option<&Simulator>,
+    ) -> Result<(), ChaosError> {
+        let pending = self.pending.drain(..);
+        self.measured.extend(pending.map(|recovery| recovery.row));
+        self.keep_measured(series, robot)
+    }
+
+    /// Of a signal of `kind` to that generation of `stage`, now.
+    fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
+        let time_s = self.time.map(MissionTime::seconds);
+        Row::new(self.seed, time_s, stage, kind, generation)
     }
 
     /// Whether the supervisor was hit, and no successor works yet.
@@ -175,6 +184,15 @@ impl Attack {
         subscriptions: &mut Subscriptions,
         report: &mut Report,
     ) -> Result<(), ChaosError> {
+        while let Some(death) = subscriptions.deaths.take()? {
+            let (stage, generation) = (name_str(&death.stage), death.generation);
+            let mut pending = self.pending.iter_mut();
+            if let Some(recovery) = pending
+                .find(|recovery| recovery.stage == stage && recovery.generation == generation)
+            {
+                recovery.noticed();
+            }
+        }
         while let Some(entries) = subscriptions.roster.samples.take()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
@@ -201,6 +219,10 @@ impl Attack {
             }
         }
         while let Some(sample) = subscriptions.wheels.take()? {
+            self.time = Some(sample.stamp.time());
+            if sample.left_counts_per_s == 0 && sample.right_counts_per_s == 0 {
+                self.pending.iter_mut().for_each(PendingRecovery::rests);
+            }
             let writer = topics::WHEELS.spec().writer;
             self.on_sign(writer, sample.stamp.generation, false, report);
         }
@@ -241,22 +263,24 @@ impl Attack {
             return;
         };
         let pending = &mut self.pending[at];
-        let took = pending.at.elapsed().as_nanos() as u64;
+        let took = pending.at.elapsed();
         let recovery = report.recovery(pending.stage);
         let frozen = pending.kind == Kind::Freeze;
-        if !pending.ready {
-            pending.ready = true;
+        let took_ms = rounded_ms(took);
+        if pending.row.ready_ms.is_none() {
+            pending.row.ready_ms = Some(took_ms);
             if frozen {
-                recovery.after_freeze.record(took);
+                recovery.after_freeze.record(took.as_nanos() as u64);
             } else {
-                recovery.ready.record(took);
+                recovery.ready.record(took.as_nanos() as u64);
             }
         }
         if !beat {
             if !frozen {
-                recovery.output.record(took);
+                recovery.output.record(took.as_nanos() as u64);
             }
-            self.pending.remove(at);
+            pending.row.first_output_ms = Some(took_ms);
+            self.measured.push(self.pending.remove(at).row);
         }
     }
 
@@ -285,6 +309,8 @@ impl Attack {
             let _ = kill_process(*pid, Signal::CONT);
         }
         report.hit(EVERYTHING, Kind::FreezeAll);
+        let row = self.row(EVERYTHING, Kind::FreezeAll, None);
+        self.measured.push(row);
         // What took longer only because nothing ran is no time of recovery.
         for recovery in &mut self.pending {
             recovery.at += began.elapsed();
@@ -292,13 +318,20 @@ impl Attack {
     }
 
     /// Hit a stage that runs and has no pending recovery, or the supervisor.
-    fn hit(&mut self, options: &Options, schedule: &mut Schedule, report: &mut Report) {
+    fn hit(&mut self, series: &mut Series<'_>) {
+        let Series {
+            options,
+            schedule,
+            report,
+            ..
+        } = series;
         if options.supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind) {
                 report.hit(SUPERVISOR, kind);
+                let row = self.row(SUPERVISOR, kind, None);
                 self.pending
-                    .push(PendingRecovery::new(SUPERVISOR, kind, 0, StartupHit::None));
+                    .push(PendingRecovery::new(SUPERVISOR, 0, StartupHit::None, row));
                 self.supervisor_hit = true;
                 self.driving = false;
             }
@@ -336,12 +369,10 @@ impl Attack {
             Some(after) if options.startup && kind != Kind::Freeze => StartupHit::After(after),
             _ => StartupHit::None,
         };
-        self.pending.push(PendingRecovery::new(
-            stage,
-            kind,
-            entry.generation,
-            startup_hit,
-        ));
+        let generation = entry.generation;
+        let row = self.row(stage, kind, Some(generation));
+        self.pending
+            .push(PendingRecovery::new(stage, generation, startup_hit, row));
     }
 
     /// Find the successors that have started and are to be hit in their start-up.
@@ -393,12 +424,15 @@ impl Attack {
             if send(process, Kind::KillAtStart) {
                 report.hit(recovery.stage, Kind::KillAtStart);
                 self.hits.push((recovery.stage, Instant::now()));
-                *recovery = PendingRecovery::new(
+                let row = Row::new(
+                    self.seed,
+                    self.time.map(MissionTime::seconds),
                     recovery.stage,
                     Kind::KillAtStart,
-                    generation,
-                    StartupHit::None,
+                    Some(generation),
                 );
+                let next = PendingRecovery::new(recovery.stage, generation, StartupHit::None, row);
+                self.measured.push(std::mem::replace(recovery, next).row);
             }
         }
     }

@@ -21,18 +21,22 @@
 mod attack;
 mod error;
 pub mod ipc_bench;
+mod kind;
 mod ledger;
 mod leftovers;
 mod liar;
 mod mission;
 mod options;
 mod proxy;
+mod recovery;
 mod replays;
 mod report;
 mod resources;
 pub mod robot_fault;
 mod robot_faults;
 mod schedule;
+mod series;
+pub mod signals;
 mod subscriptions;
 
 pub use error::ChaosError;
@@ -41,19 +45,18 @@ pub use options::Options;
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
 
-use schedule::Schedule;
+use series::Series;
 
 /// Attack missions, one after the other, until enough signals were sent. `show` is called after each.
 pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, ChaosError> {
-    let mut schedule = Schedule::new(options.seed);
-    let mut report = Report::new();
-    while report.kills() < options.kills {
-        let seed = options.seed + report.missions();
+    let mut series = Series::new(options)?;
+    while !series.is_over() {
+        let seed = options.seed + series.report.missions();
         let undisturbed = mission::undisturbed(options, seed)?;
-        mission::attack(options, seed, &mut schedule, &mut report, &undisturbed)?;
-        report.leftovers += leftovers::count(&options.robot, &options.directory);
-        show(&report);
+        mission::attack(&mut series, seed, &undisturbed)?;
+        series.report.leftovers += leftovers::count(&options.robot, &options.directory);
+        show(&series.report);
     }
-    report.end();
-    Ok(report)
+    series.report.end();
+    Ok(series.report)
 }

@@ -29,6 +29,8 @@ pub struct Options {
     pub freeze_all: bool,
     /// Whether missions are recorded, and every generation of every stage replayed.
     pub replay: bool,
+    /// Where results are kept: the table of signals and the page.
+    pub out: Option<PathBuf>,
     /// Where the run directories go; emptied mission by mission.
     pub directory: PathBuf,
 }

@@ -9,7 +9,7 @@ use std::{
 use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
-use crate::{replays::Replays, resources::Resources, schedule::Kind};
+use crate::{kind::Kind, replays::Replays, resources::Resources};
 use supervisor::stages::TABLE;
 
 /// What is hit where supervisor and stages are frozen together.
@@ -102,7 +102,12 @@ impl Report {
     }
 
     /// Signals sent.
-    pub fn kills(&self) -> u32 {
+    pub fn signals(&self) -> u32 {
+        self.kills()
+    }
+
+    /// Signals sent to stages and supervisor.
+    pub(crate) fn kills(&self) -> u32 {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
 

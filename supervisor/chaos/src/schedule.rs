@@ -3,10 +3,9 @@
 use std::{ops::Range, time::Duration};
 
 use rand_pcg::{Pcg64, rand_core::Rng};
-use rustix::process::Signal;
-use serde::Serialize;
-
 use supervisor::stages::TABLE;
+
+use crate::kind::Kind;
 
 /// Between two signals on average: each stage gets one every two to three seconds, and was stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
@@ -23,49 +22,6 @@ const SUPERVISOR_SHARE: f64 = 0.05;
 const FREEZE_ALL_SHARE: f64 = 0.5;
 /// For how long everything is frozen, seconds: less than a stage's deadline, up to three times as long.
 const FREEZE_ALL_S: Range<f64> = 0.3..1.5;
-
-/// How a stage is hit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Kind {
-    /// SIGKILL.
-    Kill,
-    /// SIGKILL in the first milliseconds of a generation.
-    KillAtStart,
-    /// SIGABRT, as a panic of a program that cannot unwind. Not SIGSEGV: Rust's runtime takes the first for an
-    /// overflow of the stack, finds none, and goes on.
-    Crash,
-    /// SIGTERM.
-    Terminate,
-    /// SIGSTOP: it hangs.
-    Freeze,
-    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
-    FreezeAll,
-}
-
-impl Kind {
-    /// The signal.
-    pub(crate) const fn signal(self) -> Signal {
-        match self {
-            Self::Kill | Self::KillAtStart => Signal::KILL,
-            Self::Crash => Signal::ABORT,
-            Self::Terminate => Signal::TERM,
-            Self::Freeze | Self::FreezeAll => Signal::STOP,
-        }
-    }
-
-    /// In words.
-    pub(crate) const fn as_str(self) -> &'static str {
-        match self {
-            Self::Kill => "killed",
-            Self::KillAtStart => "killed at start",
-            Self::Crash => "crashed",
-            Self::Terminate => "terminated",
-            Self::Freeze => "frozen",
-            Self::FreezeAll => "all frozen together",
-        }
-    }
-}
 
 /// A seeded sequence of decisions.
 #[derive(Debug)]

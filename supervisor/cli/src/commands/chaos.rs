@@ -1,6 +1,6 @@
 //! `firsthand chaos`: signals to random stages at random times, and what became of the missions.
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission};
@@ -43,6 +43,9 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Keep a row for each signal in DIR/signals.csv, as it is measured.
+    #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
+    out: Option<PathBuf>,
     /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "chaos")]
     robot: RobotName,
@@ -114,7 +117,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let options = options(arguments, loaded, set, pace)?;
     let directory = options.directory.clone();
     let ended = chaos::run(&options, &mut |report| {
-        let (kills, missions) = (report.kills(), report.missions());
+        let (kills, missions) = (report.signals(), report.missions());
         write_stderr(&format!(
             "{kills} of {} signals, {missions} missions\n",
             options.kills
@@ -168,6 +171,7 @@ fn options(
         startup: arguments.include_startup,
         freeze_all: arguments.freeze_all,
         replay: arguments.replay,
+        out: arguments.out.clone(),
         directory,
     })
 }
