@@ -1,6 +1,9 @@
 //! The attacker of one mission: sends signals, and waits for the successors to work.
 
-use std::time::{Duration, Instant};
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use common::{
     clock::MissionTime,
@@ -19,6 +22,7 @@ use supervisor::{
 };
 
 use crate::{
+    consumers::Consumers,
     error::{ChaosError, system},
     kind::Kind,
     recovery::{PendingRecovery, StartupHit},
@@ -42,6 +46,7 @@ pub(crate) struct Attack {
     seed: u64,
     /// Of the newest sample.
     time: Option<MissionTime>,
+    consumers: Consumers,
     entries: Vec<RosterEntry>,
     supervisor: u32,
     /// It was hit: what it and its stages still publish is no sign of its successor.
@@ -60,10 +65,11 @@ pub(crate) struct Attack {
 }
 
 impl Attack {
-    /// Of the mission with that seed.
-    pub(crate) fn new(seed: u64) -> Self {
+    /// Of the mission with that seed, and these consumers.
+    pub(crate) fn new(seed: u64, consumers: Consumers) -> Self {
         Self {
             seed,
+            consumers,
             ..Self::default()
         }
     }
@@ -86,6 +92,7 @@ impl Attack {
         let ended = self.pending.extract_if(.., is_stage);
         self.measured.extend(ended.map(|recovery| recovery.row));
         let mut subscriptions = loop {
+            self.consumers.tend(&mut series.report)?;
             if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
                 return Ok(());
             }
@@ -109,9 +116,10 @@ impl Attack {
             self.hit_starting(&mut series.report);
             if Instant::now() >= next && self.driving && !series.is_over() {
                 let pause = series.schedule.pause();
-                self.hit(series);
+                self.hit(series)?;
                 next = Instant::now() + pause;
             }
+            self.consumers.tend(&mut series.report)?;
             self.keep_measured(series, robot.as_deref())?;
         }
         if let Some([first, last]) = self.resources {
@@ -139,6 +147,7 @@ impl Attack {
         series: &mut Series<'_>,
         robot: Option<&Simulator>,
     ) -> Result<(), ChaosError> {
+        self.consumers.end();
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
         self.keep_measured(series, robot)
@@ -148,6 +157,12 @@ impl Attack {
     fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
         let time_s = self.time.map(MissionTime::seconds);
         Row::new(self.seed, time_s, stage, kind, generation)
+    }
+
+    /// Recordings of the run's recorder that was hit; those of other recorders.
+    pub(crate) fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
+        let consumers = &self.consumers;
+        (consumers.hit_recordings(), consumers.other_recordings())
     }
 
     /// Whether the supervisor was hit, and no successor works yet.
@@ -317,14 +332,21 @@ impl Attack {
         }
     }
 
-    /// Hit a stage that runs and has no pending recovery, or the supervisor.
-    fn hit(&mut self, series: &mut Series<'_>) {
+    /// Hit a consumer, the supervisor, or a stage that runs and has no pending recovery.
+    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), ChaosError> {
         let Series {
             options,
             schedule,
             report,
             ..
         } = series;
+        if let Some((index, kind, pause)) = schedule.consumer(self.consumers.len()) {
+            let supervisor = self.supervisor;
+            let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
+            self.measured
+                .extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
+            return Ok(());
+        }
         if options.supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind) {
@@ -335,16 +357,16 @@ impl Attack {
                 self.supervisor_hit = true;
                 self.driving = false;
             }
-            return;
+            return Ok(());
         }
         if options.freeze_all
             && let Some(pause) = schedule.freeze_all()
         {
             self.freeze_all(pause, report);
-            return;
+            return Ok(());
         }
         let Some(stage) = stages::find(schedule.stage()).map(|stage| stage.name) else {
-            return;
+            return Ok(());
         };
         let (kind, startup_hit) = (schedule.kind(), schedule.startup_hit());
         let running = |entry: &&RosterEntry| {
@@ -352,13 +374,13 @@ impl Attack {
                 && StageState::from_byte(entry.state) == StageState::Running
         };
         let Some(entry) = self.entries.iter().find(running) else {
-            return;
+            return Ok(());
         };
         let recovering = self.pending.iter().any(|recovery| recovery.stage == stage);
         self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
         let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
         if recovering || lately >= MOST_HITS || !send(entry.pid, kind) {
-            return;
+            return Ok(());
         }
         report.hit(stage, kind);
         if kind == Kind::Freeze {
@@ -373,6 +395,7 @@ impl Attack {
         let row = self.row(stage, kind, Some(generation));
         self.pending
             .push(PendingRecovery::new(stage, generation, startup_hit, row));
+        Ok(())
     }
 
     /// Find the successors that have started and are to be hit in their start-up.

@@ -19,6 +19,8 @@
 //! | [`ipc_bench`] | five bare hops on the bus |
 
 mod attack;
+mod consumer;
+mod consumers;
 mod error;
 pub mod ipc_bench;
 mod kind;
@@ -38,7 +40,10 @@ mod schedule;
 mod series;
 pub mod signals;
 mod subscriptions;
+mod terminal;
+mod words;
 
+pub use consumer::{Consumer, ConsumerError, GivenConsumer, SUBCOMMAND};
 pub use error::ChaosError;
 pub use ledger::{Entry, Ledger};
 pub use options::Options;

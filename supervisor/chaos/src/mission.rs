@@ -13,6 +13,7 @@ use serde_json::Value;
 
 use crate::{
     attack::Attack,
+    consumers::Consumers,
     error::{ChaosError, system},
     options::Options,
     report::End,
@@ -103,13 +104,15 @@ pub(crate) fn attack(
         seed,
         &options.pace.to_string(),
         &directory,
-        options.replay,
+        options.records(),
     )?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
     }
-    let mut attack = Attack::new(seed);
+    let consumers = files.join("consumers");
+    let consumers = Consumers::start(options, consumers, &mut series.report)?;
+    let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
         let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
@@ -117,7 +120,7 @@ pub(crate) fn attack(
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
-        start = resume(&directory, options.replay)?;
+        start = resume(&directory, options.records())?;
     };
     attack.end(series, robot.as_ref())?;
     let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
@@ -144,7 +147,8 @@ pub(crate) fn attack(
     }
     let mut right = series.report.add_mission(&end);
     if options.replay {
-        right &= series.report.replays().add(seed, &directory);
+        let (hit, others) = attack.hit_recordings();
+        right &= series.report.replays().add(seed, &directory, hit, &others);
     }
     if right {
         fs::remove_dir_all(&files).map_err(system("remove its directory"))?;

@@ -27,6 +27,9 @@ pub struct Report {
     healthy_aborted: u64,
     /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
+    /// Signals to consumers, by their names.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    consumers: BTreeMap<String, ConsumerCounts>,
     #[serde(serialize_with = "recoveries")]
     recovery_ms: BTreeMap<&'static str, Recovery>,
     /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and in that mission the
@@ -45,6 +48,19 @@ pub struct Report {
     took_s: f64,
     #[serde(skip)]
     began: Instant,
+}
+
+/// What became of a consumer in all missions.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct ConsumerCounts {
+    /// Times it was killed, at any moment since its start.
+    pub killed: u32,
+    /// Times it was frozen for a moment.
+    pub frozen: u32,
+    /// Times it was started by chaos.
+    pub started: u32,
+    /// Times it ended without a signal of chaos.
+    pub ended_by_itself: u32,
 }
 
 /// From the signal to the successor.
@@ -84,6 +100,7 @@ impl Report {
             wrong: Vec::new(),
             healthy_aborted: 0,
             kills: BTreeMap::new(),
+            consumers: BTreeMap::new(),
             recovery_ms: BTreeMap::new(),
             worst_pose_excess_m: 0.0,
             worst_pose_kills: 0,
@@ -103,7 +120,13 @@ impl Report {
 
     /// Signals sent.
     pub fn signals(&self) -> u32 {
-        self.kills()
+        let consumers = self.consumers.values();
+        let to_consumers: u32 = consumers.map(|counts| counts.killed + counts.frozen).sum();
+        self.kills() + to_consumers
+    }
+
+    pub(crate) fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
+        self.consumers.entry(name.to_owned()).or_default()
     }
 
     /// Signals sent to stages and supervisor.
@@ -224,7 +247,7 @@ impl fmt::Display for Report {
         writeln!(
             to,
             "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} healthy stages aborted, {} leftovers",
-            self.kills(),
+            self.signals(),
             self.missions,
             took.as_secs_f64(),
             self.reached,
@@ -271,6 +294,18 @@ impl fmt::Display for Report {
             .map(|(kind, count)| format!("{count} {}", kind.as_str()))
             .collect();
         writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
+        for (name, counts) in &self.consumers {
+            let ConsumerCounts {
+                killed,
+                frozen,
+                started,
+                ended_by_itself,
+            } = counts;
+            writeln!(
+                to,
+                "consumer {name}: {killed} killed, {frozen} frozen, started {started} times, {ended_by_itself} ended by themselves"
+            )?;
+        }
         writeln!(
             to,
             "pose error beyond the undisturbed run at most {:.4} m ({} signals in that mission)",

@@ -8,7 +8,7 @@ use common::{clock::Pace, domain::RobotName, mission::Mission};
 use super::{Failure, missions, print_text};
 use crate::progress_line::write_stderr;
 use chaos::{
-    FaultOptions, Options,
+    Consumer, FaultOptions, GivenConsumer, Options,
     robot_fault::{RobotFault, TABLE},
 };
 
@@ -31,6 +31,13 @@ pub(crate) struct Arguments {
     /// of its own, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     include_supervisor: bool,
+    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `top` (without terminals
+    /// `hz`) and `logs -f`.
+    #[arg(long, conflicts_with = "robot_faults")]
+    include_consumers: bool,
+    /// Do that to a consumer of yours: a program and its arguments, read without a shell. As often as needed.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
+    consumer: Vec<GivenConsumer>,
     /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals: as a machine that stands still.
     #[arg(long)]
     freeze_all: bool,
@@ -159,6 +166,8 @@ fn options(
     let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
     std::fs::create_dir(&directory)
         .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
+    let given = arguments.consumer.iter().cloned().map(Consumer::Given);
+    let own = arguments.include_consumers.then(Consumer::own);
     Ok(Options {
         mission: arguments.mission.clone(),
         loaded,
@@ -171,6 +180,7 @@ fn options(
         startup: arguments.include_startup,
         freeze_all: arguments.freeze_all,
         replay: arguments.replay,
+        consumers: own.into_iter().flatten().chain(given).collect(),
         out: arguments.out.clone(),
         directory,
     })
