@@ -9,10 +9,14 @@
 //! | [`Options`] | what is attacked, and how |
 //! | `schedule` | which stage gets which signal when, seeded |
 //! | `mission` | one mission, undisturbed and attacked |
+//! | `series` | what the missions have in common |
 //! | `attack`, `subscriptions` | the attacker of one mission; what it reads from the bus |
+//! | `kind`, `recovery` | how a process is hit; one that was, until its successor works |
+//! | [`Consumer`], `consumers`, `terminal`, `words` | consumers that are hit, and started again; a terminal for one that draws; a user's command |
 //! | `replays` | the missions' recordings, replayed |
 //! | `resources`, `leftovers` | what a process holds; what outlived a mission |
 //! | [`Report`] | the result of all missions |
+//! | [`signals`], `page` | the table of signals, THE file format; the page that is drawn from it |
 //! | [`robot_fault`] | THE table of the ways in which a robot lies to its link |
 //! | `robot_faults`, `proxy`, `liar` | missions of such robots; the wire, and what becomes of the bytes on it |
 //! | [`Ledger`] | how long each moved after that |
@@ -29,6 +33,7 @@ mod leftovers;
 mod liar;
 mod mission;
 mod options;
+mod page;
 mod proxy;
 mod recovery;
 mod replays;
@@ -47,6 +52,7 @@ pub use consumer::{Consumer, ConsumerError, GivenConsumer, SUBCOMMAND};
 pub use error::ChaosError;
 pub use ledger::{Entry, Ledger};
 pub use options::Options;
+pub use page::PAGE;
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
 
@@ -63,5 +69,8 @@ pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, C
         show(&series.report);
     }
     series.report.end();
+    if let (Some(file), Some(out)) = (&series.signals, &options.out) {
+        page::write(out, &series.report, &file.rows()?)?;
+    }
     Ok(series.report)
 }

@@ -63,6 +63,21 @@ pub(crate) struct ConsumerCounts {
     pub ended_by_itself: u32,
 }
 
+impl fmt::Display for ConsumerCounts {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            killed,
+            frozen,
+            started,
+            ended_by_itself,
+        } = self;
+        write!(
+            to,
+            "{killed} killed, {frozen} frozen, {started} started, {ended_by_itself} ended by themselves"
+        )
+    }
+}
+
 /// From the signal to the successor.
 #[derive(Debug, Default)]
 pub(crate) struct Recovery {
@@ -195,6 +210,36 @@ impl Report {
         most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
     }
 
+    /// What was wrong, mission by mission.
+    pub(crate) fn wrong(&self) -> &[String] {
+        &self.wrong
+    }
+
+    /// The outcome in a few words and numbers.
+    pub(crate) fn outcome(&self) -> Vec<(&'static str, String)> {
+        let mut outcome = vec![
+            ("signals", self.signals().to_string()),
+            ("missions", self.missions.to_string()),
+            ("reached", self.reached.to_string()),
+            ("collisions", self.collisions.to_string()),
+            ("healthy stages aborted", self.healthy_aborted.to_string()),
+            ("leftovers", self.leftovers.to_string()),
+            (
+                "largest pose error beyond the undisturbed run",
+                format!("{:.4} m", self.worst_pose_excess_m),
+            ),
+            ("wall time", format!("{:.0} s", self.took_s)),
+        ];
+        let consumers = self.consumers.iter();
+        outcome.extend(consumers.map(|(name, counts)| ("consumer", format!("{name}: {counts}"))));
+        outcome.extend(
+            self.replays
+                .iter()
+                .map(|replays| ("replay", replays.to_string())),
+        );
+        outcome
+    }
+
     pub(crate) fn end(&mut self) {
         self.took_s = self.began.elapsed().as_secs_f64();
     }
@@ -295,16 +340,7 @@ impl fmt::Display for Report {
             .collect();
         writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
         for (name, counts) in &self.consumers {
-            let ConsumerCounts {
-                killed,
-                frozen,
-                started,
-                ended_by_itself,
-            } = counts;
-            writeln!(
-                to,
-                "consumer {name}: {killed} killed, {frozen} frozen, started {started} times, {ended_by_itself} ended by themselves"
-            )?;
+            writeln!(to, "consumer {name}: {counts}")?;
         }
         writeln!(
             to,
