@@ -3,6 +3,7 @@
 use std::{
     ffi::OsStr,
     fs::{self, File},
+    io::{Read as _, Seek as _, SeekFrom},
     os::unix::ffi::OsStrExt as _,
     path::{Path, PathBuf},
     process::Stdio,
@@ -24,6 +25,8 @@ use crate::{
 
 /// A recorder writes its last chunk within milliseconds; a user's program may take its time.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
+/// Bytes of what a consumer said last.
+const LONGEST_LINE: u64 = 500;
 
 /// The consumers of one mission.
 #[derive(Default)]
@@ -48,6 +51,8 @@ struct Running {
     process: Option<Process>,
     starts: u32,
     frozen_until: Option<Instant>,
+    /// The file of its standard error.
+    said: PathBuf,
 }
 
 /// A signal that reached a consumer.
@@ -74,12 +79,13 @@ impl Consumers {
             directory,
         };
         let mut all = Vec::new();
-        for consumer in &options.consumers {
+        for (place, consumer) in options.consumers.iter().enumerate() {
             let mut running = Running {
                 consumer: consumer.clone(),
                 process: None,
                 starts: 0,
                 frozen_until: None,
+                said: setting.directory.join(format!("stderr-{place}")),
             };
             running.start(&setting, report)?;
             all.push(running);
@@ -125,11 +131,17 @@ impl Consumers {
             }
             if running.consumer != Consumer::RunRecorder
                 && let Some(process) = &mut running.process
-                && process.try_reap().map_err(system("reap"))?.is_some()
+                && let Some(cause) = process.try_reap().map_err(system("reap"))?
             {
                 running.process = None;
                 running.frozen_until = None;
-                report.consumer(running.consumer.name()).ended_by_itself += 1;
+                let said = last_line(&running.said);
+                let counts = report.consumer(running.consumer.name());
+                counts.ended_by_itself += 1;
+                counts.last_end = Some(match said {
+                    Some(said) => format!("{cause}: {said}"),
+                    None => cause.to_string(),
+                });
             }
         }
         Ok(())
@@ -206,26 +218,17 @@ impl Running {
         let Some(mut command) = self.consumer.command(robot, &recording) else {
             return Ok(());
         };
-        let said = directory.join("stderr");
-        let said = File::options().create(true).append(true).open(said);
+        let said = File::options().create(true).append(true).open(&self.said);
         let said = said.map_err(system("write what a consumer says"))?;
-        let draws = match self.consumer {
-            Consumer::Top => {
-                let (reads, draws) = terminal::open().map_err(system("open a terminal"))?;
-                terminal::read_all(reads);
-                Some(draws)
-            }
-            _ => None,
-        };
-        match draws {
-            Some(draws) => {
-                let its = || draws.try_clone().map_err(system("open a terminal"));
-                command.stdin(its()?).stdout(its()?).stderr(its()?);
-            }
-            None => {
-                command.stdout(Stdio::null()).stderr(said);
-            }
+        if self.consumer == Consumer::Top {
+            let (reads, draws) = terminal::open().map_err(system("open a terminal"))?;
+            terminal::read_all(reads);
+            let typed = draws.try_clone().map_err(system("open a terminal"))?;
+            command.stdin(typed).stdout(draws);
+        } else {
+            command.stdout(Stdio::null());
         }
+        command.stderr(said);
         self.process = Some(Process::spawn(command).map_err(system("start a consumer"))?);
         self.starts += 1;
         report.consumer(self.consumer.name()).started += 1;
@@ -246,6 +249,19 @@ impl Running {
             signal_all(process, Signal::CONT);
         }
     }
+}
+
+/// The last line of what a consumer said.
+fn last_line(said: &Path) -> Option<String> {
+    let mut file = File::open(said).ok()?;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_LINE)))
+        .ok()?;
+    let mut end = Vec::new();
+    file.take(LONGEST_LINE).read_to_end(&mut end).ok()?;
+    let end = String::from_utf8_lossy(&end);
+    let last = end.lines().rfind(|line| !line.trim().is_empty());
+    last.map(str::to_owned)
 }
 
 /// Signal a child that is not reaped yet, and the processes that it started.

@@ -61,6 +61,9 @@ pub(crate) struct ConsumerCounts {
     pub started: u32,
     /// Times it ended without a signal of chaos.
     pub ended_by_itself: u32,
+    /// How it did that last, and the last line that it said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_end: Option<String>,
 }
 
 impl fmt::Display for ConsumerCounts {
@@ -70,11 +73,16 @@ impl fmt::Display for ConsumerCounts {
             frozen,
             started,
             ended_by_itself,
+            last_end,
         } = self;
         write!(
             to,
             "{killed} killed, {frozen} frozen, {started} started, {ended_by_itself} ended by themselves"
-        )
+        )?;
+        match last_end {
+            Some(last) => write!(to, " ({last})"),
+            None => Ok(()),
+        }
     }
 }
 
