@@ -101,7 +101,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     assert_eq!(report["reached"], report["missions"], "{report}");
     assert_eq!(report["leftovers"], 0, "{report}");
     let consumers = &report["consumers"];
-    for name in ["firsthand record", "firsthand logs -f", &given] {
+    for name in ["record", "logs -f", &given] {
         let counts = &consumers[name];
         // It was started again after each kill.
         assert!(

@@ -29,7 +29,7 @@ use crate::{
     report::{EVERYTHING, Report},
     resources::Resources,
     series::Series,
-    signals::{Row, rounded_ms},
+    signals::Row,
     subscriptions::{POLL, Subscriptions},
 };
 
@@ -44,7 +44,7 @@ const MOST_HITS: usize = HOLD_AFTER - 4;
 pub(crate) struct Attack {
     /// Seed of the mission.
     seed: u64,
-    /// Of the newest sample.
+    /// Mission time of the newest wheel sample.
     time: Option<MissionTime>,
     consumers: Consumers,
     entries: Vec<RosterEntry>,
@@ -112,7 +112,6 @@ impl Attack {
                 robot.poll()?;
             }
             self.read(&mut subscriptions, &mut series.report)?;
-            self.schedule_startup_hits();
             self.hit_starting(&mut series.report);
             if Instant::now() >= next && self.driving && !series.is_over() {
                 let pause = series.schedule.pause();
@@ -278,23 +277,7 @@ impl Attack {
             return;
         };
         let pending = &mut self.pending[at];
-        let took = pending.at.elapsed();
-        let recovery = report.recovery(pending.stage);
-        let frozen = pending.kind == Kind::Freeze;
-        let took_ms = rounded_ms(took);
-        if pending.row.ready_ms.is_none() {
-            pending.row.ready_ms = Some(took_ms);
-            if frozen {
-                recovery.after_freeze.record(took.as_nanos() as u64);
-            } else {
-                recovery.ready.record(took.as_nanos() as u64);
-            }
-        }
-        if !beat {
-            if !frozen {
-                recovery.output.record(took.as_nanos() as u64);
-            }
-            pending.row.first_output_ms = Some(took_ms);
+        if pending.sign(beat, report.recovery(pending.stage)) {
             self.measured.push(self.pending.remove(at).row);
         }
     }
@@ -398,63 +381,33 @@ impl Attack {
         Ok(())
     }
 
-    /// Find the successors that have started and are to be hit in their start-up.
-    fn schedule_startup_hits(&mut self) {
-        for recovery in &mut self.pending {
-            let successor = self.entries.iter().find(|entry| {
-                name_str(&entry.stage) == recovery.stage
-                    && entry.generation > recovery.generation
-                    && entry.pid != 0
-            });
-            if let (StartupHit::After(after), Some(entry)) = (recovery.startup_hit, successor) {
-                let age = Duration::from_nanos(entry.uptime_ns);
-                recovery.startup_hit = StartupHit::At {
-                    when: Instant::now() + after.saturating_sub(age),
-                    process: entry.pid,
-                    generation: entry.generation,
-                };
-            }
-        }
-    }
-
-    /// Time until one of them is to be hit.
+    /// Time until a successor is to be hit in its start-up.
     fn time_to_startup_hit(&self) -> Duration {
-        let times = self
-            .pending
-            .iter()
-            .filter_map(|recovery| match recovery.startup_hit {
-                StartupHit::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
-                StartupHit::None | StartupHit::After(_) => None,
-            });
+        let times = self.pending.iter();
+        let times = times.filter_map(PendingRecovery::time_to_startup_hit);
         times.min().unwrap_or(Duration::MAX)
     }
 
-    /// Hit those whose time has come.
+    /// Hit the successors whose time has come in their start-up.
     fn hit_starting(&mut self, report: &mut Report) {
         for recovery in &mut self.pending {
-            let StartupHit::At {
-                when,
-                process,
-                generation,
-            } = recovery.startup_hit
-            else {
+            recovery.schedule_startup_hit(&self.entries);
+            let Some((process, generation)) = recovery.take_due_startup_hit() else {
                 continue;
             };
-            if Instant::now() < when {
-                continue;
-            }
-            recovery.startup_hit = StartupHit::None;
             if send(process, Kind::KillAtStart) {
-                report.hit(recovery.stage, Kind::KillAtStart);
-                self.hits.push((recovery.stage, Instant::now()));
+                let stage = recovery.stage;
+                report.hit(stage, Kind::KillAtStart);
+                self.hits.push((stage, Instant::now()));
+                let time_s = self.time.map(MissionTime::seconds);
                 let row = Row::new(
                     self.seed,
-                    self.time.map(MissionTime::seconds),
-                    recovery.stage,
+                    time_s,
+                    stage,
                     Kind::KillAtStart,
                     Some(generation),
                 );
-                let next = PendingRecovery::new(recovery.stage, generation, StartupHit::None, row);
+                let next = PendingRecovery::new(stage, generation, StartupHit::None, row);
                 self.measured.push(std::mem::replace(recovery, next).row);
             }
         }

@@ -108,11 +108,11 @@ impl Consumer {
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
-            Self::RunRecorder => "the run's recorder",
-            Self::Record => "firsthand record",
-            Self::Top => "firsthand top",
-            Self::Hz => "firsthand hz",
-            Self::Logs => "firsthand logs -f",
+            Self::RunRecorder => "run's recorder",
+            Self::Record => "record",
+            Self::Top => "top",
+            Self::Hz => "hz",
+            Self::Logs => "logs -f",
             Self::Given(given) => &given.command,
         }
     }

@@ -4,7 +4,7 @@
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ pub const FILE_NAME: &str = "signals.csv";
 pub(crate) struct Row {
     /// The mission, by its seed.
     pub(crate) mission: u64,
-    /// Mission time of the newest sample that was read before the signal, seconds.
+    /// Mission time of the newest wheel sample that was read before the signal, seconds.
     pub(crate) time_s: Option<f64>,
     /// The stage, `supervisor`, `everything`, or the consumer's name.
     pub(crate) stage: String,
@@ -84,14 +84,9 @@ impl Row {
     }
 }
 
-/// Milliseconds since `at`.
+/// Milliseconds since `at`, to the microsecond.
 pub(crate) fn ms_since(at: Instant) -> f64 {
-    rounded_ms(at.elapsed())
-}
-
-/// Milliseconds, to the microsecond.
-pub(crate) fn rounded_ms(time: Duration) -> f64 {
-    (time.as_secs_f64() * 1e6).round() / 1e3
+    (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
 /// The table of signals cannot be written or read.

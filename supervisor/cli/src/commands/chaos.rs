@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Keep a row for each signal in DIR/signals.csv, as it is measured.
+    /// Keep a row for each signal in DIR/signals.csv, as it is measured, and at the end DIR/report.html.
     #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
     out: Option<PathBuf>,
     /// Name of the robot, which also names its shared memory.
@@ -133,9 +133,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let report = match ended {
         Ok(report) => report,
         Err(error) => {
-            return Err(format!("{error}; see {}", directory.display()).into());
+            // An empty directory tells nothing.
+            return Err(match std::fs::remove_dir(&directory) {
+                Ok(()) => error.into(),
+                Err(_) => format!("{error}; see {}", directory.display()).into(),
+            });
         }
     };
+    if let Some(out) = &arguments.out {
+        let page = out.join(chaos::PAGE);
+        write_stderr(&format!("results: {}\n", page.display()));
+    }
     if report.is_right() {
         std::fs::remove_dir_all(&directory)?;
     } else {
