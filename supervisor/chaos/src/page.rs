@@ -22,7 +22,7 @@ const LONGEST_NAME: usize = 200;
 
 /// Nothing is wider than the page, and nothing is cut by the end of a sheet.
 const STYLE: &str = "body{max-width:46rem;overflow-wrap:anywhere}figure{display:block;width:auto;margin:1.5em 0;break-inside:avoid}\
-figure svg{display:block;max-width:100%;height:auto;margin:0 auto}tr{break-inside:avoid}h2{break-after:avoid}@page{margin:16mm}";
+figure svg{display:block;max-width:100%;height:auto;margin:0 auto}th{overflow-wrap:normal}tr{break-inside:avoid}h2{break-after:avoid}@page{margin:16mm}";
 
 /// Write the page of `report` and `rows` into `directory`.
 pub(crate) fn write(directory: &Path, report: &Report, rows: &[Row]) -> Result<(), ChaosError> {

@@ -240,11 +240,8 @@ impl Report {
         ];
         let consumers = self.consumers.iter();
         outcome.extend(consumers.map(|(name, counts)| ("consumer", format!("{name}: {counts}"))));
-        outcome.extend(
-            self.replays
-                .iter()
-                .map(|replays| ("replay", replays.to_string())),
-        );
+        let replays = self.replays.iter().map(Replays::to_string);
+        outcome.extend(replays.map(|said| ("replay", said.trim().replace('\n', "; "))));
         outcome
     }
 
