@@ -7,6 +7,7 @@ mod support;
 
 mod bad_input;
 mod blocked_starts;
+mod chaos;
 mod console;
 mod consumers;
 mod evaluation;

@@ -1,8 +1,12 @@
 //! The attacker of one mission: sends signals, and waits for the successors to work.
 
-use std::time::{Duration, Instant};
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use common::{
+    clock::MissionTime,
     ground_truth::GroundTruthTick,
     samples::{HealthState, Order, PoseSample, RosterEntry, StageState, name_str},
     topics::{self, AnyTopic as _, SUPERVISOR},
@@ -18,11 +22,14 @@ use supervisor::{
 };
 
 use crate::{
+    consumers::Consumers,
     error::{ChaosError, system},
-    options::Options,
+    kind::Kind,
+    recovery::{PendingRecovery, StartupHit},
     report::{EVERYTHING, Report},
     resources::Resources,
-    schedule::{Kind, Schedule},
+    series::Series,
+    signals::Row,
     subscriptions::{POLL, Subscriptions},
 };
 
@@ -31,54 +38,23 @@ const NEWEST: u32 = u32::MAX;
 /// Signals to one stage within the window of the hold rule. One that dies more often is held until an operator releases
 /// it, and here there is none. A signal may be followed by one in the start-up, and each may be counted late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
-/// A stage that was hit, until its successor works.
-struct PendingRecovery {
-    stage: &'static str,
-    kind: Kind,
-    generation: u32,
-    at: Instant,
-    ready: bool,
-    startup_hit: StartupHit,
-}
-
-impl PendingRecovery {
-    /// Of that generation of `stage`, hit now.
-    fn new(stage: &'static str, kind: Kind, generation: u32, startup_hit: StartupHit) -> Self {
-        Self {
-            stage,
-            kind,
-            generation,
-            at: Instant::now(),
-            ready: false,
-            startup_hit,
-        }
-    }
-}
-
-/// Whether the successor is to be hit in its first milliseconds.
-#[derive(Clone, Copy)]
-enum StartupHit {
-    /// No.
-    None,
-    /// So long after its start.
-    After(Duration),
-    /// It has started, and is hit then.
-    At {
-        when: Instant,
-        process: u32,
-        generation: u32,
-    },
-}
 
 /// What the attacker knows of a mission.
 #[derive(Default)]
 pub(crate) struct Attack {
+    /// Seed of the mission.
+    seed: u64,
+    /// Mission time of the newest wheel sample.
+    time: Option<MissionTime>,
+    consumers: Consumers,
     entries: Vec<RosterEntry>,
     supervisor: u32,
     /// It was hit: what it and its stages still publish is no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     pending: Vec<PendingRecovery>,
+    /// Signals of which no more is measured.
+    measured: Vec<Row>,
     /// Generations that were frozen alone: those may be taken for hung.
     frozen: Vec<(&'static str, u32)>,
     /// Stages that were hit lately, and when.
@@ -89,14 +65,21 @@ pub(crate) struct Attack {
 }
 
 impl Attack {
+    /// Of the mission with that seed, and these consumers.
+    pub(crate) fn new(seed: u64, consumers: Consumers) -> Self {
+        Self {
+            seed,
+            consumers,
+            ..Self::default()
+        }
+    }
+
     /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
     pub(crate) fn run(
         &mut self,
-        options: &Options,
+        series: &mut Series<'_>,
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
-        schedule: &mut Schedule,
-        report: &mut Report,
         patience: Duration,
     ) -> Result<(), ChaosError> {
         let began = Instant::now();
@@ -105,18 +88,21 @@ impl Attack {
         self.entries.clear();
         self.resources = None;
         // The stages of a supervisor that was hit go with it.
-        self.pending.retain(|recovery| recovery.stage == SUPERVISOR);
+        let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
+        let ended = self.pending.extract_if(.., is_stage);
+        self.measured.extend(ended.map(|recovery| recovery.row));
         let mut subscriptions = loop {
+            self.consumers.tend(&mut series.report)?;
             if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
                 return Ok(());
             }
-            match Subscriptions::join(options, child.id()) {
+            match Subscriptions::join(series.options, child.id()) {
                 Ok(Some(subscriptions)) => break subscriptions,
                 // Not up yet.
                 Ok(None) | Err(_) => std::thread::park_timeout(POLL),
             }
         };
-        let mut next = Instant::now() + schedule.pause();
+        let mut next = Instant::now() + series.schedule.pause();
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
             // A hit that is overdue waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
@@ -125,20 +111,57 @@ impl Attack {
             if let Some(robot) = &mut robot {
                 robot.poll()?;
             }
-            self.read(&mut subscriptions, report)?;
-            self.schedule_startup_hits();
-            self.hit_starting(report);
-            let enough = report.kills() >= options.kills;
-            if Instant::now() >= next && self.driving && !enough {
-                let pause = schedule.pause();
-                self.hit(options, schedule, report);
+            self.read(&mut subscriptions, &mut series.report)?;
+            self.hit_starting(&mut series.report);
+            if Instant::now() >= next && self.driving && !series.is_over() {
+                let pause = series.schedule.pause();
+                self.hit(series)?;
                 next = Instant::now() + pause;
             }
+            self.consumers.tend(&mut series.report)?;
+            self.keep_measured(series, robot.as_deref())?;
         }
         if let Some([first, last]) = self.resources {
-            report.add_growth(first, last);
+            series.report.add_growth(first, last);
         }
         Ok(())
+    }
+
+    /// Keep the signals of which no more is measured.
+    fn keep_measured(
+        &mut self,
+        series: &mut Series<'_>,
+        robot: Option<&Simulator>,
+    ) -> Result<(), ChaosError> {
+        for mut row in std::mem::take(&mut self.measured) {
+            row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
+            series.keep(&row)?;
+        }
+        Ok(())
+    }
+
+    /// The mission is over: nothing more is measured.
+    pub(crate) fn end(
+        &mut self,
+        series: &mut Series<'_>,
+        robot: Option<&Simulator>,
+    ) -> Result<(), ChaosError> {
+        self.consumers.end();
+        let pending = self.pending.drain(..);
+        self.measured.extend(pending.map(|recovery| recovery.row));
+        self.keep_measured(series, robot)
+    }
+
+    /// Of a signal of `kind` to that generation of `stage`, now.
+    fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
+        let time_s = self.time.map(MissionTime::seconds);
+        Row::new(self.seed, time_s, stage, kind, generation)
+    }
+
+    /// Recordings of the run's recorder that was hit; those of other recorders.
+    pub(crate) fn hit_recordings(&self) -> (&[PathBuf], Vec<PathBuf>) {
+        let consumers = &self.consumers;
+        (consumers.hit_recordings(), consumers.other_recordings())
     }
 
     /// Whether the supervisor was hit, and no successor works yet.
@@ -175,6 +198,15 @@ impl Attack {
         subscriptions: &mut Subscriptions,
         report: &mut Report,
     ) -> Result<(), ChaosError> {
+        while let Some(death) = subscriptions.deaths.take()? {
+            let (stage, generation) = (name_str(&death.stage), death.generation);
+            let mut pending = self.pending.iter_mut();
+            if let Some(recovery) = pending
+                .find(|recovery| recovery.stage == stage && recovery.generation == generation)
+            {
+                recovery.noticed();
+            }
+        }
         while let Some(entries) = subscriptions.roster.samples.take()? {
             self.driving = Order::from_byte(entries.header().order) == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
@@ -201,6 +233,10 @@ impl Attack {
             }
         }
         while let Some(sample) = subscriptions.wheels.take()? {
+            self.time = Some(sample.stamp.time());
+            if sample.left_counts_per_s == 0 && sample.right_counts_per_s == 0 {
+                self.pending.iter_mut().for_each(PendingRecovery::rests);
+            }
             let writer = topics::WHEELS.spec().writer;
             self.on_sign(writer, sample.stamp.generation, false, report);
         }
@@ -241,22 +277,8 @@ impl Attack {
             return;
         };
         let pending = &mut self.pending[at];
-        let took = pending.at.elapsed().as_nanos() as u64;
-        let recovery = report.recovery(pending.stage);
-        let frozen = pending.kind == Kind::Freeze;
-        if !pending.ready {
-            pending.ready = true;
-            if frozen {
-                recovery.after_freeze.record(took);
-            } else {
-                recovery.ready.record(took);
-            }
-        }
-        if !beat {
-            if !frozen {
-                recovery.output.record(took);
-            }
-            self.pending.remove(at);
+        if pending.sign(beat, report.recovery(pending.stage)) {
+            self.measured.push(self.pending.remove(at).row);
         }
     }
 
@@ -285,33 +307,49 @@ impl Attack {
             let _ = kill_process(*pid, Signal::CONT);
         }
         report.hit(EVERYTHING, Kind::FreezeAll);
+        let row = self.row(EVERYTHING, Kind::FreezeAll, None);
+        self.measured.push(row);
         // What took longer only because nothing ran is no time of recovery.
         for recovery in &mut self.pending {
             recovery.at += began.elapsed();
         }
     }
 
-    /// Hit a stage that runs and has no pending recovery, or the supervisor.
-    fn hit(&mut self, options: &Options, schedule: &mut Schedule, report: &mut Report) {
+    /// Hit a consumer, the supervisor, or a stage that runs and has no pending recovery.
+    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), ChaosError> {
+        let Series {
+            options,
+            schedule,
+            report,
+            ..
+        } = series;
+        if let Some((index, kind, pause)) = schedule.consumer(self.consumers.len()) {
+            let supervisor = self.supervisor;
+            let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
+            self.measured
+                .extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
+            return Ok(());
+        }
         if options.supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind) {
                 report.hit(SUPERVISOR, kind);
+                let row = self.row(SUPERVISOR, kind, None);
                 self.pending
-                    .push(PendingRecovery::new(SUPERVISOR, kind, 0, StartupHit::None));
+                    .push(PendingRecovery::new(SUPERVISOR, 0, StartupHit::None, row));
                 self.supervisor_hit = true;
                 self.driving = false;
             }
-            return;
+            return Ok(());
         }
         if options.freeze_all
             && let Some(pause) = schedule.freeze_all()
         {
             self.freeze_all(pause, report);
-            return;
+            return Ok(());
         }
         let Some(stage) = stages::find(schedule.stage()).map(|stage| stage.name) else {
-            return;
+            return Ok(());
         };
         let (kind, startup_hit) = (schedule.kind(), schedule.startup_hit());
         let running = |entry: &&RosterEntry| {
@@ -319,13 +357,13 @@ impl Attack {
                 && StageState::from_byte(entry.state) == StageState::Running
         };
         let Some(entry) = self.entries.iter().find(running) else {
-            return;
+            return Ok(());
         };
         let recovering = self.pending.iter().any(|recovery| recovery.stage == stage);
         self.hits.retain(|(_, at)| at.elapsed() < HOLD_WINDOW);
         let lately = self.hits.iter().filter(|(hit, _)| *hit == stage).count();
         if recovering || lately >= MOST_HITS || !send(entry.pid, kind) {
-            return;
+            return Ok(());
         }
         report.hit(stage, kind);
         if kind == Kind::Freeze {
@@ -336,69 +374,41 @@ impl Attack {
             Some(after) if options.startup && kind != Kind::Freeze => StartupHit::After(after),
             _ => StartupHit::None,
         };
-        self.pending.push(PendingRecovery::new(
-            stage,
-            kind,
-            entry.generation,
-            startup_hit,
-        ));
+        let generation = entry.generation;
+        let row = self.row(stage, kind, Some(generation));
+        self.pending
+            .push(PendingRecovery::new(stage, generation, startup_hit, row));
+        Ok(())
     }
 
-    /// Find the successors that have started and are to be hit in their start-up.
-    fn schedule_startup_hits(&mut self) {
-        for recovery in &mut self.pending {
-            let successor = self.entries.iter().find(|entry| {
-                name_str(&entry.stage) == recovery.stage
-                    && entry.generation > recovery.generation
-                    && entry.pid != 0
-            });
-            if let (StartupHit::After(after), Some(entry)) = (recovery.startup_hit, successor) {
-                let age = Duration::from_nanos(entry.uptime_ns);
-                recovery.startup_hit = StartupHit::At {
-                    when: Instant::now() + after.saturating_sub(age),
-                    process: entry.pid,
-                    generation: entry.generation,
-                };
-            }
-        }
-    }
-
-    /// Time until one of them is to be hit.
+    /// Time until a successor is to be hit in its start-up.
     fn time_to_startup_hit(&self) -> Duration {
-        let times = self
-            .pending
-            .iter()
-            .filter_map(|recovery| match recovery.startup_hit {
-                StartupHit::At { when, .. } => Some(when.saturating_duration_since(Instant::now())),
-                StartupHit::None | StartupHit::After(_) => None,
-            });
+        let times = self.pending.iter();
+        let times = times.filter_map(PendingRecovery::time_to_startup_hit);
         times.min().unwrap_or(Duration::MAX)
     }
 
-    /// Hit those whose time has come.
+    /// Hit the successors whose time has come in their start-up.
     fn hit_starting(&mut self, report: &mut Report) {
         for recovery in &mut self.pending {
-            let StartupHit::At {
-                when,
-                process,
-                generation,
-            } = recovery.startup_hit
-            else {
+            recovery.schedule_startup_hit(&self.entries);
+            let Some((process, generation)) = recovery.take_due_startup_hit() else {
                 continue;
             };
-            if Instant::now() < when {
-                continue;
-            }
-            recovery.startup_hit = StartupHit::None;
             if send(process, Kind::KillAtStart) {
-                report.hit(recovery.stage, Kind::KillAtStart);
-                self.hits.push((recovery.stage, Instant::now()));
-                *recovery = PendingRecovery::new(
-                    recovery.stage,
+                let stage = recovery.stage;
+                report.hit(stage, Kind::KillAtStart);
+                self.hits.push((stage, Instant::now()));
+                let time_s = self.time.map(MissionTime::seconds);
+                let row = Row::new(
+                    self.seed,
+                    time_s,
+                    stage,
                     Kind::KillAtStart,
-                    generation,
-                    StartupHit::None,
+                    Some(generation),
                 );
+                let next = PendingRecovery::new(stage, generation, StartupHit::None, row);
+                self.measured.push(std::mem::replace(recovery, next).row);
             }
         }
     }

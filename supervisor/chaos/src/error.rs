@@ -4,6 +4,8 @@ use common::bus::BusError;
 use supervisor::simulator::SimulatorError;
 use thiserror::Error;
 
+use crate::signals::SignalsError;
+
 /// Why chaos ended early.
 #[derive(Debug, Error)]
 pub enum ChaosError {
@@ -13,6 +15,9 @@ pub enum ChaosError {
     /// The simulated robot.
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
+    /// The table of signals.
+    #[error(transparent)]
+    Signals(#[from] SignalsError),
     /// A process or a file.
     #[error("cannot {action}: {source}")]
     System {

@@ -9,10 +9,14 @@
 //! | [`Options`] | what is attacked, and how |
 //! | `schedule` | which stage gets which signal when, seeded |
 //! | `mission` | one mission, undisturbed and attacked |
+//! | `series` | what the missions have in common |
 //! | `attack`, `subscriptions` | the attacker of one mission; what it reads from the bus |
+//! | `kind`, `recovery` | how a process is hit; one that was, until its successor works |
+//! | [`Consumer`], `consumers`, `terminal`, `words` | consumers that are hit, and started again; a terminal for one that draws; a user's command |
 //! | `replays` | the missions' recordings, replayed |
 //! | `resources`, `leftovers` | what a process holds; what outlived a mission |
 //! | [`Report`] | the result of all missions |
+//! | [`signals`], `page` | the table of signals, THE file format; the page that is drawn from it |
 //! | [`robot_fault`] | THE table of the ways in which a robot lies to its link |
 //! | `robot_faults`, `proxy`, `liar` | missions of such robots; the wire, and what becomes of the bytes on it |
 //! | [`Ledger`] | how long each moved after that |
@@ -20,42 +24,55 @@
 //! | [`process_set`] | what a process and all that it started use |
 
 mod attack;
+mod consumer;
+mod consumers;
 mod error;
 pub mod ipc_bench;
+mod kind;
 mod ledger;
 mod leftovers;
 mod liar;
 mod mission;
 mod options;
+mod page;
 pub mod process_set;
 mod proxy;
+mod recovery;
 mod replays;
 mod report;
 mod resources;
 pub mod robot_fault;
 mod robot_faults;
 mod schedule;
+mod series;
+pub mod signals;
 mod subscriptions;
+mod terminal;
+mod words;
 
+pub use consumer::{Consumer, ConsumerError, GivenConsumer, SUBCOMMAND};
 pub use error::ChaosError;
 pub use ledger::{Entry, Ledger};
 pub use options::Options;
+pub use page::PAGE;
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
 
-use schedule::Schedule;
+use series::Series;
 
 /// Attack missions, one after the other, until enough signals were sent. `show` is called after each.
 pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, ChaosError> {
-    let mut schedule = Schedule::new(options.seed);
-    let mut report = Report::new();
-    while report.kills() < options.kills {
-        let seed = options.seed + report.missions();
+    let mut series = Series::new(options)?;
+    while !series.is_over() {
+        let seed = options.seed + series.report.missions();
         let undisturbed = mission::undisturbed(options, seed)?;
-        mission::attack(options, seed, &mut schedule, &mut report, &undisturbed)?;
-        report.leftovers += leftovers::count(&options.robot, &options.directory);
-        show(&report);
+        mission::attack(&mut series, seed, &undisturbed)?;
+        series.report.leftovers += leftovers::count(&options.robot, &options.directory);
+        show(&series.report);
     }
-    report.end();
-    Ok(report)
+    series.report.end();
+    if let (Some(file), Some(out)) = (&series.signals, &options.out) {
+        page::write(out, &series.report, &file.rows()?)?;
+    }
+    Ok(series.report)
 }

@@ -13,10 +13,11 @@ use serde_json::Value;
 
 use crate::{
     attack::Attack,
+    consumers::Consumers,
     error::{ChaosError, system},
     options::Options,
-    report::{End, Report},
-    schedule::Schedule,
+    report::End,
+    series::Series,
 };
 use supervisor::{
     DEATHS,
@@ -85,13 +86,12 @@ pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosEr
 
 /// Attack the mission, and report. Its files stay if it went wrong.
 pub(crate) fn attack(
-    options: &Options,
+    series: &mut Series<'_>,
     seed: u64,
-    schedule: &mut Schedule,
-    report: &mut Report,
     undisturbed: &Value,
 ) -> Result<(), ChaosError> {
-    let before = report.kills();
+    let options = series.options;
+    let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).map_err(system("make a directory"))?;
     let directory = files.join("run");
@@ -104,31 +104,27 @@ pub(crate) fn attack(
         seed,
         &options.pace.to_string(),
         &directory,
-        options.replay,
+        options.records(),
     )?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
     }
-    let mut attack = Attack::default();
+    let consumers = files.join("consumers");
+    let consumers = Consumers::start(options, consumers, &mut series.report)?;
+    let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
-        let summary = one_supervisor(
-            options,
-            start,
-            robot.as_mut(),
-            &mut attack,
-            schedule,
-            report,
-        )?;
+        let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
         // A supervisor that was hit leaves no summary, unless it had just ended the run.
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
-        start = resume(&directory, options.replay)?;
+        start = resume(&directory, options.records())?;
     };
+    attack.end(series, robot.as_ref())?;
     let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
-    let kills = report.kills() - before;
+    let kills = series.report.kills() - before;
     let mut end = End {
         seed,
         outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
@@ -149,9 +145,10 @@ pub(crate) fn attack(
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
         end.pose_excess_m = error - number(undisturbed, "pose_error_m");
     }
-    let mut right = report.add_mission(&end);
+    let mut right = series.report.add_mission(&end);
     if options.replay {
-        right &= report.replays().add(seed, &directory);
+        let (hit, others) = attack.hit_recordings();
+        right &= series.report.replays().add(seed, &directory, hit, &others);
     }
     if right {
         fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
@@ -193,16 +190,14 @@ pub(crate) fn robot(
 
 /// One generation of a supervisor under attack. Returns its standard output.
 fn one_supervisor(
-    options: &Options,
+    series: &mut Series<'_>,
     start: Command,
     robot: Option<&mut Simulator>,
     attack: &mut Attack,
-    schedule: &mut Schedule,
-    report: &mut Report,
 ) -> Result<Vec<u8>, ChaosError> {
     let mut child = Process::spawn(start).map_err(system("start a mission"))?;
     let summary = read_stdout(&mut child);
-    let attacked = attack.run(options, &mut child, robot, schedule, report, PATIENCE);
+    let attacked = attack.run(series, &mut child, robot, PATIENCE);
     child.end(Duration::from_secs(2));
     let summary = summary.join().unwrap_or_default();
     attacked.map(|()| summary)

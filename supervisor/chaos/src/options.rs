@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::consumer::Consumer;
 use common::{clock::Pace, domain::RobotName, mission::Mission};
 
 /// What is attacked, and how.
@@ -29,6 +30,17 @@ pub struct Options {
     pub freeze_all: bool,
     /// Whether missions are recorded, and every generation of every stage replayed.
     pub replay: bool,
+    /// The consumers that are hit, too.
+    pub consumers: Vec<Consumer>,
+    /// Where results are kept: the table of signals and the page.
+    pub out: Option<PathBuf>,
     /// Where the run directories go; emptied mission by mission.
     pub directory: PathBuf,
+}
+
+impl Options {
+    /// Whether the run itself records.
+    pub(crate) fn records(&self) -> bool {
+        self.replay || self.consumers.contains(&Consumer::RunRecorder)
+    }
 }

@@ -9,7 +9,7 @@ use std::{
 use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
-use crate::{replays::Replays, resources::Resources, schedule::Kind};
+use crate::{kind::Kind, replays::Replays, resources::Resources};
 use supervisor::stages::TABLE;
 
 /// What is hit where supervisor and stages are frozen together.
@@ -27,6 +27,9 @@ pub struct Report {
     healthy_aborted: u64,
     /// Signals by stage and kind.
     kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
+    /// Signals to consumers, by their names.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    consumers: BTreeMap<String, ConsumerCounts>,
     #[serde(serialize_with = "recoveries")]
     recovery_ms: BTreeMap<&'static str, Recovery>,
     /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and in that mission the
@@ -45,6 +48,42 @@ pub struct Report {
     took_s: f64,
     #[serde(skip)]
     began: Instant,
+}
+
+/// What became of a consumer in all missions.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct ConsumerCounts {
+    /// Times it was killed, at any moment since its start.
+    pub killed: u32,
+    /// Times it was frozen for a moment.
+    pub frozen: u32,
+    /// Times it was started by chaos.
+    pub started: u32,
+    /// Times it ended without a signal of chaos.
+    pub ended_by_itself: u32,
+    /// How it did that last, and the last line that it said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_end: Option<String>,
+}
+
+impl fmt::Display for ConsumerCounts {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            killed,
+            frozen,
+            started,
+            ended_by_itself,
+            last_end,
+        } = self;
+        write!(
+            to,
+            "{killed} killed, {frozen} frozen, {started} started, {ended_by_itself} ended by themselves"
+        )?;
+        match last_end {
+            Some(last) => write!(to, " ({last})"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// From the signal to the successor.
@@ -84,6 +123,7 @@ impl Report {
             wrong: Vec::new(),
             healthy_aborted: 0,
             kills: BTreeMap::new(),
+            consumers: BTreeMap::new(),
             recovery_ms: BTreeMap::new(),
             worst_pose_excess_m: 0.0,
             worst_pose_kills: 0,
@@ -102,7 +142,18 @@ impl Report {
     }
 
     /// Signals sent.
-    pub fn kills(&self) -> u32 {
+    pub fn signals(&self) -> u32 {
+        let consumers = self.consumers.values();
+        let to_consumers: u32 = consumers.map(|counts| counts.killed + counts.frozen).sum();
+        self.kills() + to_consumers
+    }
+
+    pub(crate) fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
+        self.consumers.entry(name.to_owned()).or_default()
+    }
+
+    /// Signals sent to stages and supervisor.
+    pub(crate) fn kills(&self) -> u32 {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
 
@@ -167,6 +218,33 @@ impl Report {
         most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
     }
 
+    /// What was wrong, mission by mission.
+    pub(crate) fn wrong(&self) -> &[String] {
+        &self.wrong
+    }
+
+    /// The outcome in a few words and numbers.
+    pub(crate) fn outcome(&self) -> Vec<(&'static str, String)> {
+        let mut outcome = vec![
+            ("signals", self.signals().to_string()),
+            ("missions", self.missions.to_string()),
+            ("reached", self.reached.to_string()),
+            ("collisions", self.collisions.to_string()),
+            ("healthy stages aborted", self.healthy_aborted.to_string()),
+            ("leftovers", self.leftovers.to_string()),
+            (
+                "largest pose error beyond the undisturbed run",
+                format!("{:.4} m", self.worst_pose_excess_m),
+            ),
+            ("wall time", format!("{:.0} s", self.took_s)),
+        ];
+        let consumers = self.consumers.iter();
+        outcome.extend(consumers.map(|(name, counts)| ("consumer", format!("{name}: {counts}"))));
+        let replays = self.replays.iter().map(Replays::to_string);
+        outcome.extend(replays.map(|said| ("replay", said.trim().replace('\n', "; "))));
+        outcome
+    }
+
     pub(crate) fn end(&mut self) {
         self.took_s = self.began.elapsed().as_secs_f64();
     }
@@ -219,7 +297,7 @@ impl fmt::Display for Report {
         writeln!(
             to,
             "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} healthy stages aborted, {} leftovers",
-            self.kills(),
+            self.signals(),
             self.missions,
             took.as_secs_f64(),
             self.reached,
@@ -266,6 +344,9 @@ impl fmt::Display for Report {
             .map(|(kind, count)| format!("{count} {}", kind.as_str()))
             .collect();
         writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
+        for (name, counts) in &self.consumers {
+            writeln!(to, "consumer {name}: {counts}")?;
+        }
         writeln!(
             to,
             "pose error beyond the undisturbed run at most {:.4} m ({} signals in that mission)",

@@ -3,10 +3,9 @@
 use std::{ops::Range, time::Duration};
 
 use rand_pcg::{Pcg64, rand_core::Rng};
-use rustix::process::Signal;
-use serde::Serialize;
-
 use supervisor::stages::TABLE;
+
+use crate::kind::Kind;
 
 /// Between two signals on average: each stage gets one every two to three seconds, and was stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
@@ -19,53 +18,13 @@ const STARTUP_SHARE: f64 = 0.3;
 /// Share of the signals that hit the supervisor, where that is asked for: a hundred in two thousand.
 const SUPERVISOR_SHARE: f64 = 0.05;
 
+/// Share of the signals that hit a consumer, where there are any.
+const CONSUMER_SHARE: f64 = 0.5;
+
 /// Share of the hits that freeze everything, where that is asked for; the others fall as they do otherwise.
 const FREEZE_ALL_SHARE: f64 = 0.5;
-/// For how long everything is frozen, seconds: less than a stage's deadline, up to three times as long.
-const FREEZE_ALL_S: Range<f64> = 0.3..1.5;
-
-/// How a stage is hit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Kind {
-    /// SIGKILL.
-    Kill,
-    /// SIGKILL in the first milliseconds of a generation.
-    KillAtStart,
-    /// SIGABRT, as a panic of a program that cannot unwind. Not SIGSEGV: Rust's runtime takes the first for an
-    /// overflow of the stack, finds none, and goes on.
-    Crash,
-    /// SIGTERM.
-    Terminate,
-    /// SIGSTOP: it hangs.
-    Freeze,
-    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
-    FreezeAll,
-}
-
-impl Kind {
-    /// The signal.
-    pub(crate) const fn signal(self) -> Signal {
-        match self {
-            Self::Kill | Self::KillAtStart => Signal::KILL,
-            Self::Crash => Signal::ABORT,
-            Self::Terminate => Signal::TERM,
-            Self::Freeze | Self::FreezeAll => Signal::STOP,
-        }
-    }
-
-    /// In words.
-    pub(crate) const fn as_str(self) -> &'static str {
-        match self {
-            Self::Kill => "killed",
-            Self::KillAtStart => "killed at start",
-            Self::Crash => "crashed",
-            Self::Terminate => "terminated",
-            Self::Freeze => "frozen",
-            Self::FreezeAll => "all frozen together",
-        }
-    }
-}
+/// For how long everything, or a consumer, is frozen, seconds: less than a stage's deadline, up to three times as long.
+const FREEZE_S: Range<f64> = 0.3..1.5;
 
 /// A seeded sequence of decisions.
 #[derive(Debug)]
@@ -107,9 +66,28 @@ impl Schedule {
 
     /// Whether to freeze everything instead, and for how long.
     pub(crate) fn freeze_all(&mut self) -> Option<Duration> {
-        let Range { start, end } = FREEZE_ALL_S;
         let frozen = self.uniform() < FREEZE_ALL_SHARE;
-        frozen.then(|| Duration::from_secs_f64(start + (end - start) * self.uniform()))
+        frozen.then(|| self.freeze())
+    }
+
+    /// For how long something is frozen that is not left to the supervisor.
+    fn freeze(&mut self) -> Duration {
+        let Range { start, end } = FREEZE_S;
+        Duration::from_secs_f64(start + (end - start) * self.uniform())
+    }
+
+    /// Which of so many consumers to hit instead of a stage or the supervisor; how, and for how long where it is frozen.
+    pub(crate) fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
+        // Where there are none, the sequence of decisions is the same as ever.
+        if count == 0 || self.uniform() >= CONSUMER_SHARE {
+            return None;
+        }
+        let index = (self.uniform() * count as f64) as usize;
+        let kind = match self.uniform() {
+            ..0.7 => Kind::Kill,
+            _ => Kind::Freeze,
+        };
+        Some((index.min(count - 1), kind, self.freeze()))
     }
 
     /// How to hit it.

@@ -7,8 +7,8 @@ use common::{
     domain::Domain,
     roster::Roster,
     samples::{
-        CommandSample, GridHeader, GuidanceSample, HealthSample, PoseSample, RosterEntry,
-        RosterHeader, WheelSample,
+        CommandSample, DeathSample, GridHeader, GuidanceSample, HealthSample, PoseSample,
+        RosterEntry, RosterHeader, WheelSample,
     },
     topics,
 };
@@ -21,6 +21,7 @@ pub(crate) const POLL: Duration = Duration::from_millis(50);
 /// What the attacker reads from the bus of one generation of the supervisor.
 pub(crate) struct Subscriptions {
     pub(crate) roster: Roster,
+    pub(crate) deaths: Reader<DeathSample>,
     pub(crate) health: Reader<HealthSample>,
     pub(crate) wheels: Reader<WheelSample>,
     pub(crate) pose: Reader<PoseSample>,
@@ -35,10 +36,12 @@ impl Subscriptions {
     pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, ChaosError> {
         let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;
+        roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
         roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
         roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
         let mut subscriptions = Self {
             roster,
+            deaths: bus.reader(&topics::DEATHS)?,
             health: bus.reader(&topics::HEALTH)?,
             wheels: bus.reader(&topics::WHEELS)?,
             pose: bus.reader(&topics::POSE)?,

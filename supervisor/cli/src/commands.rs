@@ -7,6 +7,8 @@ pub(crate) mod chaos;
 pub(crate) mod check;
 #[cfg(feature = "tools")]
 pub(crate) mod command_line;
+#[cfg(feature = "tools")]
+pub(crate) mod consumer;
 mod directories;
 pub(crate) mod echo;
 #[cfg(feature = "tools")]

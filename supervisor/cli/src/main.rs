@@ -25,7 +25,8 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use commands::sim;
 #[cfg(feature = "tools")]
 use commands::{
-    chaos, command_line, evaluate, experiments, field, latency, replay, replay_log, report, top,
+    chaos, command_line, consumer, evaluate, experiments, field, latency, replay, replay_log,
+    report, top,
 };
 use commands::{
     check, echo, exit_code, fault, help, hz, install, list, logs, missions, operate, other_user,
@@ -89,6 +90,8 @@ enum Command {
     Fault(fault::Arguments),
     #[cfg(feature = "tools")]
     Chaos(chaos::Arguments),
+    #[cfg(feature = "tools")]
+    Consumer(consumer::Arguments),
     Install(install::Arguments),
     Topics(tables::TopicArguments),
     Stages(tables::StageArguments),
@@ -169,6 +172,8 @@ fn main() -> ExitCode {
         Command::Fault(arguments) => fault::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Chaos(arguments) => chaos::main(&arguments),
+        #[cfg(feature = "tools")]
+        Command::Consumer(arguments) => consumer::main(&arguments),
         Command::Install(arguments) => install::main(&arguments),
         Command::Topics(arguments) => tables::topics(&arguments),
         Command::Stages(arguments) => tables::stages(&arguments),

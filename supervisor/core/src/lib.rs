@@ -61,6 +61,7 @@ mod descriptors;
 pub mod domain;
 mod domain_error;
 mod error;
+pub mod executable;
 mod judge;
 mod last_resort;
 mod lead;

@@ -1,13 +1,11 @@
 //! The executable that a mission names for the planner: found, checked and made absolute before anything starts.
 
-use std::{
-    env, io,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use common::mission::Mission;
-use rustix::fs::{Access, access};
 use thiserror::Error;
+
+use crate::executable::{self, ExecutableError};
 
 /// The planner that a mission names cannot be started.
 #[derive(Debug, Error)]
@@ -16,7 +14,7 @@ use thiserror::Error;
 )]
 pub struct PlannerExecutableError {
     named: PathBuf,
-    problem: String,
+    problem: ExecutableError,
 }
 
 /// Make the `planner.executable` of `mission` absolute, if it names one.
@@ -36,53 +34,16 @@ pub fn resolve(mission: &mut Mission) -> Result<(), PlannerExecutableError> {
 /// # Errors
 /// When there is none, or it cannot be executed.
 pub fn find(named: &Path) -> Result<PathBuf, PlannerExecutableError> {
-    let failed = |problem: String| PlannerExecutableError {
+    executable::find(named).map_err(|problem| PlannerExecutableError {
         named: named.to_path_buf(),
         problem,
-    };
-    let is_name = named.components().count() == 1 && !named.is_absolute();
-    let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
-    let found = if is_name {
-        let found = folders().map(|folder| folder.join(named));
-        let found = found.into_iter().find(|candidate| check(candidate).is_ok());
-        found.ok_or_else(|| failed("it is neither beside firsthand nor on PATH".to_owned()))?
-    } else {
-        let absolute = std::path::absolute(named).map_err(|error| failed(error.to_string()))?;
-        check(&absolute).map_err(|error| failed(error.to_string()))?;
-        absolute
-    };
-    if found.to_str().is_none() {
-        return Err(failed("its path is not UTF-8".to_owned()));
-    }
-    Ok(found)
-}
-
-/// Where a name alone is looked for, in order, as absolute paths.
-fn folders() -> impl Iterator<Item = PathBuf> {
-    let own = env::current_exe().ok();
-    let beside = own.and_then(|own| Some(own.parent()?.to_path_buf()));
-    let path = env::var_os("PATH").unwrap_or_default();
-    let path: Vec<_> = env::split_paths(&path)
-        .filter(|folder| folder.is_absolute())
-        .collect();
-    beside.into_iter().chain(path)
-}
-
-/// Whether this user may execute the file at `path`.
-fn check(path: &Path) -> io::Result<()> {
-    if path.metadata()?.is_dir() {
-        return Err(io::ErrorKind::IsADirectory.into());
-    }
-    access(path, Access::EXEC_OK).map_err(|errno| match errno {
-        rustix::io::Errno::ACCESS => io::Error::other("it is not executable (chmod +x)"),
-        errno => errno.into(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::{fs, os::unix::fs::PermissionsExt as _};
+    use std::{env, fs, os::unix::fs::PermissionsExt as _};
 
     fn resolved(named: &Path) -> Result<PathBuf, String> {
         let text = format!("target = [1, 0]\nplanner.executable = {named:?}");

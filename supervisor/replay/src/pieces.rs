@@ -39,16 +39,19 @@ impl std::fmt::Display for Broken {
 }
 
 impl Pieces {
-    /// The next piece came.
+    /// The next piece came. One that came already says nothing: a recorder that joins a bus again gets the last one twice.
     pub(crate) fn push(&mut self, sequence: u32, piece: &[u8]) -> Result<(), Broken> {
+        if sequence < self.next {
+            return Ok(());
+        }
         if sequence != self.next {
             return Err(if self.next == 0 {
                 Broken::NoBeginning(sequence)
             } else {
-                Broken::Missing(self.next - 1, sequence.saturating_sub(self.next))
+                Broken::Missing(self.next - 1, sequence - self.next)
             });
         }
-        self.next = sequence.wrapping_add(1);
+        self.next = sequence.saturating_add(1);
         self.bytes.drain(..self.given);
         self.given = 0;
         self.bytes.extend_from_slice(piece);
@@ -97,6 +100,16 @@ mod tests {
             }
             assert_eq!(found, entries);
         }
+    }
+
+    #[test]
+    fn a_piece_that_was_recorded_twice_counts_once() {
+        let mut pieces = Pieces::default();
+        for (sequence, piece) in [(0, &[1, 0, 0][..]), (0, &[1, 0, 0]), (1, &[0, 7]), (0, &[1])] {
+            pieces.push(sequence, piece).unwrap();
+        }
+        assert_eq!(pieces.entry(), Ok(Some(vec![7])));
+        assert_eq!(pieces.entry(), Ok(None));
     }
 
     #[test]

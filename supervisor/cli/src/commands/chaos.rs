@@ -1,6 +1,6 @@
 //! `firsthand chaos`: signals to random stages at random times, and what became of the missions.
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission};
@@ -8,7 +8,7 @@ use common::{clock::Pace, domain::RobotName, mission::Mission};
 use super::{Failure, missions, print_text};
 use crate::progress_line::write_stderr;
 use chaos::{
-    FaultOptions, Options,
+    Consumer, FaultOptions, GivenConsumer, Options,
     robot_fault::{RobotFault, TABLE},
 };
 
@@ -31,6 +31,13 @@ pub(crate) struct Arguments {
     /// of its own, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     include_supervisor: bool,
+    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `top` (without terminals
+    /// `hz`) and `logs -f`.
+    #[arg(long, conflicts_with = "robot_faults")]
+    include_consumers: bool,
+    /// Do that to a consumer of yours: a program and its arguments, read without a shell. As often as needed.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
+    consumer: Vec<GivenConsumer>,
     /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals: as a machine that stands still.
     #[arg(long)]
     freeze_all: bool,
@@ -43,6 +50,9 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Keep a row for each signal in DIR/signals.csv, as it is measured, and at the end DIR/report.html.
+    #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
+    out: Option<PathBuf>,
     /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "chaos")]
     robot: RobotName,
@@ -114,7 +124,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let options = options(arguments, loaded, set, pace)?;
     let directory = options.directory.clone();
     let ended = chaos::run(&options, &mut |report| {
-        let (kills, missions) = (report.kills(), report.missions());
+        let (kills, missions) = (report.signals(), report.missions());
         write_stderr(&format!(
             "{kills} of {} signals, {missions} missions\n",
             options.kills
@@ -123,9 +133,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let report = match ended {
         Ok(report) => report,
         Err(error) => {
-            return Err(format!("{error}; see {}", directory.display()).into());
+            // An empty directory tells nothing.
+            return Err(match std::fs::remove_dir(&directory) {
+                Ok(()) => error.into(),
+                Err(_) => format!("{error}; see {}", directory.display()).into(),
+            });
         }
     };
+    if let Some(out) = &arguments.out {
+        let page = out.join(chaos::PAGE);
+        write_stderr(&format!("results: {}\n", page.display()));
+    }
     if report.is_right() {
         std::fs::remove_dir_all(&directory)?;
     } else {
@@ -156,6 +174,8 @@ fn options(
     let directory = std::env::temp_dir().join(format!("firsthand-chaos-{}", std::process::id()));
     std::fs::create_dir(&directory)
         .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
+    let given = arguments.consumer.iter().cloned().map(Consumer::Given);
+    let own = arguments.include_consumers.then(Consumer::own);
     Ok(Options {
         mission: arguments.mission.clone(),
         loaded,
@@ -168,6 +188,8 @@ fn options(
         startup: arguments.include_startup,
         freeze_all: arguments.freeze_all,
         replay: arguments.replay,
+        consumers: own.into_iter().flatten().chain(given).collect(),
+        out: arguments.out.clone(),
         directory,
     })
 }

@@ -1,0 +1,47 @@
+//! How a process is hit.
+
+use rustix::process::Signal;
+use serde::{Deserialize, Serialize};
+
+/// How a process is hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Kind {
+    /// SIGKILL.
+    Kill,
+    /// SIGKILL in the first milliseconds of a generation.
+    KillAtStart,
+    /// SIGABRT, as a panic of a program that cannot unwind. Not SIGSEGV: Rust's runtime takes the first for an
+    /// overflow of the stack, finds none, and goes on.
+    Crash,
+    /// SIGTERM.
+    Terminate,
+    /// SIGSTOP: it hangs.
+    Freeze,
+    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
+    FreezeAll,
+}
+
+impl Kind {
+    /// The signal.
+    pub(crate) const fn signal(self) -> Signal {
+        match self {
+            Self::Kill | Self::KillAtStart => Signal::KILL,
+            Self::Crash => Signal::ABORT,
+            Self::Terminate => Signal::TERM,
+            Self::Freeze | Self::FreezeAll => Signal::STOP,
+        }
+    }
+
+    /// In words.
+    pub(crate) const fn as_str(self) -> &'static str {
+        match self {
+            Self::Kill => "killed",
+            Self::KillAtStart => "killed at start",
+            Self::Crash => "crashed",
+            Self::Terminate => "terminated",
+            Self::Freeze => "frozen",
+            Self::FreezeAll => "all frozen together",
+        }
+    }
+}

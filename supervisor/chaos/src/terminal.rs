@@ -1,0 +1,45 @@
+//! A terminal without a person, for a program that draws on one.
+
+use std::{
+    fs::File,
+    io::{self, Read as _},
+    os::{fd::OwnedFd, unix::fs::OpenOptionsExt as _},
+};
+
+use rustix::{
+    fs::OFlags,
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    termios::{Winsize, tcsetwinsize},
+};
+
+/// Lines and columns.
+const SIZE: Winsize = Winsize {
+    ws_row: 24,
+    ws_col: 80,
+    ws_xpixel: 0,
+    ws_ypixel: 0,
+};
+
+/// Both ends of a terminal: who holds the first reads what is drawn on the second.
+pub(crate) fn open() -> io::Result<(File, File)> {
+    let reads: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+    grantpt(&reads)?;
+    unlockpt(&reads)?;
+    tcsetwinsize(&reads, SIZE)?;
+    let name = ptsname(&reads, Vec::new())?;
+    let name = name.to_str().map_err(io::Error::other)?;
+    let mut draws = File::options();
+    // It does not become the terminal that controls this process.
+    draws.read(true).write(true);
+    draws.custom_flags(OFlags::NOCTTY.bits().cast_signed());
+    let draws = draws.open(name)?;
+    Ok((reads.into(), draws))
+}
+
+/// Read, by a thread, whatever is drawn, until nobody draws any more.
+pub(crate) fn read_all(mut reads: File) {
+    std::thread::spawn(move || {
+        let mut some = [0; 4096];
+        while reads.read(&mut some).is_ok_and(|count| count > 0) {}
+    });
+}

@@ -1,0 +1,184 @@
+//! `firsthand chaos` through real processes: its table of signals, its page, and consumers that are hit.
+
+use std::{fs, process::Stdio, time::Instant};
+
+use serde_json::Value;
+
+use crate::support::{PATIENCE, assert_nothing_left, firsthand, output, status_of};
+
+/// A machine with other work may take its time.
+const SLOW: [&str; 2] = ["--set", "timeout_s=600"];
+
+fn number(value: &Value) -> u64 {
+    value.as_u64().unwrap_or_default()
+}
+
+/// The sum of all numbers in an object of objects.
+fn sum(of: &Value) -> u64 {
+    let objects = of.as_object().unwrap().values();
+    let counts = objects.flat_map(|counts| counts.as_object().unwrap().values());
+    counts.map(number).sum()
+}
+
+/// Command lines of processes that contain `mark`.
+fn processes(mark: &str) -> Vec<String> {
+    let entries = fs::read_dir("/proc").unwrap().flatten();
+    let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
+    let lines = lines.map(|line| String::from_utf8_lossy(&line).replace('\0', " "));
+    lines.filter(|line| line.contains(mark)).collect()
+}
+
+#[test]
+fn each_signal_of_chaos_is_a_row_of_its_table_and_the_page_draws_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("results");
+    let arguments = ["chaos", "open-room", "--kills", "12", "--include-startup"];
+    let robot = [
+        "--robot",
+        "chd-rows",
+        "--json",
+        "--out",
+        out.to_str().unwrap(),
+    ];
+    let ended = output(&[&arguments[..], &robot, &SLOW].concat());
+    let report: Value =
+        serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
+    assert_eq!(ended.status.code(), Some(0), "{report}");
+    let table = fs::read_to_string(out.join("signals.csv")).unwrap();
+    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    assert_eq!(header[..4], ["mission", "time_s", "stage", "kind"]);
+    let rows: Vec<_> = rows.collect();
+    assert_eq!(rows.len() as u64, sum(&report["kills"]), "{table}");
+    for (stage, kinds) in report["kills"].as_object().unwrap() {
+        for (kind, count) in kinds.as_object().unwrap() {
+            let its = rows.iter().filter(|row| row[2] == stage && row[3] == kind);
+            assert_eq!(its.count() as u64, number(count), "{stage} {kind}: {table}");
+        }
+    }
+    let column = |name| header.iter().position(|it| *it == name).unwrap();
+    let measured = |name| {
+        let cells = rows
+            .iter()
+            .filter_map(|row| row[column(name)].parse::<f64>().ok());
+        cells.count()
+    };
+    assert_eq!(measured("time_s"), rows.len(), "{table}");
+    for name in ["noticed_ms", "ready_ms", "first_output_ms"] {
+        assert!(measured(name) >= rows.len() / 2, "{name}: {table}");
+    }
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(
+        page.contains("Recovery of") && page.ends_with("</html>\n"),
+        "{page}"
+    );
+    assert!(
+        !page.contains("http") && !page.contains("src="),
+        "it refers to something"
+    );
+    assert_nothing_left("chd-rows");
+}
+
+#[test]
+fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_nothing() {
+    let given = format!(
+        "'{}' echo pose --robot chd-hit",
+        env!("CARGO_BIN_EXE_firsthand")
+    );
+    let arguments = [
+        "chaos",
+        "open-room",
+        "--kills",
+        "30",
+        "--include-consumers",
+        "--replay",
+    ];
+    let robot = ["--robot", "chd-hit", "--json", "--consumer", &given];
+    let ended = output(&[&arguments[..], &robot, &SLOW].concat());
+    let report: Value =
+        serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
+    assert_eq!(ended.status.code(), Some(0), "{report}");
+    assert_eq!(report["reached"], report["missions"], "{report}");
+    assert_eq!(report["leftovers"], 0, "{report}");
+    let consumers = &report["consumers"];
+    for name in ["record", "logs -f", &given] {
+        let counts = &consumers[name];
+        // It was started again after each kill.
+        assert!(
+            number(&counts["started"]) > number(&counts["killed"]),
+            "{name}: {report}"
+        );
+    }
+    let hit = |counts: &Value| number(&counts["killed"]) + number(&counts["frozen"]);
+    let hits: u64 = consumers.as_object().unwrap().values().map(hit).sum();
+    assert!(hits >= 5, "{report}");
+    assert!(hits + sum(&report["kills"]) >= 30, "{report}");
+    // What is in the recordings of such recorders was replayed, and what is not is told.
+    let partial = &report["replays"]["partial"];
+    assert!(number(&partial["equal"]) > 0, "{report}");
+    assert!(partial["not_replayed"].is_u64(), "{report}");
+    assert_nothing_left("chd-hit");
+    assert_eq!(processes("chd-hit"), Vec::<String>::new());
+}
+
+#[test]
+fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let given = format!(
+        "'{}' echo pose --robot chd-cut",
+        env!("CARGO_BIN_EXE_firsthand")
+    );
+    let mut chaos = firsthand(&["chaos", "obstacle-course", "--robot", "chd-cut", "--out"])
+        .arg(directory.path())
+        .args(["--consumer", &given])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let file = directory.path().join("signals.csv");
+    let rows = || fs::read_to_string(&file).unwrap_or_default();
+    let began = Instant::now();
+    while rows().lines().count() < 4 {
+        assert!(began.elapsed() < PATIENCE, "{}", rows());
+        assert_eq!(chaos.try_wait().unwrap(), None);
+        // Each answer waits for what the supervisor publishes next.
+        status_of("chd-cut");
+    }
+    chaos.kill().unwrap();
+    chaos.wait().unwrap();
+    let table = rows();
+    let columns = |row: &str| row.matches(',').count();
+    assert!(
+        table.ends_with('\n') && table.lines().all(|row| columns(row) == 10),
+        "{table}"
+    );
+    let left = std::env::temp_dir().join(format!("firsthand-chaos-{}", chaos.id()));
+    let marks = ["chd-cut", left.to_str().unwrap()];
+    let began = Instant::now();
+    while marks.iter().any(|mark| !processes(mark).is_empty()) {
+        assert!(began.elapsed() < PATIENCE, "{:?}", marks.map(processes));
+    }
+    fs::remove_dir_all(left).unwrap();
+}
+
+#[test]
+fn a_consumer_that_cannot_be_started_and_results_that_are_there_are_refused_with_the_remedy() {
+    let refused = output(&["chaos", "--consumer", "no-such-logger x80"]);
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    for part in ["no-such-logger x80", "nor on PATH", "give a program"] {
+        assert!(said.contains(part), "{said}");
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("signals.csv");
+    fs::write(&file, "of before\n").unwrap();
+    let out = directory.path().to_str().unwrap();
+    let refused = output(&["chaos", "--robot", "chd-there", "--out", out]);
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("signals.csv") && said.contains("another directory"),
+        "{said}"
+    );
+    assert_eq!(fs::read_to_string(&file).unwrap(), "of before\n");
+}
