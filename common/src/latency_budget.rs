@@ -15,7 +15,7 @@ use crate::clock::monotonic_ns;
 /// The environment variable that asks for it; its value does not matter.
 pub const ASKED_FOR: &str = "FIRSTHAND_LATENCY_BUDGET";
 
-/// The times of so many ticks are kept, of 64 bytes each.
+/// The times of so many ticks are kept, of 72 bytes each.
 const MOST_TICKS: usize = 1 << 16;
 
 /// What a stage's shell spends time on in a tick, in the order of the columns of a file.

@@ -2,7 +2,7 @@
 //!
 //! A process killed between the two has published a pose that its state does not hold. That is safe: the counts are
 //! cumulative and the link's last sample stays on the bus, so the successor computes the same pose again from the state
-//! before, or, where the next tick has come, the way of both ticks from the counts of the second. Where the counts
+//! before, or, where the next tick has come, the way of both ticks as one arc, a millimetre or two off. Where the counts
 //! begin, at the first tick or when the robot began them anew, the state before says nothing of them: there it is saved
 //! first. A run that is resumed after all its processes were killed just there counts that tick again.
 

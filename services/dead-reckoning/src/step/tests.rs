@@ -211,12 +211,12 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     let mut again = successor();
     assert_eq!(again.take(&wheels(2, 190, 200)), published);
     assert_eq!(again.state(), killed.state());
-    // The next one has come meanwhile: nothing of the way is lost.
+    // The next one has come meanwhile: nothing of the way is lost, but 127 mm are one arc in place of two.
     let (got, want) = (
         successor().take(&wheels(3, 280, 310)),
         killed.take(&wheels(3, 280, 310)),
     );
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);
-    assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 1e-3);
+    assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 2e-3);
 }
