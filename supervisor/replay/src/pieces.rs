@@ -105,7 +105,12 @@ mod tests {
     #[test]
     fn a_piece_that_was_recorded_twice_counts_once() {
         let mut pieces = Pieces::default();
-        for (sequence, piece) in [(0, &[1, 0, 0][..]), (0, &[1, 0, 0]), (1, &[0, 7]), (0, &[1])] {
+        for (sequence, piece) in [
+            (0, &[1, 0, 0][..]),
+            (0, &[1, 0, 0]),
+            (1, &[0, 7]),
+            (0, &[1]),
+        ] {
             pieces.push(sequence, piece).unwrap();
         }
         assert_eq!(pieces.entry(), Ok(Some(vec![7])));
