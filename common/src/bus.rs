@@ -39,14 +39,14 @@ mod spec;
 mod topic;
 mod write;
 
-pub(crate) use self::layout::{kind_of, layouts};
+pub(crate) use self::layout::layouts;
 pub use self::{
     any::{AnyReader, AnySample, ReadableTopic},
     encoded::{EncodedReader, EncodedTopic},
     error::BusError,
     layout::{
         Field, Kind, Layout, Structure, Value, decode_sample, decode_slice, encode_sample,
-        encode_slice,
+        encode_slice, kind_of,
     },
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, ZeroCopySend},

@@ -127,7 +127,8 @@ pub struct Field {
 
 impl Structure {
     /// Of `P`, which has these fields.
-    pub(crate) fn of<P: Payload>(fields: Vec<Field>) -> Kind {
+    #[must_use]
+    pub fn of<P: Payload>(fields: Vec<Field>) -> Kind {
         Kind::Struct(Self {
             name: type_name::<P>(),
             size: size_of::<P>(),
@@ -137,7 +138,8 @@ impl Structure {
 }
 
 /// What the field is that a struct's accessor gives.
-pub(crate) fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
+#[must_use]
+pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
     F::kind()
 }
 
@@ -217,7 +219,8 @@ impl<T: Layout + Default, const N: usize> Layout for [T; N] {
     }
 }
 
-/// The fields of structs, all of them: one that is missing here does not compile.
+/// The fields of payloads, all of them: one that is missing here does not compile.
+#[macro_export]
 macro_rules! layouts {
     ($($payload:ident { $($field:ident)* })*) => {$(
         impl $crate::bus::Layout for $payload {

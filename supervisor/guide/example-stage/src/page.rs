@@ -9,7 +9,7 @@ fn block(caption: &str) -> &'static str {
 }
 
 #[test]
-fn the_page_shows_step_tests_and_shell_as_they_are() {
+fn the_page_shows_step_tests_replay_and_shell_as_they_are() {
     let shown = |file: &str| block(&format!("New file `services/odometer/src/{file}`:"));
     assert_eq!(shown("step.rs"), include_str!("step.rs"));
     assert_eq!(shown("step/tests.rs"), include_str!("step/tests.rs"));
@@ -22,6 +22,17 @@ fn the_page_shows_step_tests_and_shell_as_they_are() {
         .replace("    topics::POSE,", "    topics::{DISTANCE, POSE},")
         .replace("use crate::rows::{DISTANCE, DistanceSample};\n", "");
     assert_eq!(shown("shell.rs"), shell);
+    let replay = include_str!("replay.rs")
+        .replace(
+            "    samples::PoseSample,",
+            "    samples::{DistanceSample, PoseSample},",
+        )
+        .replace(
+            "    step::Step as _,\n",
+            "    step::Step as _,\n    topics::DISTANCE,\n",
+        )
+        .replace("use crate::rows::{DISTANCE, DistanceSample};\n", "");
+    assert_eq!(shown("replay.rs"), replay);
 }
 
 #[test]

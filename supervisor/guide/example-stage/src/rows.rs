@@ -32,6 +32,10 @@ impl Stamped for DistanceSample {
     }
 }
 
+common::layouts! {
+    DistanceSample { stamp driven_m moving_s }
+}
+
 /// Metres driven and seconds in motion.
 pub static DISTANCE: Topic<DistanceSample> = Topic::new(&Spec {
     name: "distance",

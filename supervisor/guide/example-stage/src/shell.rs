@@ -3,6 +3,7 @@
 use common::{
     bus::{Reader, Writer},
     checkpoint::Checkpoint,
+    inputs::InputLog,
     samples::PoseSample,
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
@@ -10,7 +11,10 @@ use common::{
 };
 
 use crate::rows::{DISTANCE, DistanceSample};
-use crate::step::{Odometer, State};
+use crate::{
+    replay::{Input, sample},
+    step::{Odometer, State},
+};
 
 /// Room for the encoded state, bytes: it is under 60.
 const CHECKPOINT_CAPACITY: usize = 128;
@@ -21,6 +25,7 @@ pub struct Shell {
     pose: Reader<PoseSample>,
     distance: Writer<DistanceSample>,
     checkpoint: Checkpoint,
+    inputs: InputLog,
     odometer: Odometer,
     progress: Progress,
 }
@@ -30,6 +35,7 @@ impl Process for Shell {
         let mut odometer = Odometer::new(&context.run.mission);
         let (checkpoint, saved) =
             Checkpoint::open::<State>(&context.checkpoint_file(), CHECKPOINT_CAPACITY)?;
+        let inputs = InputLog::begin(context, &saved)?;
         if let Some(state) = saved {
             match odometer.restore(state) {
                 Ok(()) => tracing::info!(?state, "distance restored"),
@@ -41,6 +47,7 @@ impl Process for Shell {
             pose: context.bus.reader(&POSE)?,
             distance: context.bus.writer(&DISTANCE, context.generation.number)?,
             checkpoint,
+            inputs,
             odometer,
             progress: Progress::default(),
         })
@@ -49,15 +56,12 @@ impl Process for Shell {
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.pose.take()? {
             let (tick, time) = (pose.stamp.tick, pose.stamp.time());
+            self.progress = Progress { tick, time };
+            self.inputs.note(&Input { pose }, self.progress)?;
             let sums = self.odometer.step(&pose, time);
             self.checkpoint.save(self.odometer.state())?;
-            self.progress = Progress { tick, time };
-            let sample = DistanceSample {
-                driven_m: sums.driven_m,
-                moving_s: sums.moving_s,
-                ..DistanceSample::default()
-            };
-            self.distance.publish(tick, time, sample)?;
+            self.inputs.publish(self.progress)?;
+            self.distance.publish(tick, time, sample(sums))?;
         }
         Ok(self.progress)
     }
