@@ -222,18 +222,10 @@ impl Recording {
         topic: &'static Topic<P>,
     ) -> Result<impl Iterator<Item = Result<Sample<P>, RecordingError>> + use<P>, RecordingError>
     {
-        let file = self.path.clone();
-        let messages = self.messages(&[topic.spec().name])?;
-        Ok(messages.map(move |message| {
-            let Message {
-                log_ns,
-                data,
-                topic,
-                ..
-            } = message?;
-            let sample = decode_sample(&data).ok_or_else(|| foreign(&file, &topic))?;
-            Ok(Sample { log_ns, sample })
-        }))
+        self.decoded(topic.spec().name, |log_ns, data| {
+            let sample = decode_sample(data)?;
+            Some(Sample { log_ns, sample })
+        })
     }
 
     /// The headers and slices of `topic`, in the order of the file.
@@ -247,8 +239,24 @@ impl Recording {
         impl Iterator<Item = Result<SliceSample<H, T>, RecordingError>> + use<H, T>,
         RecordingError,
     > {
+        self.decoded(topic.spec().name, |log_ns, data| {
+            let (header, elements) = decode_slice(data)?;
+            Some(SliceSample {
+                log_ns,
+                header,
+                elements,
+            })
+        })
+    }
+
+    /// What `decode` makes of the messages of `topic`, given their times and data.
+    fn decoded<S, D: Fn(u64, &[u8]) -> Option<S>>(
+        &self,
+        topic: &str,
+        decode: D,
+    ) -> Result<impl Iterator<Item = Result<S, RecordingError>> + use<S, D>, RecordingError> {
         let file = self.path.clone();
-        let messages = self.messages(&[topic.spec().name])?;
+        let messages = self.messages(&[topic])?;
         Ok(messages.map(move |message| {
             let Message {
                 log_ns,
@@ -256,21 +264,11 @@ impl Recording {
                 topic,
                 ..
             } = message?;
-            let decoded = decode_slice(&data).ok_or_else(|| foreign(&file, &topic))?;
-            let (header, elements) = decoded;
-            Ok(SliceSample {
-                log_ns,
-                header,
-                elements,
+            decode(log_ns, &data).ok_or_else(|| RecordingError::Message {
+                file: file.clone(),
+                topic: topic.to_string(),
             })
         }))
-    }
-}
-
-fn foreign(file: &Path, topic: &str) -> RecordingError {
-    RecordingError::Message {
-        file: file.to_path_buf(),
-        topic: topic.to_owned(),
     }
 }
 

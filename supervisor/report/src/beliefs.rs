@@ -9,6 +9,8 @@ use common::{
 };
 use planner::step::{Input, Planner};
 
+use crate::kept::drop_every_second;
+
 /// At most so many maps are kept. When there are more, every second one is dropped, and from then on half as many are taken.
 const MOST: usize = 8;
 /// From one to the next at first, seconds of mission time.
@@ -82,11 +84,7 @@ impl Beliefs {
             return;
         }
         if self.kept.len() == MOST {
-            let mut nth = 0;
-            self.kept.retain(|_| {
-                nth += 1;
-                nth % 2 == 1
-            });
+            drop_every_second(&mut self.kept);
             self.apart_s *= 2.0;
         }
         self.kept.extend(Belief::of(header, grid));

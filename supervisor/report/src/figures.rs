@@ -26,8 +26,12 @@ pub(crate) struct Figure {
 /// All figures, in the order of the page.
 pub(crate) fn all(content: &Content) -> Vec<Figure> {
     let [first, second] = wheels(content);
-    let mut all = vec![trajectory(content)];
-    all.extend(map_and_field(content));
+    let end = Belief::of(&content.grid_header, &content.grid);
+    let field = end
+        .as_ref()
+        .and_then(|belief| belief.field(&content.mission));
+    let mut all = vec![trajectory(content, end.as_ref(), field.as_ref())];
+    all.extend(map_and_field(content, end.as_ref(), field.as_ref()));
     all.extend([
         timeline(content),
         sonar(content),
@@ -106,13 +110,10 @@ fn path(poses: &[PoseSample]) -> Vec<Pose2> {
     poses.iter().map(PoseSample::pose).collect()
 }
 
-fn trajectory(content: &Content) -> Figure {
+/// With the map at the `end`, and its `field`.
+fn trajectory(content: &Content, end: Option<&Belief>, field: Option<&Vec<FieldCell>>) -> Figure {
     let poses = path(content.poses.items());
-    let belief = Belief::of(&content.grid_header, &content.grid);
-    let field = belief
-        .as_ref()
-        .and_then(|belief| belief.field(&content.mission));
-    let mut scene = scene(content, belief.as_ref(), field.as_ref(), &poses);
+    let mut scene = scene(content, end, field, &poses);
     scene.covariance = content.measured.last_pose().map(|pose| {
         let [xx, xy, _, yy, ..] = pose.covariance;
         [xx, xy, yy]
@@ -132,23 +133,32 @@ fn trajectory(content: &Content) -> Figure {
     }
 }
 
-/// Map and field on the way and at the end; none of a run in which no map was recorded on the way.
-fn map_and_field(content: &Content) -> Option<Figure> {
-    let end = Belief::of(&content.grid_header, &content.grid)?;
-    let mut beliefs = content.beliefs.on_the_way(content.duration_s());
-    if beliefs.is_empty() {
+/// Map and field on the way and at the `end`; none of a run in which no map was recorded on the way.
+fn map_and_field(
+    content: &Content,
+    end: Option<&Belief>,
+    field: Option<&Vec<FieldCell>>,
+) -> Option<Figure> {
+    let on_the_way = content.beliefs.on_the_way(content.duration_s());
+    if on_the_way.is_empty() {
         return None;
     }
-    beliefs.push(&end);
     let samples = content.poses.items();
-    let drawn = beliefs.iter().map(|belief| {
-        let until = samples.partition_point(|pose| seconds(&pose.stamp) <= belief.time_s);
-        (belief.field(&content.mission), path(&samples[..until]))
-    });
-    let drawn: Vec<_> = drawn.collect();
-    let panels = beliefs.iter().zip(&drawn).map(|(belief, (field, poses))| {
+    let until = |belief: &Belief| {
+        let end = samples.partition_point(|pose| seconds(&pose.stamp) <= belief.time_s);
+        path(&samples[..end])
+    };
+    let solved = on_the_way
+        .iter()
+        .map(|belief| belief.field(&content.mission));
+    let solved: Vec<_> = solved.collect();
+    let fields = solved.iter().map(Option::as_ref).chain([field]);
+    let beliefs: Vec<_> = on_the_way.into_iter().chain(end).collect();
+    let paths: Vec<_> = beliefs.iter().map(|belief| until(belief)).collect();
+    let panels = beliefs.iter().zip(fields).zip(&paths);
+    let panels = panels.map(|((belief, field), poses)| {
         let title = format!("{:.0} s", belief.time_s);
-        (title, scene(content, Some(belief), field.as_ref(), poses))
+        (title, scene(content, Some(belief), field, poses))
     });
     Some(Figure {
         name: "map-and-field",

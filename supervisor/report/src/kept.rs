@@ -3,6 +3,15 @@
 /// At most so many samples of a kind are kept.
 const MOST: usize = 20_000;
 
+/// Of those from the first on every second one is left.
+pub(crate) fn drop_every_second<T>(items: &mut Vec<T>) {
+    let mut nth = 0;
+    items.retain(|_| {
+        nth += 1;
+        nth % 2 == 1
+    });
+}
+
 /// Samples in the order in which they came. When there are too many, every second one is dropped, and from then on every
 /// second one is taken.
 #[derive(Clone, Debug)]
@@ -26,11 +35,7 @@ impl<T> Kept<T> {
     /// One came.
     pub(crate) fn push(&mut self, item: T) {
         if self.items.len() == MOST {
-            let mut nth = 0;
-            self.items.retain(|_| {
-                nth += 1;
-                nth % 2 == 1
-            });
+            drop_every_second(&mut self.items);
             self.stride = self.stride.saturating_mul(2);
         }
         if self.seen.is_multiple_of(self.stride) {
