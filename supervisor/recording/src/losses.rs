@@ -1,4 +1,4 @@
-//! Which samples did not come: the numbers of a writer's samples follow each other.
+//! Which samples did not come, and which came before: the numbers of a writer's samples follow each other.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -11,21 +11,28 @@ use common::{
 /// Bytes of the stamp in a message, behind the encoding's header.
 const STAMP: std::ops::Range<usize> = 4..28;
 
+/// The last sample of a writer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Last {
+    sequence: u32,
+    crc32: u32,
+}
+
 /// Counts what did not come, on one bus.
 #[derive(Debug, Default)]
 pub(crate) struct Losses {
-    /// The sample that is next, by topic, stage where every stage writes, and generation.
-    next: HashMap<(&'static str, Name, u32), u32>,
+    /// By topic, stage where every stage writes, and generation.
+    last: HashMap<(&'static str, Name, u32), Last>,
     counts: BTreeMap<&'static str, u64>,
     changed: bool,
 }
 
 impl Losses {
-    /// A sample came.
-    pub(crate) fn came(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) {
+    /// A sample came. Says whether it is new: whoever joins a bus again is given the last sample of each writer once more.
+    pub(crate) fn came(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> bool {
         // Each request is a process of its own.
         if spec.writer == OPERATOR {
-            return;
+            return true;
         }
         let stage = message.get(STAMP.end..).and_then(|rest| rest.first_chunk());
         let stage = stage.filter(|_| spec.writer == EVERY_STAGE);
@@ -34,19 +41,26 @@ impl Losses {
             stage.copied().unwrap_or_default(),
             stamp.generation,
         );
-        let next = self.next.insert(key, stamp.sequence.wrapping_add(1));
+        let now = Last {
+            sequence: stamp.sequence,
+            crc32: crc32fast::hash(message),
+        };
         // Whoever attaches late has lost nothing.
-        if let Some(missing) = next.and_then(|next| stamp.sequence.checked_sub(next))
-            && missing > 0
-        {
+        let Some(last) = self.last.insert(key, now) else {
+            return true;
+        };
+        let next = last.sequence.wrapping_add(1);
+        let missing = stamp.sequence.checked_sub(next);
+        if let Some(missing) = missing.filter(|missing| *missing > 0) {
             *self.counts.entry(spec.name).or_default() += u64::from(missing);
             self.changed = true;
         }
+        now != last
     }
 
     /// The bus was replaced: all writers begin again.
     pub(crate) fn begin_again(&mut self) {
-        self.next.clear();
+        self.last.clear();
     }
 
     /// How many of each topic, if that grew since this was last asked.
@@ -57,5 +71,40 @@ impl Losses {
     /// How many in all.
     pub(crate) fn total(&self) -> u64 {
         self.counts.values().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::topics::{AnyTopic as _, POSE};
+
+    use super::*;
+
+    fn stamp(sequence: u32) -> Stamp {
+        Stamp {
+            sequence,
+            generation: 1,
+            ..Stamp::default()
+        }
+    }
+
+    #[test]
+    fn a_sample_that_is_given_again_is_not_new_and_nothing_is_lost_by_it() {
+        let mut losses = Losses::default();
+        let pose = POSE.spec();
+        assert!(losses.came(pose, &stamp(7), b"seven"));
+        assert!(losses.came(pose, &stamp(8), b"eight"));
+        assert!(!losses.came(pose, &stamp(8), b"eight"));
+        assert!(losses.came(pose, &stamp(9), b"nine"));
+        assert_eq!(losses.total(), 0);
+    }
+
+    #[test]
+    fn samples_that_did_not_come_are_counted() {
+        let mut losses = Losses::default();
+        for sequence in [3, 4, 7] {
+            losses.came(POSE.spec(), &stamp(sequence), b"pose");
+        }
+        assert_eq!(losses.total(), 2);
     }
 }

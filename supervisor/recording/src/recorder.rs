@@ -244,7 +244,9 @@ impl CurrentRun {
                 let Some(stamp) = reader.take(&mut self.message)? else {
                     break;
                 };
-                self.losses.came(spec, &stamp, &self.message);
+                if !self.losses.came(spec, &stamp, &self.message) {
+                    continue;
+                }
                 file.sample(spec, &stamp, &self.message)?;
                 let began = file.began_ns();
                 if let Some((channel, stamp_ns, json)) =

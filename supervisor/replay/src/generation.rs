@@ -56,8 +56,6 @@ struct Channel {
     next: u32,
     computed: VecDeque<Computed>,
     recorded: VecDeque<(u32, Vec<u8>)>,
-    /// The sequence of the newest sample that was recorded.
-    newest: Option<u32>,
 }
 
 /// One generation.
@@ -186,11 +184,6 @@ impl Generation {
         self.worked = true;
         if !self.is_over() {
             let channel = self.channels.entry(topic.to_owned()).or_default();
-            // A recorder that joins a bus again gets the last sample of each topic once more.
-            if channel.newest.is_some_and(|newest| sequence <= newest) {
-                return;
-            }
-            channel.newest = Some(sequence);
             channel.recorded.push_back((sequence, message));
             self.compare(setting, topic);
         }
