@@ -11,7 +11,7 @@ use recording::{End, Recording};
 use replay::{Options, Report, replay};
 use rustix::process::Signal;
 
-use crate::support::{PATIENCE, Run, STAGES, assert_nothing_left, firsthand, output};
+use crate::support::{PATIENCE, Run, STAGES, assert_nothing_left, firsthand, golden, output};
 
 fn open(directory: &Path) -> Recording {
     Recording::open(&directory.join("run/recording.mcap")).unwrap()
@@ -142,15 +142,6 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     // The run's own recorder was not touched by that.
     assert_eq!(assert_all_equal(&replayed(&open(directory.path()))), 5);
     assert_nothing_left("rec-shot");
-}
-
-/// Seconds of a mission, committed.
-fn golden() -> Recording {
-    let file = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/golden/open-room.mcap"
-    );
-    Recording::open(file.as_ref()).unwrap()
 }
 
 /// After a change that is meant, record it again, from the top of the tree:

@@ -17,6 +17,7 @@ mod faults;
 mod field;
 mod foreign_payload;
 mod kills;
+mod live_replay;
 mod lying_robots;
 mod machine;
 mod missions;

@@ -42,7 +42,7 @@ mod write;
 pub(crate) use self::layout::layouts;
 pub use self::{
     any::{AnyReader, AnySample, ReadableTopic},
-    encoded::{EncodedReader, EncodedTopic},
+    encoded::{EncodedReader, EncodedTopic, EncodedWriter},
     error::BusError,
     layout::{
         Field, Kind, Layout, Structure, Value, decode_sample, decode_slice, encode_sample,

@@ -17,6 +17,7 @@ use std::{
 };
 
 use common::{domain::Domain, making::Making};
+use recording::Recording;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -221,6 +222,15 @@ pub fn records(file: &Path) -> Vec<Value> {
 /// A whole run.
 pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
     Run::start(robot, mission, arguments).finish()
+}
+
+/// Seconds of a mission, committed.
+pub fn golden() -> Recording {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/golden/open-room.mcap"
+    );
+    Recording::open(file.as_ref()).unwrap()
 }
 
 pub fn signal_process(pid: u32, signal: Signal) {

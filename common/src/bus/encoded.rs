@@ -1,21 +1,30 @@
-//! Readers of any topic, whose samples come encoded: for what keeps or passes samples on without knowing what they are.
+//! Readers and writers of any topic, whose samples come and go encoded: for what keeps, passes on or plays samples without
+//! knowing what they are.
 
 use super::{
     error::BusError,
-    layout::{Layout, encode_sample, encode_slice},
+    layout::{Layout, decode_sample, decode_slice, encode_sample, encode_slice},
     make::Bus,
     payload::{Payload, Stamp, Stamped},
     read::{Reader, SliceReader},
     topic::{AnyTopic, SliceTopic, Topic},
+    write::{SliceWriter, Writer},
 };
 
-/// A topic that can be read without knowing what it carries.
+/// A topic that can be read and written without knowing what it carries.
 pub trait EncodedTopic: AnyTopic {
     /// Read it, every generation's samples.
     ///
     /// # Errors
     /// As [`Bus::reader`].
     fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError>;
+
+    /// Write it: samples that were published before. A slice has at most `longest` elements.
+    ///
+    /// # Errors
+    /// As [`Bus::writer`].
+    fn encoded_writer(&self, bus: &Bus, longest: usize)
+    -> Result<Box<dyn EncodedWriter>, BusError>;
 }
 
 impl<P: Payload + Stamped + Layout> EncodedTopic for Topic<P> {
@@ -23,12 +32,26 @@ impl<P: Payload + Stamped + Layout> EncodedTopic for Topic<P> {
         let reader = bus.reader_that_keeps(self, self.spec().limits.recorder_buffer)?;
         Ok(Box::new(SampleReader(reader.of_all_generations())))
     }
+
+    fn encoded_writer(&self, bus: &Bus, _: usize) -> Result<Box<dyn EncodedWriter>, BusError> {
+        Ok(Box::new(SampleWriter(bus.writer(self, 0)?)))
+    }
 }
 
 impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedTopic for SliceTopic<H, T> {
     fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError> {
         let reader = bus.slice_reader_that_keeps(self, self.spec().limits.recorder_buffer)?;
         Ok(Box::new(SliceSampleReader(reader.of_all_generations())))
+    }
+
+    fn encoded_writer(
+        &self,
+        bus: &Bus,
+        longest: usize,
+    ) -> Result<Box<dyn EncodedWriter>, BusError> {
+        Ok(Box::new(SliceSampleWriter(
+            bus.slice_writer(self, 0, longest)?,
+        )))
     }
 }
 
@@ -65,5 +88,40 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedReader for Slice
             encode_slice(sample.header(), &sample, bytes);
             *sample.header().stamp()
         }))
+    }
+}
+
+/// Writes a topic, whatever it carries.
+pub trait EncodedWriter {
+    /// Publish the sample of `message` with the stamp that it has, and wake the readers. Says whether it is a message of this
+    /// topic.
+    ///
+    /// # Errors
+    /// As [`Writer::publish`], [`SliceWriter::publish`].
+    fn publish(&mut self, message: &[u8]) -> Result<bool, BusError>;
+}
+
+/// Of structs.
+struct SampleWriter<P: Payload>(Writer<P>);
+
+impl<P: Payload + Stamped + Layout> EncodedWriter for SampleWriter<P> {
+    fn publish(&mut self, message: &[u8]) -> Result<bool, BusError> {
+        let sample = decode_sample(message).map(|sample| self.0.publish_as_stamped(sample));
+        Ok(sample.transpose()?.is_some())
+    }
+}
+
+/// Of headers with slices.
+struct SliceSampleWriter<H: Payload, T: Payload>(SliceWriter<H, T>);
+
+impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedWriter for SliceSampleWriter<H, T> {
+    fn publish(&mut self, message: &[u8]) -> Result<bool, BusError> {
+        let Some((header, elements)) = decode_slice(message) else {
+            return Ok(false);
+        };
+        let elements: Vec<T> = elements;
+        self.0
+            .publish_as_stamped(header, elements.into_iter())
+            .map(|()| true)
     }
 }

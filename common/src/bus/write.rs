@@ -116,6 +116,16 @@ impl<P: Payload + Stamped> Writer<P> {
         mut payload: P,
     ) -> Result<(), BusError> {
         *payload.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
+        self.send(payload)
+    }
+
+    /// Publish `payload` with the stamp that it has, and wake the readers.
+    pub(super) fn publish_as_stamped(&self, payload: P) -> Result<(), BusError> {
+        self.send(payload)?;
+        self.wake()
+    }
+
+    fn send(&self, payload: P) -> Result<(), BusError> {
         self.publisher
             .send_copy(payload)
             .map(drop)
@@ -195,12 +205,25 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         cells: impl ExactSizeIterator<Item = T>,
     ) -> Result<(), BusError> {
         *header.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
+        self.send(header, cells)
+    }
+
+    /// Publish `header`, with the stamp that it has, and `cells`, and wake the readers.
+    pub(super) fn publish_as_stamped(
+        &self,
+        header: H,
+        cells: impl ExactSizeIterator<Item = T>,
+    ) -> Result<(), BusError> {
+        self.send(header, cells)?;
+        self.wake()
+    }
+
+    fn send(&self, header: H, mut cells: impl ExactSizeIterator<Item = T>) -> Result<(), BusError> {
         let mut sample = self
             .publisher
             .loan_slice_uninit(cells.len())
             .map_err(refused("publish on", self.topic))?;
         *sample.user_header_mut() = header;
-        let mut cells = cells;
         sample
             .write_from_fn(|_| cells.next().unwrap_or_default())
             .send()

@@ -67,7 +67,8 @@ pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, C
         let seed = options.seed + series.report.missions();
         let undisturbed = mission::undisturbed(options, seed)?;
         mission::attack(&mut series, seed, &undisturbed)?;
-        series.report.leftovers += leftovers::count(&options.robot, &options.directory);
+        let left = leftovers::find(&options.robot, &options.directory);
+        series.report.left_behind(left);
         show(&series.report);
     }
     series.report.end();

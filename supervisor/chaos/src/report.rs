@@ -15,6 +15,9 @@ use supervisor::stages::TABLE;
 /// What is hit where supervisor and stages are frozen together.
 pub(crate) const EVERYTHING: &str = "everything";
 
+/// So many of what outlived missions are named.
+const NAMED: usize = 20;
+
 /// The result of all missions under attack. Times in milliseconds.
 #[derive(Debug, Serialize)]
 pub struct Report {
@@ -40,6 +43,9 @@ pub struct Report {
     longest_stopping_time_s: f64,
     /// Files, shared memory, processes that outlived a mission.
     pub leftovers: usize,
+    /// The first of them: after which mission, and what.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    left_behind: Vec<String>,
     /// The most that a supervisor held more at its end than when its robot began to drive.
     supervisor_growth: Resources,
     /// What became of the missions' recordings, if they were replayed.
@@ -129,6 +135,7 @@ impl Report {
             worst_pose_kills: 0,
             longest_stopping_time_s: 0.0,
             leftovers: 0,
+            left_behind: Vec::new(),
             supervisor_growth: Resources::default(),
             replays: None,
             took_s: 0.0,
@@ -255,6 +262,16 @@ impl Report {
         self.wrong.is_empty() && replayed
     }
 
+    /// These outlived the mission that has just ended.
+    pub(crate) fn left_behind(&mut self, found: Vec<String>) {
+        self.leftovers += found.len();
+        let missing = NAMED.saturating_sub(self.left_behind.len());
+        let missions = self.missions;
+        let named = found.into_iter().take(missing);
+        let named = named.map(|what| format!("by mission {missions}: {what}"));
+        self.left_behind.extend(named);
+    }
+
     /// Whether every mission did, and left nothing behind.
     pub fn is_clean(&self) -> bool {
         self.is_right() && self.leftovers == 0
@@ -307,6 +324,9 @@ impl fmt::Display for Report {
         )?;
         for wrong in &self.wrong {
             writeln!(to, "  {wrong}")?;
+        }
+        for left in &self.left_behind {
+            writeln!(to, "  left behind {left}")?;
         }
         writeln!(
             to,

@@ -2,30 +2,11 @@
 
 use std::fmt;
 
-use common::topics::{self, AnyTopic};
+use common::topics::AnyTopic;
 use recording::{Message, Recording, RecordingError};
 use serde::Serialize;
 
-use crate::values;
-
-/// The topics of a tick, in the order in which one follows from the other.
-static COMPARED: [&dyn AnyTopic; 6] = [
-    &topics::RANGE,
-    &topics::WHEELS,
-    &topics::POSE,
-    &topics::GRID,
-    &topics::GUIDANCE,
-    &topics::COMMAND,
-];
-/// What a process measures of itself, or how often it was replaced: no two runs have the same.
-const OWN: [&str; 6] = [
-    "stamp.generation",
-    "stamp.sequence",
-    "full_solve_ns",
-    "local_update_ns",
-    "full_solves",
-    "local_updates",
-];
+use crate::samples::{COMPARED, First, difference, is_keyframe, tick_of};
 
 /// Where two recordings part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -38,23 +19,6 @@ pub struct Parting {
     pub first: Option<First>,
     /// Ticks that both have.
     pub ticks: u64,
-}
-
-/// The first difference.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct First {
-    /// The tick.
-    pub tick: u64,
-    /// Its mission time, seconds.
-    pub time_s: f64,
-    /// The first of the topics of that tick that differs.
-    pub topic: &'static str,
-    /// Who wrote it.
-    pub writer: &'static str,
-    /// The first field that does.
-    pub field: String,
-    /// Its value in both.
-    pub values: [String; 2],
 }
 
 /// Find where `first` and `second` part.
@@ -117,11 +81,11 @@ impl<I: Iterator<Item = Result<Message, RecordingError>>> Ticks<I> {
         for message in self.messages.by_ref() {
             let message = message?;
             // The whole map, published again for new readers, may come in any tick.
-            if self.slices && is_keyframe(&message) {
+            if self.slices && is_keyframe(&message.data) {
                 continue;
             }
             match &last {
-                Some(held) if tick_of(held) < tick_of(&message) => {
+                Some(held) if tick_of(&held.data) < tick_of(&message.data) => {
                     self.next = Some(message);
                     break;
                 }
@@ -131,20 +95,6 @@ impl<I: Iterator<Item = Result<Message, RecordingError>>> Ticks<I> {
         }
         Ok(last)
     }
-}
-
-fn tick_of(message: &Message) -> u64 {
-    number(message, 4)
-}
-
-fn number(message: &Message, at: usize) -> u64 {
-    let bytes = message.data.get(at..).and_then(|rest| rest.first_chunk());
-    bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes))
-}
-
-/// `keyframe` of a grid's part: behind stamp, version and five numbers.
-fn is_keyframe(message: &Message) -> bool {
-    message.data.get(4 + 24 + 8 + 20) == Some(&1)
 }
 
 fn first_in(
@@ -164,12 +114,12 @@ fn first_in(
     let mut both = 0;
     while let (Some(a), Some(b)) = (&left, &right) {
         // A sample that a recorder lost says nothing.
-        match tick_of(a).cmp(&tick_of(b)) {
+        match tick_of(&a.data).cmp(&tick_of(&b.data)) {
             std::cmp::Ordering::Less => left = one.tick()?,
             std::cmp::Ordering::Greater => right = other.tick()?,
             std::cmp::Ordering::Equal => {
                 both += 1;
-                if let Some(found) = difference(topic, a, b) {
+                if let Some(found) = difference(topic, &a.data, &b.data) {
                     return Ok((Some(found), both));
                 }
                 (left, right) = (one.tick()?, other.tick()?);
@@ -177,33 +127,6 @@ fn first_in(
         }
     }
     Ok((None, both))
-}
-
-fn difference(topic: &'static dyn AnyTopic, a: &Message, b: &Message) -> Option<First> {
-    // Behind the stamp's generation and sequence.
-    if a.data.get(..20) == b.data.get(..20) && a.data.get(28..) == b.data.get(28..) {
-        return None;
-    }
-    let own = |(field, _): &(String, String)| !OWN.iter().any(|own| field.ends_with(own));
-    let one: Vec<_> = values::of(topic, &a.data).into_iter().filter(own).collect();
-    let other: Vec<_> = values::of(topic, &b.data).into_iter().filter(own).collect();
-    let differs = one.iter().zip(&other).find(|(one, other)| one != other);
-    let (field, values) = match differs {
-        Some(((field, one), (_, other))) => (field.clone(), [one.clone(), other.clone()]),
-        None if one.len() == other.len() => return None,
-        None => (
-            "number of elements".to_owned(),
-            [one.len(), other.len()].map(|count| count.to_string()),
-        ),
-    };
-    Some(First {
-        tick: tick_of(a),
-        time_s: number(a, 12) as f64 * 1e-9,
-        topic: topic.spec().name,
-        writer: topic.spec().writer,
-        field,
-        values,
-    })
 }
 
 impl fmt::Display for Parting {

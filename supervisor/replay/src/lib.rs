@@ -12,12 +12,16 @@
 //! | [`driver`] | a recording, replayed |
 //! | [`values`] | the fields of a message, for words about a difference |
 //! | [`diff`] | where two recordings part |
+//! | `samples` | samples of a tick, and where two of them differ |
+//! | [`live`] | a recording played on a bus, with stages in processes of their own |
 
 pub mod diff;
 pub mod driver;
 mod generation;
+pub mod live;
 mod pieces;
 pub mod report;
+mod samples;
 pub mod values;
 
 pub use self::{

@@ -93,6 +93,28 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
     })
 }
 
+/// `mission`, which was recorded, with `KEY=VALUE` assignments on top; none where nothing is assigned.
+#[cfg(feature = "tools")]
+pub(crate) fn with(
+    mission: &Mission,
+    assignments: &[String],
+) -> Result<Option<Mission>, LookupError> {
+    if assignments.is_empty() {
+        return Ok(None);
+    }
+    let failed = |problem: String| LookupError::Assigned {
+        name: mission.name.clone(),
+        assignments: assignments.join(" --set "),
+        problem,
+    };
+    let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
+    let assigned = assign(table, assignments)?;
+    let mission = Mission::parse(&assigned, Path::new(&mission.name));
+    mission
+        .map(Some)
+        .map_err(|error| failed(error.without_place()))
+}
+
 /// `table` with every assignment made, as text.
 fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
     for assignment in assignments {

@@ -1,14 +1,26 @@
-//! `firsthand replay F.mcap`: every generation of a recording again, compared to the bit; `firsthand diff A.mcap B.mcap`.
+//! `firsthand replay F.mcap`: every generation of a recording again, compared to the bit; with `--live` on a bus, through
+//! processes; `firsthand diff A.mcap B.mcap`.
 
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use common::clock::{MissionTime, Pace};
+use common::{
+    clock::{MissionTime, Pace},
+    domain::RobotName,
+    signals::{SIGHUP, SIGINT, SIGTERM, Signals},
+};
 use recording::Recording;
-use replay::Options;
-use supervisor::stages;
+use replay::{
+    Options,
+    live::{self, Happened},
+};
+use supervisor::{
+    planner_executable,
+    stages::{self, Stage},
+};
 
-use super::{Failure, print_text};
+use super::{Failure, missions, print_text};
+use crate::progress_line::write_stderr;
 
 /// Replay a recording: feed each stage's generations what they took, and compare what comes out with what was recorded, to the
 /// bit. Exits with 1 where something differs.
@@ -17,9 +29,20 @@ pub(crate) struct Arguments {
     /// The recording.
     #[arg(value_name = "F.mcap")]
     recording: PathBuf,
-    /// Only these stages, with commas between.
+    /// Only these stages, with commas between; with --live those that run as processes: all but the link if none is named.
     #[arg(long, value_name = "STAGES", value_delimiter = ',')]
     stage: Vec<String>,
+    /// Publish the recording on a bus, for any consumer, and run stages in processes of their own in place of the recorded
+    /// ones. At `--pace max` time waits for their answers.
+    #[arg(long)]
+    live: bool,
+    /// With --live: name of the robot whose place the recording takes.
+    #[arg(long, default_value = "replay", requires = "live")]
+    robot: RobotName,
+    /// With --live: KEY=VALUE over the recorded mission, for the stages that run, as often as needed; a planner of yours is
+    /// `planner.executable="my-planner"`.
+    #[arg(long, value_name = "KEY=VALUE", requires = "live")]
+    set: Vec<String>,
     /// `max`, or R times mission time.
     #[arg(long, default_value = "max")]
     pace: Pace,
@@ -53,6 +76,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         stages::find(name).ok_or_else(|| stages::unknown(name))?;
     }
     let recording = Recording::open(&arguments.recording)?;
+    if arguments.live {
+        return play(arguments, &recording);
+    }
     let options = Options {
         stages: arguments.stage.clone(),
         from: MissionTime::from_seconds(arguments.from),
@@ -66,6 +92,42 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         report.to_string()
     })?;
     Ok(code(report.difference.is_some()))
+}
+
+fn play(arguments: &Arguments, recording: &Recording) -> Result<ExitCode, Failure> {
+    let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
+    let chosen: Vec<&'static Stage> = if arguments.stage.is_empty() {
+        live::live_stages().collect()
+    } else {
+        let named = arguments.stage.iter();
+        named.filter_map(|name| stages::find(name)).collect()
+    };
+    let mut mission = missions::with(&recording.run().mission, &arguments.set)?;
+    if let Some(mission) = &mut mission {
+        planner_executable::resolve(mission)?;
+    }
+    let options = live::Options {
+        robot: arguments.robot.clone(),
+        stages: chosen,
+        pace: arguments.pace,
+        from: MissionTime::from_seconds(arguments.from),
+        mission,
+    };
+    let mut tell = |happened| {
+        let robot = &arguments.robot;
+        write_stderr(&match happened {
+            Happened::Ready(stage, pid) => format!("{stage}: process {pid}\n"),
+            Happened::Playing => format!("playing as robot {robot}\n"),
+            Happened::Waiting(stage, tick) => format!("waiting for {stage} in tick {tick}\n"),
+        });
+    };
+    let report = live::play(recording, &options, &mut || signals.came(), &mut tell)?;
+    print_text(&if arguments.json {
+        format!("{}\n", serde_json::to_string(&report)?)
+    } else {
+        report.to_string()
+    })?;
+    Ok(code(report.first.is_some()))
 }
 
 pub(crate) fn diff(arguments: &Diff) -> Result<ExitCode, Failure> {

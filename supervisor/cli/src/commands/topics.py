@@ -34,9 +34,7 @@ class Follower:
             node, listener, subscribers = readers
             quiet = 0
             while self._making() == making:
-                came = listener.timed_wait(self.iox2.Duration.from_millis(200))
-                while came and listener.try_wait():
-                    pass
+                came = self._wait_for(listener)
                 yield from self._take(subscribers)
                 quiet = 0 if came else quiet + 1
                 if quiet == 5:
@@ -48,6 +46,19 @@ class Follower:
             yield from self._take(subscribers)
             del subscribers, listener, node, readers
             yield "gone", None
+
+    def _wait_for(self, listener):
+        """Wait for samples, 0.2 s at most."""
+        try:
+            came = listener.timed_wait(self.iox2.Duration.from_millis(200))
+            while came and listener.try_wait():
+                pass
+            return came
+        except self.iox2.ListenerWaitError as error:
+            # A process that is stopped and goes on, and one with a handler for a signal, is woken by that.
+            if "InterruptSignal" not in str(error):
+                raise
+            return None
 
     def _take(self, subscribers):
         for topic, (subscriber, sliced) in subscribers.items():
