@@ -4,8 +4,8 @@
 
 use std::{
     fmt,
-    fs::File,
-    io,
+    fs::{File, TryLockError},
+    io::{self, Read as _},
     path::{Path, PathBuf},
     str::FromStr,
 };
@@ -104,11 +104,32 @@ impl Domain {
     /// # Errors
     /// When the system does not say.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
-        match File::open(self.lock_file()) {
-            Ok(lock) => Ok(holders(&lock)?.first().copied()),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(error),
+        let lock = match File::open(self.lock_file()) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            opened => opened?,
+        };
+        match lock.try_lock_shared() {
+            Ok(()) => Ok(None),
+            Err(TryLockError::WouldBlock) => holder_of(&lock).map(Some),
+            Err(TryLockError::Error(error)) => Err(error),
         }
+    }
+
+    /// Locked, shared, by a consumer while it joins, and not while a bus is made or removed: of one that is gone, nobody makes
+    /// files again.
+    #[must_use]
+    pub fn joining_lock_file(&self) -> PathBuf {
+        self.directory.join("joining.lock")
+    }
+
+    /// Hold off the making and removing of a bus until the result is dropped or the process ends, for a moment.
+    ///
+    /// # Errors
+    /// When there is no domain.
+    pub fn joining(&self) -> io::Result<File> {
+        let lock = File::open(self.joining_lock_file())?;
+        lock.lock_shared()?;
+        Ok(lock)
     }
 
     /// Locked, shared, by every stage as long as it runs: a new supervisor waits for the stages of the last one.
@@ -152,6 +173,18 @@ impl Domain {
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.user, self.robot)
     }
+}
+
+/// The process that holds `lock`, the supervisor's: the one that the system lists, or, where its list misses that, the one
+/// that has written its number into the file.
+fn holder_of(mut lock: &File) -> io::Result<u32> {
+    if let Some(&listed) = holders(lock)?.first() {
+        return Ok(listed);
+    }
+    let mut named = String::new();
+    lock.read_to_string(&mut named)?;
+    let unknown = |_| io::Error::other("nobody says which process holds the supervisor's lock");
+    named.trim().parse().map_err(unknown)
 }
 
 #[cfg(test)]

@@ -148,6 +148,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     }
 
     fn join(&mut self) -> Result<Joined<Topics>, BusError> {
+        // Readers make files, too. Where there is no lock there is no bus, which is told next.
+        let _joining = self.domain.joining();
         let bus = Bus::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();
         for &topic in &self.wake_on {

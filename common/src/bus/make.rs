@@ -103,10 +103,12 @@ impl Bus {
     /// # Errors
     /// When the robot does not run here, is another user's, or shared memory is full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
-        let making = Making::current(domain).map_err(|error| BusError::NotRunning {
+        let not_running = |error: io::Error| BusError::NotRunning {
             robot: domain.robot.to_string(),
             detail: format!("{}: {error}", domain.middleware_config().display()),
-        })?;
+        };
+        let _joining = domain.joining().map_err(not_running)?;
+        let making = Making::current(domain).map_err(not_running)?;
         Self::join_making(making, name)
     }
 

@@ -323,7 +323,9 @@ impl Attack {
             report,
             ..
         } = series;
-        if let Some((index, kind, pause)) = schedule.consumer(self.consumers.len()) {
+        if let Some((index, kind, pause)) =
+            schedule.consumer(self.consumers.len(), options.only_consumers)
+        {
             let supervisor = self.supervisor;
             let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
             self.measured

@@ -48,6 +48,7 @@ mod series;
 pub mod signals;
 mod subscriptions;
 mod terminal;
+mod tick_latencies;
 mod words;
 
 pub use consumer::{Consumer, ConsumerError, GivenConsumer, SUBCOMMAND};

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::mission::Mission;
+use common::{clock::Pace, mission::Mission};
 use serde_json::Value;
 
 use crate::{
@@ -74,10 +74,15 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
     serde_json::from_str(text.trim()).map_err(|_| ChaosError::NoSummary(text.into_owned()))
 }
 
-/// The summary of the mission without an attack, to compare with.
+/// The summary of the mission without an attack, to compare with: at the same pace where ticks are compared, too.
 pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
     let directory = options.directory.join("undisturbed");
-    let output = command(options, seed, "max", &directory, false)?
+    let pace = if options.only_consumers {
+        options.pace
+    } else {
+        Pace::Max
+    };
+    let output = command(options, seed, &pace.to_string(), &directory, false)?
         .output()
         .map_err(system("start a mission"))?;
     fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
@@ -146,6 +151,9 @@ pub(crate) fn attack(
         end.pose_excess_m = error - number(undisturbed, "pose_error_m");
     }
     let mut right = series.report.add_mission(&end);
+    if options.only_consumers {
+        series.report.tick_latencies().add(undisturbed, &summary);
+    }
     if options.replay {
         let (hit, others) = attack.hit_recordings();
         right &= series.report.replays().add(seed, &directory, hit, &others);

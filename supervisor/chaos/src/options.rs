@@ -32,6 +32,8 @@ pub struct Options {
     pub replay: bool,
     /// The consumers that are hit, too.
     pub consumers: Vec<Consumer>,
+    /// Whether nothing else is hit.
+    pub only_consumers: bool,
     /// Where results are kept: the table of signals and the page.
     pub out: Option<PathBuf>,
     /// Where the run directories go; emptied mission by mission.

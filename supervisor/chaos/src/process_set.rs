@@ -168,24 +168,32 @@ fn pss_kib(process: u32) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::process::{Command, Stdio};
+    use std::{
+        io::Read as _,
+        process::{Command, Stdio},
+    };
 
     #[test]
     fn a_process_and_its_child_are_counted_until_one_ends() {
-        let mut child = Command::new("cat")
+        // A shell, and a child of it, which ends with its input.
+        let mut shell = Command::new("sh")
+            .args(["-c", "exec 3<&0; cat <&3 & echo started; wait"])
             .stdin(Stdio::piped())
-            .stdout(Stdio::null())
+            .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut set = ProcessSet::of(std::process::id());
+        let mut started = [0; 8];
+        let said = shell.stdout.as_mut().unwrap();
+        said.read_exact(&mut started).unwrap();
+        let mut set = ProcessSet::of(shell.id());
         set.look();
         assert_eq!(set.used(), None, "nothing to compare with");
-        assert!(descendants(std::process::id()).contains(&child.id()));
+        assert_eq!(descendants(shell.id()).len(), 2);
         set.look();
         let used = set.used().unwrap();
         assert!(used.pss_mib > 0.1, "{used:?}");
-        child.kill().unwrap();
-        child.wait().unwrap();
+        drop(shell.stdin.take());
+        shell.wait().unwrap();
         set.look();
         assert_eq!(set.used(), Some(used), "what came after the end counts");
     }

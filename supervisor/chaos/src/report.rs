@@ -9,7 +9,7 @@ use std::{
 use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
 
-use crate::{kind::Kind, replays::Replays, resources::Resources};
+use crate::{kind::Kind, replays::Replays, resources::Resources, tick_latencies::TickLatencies};
 use supervisor::stages::TABLE;
 
 /// What is hit where supervisor and stages are frozen together.
@@ -51,6 +51,9 @@ pub struct Report {
     /// What became of the missions' recordings, if they were replayed.
     #[serde(skip_serializing_if = "Option::is_none")]
     replays: Option<Replays>,
+    /// Ticks with and without consumers, if nothing else is hit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tick_latencies: Option<TickLatencies>,
     took_s: f64,
     #[serde(skip)]
     began: Instant,
@@ -138,6 +141,7 @@ impl Report {
             left_behind: Vec::new(),
             supervisor_growth: Resources::default(),
             replays: None,
+            tick_latencies: None,
             took_s: 0.0,
             began: Instant::now(),
         }
@@ -218,6 +222,11 @@ impl Report {
         self.replays.get_or_insert_default()
     }
 
+    /// Ticks with and without consumers.
+    pub(crate) fn tick_latencies(&mut self) -> &mut TickLatencies {
+        self.tick_latencies.get_or_insert_default()
+    }
+
     /// A supervisor held `first` when its robot began to drive, and `last` at its end.
     pub fn add_growth(&mut self, first: Resources, last: Resources) {
         let most = &mut self.supervisor_growth;
@@ -249,6 +258,8 @@ impl Report {
         outcome.extend(consumers.map(|(name, counts)| ("consumer", format!("{name}: {counts}"))));
         let replays = self.replays.iter().map(Replays::to_string);
         outcome.extend(replays.map(|said| ("replay", said.trim().replace('\n', "; "))));
+        let ticks = self.tick_latencies.iter();
+        outcome.extend(ticks.map(|ticks| ("ticks", ticks.to_string())));
         outcome
     }
 
@@ -385,6 +396,9 @@ impl fmt::Display for Report {
             to,
             "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"
         )?;
+        if let Some(ticks) = &self.tick_latencies {
+            writeln!(to, "{ticks}")?;
+        }
         match &self.replays {
             Some(replays) => write!(to, "{replays}"),
             None => Ok(()),

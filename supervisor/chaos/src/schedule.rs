@@ -76,10 +76,15 @@ impl Schedule {
         Duration::from_secs_f64(start + (end - start) * self.uniform())
     }
 
-    /// Which of so many consumers to hit instead of a stage or the supervisor; how, and for how long where it is frozen.
-    pub(crate) fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
+    /// Which of so many consumers to hit instead of a stage or the supervisor, `always` or now and then; how, and for how
+    /// long where it is frozen.
+    pub(crate) fn consumer(
+        &mut self,
+        count: usize,
+        always: bool,
+    ) -> Option<(usize, Kind, Duration)> {
         // Where there are none, the sequence of decisions is the same as ever.
-        if count == 0 || self.uniform() >= CONSUMER_SHARE {
+        if count == 0 || self.uniform() >= CONSUMER_SHARE && !always {
             return None;
         }
         let index = (self.uniform() * count as f64) as usize;

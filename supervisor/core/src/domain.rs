@@ -40,6 +40,8 @@ pub struct DomainLock {
     bus: Option<(Services, Rc<Bus>)>,
     // Locked while the bus is made and removed: no stage can join meanwhile.
     stages_lock: Option<File>,
+    // The same of consumers, but for one that does not get on with joining.
+    joining_lock: Option<File>,
     cells: usize,
     _lock: File,
 }
@@ -54,6 +56,7 @@ impl DomainLock {
             domain,
             bus: None,
             stages_lock: None,
+            joining_lock: None,
             cells,
             _lock: lock,
         };
@@ -70,7 +73,7 @@ impl DomainLock {
         )?;
         let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));
-        self.stages_lock = None;
+        (self.stages_lock, self.joining_lock) = (None, None);
         Ok(())
     }
 
@@ -80,6 +83,9 @@ impl DomainLock {
         if self.stages_lock.is_none() {
             // External stages may still be stopping, or just starting.
             self.stages_lock = Some(orphans::wait_for(&self.domain)?);
+        }
+        if self.joining_lock.is_none() {
+            self.joining_lock = Some(orphans::wait_for_consumers(&self.domain)?);
         }
         wipe(&self.domain)
     }
@@ -94,7 +100,12 @@ impl Drop for DomainLock {
     fn drop(&mut self) {
         // The lock goes last, with its directory: a process that waits for it finds nothing and makes its own.
         let _ = self.clear();
-        for file in [self.domain.stages_lock_file(), self.domain.lock_file()] {
+        let domain = &self.domain;
+        for file in [
+            domain.stages_lock_file(),
+            domain.joining_lock_file(),
+            domain.lock_file(),
+        ] {
             let _ = fs::remove_file(file);
         }
         let _ = fs::remove_dir(self.domain.directory());

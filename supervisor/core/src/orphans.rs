@@ -22,6 +22,8 @@ use crate::domain_error::{DomainError, failed};
 const STOP_GRACE: Duration = Duration::from_secs(2);
 /// A killed process ends within this, unless it hangs in the kernel.
 const KILLED: Duration = Duration::from_secs(1);
+/// A consumer has joined within this.
+const JOINED_WITHIN: Duration = Duration::from_millis(300);
 /// How often the lock is tried: a file lock has no descriptor to wait on.
 const RETRY: Duration = Duration::from_millis(10);
 
@@ -47,6 +49,19 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
         robot: domain.robot.to_string(),
         holders: holders.join(", "),
     })
+}
+
+/// Wait until no consumer is joining the bus of the domain, which takes milliseconds; for one that is frozen meanwhile, or
+/// joins for ever, not longer than [`JOINED_WITHIN`]. None can begin to join while the result is held.
+pub(crate) fn wait_for_consumers(domain: &Domain) -> Result<File, DomainError> {
+    let path = domain.joining_lock_file();
+    let lock = File::create(&path).map_err(failed("make", &path))?;
+    if !locked_within(&lock, JOINED_WITHIN).map_err(failed("lock", &path))? {
+        tracing::warn!(
+            "a consumer has been joining for {JOINED_WITHIN:?}; the bus goes without it"
+        );
+    }
+    Ok(lock)
 }
 
 /// Whether the exclusive lock on `file` was acquired in time.

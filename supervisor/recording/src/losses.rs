@@ -16,6 +16,8 @@ const STAMP: std::ops::Range<usize> = 4..28;
 struct Last {
     sequence: u32,
     crc32: u32,
+    /// On which of the buses it came.
+    bus: u32,
 }
 
 /// Counts what did not come, on one bus.
@@ -23,6 +25,7 @@ struct Last {
 pub(crate) struct Losses {
     /// By topic, stage where every stage writes, and generation.
     last: HashMap<(&'static str, Name, u32), Last>,
+    bus: u32,
     counts: BTreeMap<&'static str, u64>,
     changed: bool,
 }
@@ -44,6 +47,7 @@ impl Losses {
         let now = Last {
             sequence: stamp.sequence,
             crc32: crc32fast::hash(message),
+            bus: self.bus,
         };
         // Whoever attaches late has lost nothing.
         let Some(last) = self.last.insert(key, now) else {
@@ -51,16 +55,18 @@ impl Losses {
         };
         let next = last.sequence.wrapping_add(1);
         let missing = stamp.sequence.checked_sub(next);
-        if let Some(missing) = missing.filter(|missing| *missing > 0) {
+        let same_bus = last.bus == now.bus;
+        if let Some(missing) = missing.filter(|missing| *missing > 0 && same_bus) {
             *self.counts.entry(spec.name).or_default() += u64::from(missing);
             self.changed = true;
         }
-        now != last
+        (now.sequence, now.crc32) != (last.sequence, last.crc32)
     }
 
-    /// The bus was replaced: all writers begin again.
-    pub(crate) fn begin_again(&mut self) {
-        self.last.clear();
+    /// A bus was joined again, another one or the same: writers may have begun again, and what was published meanwhile is no
+    /// loss that can be counted.
+    pub(crate) const fn joined_again(&mut self) {
+        self.bus += 1;
     }
 
     /// How many of each topic, if that grew since this was last asked.
@@ -96,6 +102,19 @@ mod tests {
         assert!(losses.came(pose, &stamp(8), b"eight"));
         assert!(!losses.came(pose, &stamp(8), b"eight"));
         assert!(losses.came(pose, &stamp(9), b"nine"));
+        assert_eq!(losses.total(), 0);
+    }
+
+    #[test]
+    fn the_last_sample_is_not_new_after_the_same_bus_was_joined_again() {
+        let mut losses = Losses::default();
+        assert!(losses.came(POSE.spec(), &stamp(7), b"seven"));
+        losses.joined_again();
+        assert!(!losses.came(POSE.spec(), &stamp(7), b"seven"));
+        losses.joined_again();
+        assert!(losses.came(POSE.spec(), &stamp(9), b"nine"));
+        losses.joined_again();
+        assert!(losses.came(POSE.spec(), &stamp(0), b"another"));
         assert_eq!(losses.total(), 0);
     }
 

@@ -121,7 +121,7 @@ pub fn record(
                 ended.finish(tell)?;
             }
             match &mut current {
-                Some(current) => current.losses.begin_again(),
+                Some(current) => current.losses.joined_again(),
                 None => {
                     files += 1;
                     let file = numbered(&options.out, files);

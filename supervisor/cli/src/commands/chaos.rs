@@ -38,6 +38,9 @@ pub(crate) struct Arguments {
     /// Do that to a consumer of yours: a program and its arguments, read without a shell. As often as needed.
     #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
     consumer: Vec<GivenConsumer>,
+    /// Hit consumers only, and compare ticks with those of the same missions without any.
+    #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
+    only_consumers: bool,
     /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals: as a machine that stands still.
     #[arg(long)]
     freeze_all: bool,
@@ -112,6 +115,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     if arguments.include_supervisor && loaded.robot.address.is_some() {
         return Err("chaos brings its own robot; leave robot.address out".into());
+    }
+    if arguments.only_consumers && !arguments.include_consumers && arguments.consumer.is_empty() {
+        return Err("--only-consumers hits nothing; give --include-consumers, or --consumer and your command, too".into());
     }
     if arguments.pace == Pace::Max {
         return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
@@ -189,6 +195,7 @@ fn options(
         freeze_all: arguments.freeze_all,
         replay: arguments.replay,
         consumers: own.into_iter().flatten().chain(given).collect(),
+        only_consumers: arguments.only_consumers,
         out: arguments.out.clone(),
         directory,
     })

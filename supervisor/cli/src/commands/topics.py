@@ -2,6 +2,7 @@
 # Printed by `firsthand topics --python` of the firsthand that runs; print it again when that is replaced.
 
 import ctypes
+import fcntl
 import os
 import time
 
@@ -91,11 +92,13 @@ class Follower:
     def _supervised(self):
         """Whether somebody holds the supervisor's lock: one that was killed leaves its bus."""
         try:
-            inode = os.stat(f"{self.directory}/lock").st_ino
-            with open("/proc/locks") as locks:
-                return any(line.split()[5].endswith(f":{inode}") for line in locks if "->" not in line)
+            with open(f"{self.directory}/lock") as lock:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return False
         except FileNotFoundError:
             return False
+        except BlockingIOError:
+            return True
 
     def _wait(self):
         while True:
@@ -108,6 +111,11 @@ class Follower:
         """Readers on the bus of `making`; None where it has just gone."""
         iox2 = self.iox2
         try:
+            # Until the readers are made the bus is not removed: nobody makes its files again. The lock ends with the file.
+            joining = open(f"{self.directory}/joining.lock")
+            fcntl.flock(joining, fcntl.LOCK_SH)
+            if self._making() != making:
+                return None
             config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{making}"))
             builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
             node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
@@ -120,7 +128,9 @@ class Follower:
                     service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
                 subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
             first = node.service_builder(iox2.ServiceName.new(next(iter(self.topics))))
-            return node, first.event().open().listener_builder().create(), subscribers
+            listener = first.event().open().listener_builder().create()
+            joining.close()
+            return node, listener, subscribers
         except Exception:
             if self._making() == making and self._supervised():
                 raise

@@ -1,0 +1,69 @@
+//! How long ticks took in missions whose consumers were hit, and in the same missions without any.
+
+use std::fmt;
+
+use serde::Serialize;
+use serde_json::Value;
+
+/// Of each mission half and 99 in 100 of its ticks took at most so long, microseconds.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct TickLatencies {
+    /// With consumers that are hit.
+    with_us: Vec<[f64; 2]>,
+    /// Without any.
+    without_us: Vec<[f64; 2]>,
+}
+
+impl TickLatencies {
+    /// A mission was run without consumers, and again with them: the summaries of both.
+    pub(crate) fn add(&mut self, without: &Value, with: &Value) {
+        let of = |summary: &Value| {
+            let latency = |share| summary["tick_latency_us"][share].as_f64();
+            Some([latency("p50")?, latency("p99")?])
+        };
+        if let (Some(without), Some(with)) = (of(without), of(with)) {
+            self.without_us.push(without);
+            self.with_us.push(with);
+        }
+    }
+}
+
+/// The median of the missions' values at `place`; NaN without missions.
+fn median(missions: &[[f64; 2]], place: usize) -> f64 {
+    let mut values: Vec<f64> = missions.iter().map(|mission| mission[place]).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+impl fmt::Display for TickLatencies {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [with, without] = [&self.with_us, &self.without_us];
+        write!(
+            to,
+            "a tick, p50 and p99, medians of {} missions: {:.0} and {:.0} us with consumers that are hit, {:.0} and {:.0} us without any",
+            with.len(),
+            median(with, 0),
+            median(with, 1),
+            median(without, 0),
+            median(without, 1)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_of_missions_that_ended_with_a_summary_both_times() {
+        let mut latencies = TickLatencies::default();
+        let summary = |p50, p99| serde_json::json!({"tick_latency_us": {"p50": p50, "p99": p99}});
+        for us in [10.0, 30.0, 20.0] {
+            latencies.add(&summary(us, 2.0 * us), &summary(us + 1.0, 3.0 * us));
+        }
+        latencies.add(&summary(900.0, 900.0), &serde_json::json!({}));
+        let said = latencies.to_string();
+        assert!(said.contains("3 missions: 21 and 60 us with"), "{said}");
+        assert!(said.contains("20 and 40 us without"), "{said}");
+    }
+}
