@@ -277,6 +277,11 @@ fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
 
 #[cfg(test)]
 mod tests {
+    use std::{
+        sync::atomic::{AtomicBool, Ordering},
+        thread,
+    };
+
     use super::*;
 
     #[test]
@@ -290,6 +295,43 @@ mod tests {
         assert!(refused.to_string().contains("iceoryx2.toml"), "{refused}");
         assert!(!domain.lock_file().exists() && !domain.stages_lock_file().exists());
         fs::remove_dir(domain.directory()).unwrap();
+    }
+
+    #[test]
+    fn a_supervisor_is_known_whatever_other_locks_come_and_go() {
+        let domain = Domain::of("many-locks".parse().unwrap());
+        let held = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let files = tempfile::tempdir().unwrap();
+        let over = AtomicBool::new(false);
+        thread::scope(|scope| {
+            for churn in 0..3 {
+                let (over, folder) = (&over, files.path());
+                scope.spawn(move || {
+                    let file = |number| folder.join(format!("{churn}-{number}"));
+                    let files: Vec<_> = (0..60).map(|n| File::create(file(n)).unwrap()).collect();
+                    while !over.load(Ordering::Relaxed) {
+                        files.iter().for_each(|file| file.lock().unwrap());
+                        files.iter().for_each(|file| file.unlock().unwrap());
+                    }
+                });
+            }
+            let missed = (0..800).filter(|_| domain.supervisor().unwrap().is_none());
+            let missed = missed.count();
+            over.store(true, Ordering::Relaxed);
+            assert_eq!(missed, 0);
+        });
+        drop(held);
+        assert_eq!(domain.supervisor().unwrap(), None);
+    }
+
+    #[test]
+    fn a_consumer_that_joins_for_ever_keeps_no_bus() {
+        let domain = Domain::of("joins-on".parse().unwrap());
+        let held = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let joining = domain.joining().unwrap();
+        drop(held);
+        assert!(!domain.directory().exists());
+        drop(joining);
     }
 
     #[test]
