@@ -2,7 +2,8 @@
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
 //! is the least of several runs. `cargo bench -p harmonic --features bench -- quick` leaves out the large maps, `-- updates` all but the
-//! updates. `-- accuracy` measures angles instead of times. `-- --maps DIR` adds the PGM maps of a directory.
+//! updates. `-- accuracy` measures angles instead of times, `-- split` where the time of a solve goes, `-- growth` time and
+//! memory by the size of the map. `-- --maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -14,6 +15,7 @@ mod accuracy;
 mod machine;
 mod others;
 mod real;
+mod split;
 mod updates;
 mod wavefront;
 
@@ -43,6 +45,12 @@ fn main() {
     let quick = asked("quick");
     if asked("updates") {
         return updates::table(quick);
+    }
+    if asked("split") {
+        return split::table(maps_directory().map(|it| real::load_all(Path::new(&it))));
+    }
+    if asked("growth") {
+        return split::growth_table();
     }
     if asked("accuracy") {
         accuracy::angle_table();
@@ -210,8 +218,8 @@ fn screening_table() {
                     .solve_observed(&domain, &Cancellation::new(), &mut |phase| {
                         let slot = match phase {
                             Phase::SetUp => 0,
-                            Phase::Solved => 1,
-                            _ => 2,
+                            Phase::Verified => 2,
+                            _ => 1,
                         };
                         times[slot] += start.elapsed().as_secs_f64() * 1e3;
                         start = Instant::now();
