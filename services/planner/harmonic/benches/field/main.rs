@@ -49,6 +49,9 @@ fn main() {
     if asked("split") {
         return split::table(maps_directory().map(|it| real::load_all(Path::new(&it))));
     }
+    if asked(split::BYTES) {
+        return split::print_bytes();
+    }
     if asked("growth") {
         return split::growth_table();
     }
@@ -156,19 +159,30 @@ fn full_table(quick: bool) {
     }
 }
 
+/// Maps of the same size to solve before one that is timed: the memory is then kept, the set-up is not. Upside down it takes the
+/// same precision, and drums take the other.
+fn others_than(domain: &Domain) -> [Domain; 2] {
+    let (width, height) = (domain.width(), domain.height());
+    let rows = domain.blocked().chunks_exact(width).rev();
+    let blocked = rows.flatten().copied().collect();
+    let target = Cell::new(domain.target().col, height - 1 - domain.target().row);
+    let upside_down = Domain::new(width, height, blocked, target);
+    let drums = Map::generate(Kind::Drums, width, height, 2).domain();
+    [upside_down, drums].map(|it| it.expect("a valid map"))
+}
+
 /// One map: times from scratch and with the set-up kept, beside those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let cells = domain.blocked().len();
     let cancellation = Cancellation::new();
-    // Memory is kept, the set-up is not: the map before was another.
     let (width, height) = (domain.width(), domain.height());
-    let other = Map::generate(Kind::Drums, width, height, 2)
-        .domain()
-        .expect("a valid map");
+    let others = others_than(domain);
     let mut solver = Solver::default();
     let mut scratch = f64::INFINITY;
     for _ in 0..runs(cells).min(12) {
-        solver.solve(&other, &cancellation).expect("a field");
+        for other in &others {
+            solver.solve(other, &cancellation).expect("a field");
+        }
         scratch = scratch.min(fastest(1, || {
             solver.solve(domain, &cancellation).expect("a field");
         }));
