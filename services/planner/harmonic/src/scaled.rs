@@ -78,13 +78,10 @@ impl PartialOrd for Scaled {
     }
 }
 
-/// 2^`n`, exactly; 0 below the normal range and infinity above it.
+/// 2^`n`, exactly; 0 below the normal range and infinity above it. Without a branch, for loops over vectors.
+#[inline(always)]
 pub(crate) fn pow2(n: i32) -> f64 {
-    match n {
-        -1022..=1023 => f64::from_bits(((n + 1023) as u64) << 52),
-        i32::MIN..=-1023 => 0.0,
-        _ => f64::INFINITY,
-    }
+    f64::from_bits(((n.clamp(-1023, 1024) + 1023) as u64) << 52)
 }
 
 #[cfg(test)]
@@ -102,6 +99,19 @@ mod tests {
             );
         }
         assert!((Scaled::new(1.0, -200_000).log10() + 60_205.999).abs() < 1e-3);
+    }
+
+    #[test]
+    fn powers_of_two_are_exact_and_end_in_zero_and_infinity() {
+        for n in -1022..=1023 {
+            assert_eq!(pow2(n), 2.0_f64.powi(n));
+        }
+        for n in [-1023, -1024, i32::MIN] {
+            assert_eq!(pow2(n), 0.0);
+        }
+        for n in [1024, 1025, i32::MAX] {
+            assert_eq!(pow2(n), f64::INFINITY);
+        }
     }
 
     #[test]

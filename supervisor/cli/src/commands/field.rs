@@ -167,7 +167,7 @@ fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), Solve
         let took = now - std::mem::replace(&mut last, now);
         match phase {
             Phase::SetUp => times.setup += took,
-            Phase::Solved => times.solve += took,
+            Phase::Cycled | Phase::Solved => times.solve += took,
             Phase::Verified => times.verify += took,
             // A phase this program does not know is no reason to fail.
             _ => {}

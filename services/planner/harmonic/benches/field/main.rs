@@ -2,7 +2,8 @@
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
 //! is the least of several runs. `cargo bench -p harmonic --features bench -- quick` leaves out the large maps, `-- updates` all but the
-//! updates. `-- accuracy` measures angles instead of times. `-- --maps DIR` adds the PGM maps of a directory.
+//! updates. `-- accuracy` measures angles instead of times, `-- split` where the time of a solve goes, `-- growth` time and
+//! memory by the size of the map. `-- --maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -14,6 +15,7 @@ mod accuracy;
 mod machine;
 mod others;
 mod real;
+mod split;
 mod updates;
 mod wavefront;
 
@@ -43,6 +45,15 @@ fn main() {
     let quick = asked("quick");
     if asked("updates") {
         return updates::table(quick);
+    }
+    if asked("split") {
+        return split::table(maps_directory().map(|it| real::load_all(Path::new(&it))));
+    }
+    if asked(split::BYTES) {
+        return split::print_bytes();
+    }
+    if asked("growth") {
+        return split::growth_table();
     }
     if asked("accuracy") {
         accuracy::angle_table();
@@ -148,19 +159,30 @@ fn full_table(quick: bool) {
     }
 }
 
+/// Maps of the same size to solve before one that is timed: the memory is then kept, the set-up is not. Upside down it takes the
+/// same precision, and drums take the other.
+fn others_than(domain: &Domain) -> [Domain; 2] {
+    let (width, height) = (domain.width(), domain.height());
+    let rows = domain.blocked().chunks_exact(width).rev();
+    let blocked = rows.flatten().copied().collect();
+    let target = Cell::new(domain.target().col, height - 1 - domain.target().row);
+    let upside_down = Domain::new(width, height, blocked, target);
+    let drums = Map::generate(Kind::Drums, width, height, 2).domain();
+    [upside_down, drums].map(|it| it.expect("a valid map"))
+}
+
 /// One map: times from scratch and with the set-up kept, beside those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let cells = domain.blocked().len();
     let cancellation = Cancellation::new();
-    // Memory is kept, the set-up is not: the map before was another.
     let (width, height) = (domain.width(), domain.height());
-    let other = Map::generate(Kind::Drums, width, height, 2)
-        .domain()
-        .expect("a valid map");
+    let others = others_than(domain);
     let mut solver = Solver::default();
     let mut scratch = f64::INFINITY;
     for _ in 0..runs(cells).min(12) {
-        solver.solve(&other, &cancellation).expect("a field");
+        for other in &others {
+            solver.solve(other, &cancellation).expect("a field");
+        }
         scratch = scratch.min(fastest(1, || {
             solver.solve(domain, &cancellation).expect("a field");
         }));
@@ -210,8 +232,8 @@ fn screening_table() {
                     .solve_observed(&domain, &Cancellation::new(), &mut |phase| {
                         let slot = match phase {
                             Phase::SetUp => 0,
-                            Phase::Solved => 1,
-                            _ => 2,
+                            Phase::Verified => 2,
+                            _ => 1,
                         };
                         times[slot] += start.elapsed().as_secs_f64() * 1e3;
                         start = Instant::now();

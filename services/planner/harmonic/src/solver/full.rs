@@ -207,6 +207,7 @@ impl<R: Real> Prepared<R> {
             let last = cycle == most_cycles;
             let judged = (cycle >= next_check).then_some(TOLERANCE);
             let settled = levels.cycle(judged).unsettled == 0 && judged.is_some();
+            observe(Phase::Cycled);
             if !(last || settled) {
                 continue;
             }

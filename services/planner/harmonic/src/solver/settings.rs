@@ -36,6 +36,8 @@ impl Default for Settings {
 pub enum Phase {
     /// What does not depend on the target is ready.
     SetUp,
+    /// One cycle of multigrid has ended.
+    Cycled,
     /// A field was computed.
     Solved,
     /// The field was checked. If it failed, more cycles or a costlier method follow, with phases of their own.

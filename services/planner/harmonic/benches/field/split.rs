@@ -1,0 +1,183 @@
+//! Where the time of a solve goes, and how time and memory grow with the map.
+
+use std::process::Command;
+use std::time::Instant;
+
+use harmonic::testing::{Kind, Map};
+use harmonic::{Cancellation, Domain, Phase, Solver};
+
+use crate::{others_than, runs, wavefront};
+
+/// One solve by phases, milliseconds.
+#[derive(Clone, Copy, Default)]
+struct Split {
+    total: f64,
+    /// The choice of a method included.
+    set_up: f64,
+    cycles: usize,
+    cycling: f64,
+    /// The end of the cycles until the field can be checked; all of a solve without cycles.
+    rest: f64,
+    checks: usize,
+    checking: f64,
+}
+
+/// A solve of `domain` by phases, and its method.
+fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static str) {
+    let mut split = Split::default();
+    let start = Instant::now();
+    let mut last = start;
+    let field = solver
+        .solve_observed(domain, &Cancellation::new(), &mut |phase| {
+            let now = Instant::now();
+            let took = (now - last).as_secs_f64() * 1e3;
+            last = now;
+            match phase {
+                Phase::SetUp => split.set_up += took,
+                Phase::Cycled => {
+                    split.cycles += 1;
+                    split.cycling += took;
+                }
+                Phase::Verified => {
+                    split.checks += 1;
+                    split.checking += took;
+                }
+                _ => split.rest += took,
+            }
+        })
+        .expect("a field");
+    split.total = start.elapsed().as_secs_f64() * 1e3;
+    (split, field.verification().method.name())
+}
+
+/// The fastest of several solves from scratch.
+fn least(domain: &Domain) -> (Split, &'static str) {
+    let others = others_than(domain);
+    let mut solver = Solver::default();
+    let mut best = (Split::default(), "");
+    for run in 0..runs(domain.blocked().len()).min(12) {
+        for other in &others {
+            let solved = solver.solve(other, &Cancellation::new());
+            solved.expect("a field");
+        }
+        let here = split(&mut solver, domain);
+        if run == 0 || here.0.total < best.0.total {
+            best = here;
+        }
+    }
+    best
+}
+
+/// Where the time of a solve from scratch goes.
+pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
+    println!("\nA solve from scratch by phases, ms, and as a multiple of a wavefront's time");
+    println!(
+        "{:<26} {:<14} {:>8} {:>6} {:>8} {:>7} {:>8} {:>8} {:>7} {:>8}",
+        "map", "method", "total", "x", "set-up", "cycles", "cycling", "rest", "checks", "checking"
+    );
+    let kinds = [
+        Kind::Drums,
+        Kind::Office,
+        Kind::Maze { corridor: 1 },
+        Kind::Maze { corridor: 4 },
+        Kind::Maze { corridor: 8 },
+        Kind::Maze { corridor: 16 },
+        Kind::Maze { corridor: 32 },
+        Kind::Maze { corridor: 64 },
+        Kind::Serpentine { corridor: 1 },
+        Kind::Serpentine { corridor: 8 },
+        Kind::Serpentine { corridor: 24 },
+        Kind::Noise { density: 0.35 },
+    ];
+    let generated = [Kind::Drums, Kind::Office].map(|kind| (kind, 50));
+    let generated = generated.into_iter().chain(kinds.map(|kind| (kind, 512)));
+    let generated = generated.map(|(kind, n)| {
+        let domain = Map::generate(kind, n, n, 1).domain();
+        (format!("{kind:?} {n}"), domain.expect("a valid map"))
+    });
+    for (name, domain) in generated.chain(real.into_iter().flatten()) {
+        let (split, method) = least(&domain);
+        let (wavefront, _) = wavefront::time(&domain, runs(domain.blocked().len()));
+        println!(
+            "{name:<26} {method:<14} {:>8.3} {:>6.2} {:>8.3} {:>7} {:>8.3} {:>8.3} {:>7} {:>8.3}",
+            split.total,
+            split.total / wavefront,
+            split.set_up,
+            split.cycles,
+            split.cycling,
+            split.rest,
+            split.checks,
+            split.checking
+        );
+    }
+}
+
+/// Time and memory of a solve from scratch, by the size of the map.
+pub(crate) fn growth_table() {
+    println!(
+        "\nGrowth with the map: ms per million cells, and bytes a cell that a solver and its field hold at most"
+    );
+    println!(
+        "{:<8} {:>6} {:<14} {:>7} {:>16} {:>11} {:>13}",
+        "map", "N", "method", "cycles", "ms a million", "wavefronts", "bytes a cell"
+    );
+    for kind in [Kind::Drums, Kind::Office] {
+        for n in [128, 256, 512, 1024, 2048, 4096] {
+            let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
+            let bytes = bytes_of_a_process(kind, n);
+            let (split, method) = least(&domain);
+            let (wavefront, _) = wavefront::time(&domain, runs(n * n).min(12));
+            println!(
+                "{:<8} {n:>6} {method:<14} {:>7} {:>16.2} {:>11.2} {:>13}",
+                format!("{kind:?}"),
+                split.cycles,
+                split.total * 1e6 / (n * n) as f64,
+                split.total / wavefront,
+                bytes.map_or("-".to_owned(), |it| format!("{:.1}", it / (n * n) as f64)),
+            );
+        }
+    }
+}
+
+/// The word that makes this program solve one map and print what [`most_bytes`] says.
+pub(crate) const BYTES: &str = "bytes";
+
+/// [`most_bytes`] in a process of its own, in which no memory was used and freed before.
+fn bytes_of_a_process(kind: Kind, n: usize) -> Option<f64> {
+    let map = format!("{kind:?}:{n}");
+    let output = Command::new(std::env::current_exe().ok()?)
+        .args([BYTES, &map])
+        .output()
+        .ok()?;
+    String::from_utf8(output.stdout).ok()?.trim().parse().ok()
+}
+
+/// Solves the map that the last argument names, and prints the bytes it took.
+pub(crate) fn print_bytes() {
+    let map = std::env::args().next_back().unwrap_or_default();
+    let domain = [Kind::Drums, Kind::Office].into_iter().find_map(|kind| {
+        let n = map.strip_prefix(&format!("{kind:?}:"))?.parse().ok()?;
+        Map::generate(kind, n, n, 1).domain().ok()
+    });
+    if let Some(bytes) = domain.and_then(|domain| most_bytes(&domain)) {
+        println!("{bytes}");
+    }
+}
+
+/// What the resident memory of this process grows by at most during a solve by a new solver; `None` where the system does not
+/// tell.
+fn most_bytes(domain: &Domain) -> Option<f64> {
+    // Makes the peak the present size.
+    std::fs::write("/proc/self/clear_refs", "5").ok()?;
+    let before = status("VmRSS:")?;
+    Solver::default().solve(domain, &Cancellation::new()).ok()?;
+    Some((status("VmHWM:")? - before).max(0.0))
+}
+
+/// A line of what Linux tells of this process, in bytes.
+fn status(line: &str) -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let value = status.lines().find_map(|it| it.strip_prefix(line))?;
+    let kilobytes: f64 = value.trim().trim_end_matches("kB").trim().parse().ok()?;
+    Some(kilobytes * 1024.0)
+}

@@ -1,0 +1,188 @@
+//! The checks of the cells of one row.
+
+use std::ops::Range;
+
+use crate::domain::Domain;
+use crate::real::Real;
+use crate::screening::Coefficients;
+
+/// Largest componentwise relative residual of a published field.
+pub(super) const RESIDUAL_LIMIT: f64 = 2e-4;
+
+/// Largest [`Verification::worst_tile`](super::Verification::worst_tile) of a published field.
+pub(super) const TILE_LIMIT: f64 = 0.01;
+
+/// The result of a verification.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Check {
+    /// Largest relative residual of the cells with u > 0 but the target.
+    pub worst_residual: f64,
+    /// As in [`Verification`](super::Verification).
+    pub worst_tile: f64,
+    /// Cells with u > 0, other than the target, that no neighbour exceeds.
+    pub local_maxima: usize,
+    /// Free cells with u = 0 beside one with u > 0.
+    pub unreached: usize,
+    /// Cells with u > 0.
+    pub reachable: usize,
+}
+
+impl Check {
+    /// The result for the cells of both.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            worst_residual: self.worst_residual.max(other.worst_residual),
+            worst_tile: self.worst_tile.max(other.worst_tile),
+            local_maxima: self.local_maxima + other.local_maxima,
+            unreached: self.unreached + other.unreached,
+            reachable: self.reachable + other.reachable,
+        }
+    }
+
+    /// The largest residual as a multiple of the limit.
+    pub(crate) fn excess(&self) -> f64 {
+        self.worst_residual / RESIDUAL_LIMIT
+    }
+
+    /// Whether the field may be handed out.
+    pub(crate) fn holds(&self) -> bool {
+        self.local_maxima == 0
+            && self.unreached == 0
+            && self.worst_residual <= RESIDUAL_LIMIT
+            && self.worst_tile <= TILE_LIMIT
+    }
+}
+
+/// u of the cells of a row and of their neighbours, all with the exponent of the cell itself; 0 where blocked.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a, R> {
+    pub here: &'a [R],
+    pub west: &'a [R],
+    pub east: &'a [R],
+    pub north: &'a [R],
+    pub south: &'a [R],
+}
+
+/// The equations of the cells of a row, and how well they hold.
+pub(super) struct Cells<R> {
+    /// 0.25 / (1 + k) of each cell, 0 where no equation holds.
+    pub weights: Vec<R>,
+    weights_set: bool,
+    /// Relative residuals, with their signs, of the cells an equation holds for.
+    pub residuals: Vec<R>,
+    /// (|grad u| / u)^2 of the same.
+    pub slopes: Vec<R>,
+}
+
+impl<R: Real> Cells<R> {
+    pub(super) fn new(width: usize) -> Self {
+        let row = vec![R::default(); width];
+        Self {
+            weights: row.clone(),
+            weights_set: false,
+            residuals: row.clone(),
+            slopes: row,
+        }
+    }
+
+    /// Checks row `row` of the map but the target.
+    #[inline(always)]
+    pub(super) fn check_row(
+        &mut self,
+        domain: &Domain,
+        row: usize,
+        raw: &[R],
+        u: Around<'_, R>,
+        found: &mut Check,
+    ) {
+        self.set_weights(domain, row);
+        let (width, target) = (domain.width(), domain.target());
+        if row == target.row {
+            self.check(raw, u, 0..target.col, found);
+            self.check(raw, u, target.col + 1..width, found);
+            self.residuals[target.col] = R::default();
+            self.slopes[target.col] = R::default();
+        } else {
+            self.check(raw, u, 0..width, found);
+        }
+    }
+
+    #[inline(always)]
+    fn set_weights(&mut self, domain: &Domain, row: usize) {
+        let width = domain.width();
+        match domain.screening() {
+            Coefficients::Uniform(k) if !self.weights_set => {
+                self.weights.fill(R::of(0.25 / (1.0 + k)));
+                self.weights_set = true;
+            }
+            Coefficients::Uniform(_) => {}
+            Coefficients::PerCell(cells) => {
+                for (weight, &k) in self
+                    .weights
+                    .iter_mut()
+                    .zip(&cells[row * width..(row + 1) * width])
+                {
+                    *weight = R::of(0.25 / (1.0 + f64::from(k)));
+                }
+            }
+        }
+    }
+
+    /// Checks the cells of `columns`, `raw` as stored.
+    #[inline(always)]
+    pub(super) fn check(
+        &mut self,
+        raw: &[R],
+        u: Around<'_, R>,
+        columns: Range<usize>,
+        found: &mut Check,
+    ) {
+        let (start, n) = (columns.start, columns.len());
+        let zero = R::default();
+        let raw = &raw[start..][..n];
+        let (here, west, east) = (
+            &u.here[start..][..n],
+            &u.west[start..][..n],
+            &u.east[start..][..n],
+        );
+        let (north, south) = (&u.north[start..][..n], &u.south[start..][..n]);
+        let weights = &self.weights[start..][..n];
+        let residuals = &mut self.residuals[start..][..n];
+        let slopes = &mut self.slopes[start..][..n];
+        let quarter = R::of(0.25);
+        let larger = |a: R, b: R| if a > b { a } else { b };
+        let (mut local_maxima, mut unreached, mut reachable) = (0_u32, 0_u32, 0_u32);
+        for x in 0..n {
+            let sum = (west[x] + east[x]) + (north[x] + south[x]);
+            let best = larger(larger(west[x], east[x]), larger(north[x], south[x]));
+            let positive = here[x] > zero;
+            reachable += u32::from(positive);
+            // A value that is no number is neither blocked nor positive: unreached.
+            let blocked = raw[x] < zero;
+            unreached += u32::from(!positive & !blocked & (sum > zero));
+            let residual = here[x] - weights[x] * sum;
+            let holds = positive & (weights[x] > zero);
+            local_maxima += u32::from(holds & (best <= here[x]));
+            let scale = if holds { R::ONE / here[x] } else { zero };
+            residuals[x] = residual * scale;
+            let (across, along) = ((east[x] - west[x]) * scale, (south[x] - north[x]) * scale);
+            slopes[x] = quarter * (across * across + along * along);
+        }
+        // In lanes: a running maximum over floats is otherwise taken one by one.
+        let mut worst = [zero; 16];
+        let chunks = residuals.chunks_exact(16);
+        for (lane, &residual) in worst.iter_mut().zip(chunks.remainder()) {
+            *lane = larger(residual.size(), *lane);
+        }
+        for chunk in chunks {
+            for (lane, &residual) in worst.iter_mut().zip(chunk) {
+                *lane = larger(residual.size(), *lane);
+            }
+        }
+        let worst = worst.into_iter().fold(zero, larger).wide();
+        found.worst_residual = found.worst_residual.max(worst);
+        found.local_maxima += local_maxima as usize;
+        found.unreached += unreached as usize;
+        found.reachable += reachable as usize;
+    }
+}

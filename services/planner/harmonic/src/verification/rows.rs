@@ -1,0 +1,122 @@
+//! Rows of u under way over the map, three at a time.
+
+use crate::real::Real;
+use crate::scaled::pow2;
+
+use super::cells::Around;
+
+/// Three neighbouring rows of u with a zero at either end, blocked cells zero.
+pub(super) struct Rows<R> {
+    above: Vec<R>,
+    here: Vec<R>,
+    below: Vec<R>,
+}
+
+impl<R: Real> Rows<R> {
+    pub(super) fn new(width: usize) -> Self {
+        let row = vec![R::default(); width + 2];
+        Self {
+            above: row.clone(),
+            here: row.clone(),
+            below: row,
+        }
+    }
+
+    /// Moves one row on; `next` is the one that comes in below, none after the last.
+    #[inline(always)]
+    pub(super) fn take(&mut self, next: Option<&[R]>) {
+        std::mem::swap(&mut self.above, &mut self.here);
+        std::mem::swap(&mut self.here, &mut self.below);
+        let zero = R::default();
+        let width = self.below.len() - 2;
+        let below = &mut self.below[1..=width];
+        match next {
+            Some(next) => {
+                for (to, &from) in below.iter_mut().zip(next) {
+                    *to = if from > zero { from } else { zero };
+                }
+            }
+            None => below.fill(zero),
+        }
+    }
+
+    /// The middle row and what lies around it.
+    #[inline(always)]
+    pub(super) fn around(&self) -> Around<'_, R> {
+        let n = self.here.len() - 2;
+        Around {
+            here: &self.here[1..][..n],
+            west: &self.here[..n],
+            east: &self.here[2..][..n],
+            north: &self.above[1..][..n],
+            south: &self.below[1..][..n],
+        }
+    }
+}
+
+/// The same with an exponent a cell.
+pub(super) struct ScaledRows {
+    mantissas: Rows<f64>,
+    above: Vec<i32>,
+    here: Vec<i32>,
+    below: Vec<i32>,
+    /// The neighbours to the west, east, north and south, with the exponent of the cell itself.
+    relative: [Vec<f64>; 4],
+}
+
+impl ScaledRows {
+    pub(super) fn new(width: usize) -> Self {
+        let row = vec![0; width + 2];
+        Self {
+            mantissas: Rows::new(width),
+            above: row.clone(),
+            here: row.clone(),
+            below: row,
+            relative: std::array::from_fn(|_| vec![0.0; width]),
+        }
+    }
+
+    /// Moves one row on; `next`, mantissas and exponents, is the one that comes in below, none after the last.
+    #[inline(always)]
+    pub(super) fn take(&mut self, next: Option<(&[f64], &[i32])>) {
+        self.mantissas.take(next.map(|(mantissas, _)| mantissas));
+        std::mem::swap(&mut self.above, &mut self.here);
+        std::mem::swap(&mut self.here, &mut self.below);
+        if let Some((_, exponents)) = next {
+            let width = self.below.len() - 2;
+            self.below[1..=width].copy_from_slice(exponents);
+        }
+    }
+
+    /// The middle row and what lies around it.
+    #[inline(always)]
+    pub(super) fn around(&mut self) -> Around<'_, f64> {
+        let u = self.mantissas.around();
+        let n = u.here.len();
+        let exponents = &self.here[1..][..n];
+        let neighbours = [
+            (u.west, &self.here[..n]),
+            (u.east, &self.here[2..][..n]),
+            (u.north, &self.above[1..][..n]),
+            (u.south, &self.below[1..][..n]),
+        ];
+        for (into, (mantissas, theirs)) in self.relative.iter_mut().zip(neighbours) {
+            let (into, mantissas, theirs) = (&mut into[..n], &mantissas[..n], &theirs[..n]);
+            for x in 0..n {
+                let steps = theirs[x].saturating_sub(exponents[x]);
+                // A cell of zero has no exponent: what counts there is only whether a neighbour is larger. Nor has a
+                // neighbour of zero, which stays zero.
+                let known = (u.here[x] > 0.0) & (mantissas[x] > 0.0);
+                into[x] = mantissas[x] * pow2(if known { steps } else { 0 });
+            }
+        }
+        let [west, east, north, south] = &self.relative;
+        Around {
+            here: u.here,
+            west,
+            east,
+            north,
+            south,
+        }
+    }
+}
