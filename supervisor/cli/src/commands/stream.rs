@@ -17,6 +17,15 @@ const CHUNK: usize = 4096;
 /// How often a command that waits looks whether it is told to end.
 pub(super) const LOOK_EVERY: Duration = Duration::from_millis(100);
 
+/// Niceness of a command that watches.
+const NICE: i32 = 5;
+
+/// Stages that answer the robot get the processor before this process.
+pub(super) fn let_stages_go_first() {
+    // Where that is refused they share it.
+    let _ = rustix::process::nice(NICE);
+}
+
 /// Standard output, and the signals that end the command.
 pub(super) struct Stream {
     signals: Signals,
@@ -24,8 +33,9 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// From now on signals end the command in order: it leaves the bus before it ends.
+    /// From now on signals end the command in order, so that it leaves the bus before it ends, and stages go first.
     pub(super) fn open() -> io::Result<Self> {
+        let_stages_go_first();
         Ok(Self {
             signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?,
             ended: false,

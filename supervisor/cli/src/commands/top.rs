@@ -10,7 +10,7 @@ use common::{domain::RobotName, samples::RequestKind};
 use console::top::{self, Action};
 use rustix::process::Signal;
 
-use super::{Failure, operate};
+use super::{Failure, operate, stream::let_stages_go_first};
 
 /// Show a robot on the terminal: stages, believed map, field; keys kill, freeze, restart, stop, resume.
 #[derive(Debug, Args)]
@@ -27,6 +27,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
                 .into(),
         );
     }
+    let_stages_go_first();
     top::show(&arguments.robot, act)?;
     Ok(ExitCode::SUCCESS)
 }
