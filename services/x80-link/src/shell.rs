@@ -267,7 +267,7 @@ impl Shell {
         for (at, header, bytes) in self.carried.wire.drain(..) {
             for piece in bytes.chunks(WIRE_PIECE) {
                 self.wire
-                    .publish_quietly(at.tick, at.time, header, piece.iter().copied())?;
+                    .publish_slice_quietly(at.tick, at.time, header, piece)?;
             }
         }
         Ok(())
