@@ -103,6 +103,11 @@ impl Process for Shell {
         Ok(self.work(Input::Fault { fault, robot })?.changed())
     }
 
+    /// Whether there is a new reader of the field is not known before.
+    fn has_idle_work(&self) -> bool {
+        true
+    }
+
     fn idle(&mut self) -> Result<(), StageError> {
         self.begin_background_solve()?;
         self.publish_field()

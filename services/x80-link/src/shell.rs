@@ -1,5 +1,7 @@
 //! The wire, `command`, `directive` and `tick_limit` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
+use std::time::Duration;
+
 use common::{
     bus::{Reader, SliceWriter, Writer},
     clock::{MissionClock, Pace, monotonic_ns},
@@ -23,6 +25,9 @@ use crate::{
     transport::{Transport, TransportError},
     writers::Writers,
 };
+
+/// Without input the link looks at the clock so often: a fifth of the shortest time that it waits for anything.
+const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
 /// Where it goes.
 #[derive(Debug)]
@@ -158,6 +163,15 @@ impl Process for Shell {
             surroundings: bus.writer(&topics::SURROUNDINGS, generation)?,
         });
         Ok(())
+    }
+
+    fn has_idle_work(&self) -> bool {
+        self.telemetry.is_some() && self.carried.has_telemetry()
+    }
+
+    /// Commands are repeated, and the failsafe acts, when it is time.
+    fn looks_again_after(&self) -> Option<Duration> {
+        Some(LOOKS_AGAIN)
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
