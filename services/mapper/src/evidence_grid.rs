@@ -134,18 +134,23 @@ impl EvidenceGrid {
         steps: u8,
     ) -> Window {
         let mut window = Window::default();
-        for row in 0..lattice.cells {
-            for col in 0..lattice.cells {
-                let cell = Cell { col, row };
-                let looks = &mut self.looks[lattice.index(cell)];
-                if *looks < sonar.pointed_enough {
-                    continue;
+        let enough = sonar.pointed_enough;
+        // Each pass over a row is without branches: the compiler makes vector instructions of it.
+        let is_over = |looks: u8| looks >= enough && looks.saturating_sub(steps) < enough;
+        let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
+        for (row, looks) in (0..).zip(rows) {
+            if looks.iter().fold(false, |any, &looks| any | is_over(looks)) {
+                let over = (0..)
+                    .zip(looks.iter())
+                    .filter(|(_, looks)| is_over(**looks));
+                for (col, _) in over {
+                    window = window.including(Cell { col, row });
                 }
-                *looks = looks.saturating_sub(steps);
-                if *looks < sonar.pointed_enough {
-                    *looks = 0;
-                    window = window.including(cell);
-                }
+            }
+            for looks in looks {
+                let less = looks.saturating_sub(steps);
+                let less = if less < enough { 0 } else { less };
+                *looks = if *looks < enough { *looks } else { less };
             }
         }
         window

@@ -10,11 +10,9 @@ use harmonic::{Cancellation, Field, Solver};
 
 use crate::{
     background::Background,
+    scheduling,
     step::{Job, Solved},
 };
-
-/// Niceness of the thread: the stages that answer the robot's ticks go first.
-const NICE: i32 = 10;
 
 /// What the thread is given.
 #[derive(Debug)]
@@ -40,16 +38,12 @@ impl BackgroundSolver {
     /// # Errors
     /// When the system has no thread or descriptor left.
     pub fn start() -> io::Result<Self> {
-        let go_last = || {
-            // Where that is refused they share the processor.
-            let _ = rustix::process::nice(NICE);
-        };
         let mut worker = Worker::default();
         let solve = move |order| worker.solve(order);
         Ok(Self {
             running: Cancellation::new(),
             untaken: None,
-            thread: Background::start("full-solve", go_last, solve)?,
+            thread: Background::start("full-solve", scheduling::behind_stages, solve)?,
         })
     }
 
