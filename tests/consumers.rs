@@ -1,6 +1,10 @@
 //! A consumer that comes late gets everything, and going away changes nothing.
 
-use std::time::{Duration, Instant};
+use std::{
+    process::{Child, Stdio},
+    sync::atomic::{AtomicBool, Ordering},
+    time::{Duration, Instant},
+};
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
 use common::{
@@ -211,6 +215,80 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         assert_eq!(summary["restarts"]["controller"], 0, "{summary}");
         drop((held, readers, grids, bus));
         assert_nothing_left("greedy");
+    });
+}
+
+/// A consumer's process, killed in the end.
+struct Staying(Child);
+
+impl Drop for Staying {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Join the bus of `robot`, read grid and field and leave, again and again until `over`; how often there was a place.
+fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
+    let domain = Domain::of(robot.parse().unwrap());
+    let mut joined = 0;
+    while !over.load(Ordering::Relaxed) {
+        let Ok(bus) = Bus::join(&domain, "visitor") else {
+            continue;
+        };
+        let grid = bus.slice_reader(&topics::GRID);
+        let field = bus.slice_reader(&topics::FIELD);
+        if let (Ok(mut grid), Ok(mut field)) = (grid, field) {
+            joined += 1;
+            let _ = (grid.take(), field.take());
+        }
+    }
+    joined
+}
+
+#[test]
+fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and_take_no_stages_place()
+ {
+    in_own_process(|| {
+        let robot = "visited-c6";
+        let mut run = Run::start(
+            robot,
+            "obstacle-course",
+            &["--pace", "2", "--timeout", "30"],
+        );
+        run.wait_until_under_way(0.5);
+        let mut staying = Vec::new();
+        for consumer in 0..10 {
+            let topic = ["grid", "field"][consumer % 2];
+            let mut echo = support::firsthand(&["echo", topic, "--robot", robot]);
+            echo.stdout(Stdio::null()).stderr(Stdio::null());
+            staying.push(Staying(echo.spawn().unwrap()));
+        }
+        let over = AtomicBool::new(false);
+        let joined: usize = std::thread::scope(|scope| {
+            let visitor = || scope.spawn(|| join_again_and_again(robot, &over));
+            let visitors = [visitor(), visitor(), visitor()];
+            run.wait_until_under_way(5.0);
+            // A stage that ends gets its place, whoever else comes.
+            run.kill_and_await_successor("planner", rustix::process::Signal::KILL);
+            run.wait_until_under_way(8.0);
+            over.store(true, Ordering::Relaxed);
+            visitors.map(|visitor| visitor.join().unwrap()).iter().sum()
+        });
+        assert!(joined > 10, "{joined}");
+        drop(staying);
+        let (_, summary) = run.finish();
+        for stage in [
+            "x80-link",
+            "dead-reckoning",
+            "mapper",
+            "planner",
+            "controller",
+        ] {
+            let killed = u64::from(stage == "planner");
+            assert_eq!(summary["restarts"][stage], killed, "{summary}");
+        }
+        assert_nothing_left(robot);
     });
 }
 

@@ -92,7 +92,7 @@ impl InputLog {
     pub fn publish(&mut self, at: Progress) -> Result<(), BusError> {
         for piece in self.unpublished.chunks(self.piece) {
             self.writer
-                .publish_quietly(at.tick, at.time, self.header, piece.iter().copied())?;
+                .publish_slice_quietly(at.tick, at.time, self.header, piece)?;
         }
         self.unpublished.clear();
         Ok(())

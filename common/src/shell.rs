@@ -90,9 +90,20 @@ pub trait Process: Sized {
         Ok(())
     }
 
+    /// Whether there is something for [`Process::idle`] to do.
+    fn has_idle_work(&self) -> bool {
+        false
+    }
+
+    /// After how long without input the stage has to look at the clock; none for one that only answers what comes.
+    fn looks_again_after(&self) -> Option<Duration> {
+        None
+    }
+
     /// Do what nobody waits for: publish a whole map again, save a snapshot. A stage that goes on computing can
     /// keep the processor from the one it has just woken, so on a wall clock this is called in the pause after a
-    /// tick; on a clock of ticks, where ticks follow each other at once, after each turn.
+    /// tick, where [`Process::has_idle_work`] says so; on a clock of ticks, where ticks follow each other at once,
+    /// after each turn.
     ///
     /// # Errors
     /// When the stage cannot go on; it will be restarted.
@@ -234,7 +245,11 @@ fn work(
     let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
     let mut busy = true;
     while !stop.came() {
-        let patience = if busy { TICK_OVER } else { heartbeat.period };
+        let pause = (busy && process.has_idle_work()).then_some(TICK_OVER);
+        let patience = [pause, process.looks_again_after()]
+            .into_iter()
+            .flatten()
+            .fold(heartbeat.time_to_beat(), Duration::min);
         context.budget.waits();
         let came = context.waiter.wait(patience)?;
         context.budget.awake();
@@ -279,9 +294,11 @@ fn inject(
 struct Heartbeat {
     writer: Writer<HealthSample>,
     sample: HealthSample,
-    /// From beat to beat, by the table of topics; also the longest that the stage waits.
+    /// From beat to beat at most, by the table of topics; also the longest that the stage waits.
     period: Duration,
     last: Instant,
+    /// The tick of the last beat.
+    tick: u64,
 }
 
 impl Heartbeat {
@@ -295,25 +312,45 @@ impl Heartbeat {
             },
             period: topics::HEALTH.restated_every(),
             last: Instant::now(),
+            tick: 0,
         })
     }
 
     fn beat(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
-        self.sample.state = state.into();
-        self.last = Instant::now();
-        self.writer
-            .publish(progress.tick, progress.time, self.sample)?;
+        self.beat_quietly(state, progress)?;
+        self.writer.wake()?;
         Ok(())
     }
 
-    /// Returns whether it was due.
+    fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
+        self.sample.state = state.into();
+        (self.last, self.tick) = (Instant::now(), progress.tick);
+        self.writer
+            .publish_quietly(progress.tick, progress.time, self.sample)?;
+        Ok(())
+    }
+
+    /// How long until the stage has to beat.
+    fn time_to_beat(&self) -> Duration {
+        self.period.saturating_sub(self.last.elapsed())
+    }
+
+    /// Beat if it is time. Returns whether it was.
+    ///
+    /// A stage that has answered a tick is awake anyway: it beats early, so that it need not wake for that alone, and
+    /// wakes nobody, for the supervisor is woken when the tick ends.
     fn beat_if_due(&mut self, progress: Progress) -> Result<bool, StageError> {
         self.sample.turns += 1;
-        let due = self.last.elapsed() >= self.period;
-        if due {
+        let age = self.last.elapsed();
+        let with_a_tick = progress.tick != self.tick && age >= self.period / 2;
+        if with_a_tick {
+            self.beat_quietly(HealthState::Ready, progress)?;
+        } else if age >= self.period {
             self.beat(HealthState::Ready, progress)?;
+        } else {
+            return Ok(false);
         }
-        Ok(due)
+        Ok(true)
     }
 
     /// Publish what was made of the fault that was asked for under `id`.

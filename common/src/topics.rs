@@ -20,8 +20,9 @@ pub use crate::bus::{
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
-/// Twenty-five heartbeats fit in the tightest deadline set on them; they take a hundredth of a percent of a core.
-const BEAT: Duration = Duration::from_millis(20);
+/// Longer than a tick at 7 Hz, so that a stage that answers ticks beats with them and need not wake for a beat alone. Three
+/// fit in the tightest deadline set on them.
+const BEAT: Duration = Duration::from_millis(150);
 /// So that `firsthand status` is up to date while no ticks come.
 const LINK_AGAIN: Duration = Duration::from_millis(100);
 

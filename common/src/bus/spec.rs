@@ -96,7 +96,7 @@ impl Limits {
         buffer: 4,
         recorder_buffer: 256,
         borrowed: 2,
-        readers: 12,
+        readers: 24,
     };
     /// For slices that are most of a whole map each.
     pub const WHOLE_MAP: Self = Self {

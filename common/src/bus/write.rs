@@ -231,6 +231,30 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
             .map_err(refused("publish on", self.topic))
     }
 
+    /// As [`SliceWriter::publish_quietly`], copies `cells` in one piece.
+    ///
+    /// # Errors
+    /// As [`SliceWriter::publish`].
+    pub fn publish_slice_quietly(
+        &mut self,
+        tick: u64,
+        time: MissionTime,
+        mut header: H,
+        cells: &[T],
+    ) -> Result<(), BusError> {
+        *header.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
+        let mut sample = self
+            .publisher
+            .loan_slice_uninit(cells.len())
+            .map_err(refused("publish on", self.topic))?;
+        *sample.user_header_mut() = header;
+        sample
+            .write_from_slice(cells)
+            .send()
+            .map(drop)
+            .map_err(refused("publish on", self.topic))
+    }
+
     /// Wake the readers of what was published quietly.
     ///
     /// # Errors

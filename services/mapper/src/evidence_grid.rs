@@ -134,18 +134,23 @@ impl EvidenceGrid {
         steps: u8,
     ) -> Window {
         let mut window = Window::default();
-        for row in 0..lattice.cells {
-            for col in 0..lattice.cells {
-                let cell = Cell { col, row };
-                let looks = &mut self.looks[lattice.index(cell)];
-                if *looks < sonar.pointed_enough {
-                    continue;
+        let enough = sonar.pointed_enough;
+        // Each pass over a row is without branches: the compiler makes vector instructions of it.
+        let is_over = |looks: u8| looks >= enough && looks.saturating_sub(steps) < enough;
+        let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
+        for (row, looks) in (0..).zip(rows) {
+            if looks.iter().fold(false, |any, &looks| any | is_over(looks)) {
+                let over = (0..)
+                    .zip(looks.iter())
+                    .filter(|(_, looks)| is_over(**looks));
+                for (col, _) in over {
+                    window = window.including(Cell { col, row });
                 }
-                *looks = looks.saturating_sub(steps);
-                if *looks < sonar.pointed_enough {
-                    *looks = 0;
-                    window = window.including(cell);
-                }
+            }
+            for looks in looks {
+                let less = looks.saturating_sub(steps);
+                let less = if less < enough { 0 } else { less };
+                *looks = if *looks < enough { *looks } else { less };
             }
         }
         window
@@ -182,11 +187,21 @@ impl EvidenceGrid {
 
         let mut arc = Vec::new();
         let mut explained = false;
-        for cell in around(lattice, beam.origin, far) {
+        // What is asked below lies within `near`, or in the triangle of the widest cone.
+        let (end, aside) = (far * beam.axis, far * outside * beam.axis.perp());
+        let corners = [
+            DVec2::splat(near),
+            DVec2::splat(-near),
+            end + aside,
+            end - aside,
+        ];
+        let least = corners.into_iter().fold(DVec2::ZERO, DVec2::min);
+        let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
+        for cell in between(lattice, beam.origin + least, beam.origin + greatest) {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
             let (across, along) = (beam.axis.perp_dot(offset), beam.axis.dot(offset));
-            // Most cells around lie outside anything asked below, which is known without an angle.
+            // Many of these cells still lie outside anything asked below, which is known without an angle.
             if range > far || range > near && across.abs() > along * outside {
                 continue;
             }
@@ -359,10 +374,15 @@ impl EvidenceGrid {
 
 /// The cells of a square of `reach` metres around `centre`, as far as they lie inside the map.
 fn around(frame: &GridFrame, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
+    between(frame, centre - reach, centre + reach)
+}
+
+/// The cells of a rectangle and those beside it, as far as they lie inside the map.
+fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<Item = Cell> + use<> {
     let last = f64::from(frame.cells) - 1.0;
     let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
-    let from = inside(frame.to_cells(centre - reach).floor());
-    let to = inside(frame.to_cells(centre + reach).ceil());
+    let from = inside(frame.to_cells(least).floor());
+    let to = inside(frame.to_cells(greatest).ceil());
     let columns = from.x as u32..=to.x as u32;
     (from.y as u32..=to.y as u32)
         .flat_map(move |row| columns.clone().map(move |col| Cell { col, row }))

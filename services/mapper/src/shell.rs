@@ -64,6 +64,8 @@ impl Process for Shell {
         }
         context.waiter.on(context.bus.wakeup(&topics::POSE)?);
         context.waiter.on(context.bus.wakeup(&topics::DIRECTIVE)?);
+        // A planner that becomes ready is a new reader of the grid.
+        context.waiter.on(context.bus.wakeup(&topics::HEALTH)?);
         let generation = context.generation.number;
         Ok(Self {
             pose: context.bus.reader(&topics::POSE)?,
@@ -109,10 +111,13 @@ impl Process for Shell {
         Ok(true)
     }
 
+    fn has_idle_work(&self) -> bool {
+        self.is_keyframe_due() || self.journal.is_long()
+    }
+
     /// What takes the time of the whole map.
     fn idle(&mut self) -> Result<(), StageError> {
-        let due = |last| self.progress.time.since(last) >= KEYFRAME_EVERY;
-        if self.last_keyframe.is_none_or(due) {
+        if self.is_keyframe_due() {
             self.publish_again()?;
         }
         if self.journal.is_long() {
@@ -162,6 +167,11 @@ impl Shell {
         Ok(self.latest_range.filter(|range| range.stamp.tick == tick))
     }
 
+    fn is_keyframe_due(&self) -> bool {
+        let due = |last| self.progress.time.since(last) >= KEYFRAME_EVERY;
+        self.last_keyframe.is_none_or(due)
+    }
+
     /// Publish the whole map although nothing changed.
     fn publish_again(&mut self) -> Result<(), StageError> {
         self.inputs
@@ -178,10 +188,16 @@ impl Shell {
         if part.is_keyframe() {
             self.last_keyframe = Some(time);
         }
-        let (header, cells) = sample_of(&self.mapper, part);
         self.inputs.publish(self.progress)?;
         self.budget.end(Item::Keep);
-        self.grid.publish_quietly(tick, time, header, cells)?;
+        if part.is_keyframe() {
+            let header = self.mapper.header(part);
+            let cells = self.mapper.state().cells();
+            self.grid.publish_slice_quietly(tick, time, header, cells)?;
+        } else {
+            let (header, cells) = sample_of(&self.mapper, part);
+            self.grid.publish_quietly(tick, time, header, cells)?;
+        }
         self.budget.published(tick, Answers::Inputs);
         self.grid.wake()?;
         Ok(())

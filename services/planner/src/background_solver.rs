@@ -1,22 +1,18 @@
 //! The background solver: a thread on which full solves run while the live field stays in use.
 
 use std::{
-    io::{self, Write},
-    os::{
-        fd::{AsFd, BorrowedFd},
-        unix::net::UnixStream,
-    },
-    sync::mpsc::{Receiver, Sender, channel},
-    thread::JoinHandle,
+    io,
+    os::fd::{AsFd, BorrowedFd},
     time::Instant,
 };
 
 use harmonic::{Cancellation, Field, Solver};
 
-use crate::step::{Job, Solved};
-
-/// Niceness of the thread: the stages that answer the robot's ticks go first.
-const NICE: i32 = 10;
+use crate::{
+    background::Background,
+    scheduling,
+    step::{Job, Solved},
+};
 
 /// What the thread is given.
 #[derive(Debug)]
@@ -30,13 +26,10 @@ pub(crate) struct Order {
 /// A solver on a thread of its own. Dropping it cancels what runs and waits for the thread.
 #[derive(Debug)]
 pub struct BackgroundSolver {
-    jobs: Option<Sender<Order>>,
-    results: Receiver<Solved>,
-    done: UnixStream,
     running: Cancellation,
     /// The job whose result was not taken yet.
     untaken: Option<u64>,
-    thread: Option<JoinHandle<()>>,
+    thread: Background<Order, Solved>,
 }
 
 impl BackgroundSolver {
@@ -45,33 +38,12 @@ impl BackgroundSolver {
     /// # Errors
     /// When the system has no thread or descriptor left.
     pub fn start() -> io::Result<Self> {
-        let (jobs, orders) = channel::<Order>();
-        let (finished, results) = channel();
-        let (done, mut wakeup) = UnixStream::pair()?;
-        done.set_nonblocking(true)?;
-        // A full pipe is readable already.
-        wakeup.set_nonblocking(true)?;
-        let work = move || {
-            // Where that is refused they share the processor.
-            let _ = rustix::process::nice(NICE);
-            let mut worker = Worker::default();
-            for order in orders {
-                if finished.send(worker.solve(order)).is_err() {
-                    return;
-                }
-                let _ = wakeup.write(&[1]);
-            }
-        };
-        let thread = std::thread::Builder::new()
-            .name("full-solve".to_owned())
-            .spawn(work)?;
+        let mut worker = Worker::default();
+        let solve = move |order| worker.solve(order);
         Ok(Self {
-            jobs: Some(jobs),
-            results,
-            done,
             running: Cancellation::new(),
             untaken: None,
-            thread: Some(thread),
+            thread: Background::start("full-solve", scheduling::behind_stages, solve)?,
         })
     }
 
@@ -80,27 +52,22 @@ impl BackgroundSolver {
         self.running.cancel();
         self.running = Cancellation::new();
         let afresh = self.untaken.replace(job.number).is_some();
-        if let Some(jobs) = &self.jobs {
-            // The thread ends only when this is dropped.
-            let _ = jobs.send(Order {
-                job,
-                cancellation: self.running.clone(),
-                afresh,
-            });
-        }
+        self.thread.begin(Order {
+            job,
+            cancellation: self.running.clone(),
+            afresh,
+        });
     }
 
     /// The next result, if there is one.
     pub fn take(&mut self) -> Option<Solved> {
-        self.drain();
-        let solved = self.results.try_recv().ok();
+        let solved = self.thread.take();
         self.taken(solved)
     }
 
     /// The next result; waits for it. None when the thread has ended.
     pub fn wait(&mut self) -> Option<Solved> {
-        let solved = self.results.recv().ok();
-        self.drain();
+        let solved = self.thread.wait();
         self.taken(solved)
     }
 
@@ -109,12 +76,6 @@ impl BackgroundSolver {
             self.untaken.take_if(|untaken| *untaken == solved.number);
         }
         solved
-    }
-
-    fn drain(&self) {
-        use std::io::Read;
-        let mut wakeups = [0; 64];
-        while matches!((&self.done).read(&mut wakeups), Ok(read) if read > 0) {}
     }
 }
 
@@ -152,17 +113,12 @@ impl Worker {
 /// Readable when a job is done.
 impl AsFd for BackgroundSolver {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.done.as_fd()
+        self.thread.as_fd()
     }
 }
 
 impl Drop for BackgroundSolver {
     fn drop(&mut self) {
         self.running.cancel();
-        self.jobs = None;
-        if let Some(thread) = self.thread.take() {
-            // A panic there has been printed; the process ends anyway.
-            let _ = thread.join();
-        }
     }
 }

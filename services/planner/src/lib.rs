@@ -9,10 +9,13 @@
 mod active_sensing;
 mod aim;
 mod arcs;
+mod background;
 pub mod background_solver;
 mod fault;
+mod field_publisher;
 mod near_echoes;
 pub mod replay;
+mod scheduling;
 pub mod shell;
 pub mod step;
 mod unheard_faces;

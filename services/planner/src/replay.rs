@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 
 use common::{
     bus::decode_slice,
-    grid::Part,
+    grid::{GridFrame, Part},
     inputs,
     replay::{Beginning, Output, Replay, ReplayError, entry},
-    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
     shell::Progress,
     step::Step as _,
     topics,
@@ -55,6 +55,8 @@ pub enum Taken<'a> {
     Fault(FaultKind, DVec2),
     /// This part of the policy is published.
     Field(#[serde(with = "inputs::sample")] Part),
+    /// The policy is computed of the field as it is here.
+    Policy,
 }
 
 struct Generation {
@@ -63,6 +65,14 @@ struct Generation {
     /// Begun, and their results not taken yet, oldest first.
     jobs: VecDeque<Order>,
     fields: bool,
+    policy: Option<Policy>,
+}
+
+/// What was computed last.
+struct Policy {
+    header: FieldHeader,
+    frame: GridFrame,
+    cells: Vec<FieldCell>,
 }
 
 /// Begin the replay of a generation.
@@ -75,6 +85,7 @@ pub fn begin(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
         worker: Worker::default(),
         jobs: VecDeque::new(),
         fields: beginning.fields,
+        policy: None,
     }))
 }
 
@@ -98,10 +109,23 @@ impl Generation {
         none
     }
 
+    fn policy(&self) -> Option<Policy> {
+        let snapshot = self.planner.snapshot().filter(|_| self.fields)?;
+        Some(Policy {
+            header: snapshot.header,
+            frame: snapshot.frame,
+            cells: snapshot.cells(),
+        })
+    }
+
     fn field(&self, part: Part, at: Progress) -> Option<Output> {
-        let (header, frame, cells) = self.planner.policy().filter(|_| self.fields)?;
-        let header = FieldHeader { part, ..header };
-        let window: Vec<_> = frame.cells_of(part.window(), &cells).collect();
+        let policy = self.policy.as_ref()?;
+        let header = FieldHeader {
+            part,
+            ..policy.header
+        };
+        let window = policy.frame.cells_of(part.window(), &policy.cells);
+        let window: Vec<_> = window.collect();
         let (tick, time) = (at.tick, at.time);
         let topic = &topics::FIELD;
         Some(Output::of_slice(topic, tick, time, header, &window))
@@ -144,6 +168,10 @@ impl Replay for Generation {
             }
             Taken::Fault(fault, robot) => self.planner.step(Input::Fault { fault, robot }, time),
             Taken::Field(part) => return Ok(self.field(part, at).into_iter().collect()),
+            Taken::Policy => {
+                self.policy = self.policy();
+                return Ok(Vec::new());
+            }
         };
         // Where there is no field the process ended.
         if let Ok(Outcome { job: Some(job), .. }) = outcome {

@@ -3,21 +3,21 @@
 use std::time::Instant;
 
 use common::{
-    bus::{Reader, SliceReader, SliceWriter, Writer, encode_slice},
-    clock::{MissionClock, MissionTime},
-    grid::Part,
+    bus::{Reader, SliceReader, Writer, encode_slice},
+    clock::MissionClock,
     inputs::InputLog,
     latency_budget::{Answers, Item, LatencyBudget},
-    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+    samples::{FaultKind, GridHeader, GuidanceSample, PoseSample},
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
-    topics::{self, AnyTopic as _},
+    topics,
 };
 
 use harmonic::SolveError;
 
 use crate::{
     background_solver::BackgroundSolver,
+    field_publisher::FieldPublisher,
     replay::{Entry, Taken},
     step::{Input, Planner, Solved, Work},
 };
@@ -28,7 +28,7 @@ pub struct Shell {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     guidance: Writer<GuidanceSample>,
-    field: SliceWriter<FieldHeader, FieldCell>,
+    field: FieldPublisher,
     planner: Planner,
     background: BackgroundSolver,
     inputs: InputLog,
@@ -42,12 +42,7 @@ pub struct Shell {
     answered: Option<u64>,
     full_solve_ns: u64,
     local_update_ns: u64,
-    field_version: u64,
     field_changed: bool,
-    /// The policy that consumers hold.
-    published: Vec<FieldCell>,
-    change_published: Option<MissionTime>,
-    keyframe_published: Option<MissionTime>,
     progress: Progress,
     budget: LatencyBudget,
 }
@@ -62,13 +57,18 @@ impl Process for Shell {
             StageError::Other(format!("cannot start the thread of full solves: {error}"))
         })?;
         context.waiter.on_readable(&background)?;
+        let field = context
+            .bus
+            .slice_writer(&topics::FIELD, generation, longest)?;
+        let field = FieldPublisher::start(field).map_err(|error| {
+            StageError::Other(format!("cannot start the thread of policies: {error}"))
+        })?;
+        context.waiter.on_readable(&field)?;
         Ok(Self {
             grid: context.bus.slice_reader(&topics::GRID)?,
             pose: context.bus.reader(&topics::POSE)?,
             guidance: context.bus.writer(&topics::GUIDANCE, generation)?,
-            field: context
-                .bus
-                .slice_writer(&topics::FIELD, generation, longest)?,
+            field,
             planner: Planner::new(mission),
             background,
             inputs: InputLog::begin(context, &())?,
@@ -79,11 +79,7 @@ impl Process for Shell {
             answered: None,
             full_solve_ns: 0,
             local_update_ns: 0,
-            field_version: 0,
             field_changed: false,
-            published: Vec::new(),
-            change_published: None,
-            keyframe_published: None,
             progress: Progress::default(),
             budget: context.budget.clone(),
         })
@@ -95,6 +91,9 @@ impl Process for Shell {
         if asked || swapped && !self.in_ticks {
             self.answer()?;
         }
+        if self.field.is_busy() {
+            self.publish_field()?;
+        }
         Ok(self.progress)
     }
 
@@ -102,6 +101,11 @@ impl Process for Shell {
         let robot = self.latest_pose.unwrap_or_default().pose().position;
         self.note(Taken::Fault(fault, robot))?;
         Ok(self.work(Input::Fault { fault, robot })?.changed())
+    }
+
+    /// Whether there is a new reader of the field is not known before.
+    fn has_idle_work(&self) -> bool {
+        true
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
@@ -257,50 +261,21 @@ impl Shell {
         Ok(())
     }
 
-    /// The field for consumers, after the robot has its guidance: what changed, or all of it when it was
-    /// not published for long or there is a new reader.
+    /// The field for consumers, after the robot has its guidance.
     fn publish_field(&mut self) -> Result<(), StageError> {
-        let since = |then: Option<MissionTime>| then.map(|then| self.progress.time.since(then));
-        let keyframe = self.field.has_new_reader()
-            || since(self.keyframe_published)
-                .is_none_or(|age| age >= topics::FIELD.restated_every());
-        let change = self.field_changed
-            && since(self.change_published)
-                .is_none_or(|age| age >= topics::FIELD.changes_at_most_every());
-        if !(keyframe || change) {
-            return Ok(());
+        if let Some((part, at)) = self.field.next(self.progress) {
+            let taken = Taken::Field(part);
+            self.inputs.note(&Entry { taken, at }, self.progress)?;
+            self.inputs.publish(self.progress)?;
+            self.field.publish(part, at)?;
         }
-        let Some((header, frame, cells)) = self.planner.policy() else {
-            return Ok(());
-        };
-        self.field_changed = false;
-        self.change_published = Some(self.progress.time);
-        let comparable = self.published.len() == cells.len();
-        let changed = if comparable {
-            frame.changed_window(&self.published, &cells)
-        } else {
-            frame.whole()
-        };
-        let keyframe = keyframe || changed == frame.whole();
-        if changed.area() > 0 {
-            self.field_version += 1;
-        } else if !keyframe {
-            return Ok(());
+        if self.field.is_due(self.field_changed, self.progress.time)
+            && let Some(snapshot) = self.planner.snapshot()
+        {
+            self.field_changed = false;
+            self.note(Taken::Policy)?;
+            self.field.begin(snapshot, self.progress);
         }
-        let version = self.field_version;
-        let part = if keyframe {
-            self.keyframe_published = Some(self.progress.time);
-            Part::whole(frame, version)
-        } else {
-            Part::of(frame, changed, version)
-        };
-        let header = FieldHeader { part, ..header };
-        let Progress { tick, time } = self.progress;
-        self.note(Taken::Field(part))?;
-        self.inputs.publish(self.progress)?;
-        let window = frame.cells_of(part.window(), &cells);
-        self.field.publish(tick, time, header, window)?;
-        self.published = cells;
         Ok(())
     }
 }

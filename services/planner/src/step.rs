@@ -2,15 +2,16 @@
 
 mod input;
 mod live;
+mod snapshot;
+
+use std::sync::Arc;
 
 use common::{
     clock::MissionTime,
     grid::{self, Applied, GridFrame, Replica, Window},
     kinematics::Pose2,
     mission::{Method, Mission},
-    samples::{
-        FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample,
-    },
+    samples::{FaultKind, FieldHeader, GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
     step::{ForeignState, Step},
 };
 use glam::DVec2;
@@ -22,9 +23,10 @@ use crate::active_sensing::{ActiveSensing, Advice, View};
 use crate::aim;
 use crate::arcs::Arcs;
 use crate::fault::lead_astray;
-use live::{Live, cell_policy, changes_in, field_cell, is_hazard};
+use live::{Live, changes_in, field_cell, is_hazard};
 
 pub use input::{Input, Job, Outcome, Solved, Work};
+pub use snapshot::Snapshot;
 
 /// Maps of at most this many cells (1024 a side) are solved whole at once where the robot has no direction to trust after a
 /// local update: that takes some ten milliseconds, and a run is the same each time. On larger ones it waits for the
@@ -178,7 +180,7 @@ impl Planner {
         self.live = Some(Live {
             frame,
             domain,
-            field,
+            field: Arc::new(field),
         });
         Ok(Work::FullSolve)
     }
@@ -216,7 +218,7 @@ impl Planner {
         }
         let verdict = self.solver.update(
             &mut live.domain,
-            &mut live.field,
+            Arc::make_mut(&mut live.field),
             &changes,
             &Cancellation::default(),
         )?;
@@ -252,9 +254,10 @@ impl Planner {
         self.urgent = waits;
         if waits && live.frame.area() <= AT_ONCE {
             let before = &live.field;
-            live.field = self
+            let field = self
                 .solver
                 .solve_near(&live.domain, before, &Cancellation::default())?;
+            live.field = Arc::new(field);
             self.urgent = false;
             self.solved();
         }
@@ -318,7 +321,7 @@ impl Planner {
         }
         if let Some(live) = &mut self.live {
             live.domain = domain;
-            live.field = field;
+            live.field = Arc::new(field);
             self.full_solves += 1;
         }
         Ok(Work::SwappedIn)
@@ -329,7 +332,7 @@ impl Planner {
         match (fault, &mut self.live) {
             (FaultKind::CorruptField, Some(live)) => {
                 let at = live.frame.to_cells(robot);
-                lead_astray(&mut live.field, [at.x, at.y]);
+                lead_astray(Arc::make_mut(&mut live.field), [at.x, at.y]);
                 Work::Broken
             }
             (FaultKind::Saddle, _) => {
@@ -421,10 +424,9 @@ impl Planner {
         }
     }
 
-    /// The policy of every cell, and what the `field` topic says of it besides stamp and part; none before
-    /// the first solve.
+    /// The field as it is now; none before the first solve.
     #[must_use]
-    pub fn policy(&self) -> Option<(FieldHeader, GridFrame, Vec<FieldCell>)> {
+    pub fn snapshot(&self) -> Option<Snapshot> {
         let Live { frame, field, .. } = self.live.as_ref()?;
         let verification = field.verification();
         let header = FieldHeader {
@@ -435,9 +437,11 @@ impl Planner {
             reachable: verification.reachable as u64,
             ..FieldHeader::default()
         };
-        let side = frame.cells as usize;
-        let cells = (0..side * side).map(|index| cell_policy(field, index % side, index / side));
-        Some((header, *frame, cells.collect()))
+        Some(Snapshot {
+            header,
+            frame: *frame,
+            field: Arc::clone(field),
+        })
     }
 }
 

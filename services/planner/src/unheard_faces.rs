@@ -35,12 +35,19 @@ const NEAR_ECHO_M: f64 = 0.25;
 /// So many such echoes weigh as much as one silence: pings are lost, but not twice as often as they are answered.
 const ECHOES_FOR_A_SILENCE: usize = 2;
 
+/// Normals to either side of the way, and the way itself.
+const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
+
 /// The readings, and the body they are asked for.
 #[derive(Clone, Debug)]
 pub(crate) struct UnheardFaces {
     beams: Vec<Beam>,
     rays: Vec<Beam>,
     reach: f64,
+    /// The normals that are asked about, of a way along x.
+    normals: [DVec2; NORMALS],
+    /// Least cosine of the angle between a beam and the normal of a face that answers it: of one that is far, and near.
+    answers: [f64; 2],
 }
 
 /// A reading.
@@ -63,30 +70,38 @@ impl UnheardFaces {
             beams: belief.clear_beams().iter().map(beam).collect(),
             rays: belief.clear_rays().iter().map(beam).collect(),
             reach: radius + MARGIN_M,
+            normals: std::array::from_fn(|index| {
+                let step = index as i32 - (NORMALS / 2) as i32;
+                DVec2::from_angle((f64::from(step) * STEP_DEG).to_radians())
+            }),
+            answers: [ANSWERS_WITHIN_DEG, NEAR_ANSWERS_WITHIN_DEG]
+                .map(|deg| deg.to_radians().cos()),
         }
     }
 
     /// Unit vectors towards the faces that a body at `at` could touch on its way along the unit vector `along`, and that no
     /// reading speaks against.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> {
-        let steps = (WIDEST_DEG / STEP_DEG) as i32;
-        (-steps..=steps)
-            .map(move |step| {
-                DVec2::from_angle((f64::from(step) * STEP_DEG).to_radians()).rotate(along)
-            })
+        let normals = self.normals.iter();
+        normals
+            .map(move |normal| normal.rotate(along))
             .filter(move |&normal| !self.is_refuted(at, normal))
     }
 
     /// Whether the readings speak against a face that touches a body at `at` on the side of `normal`.
     fn is_refuted(&self, at: DVec2, normal: DVec2) -> bool {
-        let [far, near] =
-            [ANSWERS_WITHIN_DEG, NEAR_ANSWERS_WITHIN_DEG].map(|deg| deg.to_radians().cos());
+        let [far, near] = self.answers;
         let (mut silences, mut echoes) = (0, 0);
         for beam in &self.beams {
+            let square = beam.axis.dot(normal);
+            // Most beams: however near the face is, it does not answer them.
+            if square < near {
+                continue;
+            }
             let offset = at - beam.origin;
             let distance = offset.dot(normal) + self.reach;
             let answers = if distance <= NEAR_M { near } else { far };
-            if beam.axis.dot(normal) < answers || offset.perp_dot(normal).abs() > REACHES_M {
+            if square < answers || offset.perp_dot(normal).abs() > REACHES_M {
                 continue;
             }
             if distance <= beam.clear {

@@ -1,5 +1,7 @@
 //! The wire, `command`, `directive` and `tick_limit` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
+use std::time::Duration;
+
 use common::{
     bus::{Reader, SliceWriter, Writer},
     clock::{MissionClock, Pace, monotonic_ns},
@@ -23,6 +25,9 @@ use crate::{
     transport::{Transport, TransportError},
     writers::Writers,
 };
+
+/// Without input the link looks at the clock so often: a fifth of the shortest time that it waits for anything.
+const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
 /// Where it goes.
 #[derive(Debug)]
@@ -160,6 +165,15 @@ impl Process for Shell {
         Ok(())
     }
 
+    fn has_idle_work(&self) -> bool {
+        self.telemetry.is_some() && self.carried.has_telemetry()
+    }
+
+    /// Commands are repeated, and the failsafe acts, when it is time.
+    fn looks_again_after(&self) -> Option<Duration> {
+        Some(LOOKS_AGAIN)
+    }
+
     fn idle(&mut self) -> Result<(), StageError> {
         let Some(telemetry) = &mut self.telemetry else {
             return Ok(());
@@ -267,7 +281,7 @@ impl Shell {
         for (at, header, bytes) in self.carried.wire.drain(..) {
             for piece in bytes.chunks(WIRE_PIECE) {
                 self.wire
-                    .publish_quietly(at.tick, at.time, header, piece.iter().copied())?;
+                    .publish_slice_quietly(at.tick, at.time, header, piece)?;
             }
         }
         Ok(())

@@ -79,10 +79,13 @@ pub struct Record {
 }
 
 impl Observer {
-    /// Read everything on `bus`, to complete `record`; `waiter` wakes for heartbeats and for the end of each tick.
+    /// Read everything on `bus`, to complete `record`; `waiter` wakes for what nobody waits for but the supervisor: a
+    /// heartbeat beside the ticks, the state of the link, which ends a tick, and a field. What a tick goes through it reads
+    /// then, and takes no processor from the stages meanwhile.
     pub fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
-        waiter.on(bus.wakeup(&topics::COMMAND)?);
+        waiter.on(bus.wakeup(&topics::LINK)?);
+        waiter.on(bus.wakeup(&topics::FIELD)?);
         Ok(Self {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,

@@ -42,7 +42,7 @@ pub struct Stage {
 pub struct Deadlines {
     /// From its start to its first beat as ready.
     pub startup: Duration,
-    /// From beat to beat; they come every 20 ms.
+    /// From beat to beat; they come every 150 ms, or with a tick.
     pub heartbeat: Duration,
     /// From a tick on its inputs to its output of that tick, or of a later one.
     pub answers: Duration,
@@ -69,8 +69,8 @@ impl Stage {
 /// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded
 /// machine of two cores the slowest start seen took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
-/// Twenty-five beats: a loaded machine with more stages than cores delays one by ten times 20 ms now and
-/// then. The robot does not wait for it: the link stops it when the command is stale.
+/// Three beats: a loaded machine with more stages than cores delays one by 200 ms now and then. The robot does not wait
+/// for it: the link stops it when the command is stale.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 /// An answer takes a hundredth of that where it takes long.
 const ANSWERS: Duration = Duration::from_secs(1);

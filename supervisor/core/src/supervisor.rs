@@ -403,7 +403,7 @@ impl<'a> Supervisor<'a> {
         self.turns.count();
         let mut descriptors = self.stages.descriptors();
         if let Some(simulator) = &self.robot.simulator {
-            descriptors.extend(simulator.descriptors());
+            descriptors.push(simulator.descriptor());
         }
         let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed()];
         let soonest = deadlines.into_iter().flatten().min();

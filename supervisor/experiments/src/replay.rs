@@ -94,7 +94,9 @@ pub fn replay(log: &[LogSample]) -> Result<Replay, ReplayError> {
         _ => 0.0,
     };
     Ok(Replay {
-        field: planner.policy().map(|(_, frame, field)| (frame, field)),
+        field: planner
+            .snapshot()
+            .map(|snapshot| (snapshot.frame, snapshot.cells())),
         path_m: path
             .windows(2)
             .map(|pair| pair[0].position.distance(pair[1].position))

@@ -52,7 +52,7 @@ impl Belief {
             cells: &self.cells,
         };
         planner.step(input, MissionTime::default()).ok()?;
-        planner.policy().map(|(_, _, cells)| cells)
+        planner.snapshot().map(|snapshot| snapshot.cells())
     }
 }
 

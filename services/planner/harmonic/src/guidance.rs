@@ -28,7 +28,7 @@ const WALL_REACH: f64 = 0.5;
 
 /// Gradients shorter than this fraction of the local u are those of saddle points, where the direction is that to the
 /// neighbour of largest u. It is above the rounding of the stored u and far below the gradient of other cells.
-const SADDLE: f64 = 1e-7;
+pub(crate) const SADDLE: f64 = 1e-7;
 
 impl Field {
     /// The guidance at a position in cell units (cell centres at the integers).

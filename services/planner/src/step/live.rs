@@ -1,9 +1,8 @@
 //! The live field, and cells of the grid as the field library names them.
 
-use common::{
-    grid::{self, CellState, GridFrame, Window},
-    samples::FieldCell,
-};
+use std::sync::Arc;
+
+use common::grid::{self, CellState, GridFrame, Window};
 use glam::DVec2;
 use harmonic::{Cell, Change, Domain, Field, Guidance};
 
@@ -12,7 +11,8 @@ use harmonic::{Cell, Change, Domain, Field, Guidance};
 pub(super) struct Live {
     pub(super) frame: GridFrame,
     pub(super) domain: Domain,
-    pub(super) field: Field,
+    /// Shared with the snapshots of it.
+    pub(super) field: Arc<Field>,
 }
 
 /// As near as this to the middle of the cell that is aimed at beside the target, the robot has arrived, metres.
@@ -33,17 +33,6 @@ impl Live {
         let aim = grid_cell(self.domain.target());
         let own = self.frame.cell_at(target) == Some(aim);
         !own && self.frame.centre_of(aim).distance(robot) <= BESIDE_M
-    }
-}
-
-/// The policy of one cell of the field.
-pub(super) fn cell_policy(field: &Field, col: usize, row: usize) -> FieldCell {
-    let cell = Cell::new(col, row);
-    let [ex, ey] = field.direction(cell).unwrap_or_default();
-    FieldCell {
-        ex: ex as f32,
-        ey: ey as f32,
-        log2_u: field.u(cell).log2() as f32,
     }
 }
 

@@ -89,7 +89,7 @@ fn before_the_first_keyframe_there_is_no_guidance() {
         status(&planner.guide(&at(0.0, 0.0))),
         GuidanceStatus::Waiting
     );
-    assert!(planner.policy().is_none());
+    assert!(planner.snapshot().is_none());
 }
 
 #[test]
@@ -392,8 +392,9 @@ fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
     let mut planner = Planner::new(&mission());
     let (header, cells) = keyframe(1, |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
     planner.take_grid(&header, &cells).unwrap();
-    let (header, _, policy) = planner.policy().unwrap();
-    assert_eq!((policy.len(), header.grid_version), (1600, 1));
+    let snapshot = planner.snapshot().unwrap();
+    let policy = snapshot.cells();
+    assert_eq!((policy.len(), snapshot.header.grid_version), (1600, 1));
     for (cell, &state) in policy.iter().zip(&cells) {
         let length = f64::from(cell.ex).hypot(f64::from(cell.ey));
         let directed = (length - 1.0).abs() < 1e-6;

@@ -1,6 +1,7 @@
 //! `firsthand latency`: what a tick takes, compared with what the bus alone takes.
 
 mod budget;
+mod consumers;
 mod mission;
 mod regime;
 mod report;
@@ -41,6 +42,9 @@ pub(crate) struct Arguments {
     /// Record the missions meanwhile, as `run` does.
     #[arg(long)]
     record: bool,
+    /// Processes that read grid and field of the missions meanwhile, each both.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
+    consumers: u32,
     /// One line of JSON.
     #[arg(long)]
     json: bool,
@@ -50,6 +54,9 @@ pub(crate) struct Arguments {
     /// Be the forwarder that stands for this stage.
     #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
     forwarder: Option<String>,
+    /// Be a consumer of this robot.
+    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
+    consumer: bool,
     /// The parent process: this one stops when it ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
@@ -65,6 +72,10 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(robot) => robot.clone(),
         None => format!("latency{}", std::process::id()).parse()?,
     };
+    if let (true, Some(supervisor)) = (arguments.consumer, arguments.supervisor) {
+        consumers::run(&robot, supervisor)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
         ipc_bench::run_forwarder(&robot, place, supervisor)?;
         return Ok(ExitCode::SUCCESS);
@@ -83,6 +94,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         robot: &robot,
         pace: regime.pace(rate_hz),
         record: arguments.record,
+        consumers: arguments.consumers,
     };
     let mut budget = arguments.budget.then(Budget::default);
     let mut hops = Histogram::default();

@@ -13,7 +13,7 @@ use chaos::process_set::{ProcessSet, Used};
 use common::{clock::Pace, domain::RobotName, latency_budget};
 use supervisor::process;
 
-use super::budget::Budget;
+use super::{budget::Budget, consumers};
 use crate::commands::Failure;
 
 /// The mission, as `run` is asked for it.
@@ -23,6 +23,8 @@ pub(super) struct Mission<'a> {
     pub(super) robot: &'a RobotName,
     pub(super) pace: Pace,
     pub(super) record: bool,
+    /// So many processes read its grid and field.
+    pub(super) consumers: u32,
 }
 
 /// One mission's ticks.
@@ -75,6 +77,8 @@ impl Mission<'_> {
         if budget.is_some() {
             command.env(latency_budget::ASKED_FOR, "1");
         }
+        // They wait for the bus, and follow it; they are none of the mission's processes.
+        let _consumers = consumers::start(self.robot, self.consumers)?;
         let run = command
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

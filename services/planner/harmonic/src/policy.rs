@@ -1,0 +1,136 @@
+//! The direction and the logarithm of u of every cell of a row: for whole maps, where [`Field::direction`] cell by cell
+//! would take several times as long.
+
+use crate::cell::Cell;
+use crate::field::Field;
+use crate::guidance::SADDLE;
+use crate::scaled::Scaled;
+use crate::store::Store;
+
+/// What the field answers at a cell's centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Policy {
+    /// As [`Field::direction`]; zero where it has none to give.
+    pub direction: [f64; 2],
+    /// log2 u; negative infinity where u is zero.
+    pub log2_u: f64,
+}
+
+impl Field {
+    /// Calls `each` for the cells of `row`, in the order of their columns. A direction may differ from that of
+    /// [`direction`](Self::direction) by rounding.
+    pub fn policy_of_row(&self, row: usize, mut each: impl FnMut(Policy)) {
+        let width = self.width();
+        let inside = (1..self.height().saturating_sub(1)).contains(&row);
+        let rows = (
+            row.saturating_sub(1) * width,
+            row * width,
+            (row + 1) * width,
+        );
+        match self.store() {
+            Store::Single { values, exponent } if inside && self.patches().is_empty() => {
+                let row_at = |start: usize| &values[start..start + width];
+                let [above, own, below] = [rows.0, rows.1, rows.2].map(row_at);
+                for col in 0..width {
+                    each(self.of_cell([above, own, below], *exponent, Cell::new(col, row)));
+                }
+            }
+            Store::Double { values, exponent } if inside && self.patches().is_empty() => {
+                let row_at = |start: usize| &values[start..start + width];
+                let [above, own, below] = [rows.0, rows.1, rows.2].map(row_at);
+                for col in 0..width {
+                    each(self.of_cell([above, own, below], *exponent, Cell::new(col, row)));
+                }
+            }
+            _ => (0..width).for_each(|col| each(self.policy(Cell::new(col, row)))),
+        }
+    }
+
+    /// The policy of any cell.
+    fn policy(&self, cell: Cell) -> Policy {
+        Policy {
+            direction: self.direction(cell).unwrap_or_default(),
+            log2_u: self.u(cell).log2(),
+        }
+    }
+
+    /// The policy of `cell`; `rows` are that above it, its own and that below, as stored.
+    fn of_cell<T: Copy + Into<f64>>(&self, rows: [&[T]; 3], exponent: i32, cell: Cell) -> Policy {
+        let [above, row, below] = rows;
+        let col = cell.col;
+        let own: f64 = row[col].into();
+        let (Some(right), true) = (row.get(col + 1), col > 0) else {
+            return self.policy(cell);
+        };
+        if own <= 0.0 {
+            return NONE;
+        }
+        // Blocked cells are negative, and count as 0.
+        let u = |there: T| -> f64 { Into::<f64>::into(there).max(0.0) / own };
+        let gradient = [
+            0.5 * (u(*right) - u(row[col - 1])),
+            0.5 * (u(below[col]) - u(above[col])),
+        ];
+        let square = gradient[0] * gradient[0] + gradient[1] * gradient[1];
+        let plain = square > SADDLE * SADDLE && square.is_finite() && cell != self.target();
+        if !plain {
+            return self.policy(cell);
+        }
+        let length = square.sqrt();
+        Policy {
+            direction: [gradient[0] / length, gradient[1] / length],
+            log2_u: Scaled::new(own, exponent).log2(),
+        }
+    }
+}
+
+/// Of a cell that is blocked or cut off.
+const NONE: Policy = Policy {
+    direction: [0.0; 2],
+    log2_u: f64::NEG_INFINITY,
+};
+
+#[cfg(test)]
+mod tests {
+    use crate::{Cancellation, Cell, Domain, Settings, Solver};
+
+    /// A hall with blocked cells, a region that is cut off, and the perimeter.
+    fn domain(side: usize, seed: u64) -> Domain {
+        let mut state = seed;
+        let mut blocked = Vec::new();
+        for row in 0..side {
+            for col in 0..side {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                let rim = row == 0 || col == 0 || row == side - 1 || col == side - 1;
+                let cut_off = row < 7 && col < 7 && (row == 6 || col == 6);
+                let some = (state >> 33) % 100 < 12;
+                blocked.push(rim || cut_off || some && (row, col) != (side / 2, side / 2));
+            }
+        }
+        Domain::new(side, side, blocked, Cell::new(side / 2, side / 2)).unwrap()
+    }
+
+    #[test]
+    fn a_whole_row_answers_what_each_of_its_cells_answers() {
+        // Small values of u on the larger maps, which are stored otherwise.
+        for (side, seed) in [(24, 1), (40, 2), (64, 3), (200, 4)] {
+            let mut solver = Solver::new(Settings::default());
+            let domain = domain(side, seed);
+            let field = solver.solve(&domain, &Cancellation::default()).unwrap();
+            for row in 0..side {
+                let mut policies = Vec::new();
+                field.policy_of_row(row, |policy| policies.push(policy));
+                assert_eq!(policies.len(), side);
+                for (col, policy) in policies.iter().enumerate() {
+                    let cell = Cell::new(col, row);
+                    let direction = field.direction(cell).unwrap_or_default();
+                    let off = [0, 1].map(|axis| (direction[axis] - policy.direction[axis]).abs());
+                    assert!(off[0] < 1e-12 && off[1] < 1e-12, "{cell:?}: {off:?}");
+                    assert_eq!(policy.log2_u, field.u(cell).log2(), "{cell:?}");
+                }
+            }
+        }
+    }
+}

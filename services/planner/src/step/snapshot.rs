@@ -1,0 +1,35 @@
+//! The field at one moment, from which the policy of every cell is computed, at once or later, while the planner goes on.
+
+use std::sync::Arc;
+
+use common::{
+    grid::GridFrame,
+    samples::{FieldCell, FieldHeader},
+};
+use harmonic::Field;
+
+/// The field at one moment.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// What the `field` topic says of it besides stamp and part.
+    pub header: FieldHeader,
+    /// How its cells lie.
+    pub frame: GridFrame,
+    pub(super) field: Arc<Field>,
+}
+
+impl Snapshot {
+    /// The policy of every cell, row-major.
+    #[must_use]
+    pub fn cells(&self) -> Vec<FieldCell> {
+        let mut cells = Vec::with_capacity(self.frame.area());
+        for row in 0..self.frame.cells as usize {
+            self.field.policy_of_row(row, |policy| {
+                let [ex, ey] = policy.direction.map(|component| component as f32);
+                let log2_u = policy.log2_u as f32;
+                cells.push(FieldCell { ex, ey, log2_u });
+            });
+        }
+        cells
+    }
+}
