@@ -6,7 +6,7 @@ use crate::{
     bus::{Bus, BusError},
     domain::Domain,
     making::Making,
-    topics::AnyTopic,
+    topics::{self, AnyTopic, Rate},
     waiter::Waiter,
 };
 
@@ -48,9 +48,18 @@ pub enum News<'a, Topics> {
     Gone,
 }
 
+/// The topic that wakes for samples on `topic`. For those of each tick that is the state of the link, which ends a tick: no
+/// consumer takes the processor from stages that the tick has still to pass.
+fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
+    match topic.spec().rate {
+        Rate::EachTick | Rate::EachFrame => &topics::LINK,
+        Rate::OnChange { .. } | Rate::WhenItHappens => topic,
+    }
+}
+
 impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Open> {
     /// Follow the robot of `domain` under a name that `iox2 node list` shows. `open` opens what is read on each bus, and
-    /// the follower wakes for samples on `wake_on`.
+    /// the follower wakes for samples on `wake_on`; for those of each tick, when the tick ends.
     pub fn new(domain: Domain, name: &str, wake_on: &'static dyn AnyTopic, open: Open) -> Self {
         Self {
             domain,
@@ -152,8 +161,13 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         let _joining = self.domain.joining();
         let bus = Bus::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();
-        for &topic in &self.wake_on {
-            waiter.on(bus.wakeup(topic)?);
+        let mut known = Vec::new();
+        for topic in self.wake_on.iter().map(|&topic| wakes_for(topic)) {
+            let name = topic.spec().name;
+            if !known.contains(&name) {
+                known.push(name);
+                waiter.on(bus.wakeup(topic)?);
+            }
         }
         Ok(Joined {
             topics: (self.open)(&bus)?,

@@ -20,7 +20,7 @@ pub use crate::bus::{
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
-/// Longer than a tick at 7 Hz, so that a stage that answers ticks beats with them and need not wake for a beat alone. Three
+/// Longer than a tick at 7 Hz, so that a stage that answers ticks beats with them and need not wake for a beat alone. Five
 /// fit in the tightest deadline set on them.
 const BEAT: Duration = Duration::from_millis(150);
 /// So that `firsthand status` is up to date while no ticks come.

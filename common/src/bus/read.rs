@@ -49,7 +49,11 @@ impl Bus {
         let service = struct_service::<P>(&self.node, spec)?
             .open()
             .map_err(opening(spec.name))?;
-        self.leave_places(spec, service.dynamic_config().number_of_subscribers())?;
+        self.leave_places(
+            spec,
+            spec.limits.readers,
+            service.dynamic_config().number_of_subscribers(),
+        )?;
         let subscriber = service
             .subscriber_builder()
             .buffer_size(buffer)
@@ -86,7 +90,11 @@ impl Bus {
         let service = slice_service::<H, T>(&self.node, spec)?
             .open()
             .map_err(opening(spec.name))?;
-        self.leave_places(spec, service.dynamic_config().number_of_subscribers())?;
+        self.leave_places(
+            spec,
+            spec.limits.readers,
+            service.dynamic_config().number_of_subscribers(),
+        )?;
         let subscriber = service
             .subscriber_builder()
             .buffer_size(buffer)
@@ -106,7 +114,8 @@ impl Bus {
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
         let spec = topic.spec();
         let service = open_event(&self.node, spec)?;
-        self.leave_places(spec, service.dynamic_config().number_of_listeners())?;
+        let listeners = service.dynamic_config().number_of_listeners();
+        self.leave_places(spec, Limits::LISTENERS, listeners)?;
         service
             .listener_builder()
             .create()
@@ -115,8 +124,7 @@ impl Bus {
     }
 
     /// A consumer takes no place that a stage may need.
-    fn leave_places(&self, spec: &Spec, taken: usize) -> Result<(), BusError> {
-        let places = spec.limits.readers;
+    fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result<(), BusError> {
         if self.supervisor.is_none() && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
             return Err(BusError::NoPlace { topic, places });

@@ -105,6 +105,8 @@ impl Limits {
     };
     /// Writers at once. One is meant; a kill while starting can leak a place for good.
     pub(super) const WRITERS: usize = 16;
+    /// Who waits for one topic: consumers of all that a tick publishes wait for the one that ends it.
+    pub(super) const LISTENERS: usize = 48;
     /// Places of readers that consumers leave free, for successors of stages that ended.
     pub(super) const KEPT_FREE: usize = 3;
     /// Processes at once on one topic.

@@ -170,7 +170,7 @@ fn create_event(node: &BusNode, spec: &Spec) -> Result<event::PortFactory<ipc::S
     node.service_builder(&service_name(spec)?)
         .event()
         .max_notifiers(Limits::WRITERS)
-        .max_listeners(spec.limits.readers)
+        .max_listeners(Limits::LISTENERS)
         .max_nodes(Limits::NODES)
         .create()
         .map_err(refused("create", spec.name))

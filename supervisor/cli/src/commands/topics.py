@@ -127,8 +127,9 @@ class Follower:
                 else:
                     service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
                 subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
-            first = node.service_builder(iox2.ServiceName.new(next(iter(self.topics))))
-            listener = first.event().open().listener_builder().create()
+            # It ends a tick: until then the stages need the processor.
+            link = node.service_builder(iox2.ServiceName.new("link"))
+            listener = link.event().open().listener_builder().create()
             joining.close()
             return node, listener, subscribers
         except Exception:
