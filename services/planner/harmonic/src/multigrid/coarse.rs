@@ -25,9 +25,6 @@ const SW: (isize, isize) = (-1, 1);
 const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
-/// Largest plane that is traversed as one row, in values.
-const SMALL: usize = 1 << 13;
-
 /// Cells of one coarse level.
 #[derive(Debug)]
 pub(super) struct Coarse<R> {
@@ -66,19 +63,6 @@ impl<R: Real> Coarse<R> {
         }
     }
 
-    /// Cells of a plane from its first to its last, margins between rows included: on small levels a plane is gone through
-    /// as if it were one row, because what is done once a row would cost more than the margins do. They stay zero, as
-    /// their diagonals and weights are. The results are the same either way.
-    fn span(&self) -> Option<usize> {
-        let Grid {
-            columns,
-            rows,
-            stride,
-            ..
-        } = self.grid;
-        (rows * stride <= SMALL).then(|| rows.saturating_sub(1) * stride + columns)
-    }
-
     /// Relaxes from a zero guess and restricts the residual to `next`.
     #[inline(always)]
     pub(super) fn descend(&mut self, next: &mut Self) {
@@ -96,7 +80,7 @@ impl<R: Real> Coarse<R> {
             restricted,
             ..
         } = &mut scratch;
-        if let Some(span) = self.span() {
+        if let Some(span) = self.grid.span() {
             let o = self.grid.start(0);
             self.relax(EE, o, span, []);
             self.relax(OE, o, span, [W, E]);
@@ -203,7 +187,7 @@ impl<R: Real> Coarse<R> {
         let Grid {
             columns: n, rows, ..
         } = self.grid;
-        let span = self.span();
+        let span = self.grid.span();
         let mut scratch = std::mem::take(&mut self.scratch);
         let Scratch { upper, lower, .. } = &mut scratch;
         for row in [&mut *upper, &mut *lower] {
