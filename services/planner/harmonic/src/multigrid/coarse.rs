@@ -4,7 +4,10 @@
 //! the residual on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The odd-odd cells come last, so their residual is zero, and first on the way up, so they need no correction:
 //! no interpolation to them is ever stored.
 
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
+use super::grid::{
+    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
+    split_row,
+};
 use crate::real::Real;
 
 /// The couplings stored with a cell: to its east, south, south-east and south-west neighbour. The others are those
@@ -25,9 +28,6 @@ const SW: (isize, isize) = (-1, 1);
 const SE: (isize, isize) = (1, 1);
 const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 
-/// Largest plane that is traversed as one row, in values.
-const SMALL: usize = 1 << 13;
-
 /// Cells of one coarse level.
 #[derive(Debug)]
 pub(super) struct Coarse<R> {
@@ -47,6 +47,7 @@ pub(super) struct Coarse<R> {
     pub north: Vec<R>,
     pub south: Vec<R>,
     scratch: Scratch<R>,
+    whole: Whole<R>,
 }
 
 impl<R: Real> Coarse<R> {
@@ -63,25 +64,16 @@ impl<R: Real> Coarse<R> {
             north: grid.plane(),
             south: grid.plane(),
             scratch: Scratch::default(),
+            whole: Whole::new(&grid),
         }
-    }
-
-    /// Cells of a plane from its first to its last, margins between rows included: on small levels a plane is gone through
-    /// as if it were one row, because what is done once a row would cost more than the margins do. They stay zero, as
-    /// their diagonals and weights are. The results are the same either way.
-    fn span(&self) -> Option<usize> {
-        let Grid {
-            columns,
-            rows,
-            stride,
-            ..
-        } = self.grid;
-        (rows * stride <= SMALL).then(|| rows.saturating_sub(1) * stride + columns)
     }
 
     /// Relaxes from a zero guess and restricts the residual to `next`.
     #[inline(always)]
     pub(super) fn descend(&mut self, next: &mut Self) {
+        if let Some(span) = self.grid.span() {
+            return self.descend_whole(next, span);
+        }
         let Grid {
             columns: n,
             rows,
@@ -96,36 +88,6 @@ impl<R: Real> Coarse<R> {
             restricted,
             ..
         } = &mut scratch;
-        if let Some(span) = self.span() {
-            let o = self.grid.start(0);
-            self.relax(EE, o, span, []);
-            self.relax(OE, o, span, [W, E]);
-            self.relax(EO, o, span, [N, S, NW, NE, SW, SE]);
-            self.relax(OO, o, span, ALL);
-            let [_, here] = residual_eo;
-            for buffer in [&mut *residual_ee, &mut *residual_oe, &mut *here] {
-                buffer.resize(self.grid.len(), R::default());
-            }
-            restricted.resize(2 * next.grid.columns, R::default());
-            self.gather(EE, o, ALL, &mut residual_ee[o..][..span]);
-            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[o..][..span]);
-            self.gather(EO, o, [W, E], &mut here[o..][..span]);
-            for y in 0..rows {
-                let o = self.grid.start(y);
-                let above = &here[o - stride..][..n];
-                self.restrict_row(
-                    y,
-                    residual_ee,
-                    residual_oe,
-                    (above, &here[o..][..n]),
-                    o,
-                    restricted,
-                );
-                split_row(&next.grid, &mut next.f, y, restricted);
-            }
-            self.scratch = scratch;
-            return;
-        }
         scratch.reset(&self.grid, &next.grid);
         let Scratch {
             residual_eo,
@@ -161,49 +123,79 @@ impl<R: Real> Coarse<R> {
                 &residual_eo[0][MARGIN..][..n],
                 &residual_eo[1][MARGIN..][..n],
             );
-            self.restrict_row(y, residual_ee, residual_oe, residual_eo, MARGIN, restricted);
+            let m = MARGIN;
+            self.restrict(
+                o,
+                &residual_ee[m..],
+                &residual_oe[m - 1..],
+                residual_eo,
+                &mut restricted[..n],
+            );
             split_row(&next.grid, &mut next.f, y, restricted);
         }
         self.scratch = scratch;
     }
 
-    /// Restricts the residuals on row `y` and around it to the next level's right-hand side; `at` is where the row starts in
-    /// `residual_ee` and `residual_oe`.
+    /// [`descend`](Self::descend) for a small level, plane by plane: `span` places of each.
     #[inline(always)]
-    fn restrict_row(
+    fn descend_whole(&mut self, next: &mut Self, span: usize) {
+        let (o, stride) = (self.grid.start(0), self.grid.stride);
+        let mut whole = std::mem::take(&mut self.whole);
+        let Whole {
+            transfer,
+            residual_ee,
+            residual_oe,
+            residual_eo,
+            ..
+        } = &mut whole;
+        self.relax(EE, o, span, []);
+        self.relax(OE, o, span, [W, E]);
+        self.relax(EO, o, span, [N, S, NW, NE, SW, SE]);
+        self.relax(OO, o, span, ALL);
+        self.gather(EE, o, ALL, &mut residual_ee[o..][..span]);
+        self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[o..][..span]);
+        self.gather(EO, o, [W, E], &mut residual_eo[o..][..span]);
+        self.restrict(
+            o,
+            &residual_ee[o..],
+            &residual_oe[o - 1..],
+            (&residual_eo[o - stride..], &residual_eo[o..]),
+            &mut transfer[o..][..span],
+        );
+        split(&self.grid, &next.grid, &mut next.f, transfer);
+        self.whole = whole;
+    }
+
+    /// Restricts residuals to as many cells of the next level from `o` on as `out` has. `odd_even` starts one cell to the west,
+    /// the two of even-odd cells a row above and here.
+    #[inline(always)]
+    fn restrict(
         &self,
-        y: usize,
-        residual_ee: &[R],
-        residual_oe: &[R],
+        o: usize,
+        even_even: &[R],
+        odd_even: &[R],
         (above, here): (&[R], &[R]),
-        at: usize,
         out: &mut [R],
     ) {
-        let n = self.grid.columns;
-        let o = self.grid.start(y);
-        let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
-        let (north, south) = (
-            &self.north[o..][..n],
-            &self.south[o - self.grid.stride..][..n],
-        );
-        let (b, b_west) = (&residual_oe[at..][..n], &residual_oe[at - 1..][..n]);
-        let (h, a, residual_ee) = (&here[..n], &above[..n], &residual_ee[at..][..n]);
-        let active = &self.inverse[EE][o..][..n];
-        let out = &mut out[..n];
-        for x in 0..n {
-            let around =
-                (west[x] * b[x] + east[x] * b_west[x]) + (north[x] * h[x] + south[x] * a[x]);
-            out[x] = (active[x].is_active() * residual_ee[x] + around).flushed();
-        }
+        let weights = [
+            &self.west[o..],
+            &self.east[o - 1..],
+            &self.north[o..],
+            &self.south[o - self.grid.stride..],
+        ];
+        let around = [&odd_even[1..], odd_even, here, above];
+        sum_weighted(out, &self.inverse[EE][o..], even_even, weights, around);
     }
 
     /// Adds the correction from `next` and relaxes.
     #[inline(always)]
     pub(super) fn ascend(&mut self, next: &Self) {
+        if let Some(span) = self.grid.span() {
+            return self.ascend_whole(next, span);
+        }
         let Grid {
             columns: n, rows, ..
         } = self.grid;
-        let span = self.span();
         let mut scratch = std::mem::take(&mut self.scratch);
         let Scratch { upper, lower, .. } = &mut scratch;
         for row in [&mut *upper, &mut *lower] {
@@ -214,46 +206,53 @@ impl<R: Real> Coarse<R> {
         for y in 0..=rows {
             if y < rows {
                 join_row(&next.grid, &next.u, y + 1, lower);
-                let o = self.grid.start(y);
-                let (c, c_east, c_south) = (&upper[..n], &upper[1..=n], &lower[..n]);
-                let active = &self.inverse[EE][o..][..n];
-                let u = &mut self.u[EE][o..][..n];
-                for x in 0..n {
-                    u[x] += active[x].is_active() * c[x];
-                }
-                let (west, east) = (&self.west[o..][..n], &self.east[o..][..n]);
-                let u = &mut self.u[OE][o..][..n];
-                for x in 0..n {
-                    u[x] += west[x] * c[x] + east[x] * c_east[x];
-                }
-                let (north, south) = (&self.north[o..][..n], &self.south[o..][..n]);
-                let u = &mut self.u[EO][o..][..n];
-                for x in 0..n {
-                    u[x] += north[x] * c[x] + south[x] * c_south[x];
-                }
+                self.correct(self.grid.start(y), upper, lower, n);
                 std::mem::swap(upper, lower);
             }
-            if y > 0 && span.is_none() {
+            if y > 0 {
                 let o = self.grid.start(y - 1);
                 for plane in [OO, EO, OE, EE] {
                     self.relax(plane, o, n, ALL);
                 }
             }
         }
-        if let Some(span) = span {
-            for plane in [OO, EO, OE, EE] {
-                self.relax(plane, self.grid.start(0), span, ALL);
-            }
-        }
         self.scratch = scratch;
+    }
+
+    /// [`ascend`](Self::ascend) for a small level, plane by plane: `span` places of each.
+    #[inline(always)]
+    fn ascend_whole(&mut self, next: &Self, span: usize) {
+        let o = self.grid.start(0);
+        let mut whole = std::mem::take(&mut self.whole);
+        let transfer = &mut whole.transfer;
+        join(&self.grid, &next.grid, &next.u, transfer);
+        let below = &transfer[o + self.grid.stride..];
+        self.correct(o, &transfer[o..], below, span);
+        for plane in [OO, EO, OE, EE] {
+            self.relax(plane, o, span, ALL);
+        }
+        self.whole = whole;
+    }
+
+    /// Adds the correction to `n` cells from `o` on of each plane but the odd-odd one.
+    #[inline(always)]
+    fn correct(&mut self, o: usize, upper: &[R], lower: &[R], n: usize) {
+        add_active(&mut self.u[EE][o..][..n], &self.inverse[EE][o..], upper);
+        let (west, east) = (&self.west[o..], &self.east[o..]);
+        let u = &mut self.u[OE][o..][..n];
+        add_products(u, (west, upper), (east, &upper[1..]));
+        let (north, south) = (&self.north[o..], &self.south[o..]);
+        let u = &mut self.u[EO][o..][..n];
+        add_products(u, (north, upper), (south, lower));
     }
 
     /// Keeps u of the first visit and makes its residual the right-hand side of the second.
     #[inline(always)]
     pub(super) fn begin_second_visit(&mut self) {
-        let Grid {
-            columns: n, rows, ..
-        } = self.grid;
+        let (n, rows) = match self.grid.span() {
+            Some(span) => (span, 1),
+            None => (self.grid.columns, self.grid.rows),
+        };
         for plane in [EE, OE, EO, OO] {
             for y in 0..rows {
                 let o = self.grid.start(y);
@@ -444,6 +443,35 @@ fn relax<R: Real, const COUNT: usize>(
 ) {
     for x in 0..out.len() {
         out[x] = ((f[x] + sum_at(terms, x)) * inverse[x]).flushed();
+    }
+}
+
+/// Adds `values` to active cells.
+#[inline(always)]
+fn add_active<R: Real>(u: &mut [R], inverse: &[R], values: &[R]) {
+    let n = u.len();
+    let (inverse, values) = (&inverse[..n], &values[..n]);
+    for x in 0..n {
+        u[x] += inverse[x].is_active() * values[x];
+    }
+}
+
+/// `own` where active, and four weighted values.
+#[inline(always)]
+fn sum_weighted<R: Real>(
+    out: &mut [R],
+    inverse: &[R],
+    own: &[R],
+    weights: [&[R]; 4],
+    values: [&[R]; 4],
+) {
+    let n = out.len();
+    let (inverse, own) = (&inverse[..n], &own[..n]);
+    let [s, t, v, w] = weights.map(|it| &it[..n]);
+    let [a, b, c, d] = values.map(|it| &it[..n]);
+    for x in 0..n {
+        let around = (s[x] * a[x] + t[x] * b[x]) + (v[x] * c[x] + w[x] * d[x]);
+        out[x] = (inverse[x].is_active() * own[x] + around).flushed();
     }
 }
 

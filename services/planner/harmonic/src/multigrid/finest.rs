@@ -7,7 +7,10 @@
 //! are exactly its residual, which is restricted at once.
 
 use super::coarse::Coarse;
-use super::grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, join_row, split_row};
+use super::grid::{
+    EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
+    split_row,
+};
 use crate::real::Real;
 
 /// An inflow at one cell: the right-hand side of its equation.
@@ -43,6 +46,7 @@ pub(super) struct Finest<R> {
     /// By plane and row.
     pub sources: Vec<Source<R>>,
     scratch: Scratch<R>,
+    whole: Whole<R>,
 }
 
 /// What a pass tells of the convergence.
@@ -65,6 +69,7 @@ impl<R: Real> Finest<R> {
             south: grid.plane(),
             sources: Vec::new(),
             scratch: Scratch::default(),
+            whole: Whole::new(&grid),
         }
     }
 
@@ -163,11 +168,11 @@ impl<R: Real> Finest<R> {
         descend: bool,
         tolerance: Option<R>,
     ) -> Progress {
+        if let Some(span) = self.grid.span() {
+            return self.pass_whole(next, sweeps, descend, tolerance, span);
+        }
         let Grid {
-            columns: n,
-            rows,
-            stride,
-            ..
+            columns: n, rows, ..
         } = self.grid;
         let grid = self.grid;
         let mut progress = Progress::default();
@@ -189,9 +194,10 @@ impl<R: Real> Finest<R> {
             if y < rows {
                 join_row(&next.grid, &next.u, y + 1, lower);
                 if let Some(tolerance) = tolerance {
-                    progress.unsettled += self.unsettled(y, upper, lower, tolerance);
+                    progress.unsettled +=
+                        self.unsettled(self.grid.start(y), upper, lower, tolerance, n);
                 }
-                self.correct_black(y, upper, lower);
+                self.correct_black(self.grid.start(y), upper, lower, n);
                 std::mem::swap(upper, lower);
             }
             // Every sweep follows the one before at a distance of one row.
@@ -222,25 +228,19 @@ impl<R: Real> Finest<R> {
                 self.relax(OO, y, Some(&mut change_oo[1]));
                 residual_eo.swap(0, 1);
                 let [above, here] = &mut *residual_eo;
-                residual_on_black(
-                    n,
-                    [&change_ee[0], &change_ee[1]],
-                    [&change_oo[0], &change_oo[1]],
-                    residual_oe,
-                    here,
-                );
-                let o = grid.start(y);
                 let m = MARGIN;
-                let (west, east) = (&self.west[o..][..n], &self.east[o - 1..][..n]);
-                let (north, south) = (&self.north[o..][..n], &self.south[o - stride..][..n]);
-                let (b, b_west) = (&residual_oe[m..][..n], &residual_oe[m - 1..][..n]);
-                let (h, a) = (&here[m..][..n], &above[m..][..n]);
-                let out = &mut restricted[..n];
-                for x in 0..n {
-                    let sum = (west[x] * b[x] + east[x] * b_west[x])
-                        + (north[x] * h[x] + south[x] * a[x]);
-                    out[x] = sum.flushed();
-                }
+                residual_on_black(
+                    [&change_ee[0], &change_ee[1]].map(|row| &row[m..]),
+                    [&change_oo[0], &change_oo[1]].map(|row| &row[m - 1..]),
+                    &mut residual_oe[m..][..n],
+                    &mut here[m..][..n],
+                );
+                self.restrict(
+                    grid.start(y),
+                    &residual_oe[m - 1..],
+                    (&above[m..], &here[m..]),
+                    &mut restricted[..n],
+                );
                 split_row(&next.grid, &mut next.f, y, restricted);
             }
         }
@@ -248,16 +248,70 @@ impl<R: Real> Finest<R> {
         progress
     }
 
-    /// Counts the even-even cells of row `y` that the coarse correction unsettles.
+    /// [`pass`](Self::pass) for a small level, plane by plane: `span` places of each.
+    #[inline(always)]
+    fn pass_whole(
+        &mut self,
+        next: &mut Coarse<R>,
+        sweeps: usize,
+        descend: bool,
+        tolerance: Option<R>,
+        span: usize,
+    ) -> Progress {
+        let grid = self.grid;
+        let (o, stride) = (grid.start(0), grid.stride);
+        let mut whole = std::mem::take(&mut self.whole);
+        let Whole {
+            transfer,
+            change_ee,
+            change_oo,
+            residual_oe,
+            residual_eo,
+            ..
+        } = &mut whole;
+        let mut progress = Progress::default();
+        join(&grid, &next.grid, &next.u, transfer);
+        let (upper, lower) = (&transfer[o..], &transfer[o + stride..]);
+        if let Some(tolerance) = tolerance {
+            progress.unsettled = self.unsettled(o, upper, lower, tolerance, span);
+        }
+        self.correct_black(o, upper, lower, span);
+        for _ in 0..sweeps {
+            for plane in [EE, OO, OE, EO] {
+                self.relax_places(plane, o, span, None);
+                self.add_sources_of(plane, None);
+            }
+        }
+        if descend {
+            for (plane, change) in [(EE, &mut *change_ee), (OO, &mut *change_oo)] {
+                self.relax_places(plane, o, span, Some(&mut change[o..]));
+                self.add_sources_of(plane, Some(change));
+            }
+            residual_on_black(
+                [&change_ee[o..], &change_ee[o + stride..]],
+                [&change_oo[o - stride - 1..], &change_oo[o - 1..]],
+                &mut residual_oe[o..][..span],
+                &mut residual_eo[o..][..span],
+            );
+            self.restrict(
+                o,
+                &residual_oe[o - 1..],
+                (&residual_eo[o - stride..], &residual_eo[o..]),
+                &mut transfer[o..][..span],
+            );
+            split(&grid, &next.grid, &mut next.f, transfer);
+        }
+        self.whole = whole;
+        progress
+    }
+
+    /// Counts the even-even cells that the coarse correction unsettles, of `n` places from `o` on.
     ///
     /// Their differences of u, to the next even-even cell east and south, are those of one gradient; the correction's are
     /// what it changes by, so the cross product of both is the angle it turns by.
     #[inline(always)]
-    fn unsettled(&self, y: usize, upper: &[R], lower: &[R], tolerance: R) -> usize {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
-        let o = self.grid.start(y);
+    fn unsettled(&self, o: usize, upper: &[R], lower: &[R], tolerance: R, n: usize) -> usize {
+        let stride = self.grid.stride;
         let flat = R::of(FLAT / self.grid.width.max(self.grid.height) as f64);
         let (flat, largest) = (flat * flat, R::of(LARGEST_CHANGE));
         let (c, c_east, c_south) = (&upper[..n], &upper[1..=n], &lower[..n]);
@@ -280,31 +334,43 @@ impl<R: Real> Finest<R> {
         unsettled as usize
     }
 
-    /// Adds the coarse correction to the black cells of row `y`.
+    /// Adds the coarse correction to `n` black cells of either plane from `o` on.
     #[inline(always)]
-    fn correct_black(&mut self, y: usize, upper: &[R], lower: &[R]) {
-        let n = self.grid.columns;
-        let o = self.grid.start(y);
-        let (c, east, south) = (&upper[..n], &upper[1..=n], &lower[..n]);
-        let (to_west, to_east) = (&self.west[o..][..n], &self.east[o..][..n]);
+    fn correct_black(&mut self, o: usize, upper: &[R], lower: &[R], n: usize) {
+        let (to_west, to_east) = (&self.west[o..], &self.east[o..]);
         let u = &mut self.u[OE][o..][..n];
-        for x in 0..n {
-            u[x] += to_west[x] * c[x] + to_east[x] * east[x];
-        }
-        let (to_north, to_south) = (&self.north[o..][..n], &self.south[o..][..n]);
+        add_products(u, (to_west, upper), (to_east, &upper[1..]));
+        let (to_north, to_south) = (&self.north[o..], &self.south[o..]);
         let u = &mut self.u[EO][o..][..n];
-        for x in 0..n {
-            u[x] += to_north[x] * c[x] + to_south[x] * south[x];
-        }
+        add_products(u, (to_north, upper), (to_south, lower));
+    }
+
+    /// Restricts the residuals of black cells to as many coarse cells from `o` on as `out` has. `odd_even` starts one cell
+    /// to the west, the two of even-odd cells a row above and here.
+    #[inline(always)]
+    fn restrict(&self, o: usize, odd_even: &[R], (above, here): (&[R], &[R]), out: &mut [R]) {
+        let weights = [
+            &self.west[o..],
+            &self.east[o - 1..],
+            &self.north[o..],
+            &self.south[o - self.grid.stride..],
+        ];
+        sum_weighted(out, weights, [&odd_even[1..], odd_even, here, above]);
     }
 
     /// Relaxes row `y` of a plane from its four neighbours; `change`, if given, takes what each cell changes by.
     #[inline(always)]
     fn relax(&mut self, plane: usize, y: usize, mut change: Option<&mut [R]>) {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
         let o = self.grid.start(y);
+        let noted = change.as_deref_mut().map(|change| &mut change[MARGIN..]);
+        self.relax_places(plane, o, self.grid.columns, noted);
+        self.add_sources(plane, y, change);
+    }
+
+    /// Relaxes `n` places of a plane from `o` on, without sources.
+    #[inline(always)]
+    fn relax_places(&mut self, plane: usize, o: usize, n: usize, change: Option<&mut [R]>) {
+        let stride = self.grid.stride;
         let mut row = std::mem::take(&mut self.u[plane]);
         let [ee, oe, eo, oo] = &self.u;
         let [a, b, c, d] = match plane {
@@ -315,12 +381,23 @@ impl<R: Real> Finest<R> {
         };
         let around = [&a[..n], &b[..n], &c[..n], &d[..n]];
         let inverse = &self.inverse[plane][o..][..n];
-        match &mut change {
-            Some(change) => relax_noting(&mut row[o..][..n], inverse, around, change),
+        match change {
+            Some(change) => relax_noting(&mut row[o..][..n], inverse, around, &mut change[..n]),
             None => relax(&mut row[o..][..n], inverse, around),
         }
         self.u[plane] = row;
-        self.add_sources(plane, y, change);
+    }
+
+    /// Adds what flows into the cells of a plane, to u and to its noted change.
+    #[inline(always)]
+    fn add_sources_of(&mut self, plane: usize, mut change: Option<&mut [R]>) {
+        for source in self.sources.iter().filter(|source| source.plane == plane) {
+            let inflow = self.inverse[plane][source.at] * source.value;
+            self.u[plane][source.at] += inflow;
+            if let Some(change) = change.as_deref_mut() {
+                change[source.at] += inflow;
+            }
+        }
     }
 
     /// Adds what flows into the cells of one row, to u and to its noted change.
@@ -355,7 +432,7 @@ fn relax<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4]) {
 fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], change: &mut [R]) {
     let n = u.len();
     let (inverse, a, b, c, d) = (&inverse[..n], &a[..n], &b[..n], &c[..n], &d[..n]);
-    let change = &mut change[MARGIN..][..n];
+    let change = &mut change[..n];
     for x in 0..n {
         let new = (inverse[x] * ((a[x] + b[x]) + (c[x] + d[x]))).flushed();
         change[x] = new - u[x];
@@ -363,26 +440,35 @@ fn relax_noting<R: Real>(u: &mut [R], inverse: &[R], [a, b, c, d]: [&[R]; 4], ch
     }
 }
 
-/// The residual of one row of black cells: the sum of what their red neighbours changed by. Blocked cells get one too;
-/// their interpolation weights are zero.
+/// The residual of black cells, as many as the outputs have: the sum of what their red neighbours changed by. Blocked cells get
+/// one too; their interpolation weights are zero. The changes of even-even cells are those here and a row below, those of
+/// odd-odd ones a row above and here, from one cell to the west on.
 #[inline(always)]
 fn residual_on_black<R: Real>(
-    n: usize,
     [even, even_below]: [&[R]; 2],
     [odd_above, odd]: [&[R]; 2],
     odd_even: &mut [R],
     even_odd: &mut [R],
 ) {
-    let m = MARGIN;
-    let (west, east) = (&even[m..][..n], &even[m + 1..][..n]);
-    let (above, here) = (&odd_above[m..][..n], &odd[m..][..n]);
-    let out = &mut odd_even[m..][..n];
+    sum_of_four(odd_even, [even, &even[1..], &odd_above[1..], &odd[1..]]);
+    sum_of_four(even_odd, [even, even_below, odd, &odd[1..]]);
+}
+
+#[inline(always)]
+fn sum_of_four<R: Real>(out: &mut [R], [a, b, c, d]: [&[R]; 4]) {
+    let n = out.len();
+    let (a, b, c, d) = (&a[..n], &b[..n], &c[..n], &d[..n]);
     for x in 0..n {
-        out[x] = (west[x] + east[x]) + (above[x] + here[x]);
+        out[x] = (a[x] + b[x]) + (c[x] + d[x]);
     }
-    let (below, left) = (&even_below[m..][..n], &odd[m - 1..][..n]);
-    let out = &mut even_odd[m..][..n];
+}
+
+#[inline(always)]
+fn sum_weighted<R: Real>(out: &mut [R], weights: [&[R]; 4], values: [&[R]; 4]) {
+    let n = out.len();
+    let [s, t, v, w] = weights.map(|it| &it[..n]);
+    let [a, b, c, d] = values.map(|it| &it[..n]);
     for x in 0..n {
-        out[x] = (west[x] + below[x]) + (left[x] + here[x]);
+        out[x] = ((s[x] * a[x] + t[x] * b[x]) + (v[x] * c[x] + w[x] * d[x])).flushed();
     }
 }

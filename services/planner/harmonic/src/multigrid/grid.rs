@@ -18,6 +18,9 @@ pub(super) const OO: usize = 3;
 /// Zeros before the first row; one would do, eight keep the rows aligned.
 pub(super) const MARGIN: usize = 8;
 
+/// Largest plane that is gone through as one row, in values.
+const SMALL: usize = 1 << 13;
+
 /// One value a cell, by plane.
 pub(super) type Planes<R> = [Vec<R>; 4];
 
@@ -66,6 +69,15 @@ impl Grid {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
     }
 
+    /// Cells of a plane from its first to its last, margins between rows included, where the level is small. Its planes are
+    /// gone through as if each were one row, because what is done once a row, and the values that fill no vector at its end, would
+    /// cost more than the margins do. Those stay zero, as their diagonals and weights are. The results are the same either way.
+    #[inline(always)]
+    pub(super) fn span(&self) -> Option<usize> {
+        (self.rows * self.stride <= SMALL)
+            .then(|| self.rows.saturating_sub(1) * self.stride + self.columns)
+    }
+
     /// Four planes of zeros.
     pub(super) fn planes<R: Real>(&self) -> Planes<R> {
         std::array::from_fn(|_| self.plane())
@@ -96,6 +108,66 @@ pub(super) struct Scratch<R> {
     pub residual_eo: [Vec<R>; 2],
     pub residual_oe: Vec<R>,
     pub residual_ee: Vec<R>,
+}
+
+/// Planes of a pass over a small level, margins included, kept between passes.
+#[derive(Debug, Default)]
+pub(super) struct Whole<R> {
+    /// What the even-even cells are corrected by on the way up, their residual on the way down.
+    pub transfer: Vec<R>,
+    /// What even-even and odd-odd cells changed by, on the finest level.
+    pub change_ee: Vec<R>,
+    pub change_oo: Vec<R>,
+    pub residual_oe: Vec<R>,
+    pub residual_eo: Vec<R>,
+    pub residual_ee: Vec<R>,
+}
+
+impl<R: Real> Whole<R> {
+    /// Planes of zeros.
+    pub(super) fn new(grid: &Grid) -> Self {
+        let plane = || {
+            if grid.span().is_some() {
+                grid.plane()
+            } else {
+                Vec::new()
+            }
+        };
+        Self {
+            transfer: plane(),
+            change_ee: plane(),
+            change_oo: plane(),
+            residual_oe: plane(),
+            residual_eo: plane(),
+            residual_ee: plane(),
+        }
+    }
+}
+
+/// Reads all rows of the level `next` of that of `grid` into one of its planes.
+#[inline(always)]
+pub(super) fn join<R: Real>(grid: &Grid, next: &Grid, planes: &Planes<R>, into: &mut [R]) {
+    for y in 0..grid.rows {
+        join_row(next, planes, y, &mut into[grid.start(y)..]);
+    }
+}
+
+/// Writes a plane of the level of `grid` to all rows of the level `next`.
+#[inline(always)]
+pub(super) fn split<R: Real>(grid: &Grid, next: &Grid, planes: &mut Planes<R>, from: &[R]) {
+    for y in 0..grid.rows {
+        split_row(next, planes, y, &from[grid.start(y)..]);
+    }
+}
+
+/// Adds two products to every value.
+#[inline(always)]
+pub(super) fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R])) {
+    let n = out.len();
+    let (w, a, v, b) = (&w[..n], &a[..n], &v[..n], &b[..n]);
+    for x in 0..n {
+        out[x] += w[x] * a[x] + v[x] * b[x];
+    }
 }
 
 impl<R: Real> Scratch<R> {
