@@ -23,6 +23,7 @@ use coarse::Coarse;
 use coarsest::Coarsest;
 pub(crate) use finest::Progress;
 use finest::{Finest, Source};
+use galerkin::Products;
 use grid::Grid;
 
 use std::ops::Range;
@@ -58,6 +59,8 @@ pub(crate) struct Multigrid<R> {
     finest: Finest<R>,
     coarse: Vec<Coarse<R>>,
     coarsest: Coarsest,
+    /// By level that a next one is set up from, the finest first.
+    products: Vec<Products<R>>,
     /// Full sweeps in the next pass of a cycle; one in the first, so that no solve depends on the one before.
     sweeps: usize,
     simd: Simd,
@@ -69,7 +72,9 @@ impl<R: Real> Multigrid<R> {
         let mut grid = Grid::new(width, height);
         let finest = Finest::new(grid);
         let mut coarse = Vec::new();
+        let mut products = Vec::new();
         loop {
+            products.push(Products::new(&grid));
             grid = Grid::new(grid.columns, grid.rows);
             coarse.push(Coarse::new(grid));
             if grid.width.max(grid.height) <= COARSEST_SIDE {
@@ -80,6 +85,7 @@ impl<R: Real> Multigrid<R> {
             finest,
             coarse,
             coarsest: Coarsest::default(),
+            products,
             sweeps: 1,
             simd: Simd::default(),
         }
@@ -116,24 +122,26 @@ impl<R: Real> Multigrid<R> {
     /// Interpolation and coarse equations, where they depend on `rows` of the finest level.
     fn set_up_levels(&mut self, mut rows: Range<usize>) {
         let (finest, first) = (&mut self.finest, &mut self.coarse[0]);
+        let products = &mut self.products[0];
         let count = finest.grid.rows;
         self.simd.run(
             #[inline(always)]
             || {
                 finest.interpolate_rows(rows_of_interpolation(&rows, count));
-                finest.coarsen(first, rows_of_next(&rows, count));
+                finest.coarsen(first, rows_of_next(&rows, count), products);
             },
         );
         for level in 1..self.coarse.len() {
             rows = rows_of_next(&rows, self.coarse[level - 1].grid.height);
             let (fine, next) = self.coarse.split_at_mut(level);
             let (fine, next) = (&mut fine[level - 1], &mut next[0]);
+            let products = &mut self.products[level];
             let count = fine.grid.rows;
             self.simd.run(
                 #[inline(always)]
                 || {
                     fine.interpolate(rows_of_interpolation(&rows, count));
-                    fine.coarsen(next, rows_of_next(&rows, count));
+                    fine.coarsen(next, rows_of_next(&rows, count), products);
                 },
             );
         }

@@ -22,6 +22,22 @@ pub(crate) enum Store {
     },
 }
 
+/// From u times 2^TOP.
+impl From<Vec<f32>> for Store {
+    fn from(values: Vec<f32>) -> Self {
+        let exponent = -f32::TOP;
+        Self::Single { values, exponent }
+    }
+}
+
+/// From u times 2^TOP.
+impl From<Vec<f64>> for Store {
+    fn from(values: Vec<f64>) -> Self {
+        let exponent = -f64::TOP;
+        Self::Double { values, exponent }
+    }
+}
+
 impl Store {
     /// The stored value and its exponent.
     pub(crate) fn raw(&self, index: usize) -> (f64, i32) {

@@ -2,7 +2,7 @@
 //!
 //! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
 //! is the least of several runs. `cargo bench -p harmonic --features bench -- quick` leaves out the large maps, `-- updates` all but the
-//! updates. `-- accuracy` measures angles instead of times, `-- split` where the time of a solve goes, `-- growth` time and
+//! updates. `-- accuracy` measures angles instead of times, `-- split` where the time of a solve goes (`quick`: on small maps), `-- growth` time and
 //! memory by the size of the map. `-- --maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
@@ -47,7 +47,10 @@ fn main() {
         return updates::table(quick);
     }
     if asked("split") {
-        return split::table(maps_directory().map(|it| real::load_all(Path::new(&it))));
+        return split::table(
+            quick,
+            maps_directory().map(|it| real::load_all(Path::new(&it))),
+        );
     }
     if asked(split::BYTES) {
         return split::print_bytes();

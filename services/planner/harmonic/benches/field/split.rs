@@ -68,8 +68,8 @@ fn least(domain: &Domain) -> (Split, &'static str) {
     best
 }
 
-/// Where the time of a solve from scratch goes.
-pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
+/// Where the time of a solve from scratch goes; `quick` leaves out all but small maps.
+pub(crate) fn table(quick: bool, real: Option<Vec<(String, Domain)>>) {
     println!("\nA solve from scratch by phases, ms, and as a multiple of a wavefront's time");
     println!(
         "{:<26} {:<14} {:>8} {:>6} {:>8} {:>7} {:>8} {:>8} {:>7} {:>8}",
@@ -89,8 +89,10 @@ pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
         Kind::Serpentine { corridor: 24 },
         Kind::Noise { density: 0.35 },
     ];
-    let generated = [Kind::Drums, Kind::Office].map(|kind| (kind, 50));
-    let generated = generated.into_iter().chain(kinds.map(|kind| (kind, 512)));
+    let small =
+        [50, 120, 280].map(|n| [Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, n)));
+    let large = kinds.map(|kind| (kind, 512)).into_iter().filter(|_| !quick);
+    let generated = small.into_iter().flatten().chain(large);
     let generated = generated.map(|(kind, n)| {
         let domain = Map::generate(kind, n, n, 1).domain();
         (format!("{kind:?} {n}"), domain.expect("a valid map"))

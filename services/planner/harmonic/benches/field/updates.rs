@@ -18,9 +18,9 @@ pub(crate) fn table(quick: bool) {
         "map", "N", "length", "", "p50", "p90", "p99"
     );
     let sides: &[usize] = if quick {
-        &[120, 280, 512]
+        &[50, 120, 280, 512]
     } else {
-        &[120, 280, 512, 1024, 2048, 4096]
+        &[50, 120, 280, 512, 1024, 2048, 4096]
     };
     for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
         for &n in sides {

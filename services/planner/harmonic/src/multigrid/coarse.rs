@@ -75,19 +75,9 @@ impl<R: Real> Coarse<R> {
             return self.descend_whole(next, span);
         }
         let Grid {
-            columns: n,
-            rows,
-            stride,
-            ..
+            columns: n, rows, ..
         } = self.grid;
         let mut scratch = std::mem::take(&mut self.scratch);
-        let Scratch {
-            residual_eo,
-            residual_oe,
-            residual_ee,
-            restricted,
-            ..
-        } = &mut scratch;
         scratch.reset(&self.grid, &next.grid);
         let Scratch {
             residual_eo,

@@ -24,8 +24,9 @@ const BELOW_EAST: usize = 5;
 
 type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 
-/// Rows under way from a fine level to the next.
-struct Products<R> {
+/// Rows under way from a fine level to the next, kept between set-ups.
+#[derive(Debug)]
+pub(super) struct Products<R> {
     n: usize,
     /// Interpolation weights of the odd-odd cells of the row above and of this row.
     corner: [Rows<R, 4>; 2],
@@ -40,7 +41,7 @@ struct Products<R> {
 }
 
 impl<R: Real> Products<R> {
-    fn new(grid: &Grid) -> Self {
+    pub(super) fn new(grid: &Grid) -> Self {
         fn rows<R: Real, const COUNT: usize>(grid: &Grid) -> Rows<R, COUNT> {
             std::array::from_fn(|_| grid.row_buffer())
         }
@@ -51,6 +52,15 @@ impl<R: Real> Products<R> {
             even_odd: [rows(grid), rows(grid)],
             even_even: rows(grid),
             out: rows(grid),
+        }
+    }
+
+    /// Makes the rows above the first zero.
+    fn start(&mut self) {
+        let [_, corner] = &mut self.corner;
+        let [_, even_odd] = &mut self.even_odd;
+        for row in corner.iter_mut().chain(even_odd) {
+            row.fill(R::default());
         }
     }
 
@@ -123,13 +133,18 @@ struct Weights<'a, R> {
 impl<R: Real> Finest<R> {
     /// Sets `rows` of the equations of `next`.
     #[inline(always)]
-    pub(super) fn coarsen(&self, next: &mut Coarse<R>, rows: Range<usize>) {
+    pub(super) fn coarsen(
+        &self,
+        next: &mut Coarse<R>,
+        rows: Range<usize>,
+        products: &mut Products<R>,
+    ) {
         let Grid {
             columns: n,
             stride: s,
             ..
         } = self.grid;
-        let mut products = Products::new(&self.grid);
+        products.start();
         let zero = R::default();
         // One row more before the first: what it leaves behind is added to that one.
         for y in rows.start.saturating_sub(1)..rows.end {
@@ -241,13 +256,13 @@ impl<R: Real> Finest<R> {
 impl<R: Real> Coarse<R> {
     /// Sets `rows` of the equations of `next`.
     #[inline(always)]
-    pub(super) fn coarsen(&self, next: &mut Self, rows: Range<usize>) {
+    pub(super) fn coarsen(&self, next: &mut Self, rows: Range<usize>, products: &mut Products<R>) {
         let Grid {
             columns: n,
             stride: s,
             ..
         } = self.grid;
-        let mut products = Products::new(&self.grid);
+        products.start();
         let zero = R::default();
         let m = MARGIN;
         let a = |direction: usize, plane: usize, start: usize| {

@@ -19,7 +19,7 @@ pub(super) const OO: usize = 3;
 pub(super) const MARGIN: usize = 8;
 
 /// Largest plane that is gone through as one row, in values.
-const SMALL: usize = 1 << 13;
+const SMALL: usize = 1 << 15;
 
 /// One value a cell, by plane.
 pub(super) type Planes<R> = [Vec<R>; 4];

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::plan::{plan, plan_near};
+use super::plan::plan;
 use super::settings::{Phase, Settings};
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
@@ -27,6 +27,10 @@ const FIRST_CHECK: usize = 3;
 
 /// The same for a solve that starts from the field of a similar map: the first cycle has no correction to judge by.
 const FIRST_CHECK_NEAR: usize = 2;
+
+/// Most cycles from the field of a similar map; then it is solved from scratch. Those that need more are mostly maps in which cells
+/// were cut off: u of theirs falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
+const NEAR_CYCLES: usize = 20;
 
 /// Cycles after which a cell still at zero is one whose u is below what the precision holds.
 const REACHED: usize = 6;
@@ -88,32 +92,35 @@ impl Full {
             settings,
             domain,
             cancellation,
+            near,
             ..
         } = task;
         cancellation.check()?;
         let budget = Budget::of(domain, settings.memory_limit);
-        let near = task.near.filter(|near| near.fits(domain));
-        let mut plan = match near.and_then(plan_near) {
-            Some(plan) => plan,
-            None => plan(domain, &budget, cancellation)?,
-        };
+        if let Some(near) = near.filter(|near| near.fits(domain)) {
+            let method = near.verification().method;
+            let solved = match method {
+                Method::MultigridSingle => {
+                    Some(self.single.solve(task, Some(near), NEAR_CYCLES, observe)?)
+                }
+                Method::MultigridDouble => {
+                    Some(self.double.solve(task, Some(near), NEAR_CYCLES, observe)?)
+                }
+                // Of these the cost is in the shape of the map.
+                Method::MultigridBands | Method::Multifrontal => None,
+            };
+            if let Some((store, check)) = solved
+                && check.holds()
+            {
+                return Ok(field(domain, store, &check, method));
+            }
+        }
+        let mut plan = plan(domain, &budget, cancellation)?;
         let mut failed = Check::default();
         for method in plan.methods {
             let (store, check) = match method {
-                Method::MultigridSingle => {
-                    let store = |values| Store::Single {
-                        values,
-                        exponent: -f32::TOP,
-                    };
-                    self.single.solve(task, SINGLE_CYCLES, store, observe)?
-                }
-                Method::MultigridDouble => {
-                    let store = |values| Store::Double {
-                        values,
-                        exponent: -f64::TOP,
-                    };
-                    self.double.solve(task, DOUBLE_CYCLES, store, observe)?
-                }
+                Method::MultigridSingle => self.single.solve(task, None, SINGLE_CYCLES, observe)?,
+                Method::MultigridDouble => self.double.solve(task, None, DOUBLE_CYCLES, observe)?,
                 Method::MultigridBands => {
                     let store = multigrid_bands::solve(domain, cancellation)?;
                     observe(Phase::Solved);
@@ -151,18 +158,7 @@ impl Full {
                 }
             };
             if check.holds() {
-                let verification = Verification {
-                    worst_residual: check.worst_residual,
-                    worst_tile: check.worst_tile,
-                    method,
-                    reachable: check.reachable,
-                };
-                return Ok(Field::new(
-                    (domain.width(), domain.height()),
-                    domain.target(),
-                    store,
-                    verification,
-                ));
+                return Ok(field(domain, store, &check, method));
             }
             failed = check;
         }
@@ -173,26 +169,42 @@ impl Full {
     }
 }
 
-impl<R: Real> Prepared<R> {
-    /// Cycles until every cell has converged and the check holds, or this precision is given up; returns what there is then.
+/// The field of `domain` that `method` computed and `check` found to hold.
+fn field(domain: &Domain, store: Store, check: &Check, method: Method) -> Field {
+    let verification = Verification {
+        worst_residual: check.worst_residual,
+        worst_tile: check.worst_tile,
+        method,
+        reachable: check.reachable,
+    };
+    let size = (domain.width(), domain.height());
+    Field::new(size, domain.target(), store, verification)
+}
+
+impl<R: Real> Prepared<R>
+where
+    Store: From<Vec<R>>,
+{
+    /// Cycles, from the field `near` where there is one, until every cell has converged and the check holds, or this is given up;
+    /// returns what there is then.
     fn solve(
         &mut self,
         task: Task<'_>,
+        near: Option<&Field>,
         most_cycles: usize,
-        store: impl Fn(Vec<R>) -> Store,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<(Store, Check), SolveError> {
         let Task {
             settings,
             domain,
-            near,
             cancellation,
+            ..
         } = task;
         let levels = self.prepare(domain);
         observe(Phase::SetUp);
         let mut next_check = FIRST_CHECK;
         match near {
-            Some(near) if near.fits(domain) => {
+            Some(near) => {
                 let width = domain.width();
                 levels.start_near(domain.target(), |row, guess| {
                     let cells = row * width..(row + 1) * width;
@@ -200,7 +212,7 @@ impl<R: Real> Prepared<R> {
                 });
                 next_check = FIRST_CHECK_NEAR;
             }
-            _ => levels.start(domain.target()),
+            None => levels.start(domain.target()),
         }
         for cycle in 1.. {
             cancellation.check()?;
@@ -214,7 +226,7 @@ impl<R: Real> Prepared<R> {
             levels.finish();
             let mut values = Vec::new();
             levels.read(domain.target(), R::of(BLOCKED), &mut values);
-            let store = store(values);
+            let store = Store::from(values);
             observe(Phase::Solved);
             let check = verification::check(domain, &store, settings.threads);
             observe(Phase::Verified);

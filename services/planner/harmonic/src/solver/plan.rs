@@ -8,7 +8,6 @@
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
-use crate::field::Field;
 use crate::method::Method;
 use crate::multifrontal::{BreadthFirst, Budget, Tree};
 
@@ -119,17 +118,6 @@ pub(super) fn plan(
     Ok(Plan {
         methods,
         multifrontal: Some((pass, tree)),
-    })
-}
-
-/// The plan for a map much like that of `near`, a field by multigrid: the same method, without a look at the map. `None` for
-/// other methods, whose cost is in the shape of the map.
-pub(super) fn plan_near(near: &Field) -> Option<Plan> {
-    use Method::{Multifrontal, MultigridBands, MultigridDouble, MultigridSingle};
-    let first = near.verification().method;
-    matches!(first, MultigridSingle | MultigridDouble).then(|| Plan {
-        methods: costlier(first, &[MultigridDouble, MultigridBands, Multifrontal]),
-        multifrontal: None,
     })
 }
 
