@@ -15,6 +15,7 @@ mod coarsest;
 mod finest;
 mod galerkin;
 mod grid;
+mod kernels;
 mod sources;
 #[cfg(test)]
 mod tests;

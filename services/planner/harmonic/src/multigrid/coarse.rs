@@ -8,6 +8,7 @@ use super::grid::{
     EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
     split_row,
 };
+use super::kernels::{add_active, gather, relax, subtract, sum_weighted};
 use crate::real::Real;
 
 /// The couplings stored with a cell: to its east, south, south-east and south-west neighbour. The others are those
@@ -418,86 +419,6 @@ impl<R: Real> Coarse<R> {
                 to_north[x] = no[x].is_active() * (no[x] + nw[x] + ne[x]) * share;
                 to_south[x] = so[x].is_active() * (so[x] + sw[x] + se[x]) * share;
             }
-        }
-    }
-}
-
-// Functions of their own, because only an argument tells the compiler that the output overlaps no input.
-
-#[inline(always)]
-fn relax<R: Real, const COUNT: usize>(
-    out: &mut [R],
-    f: &[R],
-    inverse: &[R],
-    terms: &[(&[R], &[R]); COUNT],
-) {
-    for x in 0..out.len() {
-        out[x] = ((f[x] + sum_at(terms, x)) * inverse[x]).flushed();
-    }
-}
-
-/// Adds `values` to active cells.
-#[inline(always)]
-fn add_active<R: Real>(u: &mut [R], inverse: &[R], values: &[R]) {
-    let n = u.len();
-    let (inverse, values) = (&inverse[..n], &values[..n]);
-    for x in 0..n {
-        u[x] += inverse[x].is_active() * values[x];
-    }
-}
-
-/// `own` where active, and four weighted values.
-#[inline(always)]
-fn sum_weighted<R: Real>(
-    out: &mut [R],
-    inverse: &[R],
-    own: &[R],
-    weights: [&[R]; 4],
-    values: [&[R]; 4],
-) {
-    let n = out.len();
-    let (inverse, own) = (&inverse[..n], &own[..n]);
-    let [s, t, v, w] = weights.map(|it| &it[..n]);
-    let [a, b, c, d] = values.map(|it| &it[..n]);
-    for x in 0..n {
-        let around = (s[x] * a[x] + t[x] * b[x]) + (v[x] * c[x] + w[x] * d[x]);
-        out[x] = (inverse[x].is_active() * own[x] + around).flushed();
-    }
-}
-
-/// f less the equations' left side; 0 for inactive cells.
-#[inline(always)]
-fn subtract<R: Real, const COUNT: usize>(
-    f: &mut [R],
-    u: &[R],
-    inverse: &[R],
-    terms: &[(&[R], &[R]); COUNT],
-) {
-    for x in 0..f.len() {
-        let active = inverse[x].is_active();
-        let residual = (f[x] + sum_at(terms, x)) - inverse[x].inverse() * u[x];
-        f[x] = (active * residual).flushed();
-    }
-}
-
-#[inline(always)]
-fn gather<R: Real, const COUNT: usize>(out: &mut [R], terms: &[(&[R], &[R]); COUNT]) {
-    for (x, out) in out.iter_mut().enumerate() {
-        *out = sum_at(terms, x);
-    }
-}
-
-/// The sum of products at one place of the rows. Pairwise, and by index: the compiler then keeps the rows in registers.
-#[inline(always)]
-fn sum_at<R: Real, const COUNT: usize>(terms: &[(&[R], &[R]); COUNT], x: usize) -> R {
-    let product = |k: usize| terms[k].0[x] * terms[k].1[x];
-    match COUNT {
-        0 => R::default(),
-        2 => product(0) + product(1),
-        6 => (product(0) + product(1)) + (product(2) + product(3)) + (product(4) + product(5)),
-        _ => {
-            ((product(0) + product(1)) + (product(2) + product(3)))
-                + ((product(4) + product(5)) + (product(6) + product(7)))
         }
     }
 }
