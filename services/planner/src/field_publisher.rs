@@ -30,6 +30,10 @@ struct Policy {
     changed: Window,
 }
 
+/// How often the thread offers the processor to others in the course of a policy. Each time it may wait for its turn among all
+/// that want it.
+const YIELDS: usize = 8;
+
 /// Computes policies, and keeps the last one to compare with.
 #[derive(Default)]
 struct Worker {
@@ -38,8 +42,17 @@ struct Worker {
 
 impl Worker {
     fn policy(&mut self, (snapshot, at): (Snapshot, Progress)) -> Policy {
-        let cells = Arc::new(snapshot.cells());
         let frame = snapshot.frame;
+        let rows = frame.cells as usize;
+        let mut cells = Vec::with_capacity(frame.area());
+        for row in 0..rows {
+            snapshot.append_row(row, &mut cells);
+            // A stage that waits for this processor gets it: it might wait for some milliseconds otherwise.
+            if row % rows.div_ceil(YIELDS) == 0 {
+                std::thread::yield_now();
+            }
+        }
+        let cells = Arc::new(cells);
         let changed = if self.before.len() == cells.len() {
             frame.changed_window(&self.before, &cells)
         } else {
@@ -82,7 +95,7 @@ impl FieldPublisher {
         let policy = move |job| worker.policy(job);
         Ok(Self {
             writer,
-            thread: Background::start("policy", scheduling::idle_time_only, policy)?,
+            thread: Background::start("policy", scheduling::behind_stages, policy)?,
             busy: false,
             published: None,
             version: 0,

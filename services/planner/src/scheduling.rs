@@ -9,21 +9,16 @@ use thread_priority::{
 /// Niceness 10 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
 const NICENESS_10: u8 = 22;
 
-/// Let this thread run only while a processor has nothing else to do, or hardly anything: Linux's SCHED_IDLE. A stage that
-/// becomes ready to run takes the processor from it at once.
-pub(crate) fn idle_time_only() {
-    take(ThreadPriority::Min, Normal::Idle);
-}
-
-/// Let this thread run when it must, and yet with a tenth of what a stage gets of a processor that both want.
+/// Let this thread run with a tenth of what a stage gets of a processor that both want.
+///
+/// Not less, though nobody waits for it: a process that is killed ends only once each of its threads has run, and what a
+/// thread holds in the kernel the others wait for. With SCHED_IDLE both took seconds on a busy machine.
 pub(crate) fn behind_stages() {
-    if let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) {
-        take(ThreadPriority::Crossplatform(value), Normal::Other);
-    }
-}
-
-fn take(priority: ThreadPriority, policy: Normal) {
-    let policy = ThreadSchedulePolicy::Normal(policy);
+    let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
+        return;
+    };
+    let policy = ThreadSchedulePolicy::Normal(Normal::Other);
+    let priority = ThreadPriority::Crossplatform(value);
     // Where that is refused they share the processor.
     let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
 }

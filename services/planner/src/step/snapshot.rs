@@ -24,12 +24,17 @@ impl Snapshot {
     pub fn cells(&self) -> Vec<FieldCell> {
         let mut cells = Vec::with_capacity(self.frame.area());
         for row in 0..self.frame.cells as usize {
-            self.field.policy_of_row(row, |policy| {
-                let [ex, ey] = policy.direction.map(|component| component as f32);
-                let log2_u = policy.log2_u as f32;
-                cells.push(FieldCell { ex, ey, log2_u });
-            });
+            self.append_row(row, &mut cells);
         }
         cells
+    }
+
+    /// Append the policy of the cells of `row` to `cells`.
+    pub fn append_row(&self, row: usize, cells: &mut Vec<FieldCell>) {
+        self.field.policy_of_row(row, |policy| {
+            let [ex, ey] = policy.direction.map(|component| component as f32);
+            let log2_u = policy.log2_u as f32;
+            cells.push(FieldCell { ex, ey, log2_u });
+        });
     }
 }
