@@ -4,6 +4,7 @@
 mod support;
 
 use rustix::process::Signal;
+use supervisor::stages::find as find_stage;
 use support::{Run, STAGES, assert_nothing_left, find};
 
 /// How late a deadline may be noticed.
@@ -43,11 +44,8 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
         .iter()
         .map(|death| {
             assert_eq!(death["hung"], true, "{death}");
-            let deadline = if death["stage"] == "planner" {
-                2.0
-            } else {
-                0.5
-            };
+            let stage = find_stage(death["stage"].as_str().unwrap()).unwrap();
+            let deadline = stage.deadlines.heartbeat.as_secs_f64();
             death["noticed_after_s"].as_f64().unwrap() - deadline
         })
         .collect();

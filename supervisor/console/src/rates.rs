@@ -249,7 +249,7 @@ mod tests {
         for number in 50..100 {
             health.add(of(1), stamp(number, 0), began + 20 * number * MS);
         }
-        health.add(of(2), stamp(50, 0), began + 2000 * MS);
+        health.add(of(2), stamp(60, 0), began + 2000 * MS);
         let report = health.report(began + 2000 * MS);
         assert_eq!(
             (report.late, report.longest_gap_s),

@@ -12,7 +12,7 @@ const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
 }
 
-/// Of the link: beats due every 500 ms, ready due after 3 s.
+/// Of the link: beats due every 750 ms, ready due after 3 s.
 fn running() -> Policy {
     let mut policy = Policy::new(TABLE[0].deadlines);
     assert_eq!(policy.step(Event::Start, ms(0)), Some(Action::Start));
@@ -137,11 +137,11 @@ fn a_stable_generation_clears_the_deaths_before_it() {
 #[test]
 fn a_stage_that_stops_beating_is_aborted_then_killed() {
     let mut policy = running();
-    assert_eq!(policy.step(Event::Time, ms(509)), None);
-    assert_eq!(policy.step(Event::Time, ms(510)), Some(Action::Abort));
-    assert_eq!(policy.step(Event::Time, ms(609)), None);
-    assert_eq!(policy.step(Event::Time, ms(610)), Some(Action::Kill));
-    assert_eq!(policy.step(Event::Exited, ms(611)), Some(Action::Start));
+    assert_eq!(policy.step(Event::Time, ms(759)), None);
+    assert_eq!(policy.step(Event::Time, ms(760)), Some(Action::Abort));
+    assert_eq!(policy.step(Event::Time, ms(859)), None);
+    assert_eq!(policy.step(Event::Time, ms(860)), Some(Action::Kill));
+    assert_eq!(policy.step(Event::Exited, ms(861)), Some(Action::Start));
 }
 
 #[test]
@@ -325,7 +325,7 @@ impl Model {
     fn due(&self) -> Option<Now> {
         match &self.generation {
             Some(generation) => Some(generation.kill.unwrap_or_else(|| match generation.ready {
-                Some(_) => generation.sign + ms(500),
+                Some(_) => generation.sign + ms(750),
                 None => generation.sign + ms(3000),
             })),
             None if self.wanted && !self.held => {
