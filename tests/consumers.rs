@@ -278,13 +278,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
         assert!(joined > 10, "{joined}");
         drop(staying);
         let (_, summary) = run.finish();
-        for stage in [
-            "x80-link",
-            "dead-reckoning",
-            "mapper",
-            "planner",
-            "controller",
-        ] {
+        for stage in support::STAGES {
             let killed = u64::from(stage == "planner");
             assert_eq!(summary["restarts"][stage], killed, "{summary}");
         }

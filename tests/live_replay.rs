@@ -25,6 +25,13 @@ fn process_of(stage: &str, said: &mut Lines<BufReader<ChildStderr>>) -> u32 {
     process.parse().unwrap()
 }
 
+/// `stage` answered every tick that the recorded one did, with the same values.
+fn assert_as_recorded(report: &Value, stage: &str) {
+    let found = &report["stages"][stage];
+    assert_eq!(found["equal"], found["answered"], "{report}");
+    assert_eq!(found["unanswered"], 0, "{report}");
+}
+
 #[test]
 fn live_stages_answer_a_played_recording_as_it_was_recorded() {
     let golden = golden();
@@ -35,8 +42,7 @@ fn live_stages_answer_a_played_recording_as_it_was_recorded() {
     for stage in ["dead-reckoning", "mapper", "planner", "controller"] {
         let found = &report["stages"][stage];
         assert!(found["answered"].as_u64().unwrap() > 20, "{report}");
-        assert_eq!(found["equal"], found["answered"], "{report}");
-        assert_eq!(found["unanswered"], 0, "{report}");
+        assert_as_recorded(&report, stage);
     }
     assert_nothing_left("live-equal");
 }
@@ -102,9 +108,7 @@ fn time_waits_for_a_live_stage_that_stands_still() {
     signal_process(planner, Signal::CONT);
     let output = played.wait_with_output().unwrap();
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let found = &report["stages"]["planner"];
-    assert_eq!(found["equal"], found["answered"], "{report}");
-    assert_eq!(found["unanswered"], 0, "{report}");
+    assert_as_recorded(&report, "planner");
     assert_nothing_left("live-wait");
 }
 

@@ -115,6 +115,15 @@ impl Domain {
         }
     }
 
+    /// Whether somebody supervises the robot, for who need not know which process; where the system does not say, true.
+    #[must_use]
+    pub fn is_supervised(&self) -> bool {
+        match File::open(self.lock_file()) {
+            Ok(lock) => lock.try_lock_shared().is_err(),
+            Err(error) => error.kind() != io::ErrorKind::NotFound,
+        }
+    }
+
     /// Locked, shared, by a consumer while it joins, and not while a bus is made or removed: of one that is gone, nobody makes
     /// files again.
     #[must_use]

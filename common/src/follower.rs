@@ -133,7 +133,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         let Ok(making) = Making::current(&self.domain) else {
             return Ok(false);
         };
-        if !self.is_supervised() {
+        if !self.domain.is_supervised() {
             return Ok(false);
         }
         match self.join() {
@@ -178,14 +178,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
 
     fn is_gone(&self) -> bool {
         let replaced = |joined: &Joined<Topics>| joined.bus.is_replaced();
-        self.joined.as_ref().is_some_and(replaced) || !self.is_supervised()
-    }
-
-    /// A supervisor that was killed leaves its bus, on which nobody publishes.
-    fn is_supervised(&self) -> bool {
-        // Where the system does not say, the bus counts.
-        self.domain
-            .supervisor()
-            .map_or(true, |holder| holder.is_some())
+        // A supervisor that was killed leaves its bus, on which nobody publishes.
+        self.joined.as_ref().is_some_and(replaced) || !self.domain.is_supervised()
     }
 }

@@ -139,7 +139,7 @@ pub fn record(
             run.take_logs(stopped)?;
             run.file()?.flush_if_due()?;
         }
-        let run_over = news == Some(false) && !is_supervised(&options.domain);
+        let run_over = news == Some(false) && !options.domain.is_supervised();
         if (stopped || run_over)
             && let Some(mut ended) = current.take()
         {
@@ -149,10 +149,6 @@ pub fn record(
             return Ok(());
         }
     }
-}
-
-fn is_supervised(domain: &Domain) -> bool {
-    domain.supervisor().map_or(true, |holder| holder.is_some())
 }
 
 /// The directory of the run that is under way.

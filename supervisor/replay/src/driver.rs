@@ -19,6 +19,7 @@ use supervisor::stages::{self, Stage};
 use crate::{
     generation::{Generation, Setting},
     report::Report,
+    samples::time_of,
 };
 
 /// What to replay, and how.
@@ -115,9 +116,8 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
 
 /// Wait until the mission time of `message` has come.
 fn wait_for(message: &Message, rate: f64, began: Instant) {
-    let stamp = message.data.get(12..).and_then(|rest| rest.first_chunk());
-    let stamp = MissionTime(stamp.map_or(0, |bytes| u64::from_le_bytes(*bytes)));
-    let due = Duration::try_from_secs_f64(stamp.seconds() / rate).unwrap_or_default();
+    let due =
+        Duration::try_from_secs_f64(time_of(&message.data).seconds() / rate).unwrap_or_default();
     thread::sleep(due.saturating_sub(began.elapsed()));
 }
 

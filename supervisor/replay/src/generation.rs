@@ -17,12 +17,11 @@ use supervisor::stages::Stage;
 use crate::{
     pieces::Pieces,
     report::{Difference, StageReport, Verdict},
+    samples::{tick_of, time_of},
     values,
 };
 
-/// Where the stamp's tick, time, generation and sequence stand in a message, behind the encoding's header.
-const TICK: usize = 4;
-const TIME: usize = 12;
+/// Where the stamp's generation and sequence stand in a message, behind the encoding's header.
 const GENERATION: usize = 20;
 const SEQUENCE: usize = 24;
 /// Entries before an output that a difference shows.
@@ -207,7 +206,7 @@ impl Generation {
             let (Some((_, recorded)), Some(computed)) = (recorded, computed) else {
                 return;
             };
-            if number(&recorded, TIME) < setting.from.0 {
+            if time_of(&recorded) < setting.from {
                 continue;
             }
             self.compared += 1;
@@ -219,7 +218,7 @@ impl Generation {
     }
 
     fn differs(&mut self, topic: &str, recorded: &[u8], computed: &Computed) {
-        let tick = number(recorded, TICK);
+        let tick = tick_of(recorded);
         let known = topics::TABLE
             .iter()
             .find(|known| known.spec().name == topic);
@@ -292,7 +291,7 @@ impl Generation {
     fn find_what_was_not_computed(&mut self, setting: &Setting<'_>) {
         let late = |(topic, channel): (&String, &Channel)| {
             let (_, message) = channel.recorded.front()?;
-            (number(message, TIME) >= setting.from.0).then(|| (topic.clone(), message.clone()))
+            (time_of(message) >= setting.from).then(|| (topic.clone(), message.clone()))
         };
         if self.replay.is_some()
             && let Some((topic, message)) = self.channels.iter().find_map(late)
@@ -331,10 +330,4 @@ impl Generation {
             None => "none of its `inputs` is recorded".to_owned(),
         })
     }
-}
-
-/// The u64 at `at` of a message; 0 if that is too short.
-fn number(message: &[u8], at: usize) -> u64 {
-    let bytes = message.get(at..).and_then(|rest| rest.first_chunk());
-    bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes))
 }

@@ -256,6 +256,20 @@ impl Player {
         Ok(())
     }
 
+    /// Take what the live stages published. Returns one that has not answered the tick under way.
+    fn look(&mut self) -> Result<Option<&'static str>, LiveError> {
+        // Whoever beats wakes this process, too.
+        while self.health.take()?.is_some() {}
+        let mut waiting = None;
+        for live in &mut self.stages {
+            if !live.has_answered(self.tick)? {
+                waiting = waiting.or(Some(live.stage.name));
+            }
+        }
+        self.check_stages()?;
+        Ok(waiting)
+    }
+
     /// The tick under way is over: wait for the answers of live stages where time waits for them, and compare. Says
     /// whether to go on.
     fn await_answers(
@@ -265,19 +279,7 @@ impl Player {
     ) -> Result<bool, LiveError> {
         let began = Instant::now();
         let mut told = false;
-        loop {
-            // Whoever beats wakes this, too.
-            while self.health.take()?.is_some() {}
-            let mut waiting = None;
-            for live in &mut self.stages {
-                if !live.has_answered(self.tick)? {
-                    waiting = waiting.or(Some(live.stage.name));
-                }
-            }
-            self.check_stages()?;
-            let (Some(stage), Pace::Max) = (waiting, self.pace) else {
-                break;
-            };
+        while let (Some(stage), Pace::Max) = (self.look()?, self.pace) {
             if stop() {
                 return Ok(false);
             }
@@ -316,11 +318,7 @@ impl Player {
             if stop() {
                 return Ok(false);
             }
-            while self.health.take()?.is_some() {}
-            for live in &mut self.stages {
-                live.has_answered(self.tick)?;
-            }
-            self.check_stages()?;
+            self.look()?;
             self.wait(left.min(POLL))?;
         }
     }

@@ -117,8 +117,7 @@ impl LiveStage {
     pub(super) fn recorded(&mut self, topic: &str, message: &[u8]) -> bool {
         let own = |answers: &&mut Answers| answers.topic.spec().name == topic;
         if let Some(answers) = self.answers.iter_mut().find(own) {
-            // The whole map, published again for new readers, answers no tick.
-            if answers.topic.layout().1.is_none() || !is_keyframe(message) {
+            if answers.is_answer(message) {
                 answers.recorded = Some(message.to_vec());
             }
             return true;
@@ -171,13 +170,18 @@ impl Drop for LiveStage {
 }
 
 impl Answers {
+    /// The whole map, published again for new readers, answers no tick.
+    fn is_answer(&self, message: &[u8]) -> bool {
+        self.topic.layout().1.is_none() || !is_keyframe(message)
+    }
+
     fn take(&mut self) -> Result<(), BusError> {
         loop {
             let mut message = Vec::new();
             if self.reader.take(&mut message)?.is_none() {
                 return Ok(());
             }
-            if self.topic.layout().1.is_none() || !is_keyframe(&message) {
+            if self.is_answer(&message) {
                 self.given = Some(message);
             }
         }
