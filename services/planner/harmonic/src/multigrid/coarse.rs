@@ -178,11 +178,11 @@ impl<R: Real> Coarse<R> {
         sum_weighted(out, &self.inverse[EE][o..], even_even, weights, around);
     }
 
-    /// Adds the correction from `next` and relaxes.
+    /// Adds `share` of the correction from `next` and relaxes.
     #[inline(always)]
-    pub(super) fn ascend(&mut self, next: &Self) {
+    pub(super) fn ascend(&mut self, next: &Self, share: R) {
         if let Some(span) = self.grid.span() {
-            return self.ascend_whole(next, span);
+            return self.ascend_whole(next, share, span);
         }
         let Grid {
             columns: n, rows, ..
@@ -193,10 +193,10 @@ impl<R: Real> Coarse<R> {
             row.clear();
             row.resize(2 * next.grid.columns + 2, R::default());
         }
-        join_row(&next.grid, &next.u, 0, upper);
+        join_row(&next.grid, &next.u, 0, share, upper);
         for y in 0..=rows {
             if y < rows {
-                join_row(&next.grid, &next.u, y + 1, lower);
+                join_row(&next.grid, &next.u, y + 1, share, lower);
                 self.correct(self.grid.start(y), upper, lower, n);
                 std::mem::swap(upper, lower);
             }
@@ -212,11 +212,11 @@ impl<R: Real> Coarse<R> {
 
     /// [`ascend`](Self::ascend) for a small level, plane by plane: `span` places of each.
     #[inline(always)]
-    fn ascend_whole(&mut self, next: &Self, span: usize) {
+    fn ascend_whole(&mut self, next: &Self, share: R, span: usize) {
         let o = self.grid.start(0);
         let mut whole = std::mem::take(&mut self.whole);
         let transfer = &mut whole.transfer;
-        join(&self.grid, &next.grid, &next.u, transfer);
+        join(&self.grid, &next.grid, &next.u, share, transfer);
         let below = &transfer[o + self.grid.stride..];
         self.correct(o, &transfer[o..], below, span);
         for plane in [OO, EO, OE, EE] {

@@ -49,6 +49,19 @@ pub(super) struct Finest<R> {
     whole: Whole<R>,
 }
 
+/// What a pass does.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Work<R> {
+    /// What the correction from the next level is multiplied by.
+    pub share: R,
+    /// Full sweeps after the correction.
+    pub sweeps: usize,
+    /// Whether a half sweep follows whose changes are restricted to the next level as the residual.
+    pub descend: bool,
+    /// A cell whose direction the correction turns by more than this, radians, counts as unsettled; none without.
+    pub tolerance: Option<R>,
+}
+
 /// What a pass tells of the convergence.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
@@ -158,19 +171,18 @@ impl<R: Real> Finest<R> {
         ]
     }
 
-    /// One pass: correction from `next`, so many full `sweeps`, and if `descend` a half sweep more, whose changes are
-    /// restricted to `next` as the residual.
+    /// One pass: correction from `next`, sweeps, and residual.
     #[inline(always)]
-    pub(super) fn pass(
-        &mut self,
-        next: &mut Coarse<R>,
-        sweeps: usize,
-        descend: bool,
-        tolerance: Option<R>,
-    ) -> Progress {
+    pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> Progress {
         if let Some(span) = self.grid.span() {
-            return self.pass_whole(next, sweeps, descend, tolerance, span);
+            return self.pass_whole(next, work, span);
         }
+        let Work {
+            share,
+            sweeps,
+            descend,
+            tolerance,
+        } = work;
         let Grid {
             columns: n, rows, ..
         } = self.grid;
@@ -188,11 +200,11 @@ impl<R: Real> Finest<R> {
             residual_oe,
             ..
         } = &mut scratch;
-        join_row(&next.grid, &next.u, 0, upper);
+        join_row(&next.grid, &next.u, 0, share, upper);
 
         for y in 0..rows + sweeps + 2 {
             if y < rows {
-                join_row(&next.grid, &next.u, y + 1, lower);
+                join_row(&next.grid, &next.u, y + 1, share, lower);
                 if let Some(tolerance) = tolerance {
                     progress.unsettled +=
                         self.unsettled(self.grid.start(y), upper, lower, tolerance, n);
@@ -250,14 +262,7 @@ impl<R: Real> Finest<R> {
 
     /// [`pass`](Self::pass) for a small level, plane by plane: `span` places of each.
     #[inline(always)]
-    fn pass_whole(
-        &mut self,
-        next: &mut Coarse<R>,
-        sweeps: usize,
-        descend: bool,
-        tolerance: Option<R>,
-        span: usize,
-    ) -> Progress {
+    fn pass_whole(&mut self, next: &mut Coarse<R>, work: Work<R>, span: usize) -> Progress {
         let grid = self.grid;
         let (o, stride) = (grid.start(0), grid.stride);
         let mut whole = std::mem::take(&mut self.whole);
@@ -270,19 +275,19 @@ impl<R: Real> Finest<R> {
             ..
         } = &mut whole;
         let mut progress = Progress::default();
-        join(&grid, &next.grid, &next.u, transfer);
+        join(&grid, &next.grid, &next.u, work.share, transfer);
         let (upper, lower) = (&transfer[o..], &transfer[o + stride..]);
-        if let Some(tolerance) = tolerance {
+        if let Some(tolerance) = work.tolerance {
             progress.unsettled = self.unsettled(o, upper, lower, tolerance, span);
         }
         self.correct_black(o, upper, lower, span);
-        for _ in 0..sweeps {
+        for _ in 0..work.sweeps {
             for plane in [EE, OO, OE, EO] {
                 self.relax_places(plane, o, span, None);
                 self.add_sources_of(plane, None);
             }
         }
-        if descend {
+        if work.descend {
             for (plane, change) in [(EE, &mut *change_ee), (OO, &mut *change_oo)] {
                 self.relax_places(plane, o, span, Some(&mut change[o..]));
                 self.add_sources_of(plane, Some(change));

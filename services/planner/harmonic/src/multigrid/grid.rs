@@ -144,11 +144,17 @@ impl<R: Real> Whole<R> {
     }
 }
 
-/// Reads all rows of the level `next` of that of `grid` into one of its planes.
+/// Reads all rows of the level `next` of that of `grid`, times `share`, into one of its planes.
 #[inline(always)]
-pub(super) fn join<R: Real>(grid: &Grid, next: &Grid, planes: &Planes<R>, into: &mut [R]) {
+pub(super) fn join<R: Real>(
+    grid: &Grid,
+    next: &Grid,
+    planes: &Planes<R>,
+    share: R,
+    into: &mut [R],
+) {
     for y in 0..grid.rows {
-        join_row(next, planes, y, &mut into[grid.start(y)..]);
+        join_row(next, planes, y, share, &mut into[grid.start(y)..]);
     }
 }
 
@@ -207,9 +213,15 @@ pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize
     }
 }
 
-/// Reads row `row` of a level from the planes, in column order; zeros beyond the last row.
+/// Reads row `row` of a level from the planes, times `share`, in column order; zeros beyond the last row.
 #[inline(always)]
-pub(super) fn join_row<R: Real>(grid: &Grid, planes: &Planes<R>, row: usize, values: &mut [R]) {
+pub(super) fn join_row<R: Real>(
+    grid: &Grid,
+    planes: &Planes<R>,
+    row: usize,
+    share: R,
+    values: &mut [R],
+) {
     let values = &mut values[..2 * grid.columns];
     if row >= grid.height {
         values.fill(R::default());
@@ -220,7 +232,7 @@ pub(super) fn join_row<R: Real>(grid: &Grid, planes: &Planes<R>, row: usize, val
     let even = &planes[first][start..start + grid.columns];
     let odd = &planes[first + 1][start..start + grid.columns];
     for ((even, odd), pair) in even.iter().zip(odd).zip(values.chunks_exact_mut(2)) {
-        pair[0] = *even;
-        pair[1] = *odd;
+        pair[0] = share * *even;
+        pair[1] = share * *odd;
     }
 }
