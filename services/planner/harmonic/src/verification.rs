@@ -25,7 +25,7 @@ use crate::simd::Simd;
 use crate::store::Store;
 use cells::Cells;
 pub(crate) use cells::Check;
-use rows::{Rows, ScaledRows};
+use rows::{Rows, ScaledRows, Window};
 use tiles::{TILE, Tiles};
 
 /// What was verified of a field, cell by cell.
@@ -101,28 +101,11 @@ fn in_strips(
     })
 }
 
-/// Checks rows of a field with one common exponent, with wide vectors.
+/// Checks rows of a field with one common exponent.
 fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>) -> Check {
-    Simd::default().run(
-        #[inline(always)]
-        || {
-            let width = domain.width();
-            let row_of = |row: usize| values.get(row * width..(row + 1) * width);
-            let mut found = Check::default();
-            let (mut rows, mut cells) = (Rows::new(width), Cells::new(width));
-            let mut tiles = Tiles::new(width);
-            rows.take(strip.start.checked_sub(1).and_then(row_of));
-            rows.take(row_of(strip.start));
-            for row in strip.clone() {
-                rows.take(row_of(row + 1));
-                let raw = &values[row * width..(row + 1) * width];
-                cells.check_row(domain, row, raw, rows.around(), &mut found);
-                tiles.add_row(row, &cells.residuals, &cells.slopes);
-            }
-            found.worst_tile = tiles.finish();
-            found
-        },
-    )
+    let width = domain.width();
+    let row_of = |row: usize| values.get(row * width..(row + 1) * width);
+    check_strip(domain, values, Rows::new(width), row_of, strip)
 }
 
 /// Checks rows of a field with an exponent a cell.
@@ -132,22 +115,34 @@ fn check_extended(
     exponents: &[i32],
     strip: Range<usize>,
 ) -> Check {
+    let width = domain.width();
+    let row_of = |row: usize| {
+        let cells = row * width..(row + 1) * width;
+        mantissas.get(cells.clone()).zip(exponents.get(cells))
+    };
+    check_strip(domain, mantissas, ScaledRows::new(width), row_of, strip)
+}
+
+/// Checks a strip of rows with wide vectors: `raw` is what is stored, `row_of` gives rows by number, none beyond the map.
+fn check_strip<'f, R: Real, W: Window<R>>(
+    domain: &Domain,
+    raw: &[R],
+    mut rows: W,
+    row_of: impl Fn(usize) -> Option<W::Row<'f>>,
+    strip: Range<usize>,
+) -> Check {
     Simd::default().run(
         #[inline(always)]
         || {
             let width = domain.width();
-            let row_of = |row: usize| {
-                let cells = row * width..(row + 1) * width;
-                mantissas.get(cells.clone()).zip(exponents.get(cells))
-            };
             let mut found = Check::default();
-            let (mut rows, mut cells) = (ScaledRows::new(width), Cells::new(width));
+            let mut cells = Cells::new(width);
             let mut tiles = Tiles::new(width);
-            rows.take(strip.start.checked_sub(1).and_then(row_of));
+            rows.take(strip.start.checked_sub(1).and_then(&row_of));
             rows.take(row_of(strip.start));
             for row in strip.clone() {
                 rows.take(row_of(row + 1));
-                let raw = &mantissas[row * width..(row + 1) * width];
+                let raw = &raw[row * width..(row + 1) * width];
                 cells.check_row(domain, row, raw, rows.around(), &mut found);
                 tiles.add_row(row, &cells.residuals, &cells.slopes);
             }

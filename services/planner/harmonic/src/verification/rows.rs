@@ -5,7 +5,19 @@ use crate::scaled::pow2;
 
 use super::cells::Around;
 
-/// Three neighbouring rows of u with a zero at either end, blocked cells zero.
+/// Three neighbouring rows of u.
+pub(super) trait Window<R> {
+    /// A row as the field stores it.
+    type Row<'f>;
+
+    /// Moves one row on; `next` is the one that comes in below, none after the last.
+    fn take(&mut self, next: Option<Self::Row<'_>>);
+
+    /// The middle row and what lies around it.
+    fn around(&mut self) -> Around<'_, R>;
+}
+
+/// Three rows of numbers with a zero at either end, blocked cells zero.
 pub(super) struct Rows<R> {
     above: Vec<R>,
     here: Vec<R>,
@@ -21,10 +33,13 @@ impl<R: Real> Rows<R> {
             below: row,
         }
     }
+}
 
-    /// Moves one row on; `next` is the one that comes in below, none after the last.
+impl<R: Real> Window<R> for Rows<R> {
+    type Row<'f> = &'f [R];
+
     #[inline(always)]
-    pub(super) fn take(&mut self, next: Option<&[R]>) {
+    fn take(&mut self, next: Option<&[R]>) {
         std::mem::swap(&mut self.above, &mut self.here);
         std::mem::swap(&mut self.here, &mut self.below);
         let zero = R::default();
@@ -40,9 +55,8 @@ impl<R: Real> Rows<R> {
         }
     }
 
-    /// The middle row and what lies around it.
     #[inline(always)]
-    pub(super) fn around(&self) -> Around<'_, R> {
+    fn around(&mut self) -> Around<'_, R> {
         let n = self.here.len() - 2;
         Around {
             here: &self.here[1..][..n],
@@ -54,7 +68,7 @@ impl<R: Real> Rows<R> {
     }
 }
 
-/// The same with an exponent a cell.
+/// Three rows of numbers with an exponent each.
 pub(super) struct ScaledRows {
     mantissas: Rows<f64>,
     above: Vec<i32>,
@@ -75,10 +89,14 @@ impl ScaledRows {
             relative: std::array::from_fn(|_| vec![0.0; width]),
         }
     }
+}
 
-    /// Moves one row on; `next`, mantissas and exponents, is the one that comes in below, none after the last.
+impl Window<f64> for ScaledRows {
+    /// Mantissas and exponents.
+    type Row<'f> = (&'f [f64], &'f [i32]);
+
     #[inline(always)]
-    pub(super) fn take(&mut self, next: Option<(&[f64], &[i32])>) {
+    fn take(&mut self, next: Option<(&[f64], &[i32])>) {
         self.mantissas.take(next.map(|(mantissas, _)| mantissas));
         std::mem::swap(&mut self.above, &mut self.here);
         std::mem::swap(&mut self.here, &mut self.below);
@@ -88,9 +106,8 @@ impl ScaledRows {
         }
     }
 
-    /// The middle row and what lies around it.
     #[inline(always)]
-    pub(super) fn around(&mut self) -> Around<'_, f64> {
+    fn around(&mut self) -> Around<'_, f64> {
         let u = self.mantissas.around();
         let n = u.here.len();
         let exponents = &self.here[1..][..n];
