@@ -269,10 +269,14 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
             let visitor = || scope.spawn(|| join_again_and_again(robot, &over));
             let visitors = [visitor(), visitor(), visitor()];
             run.wait_until_under_way(5.0);
-            // A stage that ends gets its place, whoever else comes.
+            let bus = Bus::join(&Domain::of(robot.parse().unwrap()), robot).unwrap();
+            let all_that_there_are: Vec<_> =
+                std::iter::from_fn(|| bus.slice_reader(&topics::GRID).ok()).collect();
+            // A stage that ends gets its place, whoever else waits for one.
             run.kill_and_await_successor("planner", rustix::process::Signal::KILL);
             run.wait_until_under_way(8.0);
             over.store(true, Ordering::Relaxed);
+            drop(all_that_there_are);
             visitors.map(|visitor| visitor.join().unwrap()).iter().sum()
         });
         assert!(joined > 10, "{joined}");

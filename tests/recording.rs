@@ -1,6 +1,7 @@
 //! Runs recorded through real processes, opened, replayed to the bit; recorders killed.
 
 use std::{
+    fs,
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
     process::Stdio,
@@ -213,4 +214,23 @@ fn replay_and_diff_print_what_they_found_and_exit_with_1_on_a_difference() {
     );
     let unknown = output(&["replay", file, "--stage", "wheel"]);
     assert_eq!(unknown.status.code(), Some(1));
+}
+
+#[test]
+fn a_runs_directory_stands_for_its_recording_unless_it_holds_none_or_several() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = directory.path().to_str().unwrap();
+    let replay = || output(&["replay", run, "--stage", "mapper"]);
+    let told = |words: &str| {
+        let replayed = replay();
+        let said = String::from_utf8_lossy(&replayed.stderr).into_owned();
+        assert_eq!(replayed.status.code(), Some(1), "{said}");
+        assert!(said.contains(words) && said.contains(run), "{said}");
+    };
+    told("holds no recording.mcap");
+    let copy = |name: &str| fs::copy(golden().path(), directory.path().join(name)).unwrap();
+    copy("recording.mcap");
+    assert_eq!(replay().status.code(), Some(0));
+    copy("recording-2.mcap");
+    told("recording-2.mcap");
 }

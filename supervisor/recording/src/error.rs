@@ -26,6 +26,19 @@ pub enum RecordingError {
         /// What the writer reports.
         problem: String,
     },
+    /// A directory without a recording.
+    #[error("{0} holds no recording.mcap: give a run that was recorded, or a recording")]
+    NoRecording(PathBuf),
+    /// A directory with several.
+    #[error(
+        "{directory} holds several recordings, of a run that was resumed: give one of them, up to {last}"
+    )]
+    Several {
+        /// The directory.
+        directory: PathBuf,
+        /// The last of them.
+        last: PathBuf,
+    },
     /// It is not a recording of ours.
     #[error("{file} is no recording of firsthand: {problem}; `firsthand record` makes one")]
     Foreign {

@@ -61,6 +61,6 @@ pub mod schema;
 
 pub use self::{
     error::RecordingError,
-    reader::{End, Message, Recording, Sample, SliceSample},
+    reader::{End, Message, Recording, Sample, SliceSample, parts},
     recorder::{Options, record},
 };

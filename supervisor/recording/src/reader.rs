@@ -84,12 +84,37 @@ pub struct SliceSample<H, T> {
     pub elements: Vec<T>,
 }
 
+/// Parts of a run that are looked for at most.
+const MOST_PARTS: usize = 1000;
+
+/// The recordings in a run's directory, the first one first: a run that is resumed begins another.
+#[must_use]
+pub fn parts(run: &Path) -> Vec<PathBuf> {
+    let later = (2..=MOST_PARTS).map(|nth| format!("recording-{nth}.mcap"));
+    std::iter::once("recording.mcap".to_owned())
+        .chain(later)
+        .map(|name| run.join(name))
+        .take_while(|file| file.is_file())
+        .collect()
+}
+
 impl Recording {
-    /// Read what `path` says of itself, and how it ends: all of it is read once, and none is held.
+    /// Read what `path` says of itself, and how it ends: all of it is read once, and none is held. Of a run's directory it
+    /// is the recording in it.
     ///
     /// # Errors
-    /// When it cannot be read, or is no recording of a run.
+    /// When it cannot be read, is no recording of a run, or a directory with none or several.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        if path.is_dir() {
+            return match &parts(path)[..] {
+                [only] => Self::open(only),
+                [] => Err(RecordingError::NoRecording(path.to_path_buf())),
+                [.., last] => Err(RecordingError::Several {
+                    directory: path.to_path_buf(),
+                    last: last.clone(),
+                }),
+            };
+        }
         let mut records = Records::open(path)?;
         let mut about = None;
         let mut counts = BTreeMap::new();

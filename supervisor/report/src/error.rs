@@ -14,9 +14,6 @@ pub enum ReportError {
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The run was not recorded.
-    #[error("{0} holds no recording.mcap: give a run that was recorded, or a recording")]
-    NoRecording(PathBuf),
     /// The file system refused.
     #[error("cannot {action} {file}: {source}")]
     File {

@@ -6,15 +6,13 @@ use std::{
 };
 
 use common::run::Run;
-use recording::Recording;
+use recording::{Recording, RecordingError};
 use serde_json::{Map, Value};
 
 use crate::error::ReportError;
 
 /// A summary takes 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
-/// Parts of a run that are read at most: a run that is resumed begins another.
-const MOST_PARTS: usize = 1000;
 
 /// What a report is made of.
 pub(crate) struct Source {
@@ -32,14 +30,9 @@ impl Source {
                 is_run: false,
             });
         }
-        let first = run.join("recording.mcap");
-        let later = (2..=MOST_PARTS).map(|nth| run.join(format!("recording-{nth}.mcap")));
-        let files: Vec<_> = std::iter::once(first)
-            .chain(later)
-            .take_while(|file| file.exists())
-            .collect();
+        let files = recording::parts(run);
         if files.is_empty() {
-            return Err(ReportError::NoRecording(run.to_path_buf()));
+            return Err(RecordingError::NoRecording(run.to_path_buf()).into());
         }
         Ok(Self {
             files,

@@ -26,8 +26,8 @@ use crate::progress_line::write_stderr;
 /// bit. Exits with 1 where something differs.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The recording.
-    #[arg(value_name = "F.mcap")]
+    /// The directory of a run that was recorded, or a recording.
+    #[arg(value_name = "RUN|F.mcap")]
     recording: PathBuf,
     /// Only these stages, with commas between; with --live those that run as processes: all but the link if none is named.
     #[arg(long, value_name = "STAGES", value_delimiter = ',')]
@@ -57,11 +57,11 @@ pub(crate) struct Arguments {
 /// Find where two recordings part: the first tick, topic and field. Exits with 1 where they do.
 #[derive(Debug, Args)]
 pub(crate) struct Diff {
-    /// The first recording.
-    #[arg(value_name = "A.mcap")]
+    /// The first recording, or the directory of its run.
+    #[arg(value_name = "A|A.mcap")]
     first: PathBuf,
     /// The second.
-    #[arg(value_name = "B.mcap")]
+    #[arg(value_name = "B|B.mcap")]
     second: PathBuf,
     /// Print one line of JSON.
     #[arg(long)]
