@@ -46,7 +46,7 @@ const VISITED_TWICE: Range<usize> = 1..3;
 
 /// What coarse corrections are multiplied by, on the finest level and between coarse ones. Interpolation bends u more than a
 /// solution is bent, at doors above all, so the correction that is best by energy is too small (Braess, "Towards algebraic
-/// multigrid for elliptic problems of second order", 1995). Measured: 1.2 and 1.07 save a quarter of the cycles, 1.3 or 1.15
+/// multigrid for elliptic problems of second order", 1995). Measured: 1.2 and 1.07 save a quarter of the cycles, 1.3 or 1.2
 /// cost some on some maps. On small maps the second is one: their levels are visited once, and its powers would add up.
 const OVERCORRECTION: f64 = 1.2;
 const COARSE_OVERCORRECTION: f64 = 1.07;
