@@ -150,6 +150,11 @@ impl Process {
         let _ = pidfd_send_signal(&self.pidfd, signal);
     }
 
+    /// Whether this process started it.
+    pub(crate) const fn is_child(&self) -> bool {
+        self.child.is_some()
+    }
+
     /// Reap it, if it has ended.
     pub fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
         let Some(child) = &mut self.child else {

@@ -49,6 +49,8 @@ pub(crate) struct StageProcess {
     hung: Option<Now>,
     /// Its last beat says that it was asked to stop.
     stopping: bool,
+    /// It was found ended in the turn before.
+    found_ended: bool,
 }
 
 impl StageProcess {
@@ -67,6 +69,7 @@ impl StageProcess {
             log_start: 0,
             hung: None,
             stopping: false,
+            found_ended: false,
         }
     }
 
@@ -213,15 +216,19 @@ impl StageProcess {
         }
     }
 
-    /// What ended its process, if it has ended.
+    /// What ended its process, if it has ended. Of an external one that has said nothing of it this is told a turn later: its
+    /// last beat may have come after the beats of this turn were read.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
             return Ok(None);
         };
-        process.try_reap().map_err(|source| StageProcessError {
+        let cause = process.try_reap().map_err(|source| StageProcessError {
             stage: self.stage.name,
             source,
-        })
+        })?;
+        let found_before = std::mem::replace(&mut self.found_ended, cause.is_some());
+        let is_known = process.is_child() || self.stopping || found_before;
+        Ok(cause.filter(|_| is_known))
     }
 
     /// Its process is reaped. Returns what is known of it, besides what follows.
@@ -241,7 +248,8 @@ impl StageProcess {
             next: Next::Nothing,
             last_words: last_words(&self.log(directory), self.log_start),
         };
-        (self.process, self.beat, self.stopping) = (None, None, false);
+        (self.process, self.beat) = (None, None);
+        (self.stopping, self.found_ended) = (false, false);
         death
     }
 
