@@ -61,6 +61,6 @@ pub mod schema;
 
 pub use self::{
     error::RecordingError,
-    reader::{End, Message, Recording, Sample, SliceSample, parts},
+    reader::{End, Message, Recording, Sample, SliceSample, parts, places},
     recorder::{Options, record},
 };

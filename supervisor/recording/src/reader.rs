@@ -20,7 +20,7 @@ use mcap::{
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
-use crate::{error::RecordingError, file::RUN};
+use crate::{error::RecordingError, file::RUN, recorder::numbered};
 
 /// No record or chunk of ours is longer, bytes.
 const LONGEST_RECORD: usize = 1 << 28;
@@ -87,13 +87,17 @@ pub struct SliceSample<H, T> {
 /// Parts of a run that are looked for at most.
 const MOST_PARTS: usize = 1000;
 
-/// The recordings in a run's directory, the first one first: a run that is resumed begins another.
+/// Where the recordings of a run go, the first one first: a run that is resumed begins another.
+pub fn places(run: &Path) -> impl Iterator<Item = PathBuf> {
+    let first = run.join("recording.mcap");
+    (1..).map(move |number| numbered(&first, number))
+}
+
+/// The recordings in a run's directory, the first one first.
 #[must_use]
 pub fn parts(run: &Path) -> Vec<PathBuf> {
-    let later = (2..=MOST_PARTS).map(|nth| format!("recording-{nth}.mcap"));
-    std::iter::once("recording.mcap".to_owned())
-        .chain(later)
-        .map(|name| run.join(name))
+    places(run)
+        .take(MOST_PARTS)
         .take_while(|file| file.is_file())
         .collect()
 }

@@ -158,7 +158,7 @@ fn find_run(options: &Options) -> Option<PathBuf> {
 }
 
 /// `F.mcap`, `F-2.mcap`, ...
-fn numbered(out: &Path, number: u32) -> PathBuf {
+pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     if number <= 1 {
         return out.to_path_buf();
     }

@@ -310,8 +310,8 @@ impl<R: Real> Multigrid<R> {
     /// Solves on a coarse level, from zero, by one cycle through it and those below; on some it is followed by another.
     fn solve_level(&mut self, level: usize) {
         self.visit(level);
-        let below = self.coarse.len() - 1 - level;
-        if below > 0 && self.is_large() && VISITED_TWICE.contains(&level) {
+        // None of them is the coarsest of a large map.
+        if self.is_large() && VISITED_TWICE.contains(&level) {
             self.second_visit(level);
         }
     }

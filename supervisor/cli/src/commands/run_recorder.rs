@@ -1,7 +1,7 @@
 //! The recorder that `firsthand run` starts: a consumer in a process of its own. Whatever becomes of it, the mission goes
 //! on.
 
-use std::{fs::File, path::PathBuf, process::Stdio, time::Duration};
+use std::{fs::File, process::Stdio, time::Duration};
 
 use common::poll;
 use supervisor::{
@@ -38,7 +38,9 @@ impl RunRecorder {
             .append(true)
             .open(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
-        command.arg("--out").arg(free_file(options));
+        // Not over the recording of a run that is resumed.
+        let free = recording::places(directory).find(|file| !file.exists());
+        command.arg("--out").args(free);
         command.arg("--run-directory").arg(directory);
         command.args(["--supervisor", &std::process::id().to_string()]);
         command.stdout(Stdio::piped()).stderr(log);
@@ -59,17 +61,5 @@ impl RunRecorder {
     /// The run is over: let it write the rest.
     pub(crate) fn end(mut self) {
         self.process.end(ENDED_WITHIN);
-    }
-}
-
-/// `recording.mcap`, or, in a run that is resumed, the first of `recording-2.mcap` and so on that is not there.
-fn free_file(options: &Options) -> PathBuf {
-    let directory = &options.directory;
-    let first = directory.join("recording.mcap");
-    let mut later = (2..).map(|number| directory.join(format!("recording-{number}.mcap")));
-    if first.exists() {
-        later.find(|file| !file.exists()).unwrap_or(first)
-    } else {
-        first
     }
 }
