@@ -11,7 +11,7 @@ use crate::support::{
     PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, in_own_process, making, pid,
     signal_process,
 };
-use common::{bus::Bus, making::Making, topics};
+use common::{bus::Bus, bus_instance::BusInstance, topics};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -24,7 +24,7 @@ fn process_of(number: u128) -> u32 {
 }
 
 /// The directories of the node files of process `pid`.
-fn nodes_of(making: &Making, pid: u32) -> Vec<PathBuf> {
+fn nodes_of(making: &BusInstance, pid: u32) -> Vec<PathBuf> {
     let nodes = fs::read_dir(making.root().join("nodes")).unwrap();
     let nodes = nodes.map(|entry| entry.unwrap().path()).filter(|path| {
         let name = path.file_name().unwrap().to_str().unwrap();
@@ -34,7 +34,7 @@ fn nodes_of(making: &Making, pid: u32) -> Vec<PathBuf> {
 }
 
 /// The files in shared memory of `domain` that end so.
-fn shared(making: &Making, suffix: &str) -> Vec<String> {
+fn shared(making: &BusInstance, suffix: &str) -> Vec<String> {
     let names = fs::read_dir("/dev/shm").unwrap().flatten();
     let names = names.filter_map(|entry| entry.file_name().into_string().ok());
     names
@@ -43,7 +43,7 @@ fn shared(making: &Making, suffix: &str) -> Vec<String> {
 }
 
 /// A connection of port `port` to another, half made.
-fn half_make_connection(making: &Making, port: u128) {
+fn half_make_connection(making: &BusInstance, port: u128) {
     let made = shared(making, ".connection");
     // Prefix and hash of the type: up to the first port's number.
     let start = made[0].rsplitn(3, '_').last().unwrap();

@@ -10,7 +10,7 @@ use crate::support::{self, Run, assert_nothing_left, in_own_process};
 use common::{
     bus::{Bus, BusError},
     domain::Domain,
-    follower::{Follower, News},
+    follower::{Event, Follower},
     grid::{CellState, Replica},
     samples::FieldCell,
     topics,
@@ -129,13 +129,13 @@ fn follow(robot: &str, runs: usize) -> Vec<usize> {
     while heard.len() < runs || here {
         assert!(began.elapsed() < support::PATIENCE, "{heard:?}");
         match follower.wait(Duration::from_secs(1)).unwrap() {
-            News::Here => {
+            Event::Connected => {
                 here = true;
                 heard.push(0);
             }
-            News::Gone => here = false,
-            News::Nothing => {}
-            News::Samples((poses, grids)) => {
+            Event::Disconnected => here = false,
+            Event::Nothing => {}
+            Event::Samples((poses, grids)) => {
                 while poses.take().unwrap().is_some() {
                     *heard.last_mut().unwrap() += 1;
                 }

@@ -14,7 +14,7 @@ use common::{
 };
 use serde_json::Value;
 
-/// At this speed the mission has thousands of ticks: seconds to be broken in, on a clock of ticks, which does not
+/// At this speed the mission has thousands of ticks: seconds to be broken in, in lockstep, which does not
 /// care how loaded the machine is.
 const SLOW: [&str; 4] = ["--set", "controller.speed_m_s=0.004", "--timeout", "20000"];
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
@@ -56,7 +56,7 @@ fn broken(
     let log = std::fs::read_to_string(directory.join("supervisor.log")).unwrap();
     let stalls = records(&directory.join("stalls.jsonl"));
     assert_eq!(summary["replans"], count(&stalls, "replan"), "{stalls:?}");
-    assert_eq!(summary["resets"], count(&stalls, "forget"), "{stalls:?}");
+    assert_eq!(summary["resets"], count(&stalls, "reset"), "{stalls:?}");
     assert_eq!(
         log.matches("the robot stalls").count(),
         stalls.len(),
@@ -74,7 +74,7 @@ fn a_robot_on_a_saddle_comes_free_by_a_fresh_planner() {
         (&stalls[0]["cause"], &stalls[0]["recovery"]),
         (&"still".into(), &"replan".into())
     );
-    assert_eq!(count(&stalls, "forget"), 0, "{stalls:?}");
+    assert_eq!(count(&stalls, "reset"), 0, "{stalls:?}");
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_robot_pinned_by_a_corrupted_field_comes_free_by_a_fresh_planner_by_either_m
         let (summary, stalls, _) = broken(robot, "planner", "corrupt-field", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
         assert_eq!(stalls[0]["recovery"], "replan", "{stalls:?}");
-        assert_eq!(count(&stalls, "forget"), 0, "{stalls:?}");
+        assert_eq!(count(&stalls, "reset"), 0, "{stalls:?}");
     }
 }
 
@@ -92,7 +92,7 @@ fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_forgotten_belief_
     for (robot, method) in [("inside", &[][..]), ("inside-p", &PAPER[..])] {
         let (summary, stalls, _) = broken(robot, "mapper", "hazard-around-robot", method);
         assert_eq!(summary["outcome"], "reached", "{summary}");
-        let first = stalls.iter().find(|stall| stall["recovery"] == "forget");
+        let first = stalls.iter().find(|stall| stall["recovery"] == "reset");
         assert_eq!(first.unwrap()["cause"], "inside_hazard", "{stalls:?}");
     }
 }
@@ -113,7 +113,7 @@ fn a_robot_cut_off_for_good_ends_unreachable_with_a_picture_that_says_so() {
     let recoveries: Vec<_> = stalls.iter().map(|stall| &stall["recovery"]).collect();
     assert_eq!(
         recoveries,
-        ["forget", "forget", "forget", "give_up"],
+        ["reset", "reset", "reset", "give_up"],
         "{stalls:?}"
     );
     assert!(

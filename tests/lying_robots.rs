@@ -56,14 +56,14 @@ struct Shared {
     inject: Vec<Command>,
 }
 
-struct Liar {
+struct FaultInjector {
     address: SocketAddr,
     shared: Arc<Mutex<Shared>>,
     over: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Liar {
+impl FaultInjector {
     fn before(robot: &Robot, lie: Lie) -> Self {
         let host = UdpSocket::bind("127.0.0.1:0").unwrap();
         let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -132,7 +132,7 @@ impl Liar {
     }
 }
 
-impl Drop for Liar {
+impl Drop for FaultInjector {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
@@ -219,9 +219,9 @@ fn moves(motion: &Motion) -> bool {
 }
 
 /// A run of the default mission on the wall clock whose robot lies from the beginning.
-fn lying(robot: &str, lie: Lie) -> (Robot, Liar, Run) {
+fn lying(robot: &str, lie: Lie) -> (Robot, FaultInjector, Run) {
     let body = Robot::start();
-    let liar = Liar::before(&body, lie);
+    let liar = FaultInjector::before(&body, lie);
     let address = format!("robot.address=\"udp://{}\"", liar.address);
     let run = Run::start(robot, "obstacle-course", &["--set", &address]);
     (body, liar, run)

@@ -81,7 +81,7 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
         (&last["cause"]["exited"], &last["next"]),
         (&1.into(), &"hold".into())
     );
-    let words = last["last_words"].as_str().unwrap();
+    let words = last["log_tail"].as_str().unwrap();
     assert!(words.contains("mapper.checkpoint"), "{words}");
     std::fs::remove_dir(&checkpoint).unwrap();
     operate("held", &["restart", "mapper"]);
@@ -141,7 +141,7 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
         "{deaths:?}"
     );
     assert!(
-        deaths[0]["last_words"].as_str().unwrap().contains("ready"),
+        deaths[0]["log_tail"].as_str().unwrap().contains("ready"),
         "{deaths:?}"
     );
     run.signal(Signal::TERM);

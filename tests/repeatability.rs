@@ -1,4 +1,4 @@
-//! A run on a clock of ticks is the same each time, whatever the machine does meanwhile.
+//! A run in lockstep is the same each time, whatever the machine does meanwhile.
 
 use std::{collections::BTreeMap, fmt::Debug, time::Duration};
 

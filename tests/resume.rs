@@ -56,7 +56,7 @@ fn a_run_whose_supervisor_was_killed_again_and_again_is_resumed_and_loses_no_pos
 
 #[test]
 fn a_run_goes_on_after_everything_was_killed_at_once() {
-    // A mission of tens of thousands of ticks, on a clock of ticks.
+    // A mission of tens of thousands of ticks, in lockstep.
     let slow = ["--set", "controller.speed_m_s=0.004", "--timeout", "20000"];
     let mut all = Run::start("res-all", "open-room", &slow);
     all.wait_until_under_way(1.0);

@@ -170,7 +170,7 @@ impl Domain {
     }
 
     /// The middleware's configuration: what a consumer in any language loads first. A link to that of the bus that is
-    /// there: see [`Making`](crate::making::Making).
+    /// there: see [`BusInstance`](crate::bus_instance::BusInstance).
     #[must_use]
     pub fn middleware_config(&self) -> PathBuf {
         self.directory.join("iceoryx2.toml")

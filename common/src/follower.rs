@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use crate::{
     bus::{Bus, BusError},
+    bus_instance::BusInstance,
     domain::Domain,
-    making::Making,
     topics::{self, AnyTopic, Rate},
     waiter::Waiter,
 };
@@ -25,7 +25,7 @@ pub struct Follower<Topics, Open> {
     ending: bool,
     joined: Option<Joined<Topics>>,
     /// Since when the bus that is there cannot be used.
-    refused: Option<(Making, Instant)>,
+    refused: Option<(BusInstance, Instant)>,
 }
 
 /// Readers of a bus. Fields are dropped in this order: the bus last.
@@ -37,15 +37,15 @@ struct Joined<Topics> {
 
 /// What came.
 #[derive(Debug, PartialEq, Eq)]
-pub enum News<'a, Topics> {
+pub enum Event<'a, Topics> {
     /// The robot is there: its bus has just been joined.
-    Here,
+    Connected,
     /// Something may have been published: take all there is.
     Samples(&'a mut Topics),
     /// Nothing, for the time that was given. The robot is as it was: there, or away.
     Nothing,
     /// The robot's run has ended, or its bus was replaced: it is waited for again.
-    Gone,
+    Disconnected,
 }
 
 /// The topic that wakes for samples on `topic`. For those of each tick that is the state of the link, which ends a tick: no
@@ -83,15 +83,15 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     ///
     /// # Errors
     /// When a bus that is there cannot be used: what that is about stays until someone mends it.
-    pub fn wait(&mut self, timeout: Duration) -> Result<News<'_, Topics>, BusError> {
+    pub fn wait(&mut self, timeout: Duration) -> Result<Event<'_, Topics>, BusError> {
         let began = Instant::now();
         while self.joined.is_none() {
             if self.look()? {
-                return Ok(News::Here);
+                return Ok(Event::Connected);
             }
             let left = timeout.saturating_sub(began.elapsed());
             if left.is_zero() {
-                return Ok(News::Nothing);
+                return Ok(Event::Nothing);
             }
             std::thread::park_timeout(left.min(LOOK_EVERY));
         }
@@ -106,9 +106,9 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             }
             if self.ending {
                 (self.joined, self.ending) = (None, false);
-                return Ok(News::Gone);
+                return Ok(Event::Disconnected);
             }
-            if self.is_gone() {
+            if self.on_disconnected() {
                 self.ending = true;
                 came = true;
                 break;
@@ -118,8 +118,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             }
         }
         Ok(match &mut self.joined {
-            Some(joined) if came => News::Samples(&mut joined.topics),
-            _ => News::Nothing,
+            Some(joined) if came => Event::Samples(&mut joined.topics),
+            _ => Event::Nothing,
         })
     }
 
@@ -130,7 +130,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
 
     /// Join the robot's bus, if there is one. Returns whether it was joined.
     fn look(&mut self) -> Result<bool, BusError> {
-        let Ok(making) = Making::current(&self.domain) else {
+        let Ok(making) = BusInstance::current(&self.domain) else {
             return Ok(false);
         };
         if !self.domain.is_supervised() {
@@ -176,7 +176,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         })
     }
 
-    fn is_gone(&self) -> bool {
+    fn on_disconnected(&self) -> bool {
         let replaced = |joined: &Joined<Topics>| joined.bus.is_replaced();
         // A supervisor that was killed leaves its bus, on which nobody publishes.
         self.joined.as_ref().is_some_and(replaced) || !self.domain.is_supervised()

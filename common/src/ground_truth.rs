@@ -61,9 +61,9 @@ pub struct GroundTruthRadio {
     pub lost: u64,
     /// The longest outage, seconds.
     pub longest_outage_s: f64,
-    /// Ticks before this one whose frames nobody heard, on a clock of ticks.
+    /// Ticks before this one whose frames nobody heard, in lockstep.
     #[serde(default)]
-    pub unheard_ticks: u64,
+    pub missed_ticks: u64,
 }
 
 impl GroundTruthTick {
@@ -72,12 +72,12 @@ impl GroundTruthTick {
     /// Clearance where nothing stands, metres: JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
 
-    /// The number of this tick where ticks are counted that were heard: that of its pose, on a clock of ticks. Of a tick that
+    /// The number of this tick where ticks are counted that were heard: that of its pose, in lockstep. Of a tick that
     /// was not heard itself, that of the next one.
     #[must_use]
     pub const fn heard_tick(&self) -> u64 {
         match self.radio {
-            Some(radio) => self.tick.saturating_sub(radio.unheard_ticks),
+            Some(radio) => self.tick.saturating_sub(radio.missed_ticks),
             None => self.tick,
         }
     }

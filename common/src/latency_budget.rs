@@ -26,7 +26,7 @@ pub enum Item {
     /// The pure step.
     Step,
     /// What a successor or a replay needs: inputs, checkpoint, journal; before the output is published.
-    Keep,
+    Persist,
     /// The output, until its readers are about to be woken.
     Publish,
     /// All from then on until the process waits again: to wake the readers, and what nobody waits for.
@@ -38,7 +38,7 @@ impl Item {
     pub const ALL: [Self; 5] = [
         Self::Read,
         Self::Step,
-        Self::Keep,
+        Self::Persist,
         Self::Publish,
         Self::After,
     ];
@@ -49,7 +49,7 @@ impl Item {
         match self {
             Self::Read => "read",
             Self::Step => "step",
-            Self::Keep => "keep",
+            Self::Persist => "persist",
             Self::Publish => "publish",
             Self::After => "after",
         }
@@ -276,9 +276,9 @@ mod tests {
         stopwatch.awake(began_ns);
         for (item, after_ns) in [
             (Item::Read, 3),
-            (Item::Keep, 5),
+            (Item::Persist, 5),
             (Item::Step, 12),
-            (Item::Keep, 13),
+            (Item::Persist, 13),
         ] {
             stopwatch.end(item, began_ns + after_ns);
         }

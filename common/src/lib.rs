@@ -18,7 +18,7 @@
 //! | [`signals`] | signals as something to wait for |
 //! | [`lock_holders`] | who holds a lock on a file |
 //! | [`domain`] | a robot's directory, locks and shared memory on this machine |
-//! | [`making`] | the names of one making of its bus |
+//! | [`bus_instance`] | the names of one making of its bus |
 //! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
 //! | [`bus`] | writers, readers and wakeups; the one folder that names the middleware |
 //! | [`samples`] | the payloads of the topics |
@@ -36,6 +36,7 @@
 
 pub mod address;
 pub mod bus;
+pub mod bus_instance;
 pub mod checkpoint;
 pub mod clock;
 pub mod domain;
@@ -52,7 +53,6 @@ pub mod kinematics;
 pub mod latency;
 pub mod latency_budget;
 pub mod lock_holders;
-pub mod making;
 pub mod mission;
 pub mod poll;
 pub mod process_status;

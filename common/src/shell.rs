@@ -102,7 +102,7 @@ pub trait Process: Sized {
 
     /// Do what nobody waits for: publish a whole map again, save a snapshot. A stage that goes on computing can
     /// keep the processor from the one it has just woken, so on a wall clock this is called in the pause after a
-    /// tick, where [`Process::has_idle_work`] says so; on a clock of ticks, where ticks follow each other at once,
+    /// tick, where [`Process::has_idle_work`] says so; in lockstep, where ticks follow each other at once,
     /// after each turn.
     ///
     /// # Errors

@@ -117,7 +117,7 @@ topics! {
     DIRECTIVE: Topic<DirectiveSample> {
         name: "directive", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
     }
-    /// How far the robot may go on a clock of ticks, and since which tick the newest recovery step holds.
+    /// How far the robot may go in lockstep, and since which tick the newest recovery step holds.
     TICK_LIMIT: Topic<TickLimitSample> {
         name: "tick_limit", writer: SUPERVISOR, rate: on_change(RESTATE), limits: Limits::SMALL, logged: Yes,
     }

@@ -16,7 +16,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{domain::Domain, making::Making};
+use common::{bus_instance::BusInstance, domain::Domain};
 use recording::Recording;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -259,8 +259,8 @@ pub fn half_make(path: &Path) {
 }
 
 /// The bus of `robot` that is there.
-pub fn making(robot: &str) -> Making {
-    Making::current(&Domain::of(robot.parse().unwrap())).unwrap()
+pub fn making(robot: &str) -> BusInstance {
+    BusInstance::current(&Domain::of(robot.parse().unwrap())).unwrap()
 }
 
 /// `firsthand status --json`; none before the robot has a bus.

@@ -1,4 +1,4 @@
-//! Making and joining a bus, and removing what killed processes leave on it.
+//! BusInstance and joining a bus, and removing what killed processes leave on it.
 
 use std::{
     any::Any,
@@ -24,8 +24,8 @@ use super::{
     topic::{AnyTopic, BusNode},
 };
 use crate::{
+    bus_instance::BusInstance,
     domain::{Domain, SHARED_MEMORY},
-    making::Making,
 };
 
 /// A process's place on a robot's bus.
@@ -34,7 +34,7 @@ pub struct Bus {
     pub(super) node: BusNode,
     /// The process that alone writes the supervisor's topics, of a stage; none of a consumer.
     pub(super) supervisor: Option<u32>,
-    making: Making,
+    instance: BusInstance,
 }
 
 /// The services of every topic, existing as long as this is held.
@@ -61,29 +61,29 @@ impl Bus {
         table: &[&dyn AnyTopic],
     ) -> Result<(Self, Services), BusError> {
         let failed = |error: io::Error| no_join(domain)(error.to_string());
-        let making = Making::new(domain);
+        let instance = BusInstance::new(domain);
         // Not one that is there: another user may have made it.
         DirBuilder::new()
             .mode(0o700)
-            .create(making.root())
+            .create(instance.root())
             .map_err(failed)?;
-        Self::write_config(&making)?;
-        let mut bus = Self::join_making(making, name)?;
+        Self::write_config(&instance)?;
+        let mut bus = Self::join_instance(instance, name)?;
         bus.supervisor = Some(std::process::id());
         let services = table
             .iter()
             .map(|topic| topic.create(&bus.node))
             .collect::<Result<_, _>>()?;
         leftovers::back_up(&bus.services(), &bus.backup()).map_err(failed)?;
-        bus.making.make_current().map_err(failed)?;
+        bus.instance.make_current().map_err(failed)?;
         Ok((bus, Services(services)))
     }
 
-    fn write_config(making: &Making) -> Result<(), BusError> {
-        let failed = no_join(making.domain());
+    fn write_config(instance: &BusInstance) -> Result<(), BusError> {
+        let failed = no_join(instance.domain());
         let mut config = Config::default();
-        let root = making.root();
-        let prefix = making.shared_memory_prefix();
+        let root = instance.root();
+        let prefix = instance.shared_memory_prefix();
         let path = SemanticString::new(root.as_os_str().as_encoded_bytes())
             .map_err(|error| failed(format!("{error:?} in {root:?}")))?;
         config.global.set_root_path(&path);
@@ -94,7 +94,7 @@ impl Bus {
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
-        let file = making.config();
+        let file = instance.config();
         std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
@@ -108,8 +108,8 @@ impl Bus {
             detail: format!("{}: {error}", domain.middleware_config().display()),
         };
         let _joining = domain.joining().map_err(not_running)?;
-        let making = Making::current(domain).map_err(not_running)?;
-        Self::join_making(making, name)
+        let instance = BusInstance::current(domain).map_err(not_running)?;
+        Self::join_instance(instance, name)
     }
 
     /// Join as a stage that process `supervisor` supervises: what others write on the supervisor's topics is ignored,
@@ -124,13 +124,13 @@ impl Bus {
         })
     }
 
-    fn join_making(making: Making, name: &str) -> Result<Self, BusError> {
+    fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
         // We report what the middleware reports; IOX2_LOG_LEVEL brings its own messages back.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let join = no_join(making.domain());
+        let join = no_join(instance.domain());
         let failed = |error: io::Error| join(error.to_string());
-        ownership::check(&making).map_err(failed)?;
-        let file = making.config();
+        ownership::check(&instance).map_err(failed)?;
+        let file = instance.config();
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
         // Where a node names none: what killed processes left is then looked for in the first bus.
@@ -144,11 +144,11 @@ impl Bus {
             .create::<ipc::Service>()
             .map_err(|error| join(format!("{error:?}")))?;
         // One that is missing was made anew with the node.
-        ownership::close_to_others(&making).map_err(failed)?;
+        ownership::close_to_others(&instance).map_err(failed)?;
         Ok(Self {
             node,
             supervisor: None,
-            making,
+            instance,
         })
     }
 
@@ -156,7 +156,7 @@ impl Bus {
     /// or the robot's run has ended. A consumer drops everything it has of it, and joins again.
     #[must_use]
     pub fn is_replaced(&self) -> bool {
-        Making::current(self.making.domain()).map_or(true, |now| now != self.making)
+        BusInstance::current(self.instance.domain()).map_or(true, |now| now != self.instance)
     }
 
     /// Where the services' files are.

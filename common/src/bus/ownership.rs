@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{domain::SHARED_MEMORY, making::Making};
+use crate::{bus_instance::BusInstance, domain::SHARED_MEMORY};
 
 /// Ends the name of the middleware's count of nodes.
 const COUNT_OF_NODES: &str = ".global_mgmt";
@@ -20,14 +20,14 @@ const OTHERS: u32 = 0o077;
 ///
 /// # Errors
 /// Names what is not.
-pub(super) fn check(making: &Making) -> io::Result<()> {
-    let directory = making.domain().directory();
-    let directories = [directory, &making.root()];
+pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
+    let directory = instance.domain().directory();
+    let directories = [directory, &instance.root()];
     for path in directory.parent().into_iter().chain(directories) {
         check_one(path, true)?;
     }
-    check_one(&making.config(), false)?;
-    for count in counts_of_nodes(making)? {
+    check_one(&instance.config(), false)?;
+    for count in counts_of_nodes(instance)? {
         check_one(&count, false)?;
         if fs::symlink_metadata(&count)?.len() == 0 {
             return Err(wrong(&count, "is empty; start the robot again"));
@@ -40,8 +40,8 @@ pub(super) fn check(making: &Making) -> io::Result<()> {
 ///
 /// # Errors
 /// When a file's mode cannot be set.
-pub(super) fn close_to_others(making: &Making) -> io::Result<()> {
-    for count in counts_of_nodes(making)? {
+pub(super) fn close_to_others(instance: &BusInstance) -> io::Result<()> {
+    for count in counts_of_nodes(instance)? {
         let mut permissions = fs::symlink_metadata(&count)?.permissions();
         if permissions.mode() & OTHERS != 0 {
             permissions.set_mode(permissions.mode() & !OTHERS);
@@ -51,8 +51,8 @@ pub(super) fn close_to_others(making: &Making) -> io::Result<()> {
     Ok(())
 }
 
-fn counts_of_nodes(making: &Making) -> io::Result<Vec<PathBuf>> {
-    let prefix = making.shared_memory_prefix();
+fn counts_of_nodes(instance: &BusInstance) -> io::Result<Vec<PathBuf>> {
+    let prefix = instance.shared_memory_prefix();
     let mut found = Vec::new();
     for entry in fs::read_dir(SHARED_MEMORY)? {
         let entry = entry?;

@@ -30,7 +30,7 @@ impl CellState {
 
     /// Whether the sonar looked here.
     #[must_use]
-    pub const fn is_swept(self) -> bool {
+    pub const fn is_scanned(self) -> bool {
         matches!(self, Self::Swept | Self::Margin)
     }
 

@@ -109,7 +109,7 @@ wire_enum! {
         /// They have disagreed for so long that the mission ends.
         OdometryGivenUp = 13,
         /// The robot was told to stand, and its encoders say that it moves.
-        RobotDisobeys = 14,
+        RobotDoesNotStop = 14,
         /// The robot answers and sends no motor frames.
         FramesSilent = 15,
         /// Motor frames come less often than commands last.

@@ -84,7 +84,7 @@ pub struct DirectiveSample {
     pub reason: u8,
 }
 
-/// Topic `tick_limit`: on a clock of ticks, how far the link may go ahead of the supervisor, so that what the supervisor
+/// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that what the supervisor
 /// does about a stall holds from a tick that does not depend on the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.TickLimit")]
@@ -273,7 +273,7 @@ pub struct DeathSample {
     /// 1: it hung, or was never ready, and the supervisor ended it.
     pub hung: u8,
     /// The end of its log.
-    pub last_words: Words,
+    pub log_tail: Words,
 }
 
 wire_enum! {
@@ -284,7 +284,7 @@ wire_enum! {
         /// A new generation of the planner, which solves the full field.
         Replan = 0,
         /// What was sensed is forgotten.
-        Forget = 1,
+        Reset = 1,
         /// The mission ends: the target is unreachable.
         GiveUp = 2,
     }
@@ -460,7 +460,7 @@ layouts! {
     RosterHeader { stamp supervisor_pid order reason simulated last_request }
     RosterEntry { stage pid generation state restarts uptime_ns beat_age_ns output_age_ns }
     Words { bytes }
-    DeathSample { stamp stage pid generation beat_age_ns uptime_ns next_after_ns code deaths_in_window cause next hung last_words }
+    DeathSample { stamp stage pid generation beat_age_ns uptime_ns next_after_ns code deaths_in_window cause next hung log_tail }
     StallSample { stamp x_m y_m epoch replans resets cause recovery }
     RequestSample { stamp id stage kind }
     FaultSample { stamp id stage kind although_real }

@@ -139,7 +139,7 @@ impl Decoder {
     }
 
     /// Forget what is held: what comes next is not its continuation. The bytes count as noise.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.skip(self.buffer.len() - self.start);
     }
 

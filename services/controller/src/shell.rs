@@ -46,11 +46,11 @@ impl Process for Shell {
         self.progress = Progress { tick, time };
         self.budget.end(Item::Read);
         self.inputs.note(&Input { guidance }, self.progress)?;
-        self.budget.end(Item::Keep);
+        self.budget.end(Item::Persist);
         let command = self.controller.step(&guidance, time);
         self.budget.end(Item::Step);
         self.inputs.publish(self.progress)?;
-        self.budget.end(Item::Keep);
+        self.budget.end(Item::Persist);
         self.command.publish_quietly(tick, time, command)?;
         self.budget.published(tick, Answers::Inputs);
         self.command.wake()?;

@@ -81,7 +81,7 @@ impl Process for Shell {
             self.progress = Progress { tick, time };
             self.budget.end(Item::Read);
             self.inputs.note(&Input { wheels }, self.progress)?;
-            self.budget.end(Item::Keep);
+            self.budget.end(Item::Persist);
             let first = self.reckoning.state().newest().is_none();
             let Reckoned { pose, rejected } = self.reckoning.step(&wheels, time);
             self.budget.end(Item::Step);
@@ -96,7 +96,7 @@ impl Process for Shell {
                 self.checkpoint.save(self.reckoning.state())?;
             }
             self.inputs.publish(self.progress)?;
-            self.budget.end(Item::Keep);
+            self.budget.end(Item::Persist);
             self.pose.publish_quietly(tick, time, pose)?;
             self.budget.published(tick, Answers::Inputs);
             self.pose.wake()?;

@@ -29,16 +29,16 @@ use crate::{
 };
 
 /// A cell that was swept just now: it falls by one for every [`step_m`] that the wheels roll.
-const SWEPT: u8 = u8::MAX;
+const SCANNED: u8 = u8::MAX;
 
 /// Something stands in the cell.
 const OCCUPIED: u8 = 1;
 /// An infrared ranger saw it there.
 const SEEN: u8 = 2;
 
-/// How far the wheels roll until swept ground is one step less sure, metres.
+/// How far the wheels roll until scanned ground is one step less sure, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
-    sonar.swept_for_m / f64::from(SWEPT - sonar.pointed_enough)
+    sonar.scanned_for_m / f64::from(SCANNED - sonar.pointed_enough)
 }
 
 /// One reading, where it was taken.
@@ -72,7 +72,7 @@ pub(crate) struct EvidenceGrid {
     /// The beam that was heard last: 256ths of a turn.
     #[serde(with = "serde_bytes")]
     side: Vec<u8>,
-    /// From [`SWEPT`] down to [`SonarModel::pointed_enough`]: swept; below, how often the sonar was pointed here in vain.
+    /// From [`SCANNED`] down to [`SonarModel::pointed_enough`]: swept; below, how often the sonar was pointed here in vain.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
     /// [`OCCUPIED`], [`SEEN`].
@@ -116,7 +116,7 @@ impl EvidenceGrid {
     }
 
     /// Whether the sonar looked at a cell, or learned all it can of it.
-    pub(crate) fn is_swept(&self, sonar: &SonarModel, index: usize) -> bool {
+    pub(crate) fn is_scanned(&self, sonar: &SonarModel, index: usize) -> bool {
         self.looks[index] >= sonar.pointed_enough
     }
 
@@ -175,8 +175,8 @@ impl EvidenceGrid {
             .echo
             .map_or(f64::INFINITY, |range| range - sonar.before_m);
         let clear_to = passed_to.min(beam.reach);
-        let swept_to = passed_to.min(sonar.swept_m.max(beam.reach));
-        let known_to = echo.map_or(swept_to, |range| range + sonar.behind_m);
+        let scanned_to = passed_to.min(sonar.scanned_m.max(beam.reach));
+        let known_to = echo.map_or(scanned_to, |range| range + sonar.behind_m);
         let far = known_to
             .max(sonar.pointed_m)
             .max(echo.unwrap_or(0.0) + band);
@@ -209,8 +209,8 @@ impl EvidenceGrid {
             // Half a cell's diagonal seen from the sensor: at its feet the cone is narrower than a cell.
             let slack = (half_diagonal / range.max(half_diagonal)).asin().min(1.0);
             let index = lattice.index(cell);
-            if range <= known_to && off <= sonar.swept.max(slack) {
-                let was = std::mem::replace(&mut self.looks[index], SWEPT);
+            if range <= known_to && off <= sonar.scanned.max(slack) {
+                let was = std::mem::replace(&mut self.looks[index], SCANNED);
                 if was < sonar.pointed_enough {
                     window = window.including(cell);
                 }
@@ -220,7 +220,7 @@ impl EvidenceGrid {
             {
                 self.looks[index] += 1;
                 if self.looks[index] >= sonar.pointed_enough {
-                    self.looks[index] = SWEPT;
+                    self.looks[index] = SCANNED;
                     window = window.including(cell);
                 }
             }
@@ -267,7 +267,7 @@ impl EvidenceGrid {
             if distance > touches {
                 continue;
             }
-            let was = std::mem::replace(&mut self.looks[index], SWEPT);
+            let was = std::mem::replace(&mut self.looks[index], SCANNED);
             if stands {
                 self.set(sonar, lattice, cell, 0, flips);
             }
@@ -312,7 +312,7 @@ impl EvidenceGrid {
                 let weight = weight.max(-sonar.pass) + sonar.hit as i8;
                 self.set(sonar, lattice, cell, weight, flips);
             } else if along <= clear_m {
-                self.looks[index] = SWEPT;
+                self.looks[index] = SCANNED;
                 if on_ray {
                     let weight = weight.saturating_sub(sonar.pass);
                     self.set(sonar, lattice, cell, weight, flips);
@@ -326,7 +326,7 @@ impl EvidenceGrid {
     }
 
     /// Forget everything but what was heard within `keep` metres of `robot`.
-    pub(crate) fn forget(
+    pub(crate) fn reset(
         &mut self,
         sonar: &SonarModel,
         lattice: &GridFrame,

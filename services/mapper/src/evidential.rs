@@ -1,4 +1,4 @@
-//! The evidential method's map: evidence turned into hazard and swept ground.
+//! The evidential method's map: evidence turned into hazard and scanned ground.
 
 use common::{
     grid::{Cell, CellState, Window},
@@ -35,7 +35,7 @@ impl EvidenceMap {
 
 /// What a reading brought.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct News {
+pub(crate) struct Observed {
     /// The cells of the grid that may look different now.
     pub(crate) window: Window,
     /// Whether something was heard where nothing was believed to stand.
@@ -119,7 +119,7 @@ impl Evidential {
         reading: Option<Reading>,
         rays: &[Ray],
         rolled_m: f64,
-    ) -> News {
+    ) -> Observed {
         let mut flips = Vec::new();
         let lattice = &self.geometry.lattice;
         let body = (robot, self.radius);
@@ -149,7 +149,7 @@ impl Evidential {
         for flip in &flips {
             window = window.union(map.inflation.follow(&self.geometry, *flip));
         }
-        News {
+        Observed {
             window,
             safety_event: flips.iter().any(|flip| flip.occupied),
         }
@@ -168,7 +168,7 @@ impl Evidential {
     }
 
     /// Forget all but what is near the robot; at every second reset that as well, for it may be what is wrong.
-    pub(crate) fn forget(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
+    pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
         let keep = if epoch % 2 == 1 {
             self.sonar.near_m
         } else {
@@ -178,7 +178,7 @@ impl Evidential {
         map.beams.clear();
         let lattice = &self.geometry.lattice;
         map.evidence
-            .forget(&self.sonar, lattice, (robot, keep), &mut flips);
+            .reset(&self.sonar, lattice, (robot, keep), &mut flips);
         for flip in &flips {
             map.inflation.follow(&self.geometry, *flip);
         }
@@ -189,8 +189,8 @@ impl Evidential {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
         let under = lattice.cell_at(grid.centre_of(cell));
-        let is_swept = |under| map.evidence.is_swept(&self.sonar, lattice.index(under));
-        match (hazard, under.is_some_and(is_swept)) {
+        let is_scanned = |under| map.evidence.is_scanned(&self.sonar, lattice.index(under));
+        match (hazard, under.is_some_and(is_scanned)) {
             (true, true) => CellState::Margin,
             (true, false) => CellState::Sensed,
             (false, true) => CellState::Swept,

@@ -41,7 +41,7 @@ pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Ar
 }
 
 /// What is left of `fault` in a belief that forgot what was sensed.
-pub(crate) fn after_forgetting(fault: FaultKind) -> FaultKind {
+pub(crate) fn after_reset(fault: FaultKind) -> FaultKind {
     match fault {
         FaultKind::CutOff => fault,
         _ => FaultKind::Nothing,

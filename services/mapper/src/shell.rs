@@ -93,7 +93,7 @@ impl Process for Shell {
             self.take(Input::Tick { pose, range })?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()? {
-            self.take(Input::Forget { epoch })?;
+            self.take(Input::Reset { epoch })?;
         }
         if self.grid.has_new_reader() {
             self.publish_again()?;
@@ -133,13 +133,13 @@ impl Shell {
         self.budget.end(Item::Read);
         self.inputs
             .note(&Entry::Step(input, self.progress), self.progress)?;
-        self.budget.end(Item::Keep);
+        self.budget.end(Item::Persist);
         let change = self.mapper.step(input, self.progress.time);
         self.budget.end(Item::Step);
         if change == Change::None {
             return Ok(());
         }
-        if let Input::Forget { epoch } = input {
+        if let Input::Reset { epoch } = input {
             tracing::warn!(epoch, "sensed belief reset");
         }
         self.journal.append(&input)?;
@@ -189,7 +189,7 @@ impl Shell {
             self.last_keyframe = Some(time);
         }
         self.inputs.publish(self.progress)?;
-        self.budget.end(Item::Keep);
+        self.budget.end(Item::Persist);
         if part.is_keyframe() {
             let header = self.mapper.header(part);
             let cells = self.mapper.state().cells();

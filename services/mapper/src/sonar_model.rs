@@ -56,10 +56,10 @@ pub(crate) struct SonarModel {
 
     /// Half the angle in which a beam without echo sweeps ground. Less than the cone has: a surface that only just
     /// reaches into the cone throws the sound away.
-    pub(crate) swept: f64,
+    pub(crate) scanned: f64,
     /// So far ground is swept, metres, though echoes are mapped less far: an echo there is too wide to be mapped, yet no
     /// echo says that the ground is free.
-    pub(crate) swept_m: f64,
+    pub(crate) scanned_m: f64,
     /// Half the angle in which the sonar counts as pointed at a cell that it cannot see, ...
     pub(crate) pointed: f64,
     /// ... how far ahead of the sensor, metres, ...
@@ -68,7 +68,7 @@ pub(crate) struct SonarModel {
     pub(crate) pointed_enough: u8,
     /// Swept ground stays so while the wheels roll this far, turns on the spot included, metres: wheels slip, and by then
     /// the pose is off by about the clearance that hazards are given.
-    pub(crate) swept_for_m: f64,
+    pub(crate) scanned_for_m: f64,
 
     /// No echo from within this says that no face square to the beam is there, metres. Half a metre less than the sonar's
     /// reach, where answers grow weak.
@@ -104,12 +104,12 @@ impl Default for SonarModel {
             occupied: 2,
             released: 0,
             explains: 6,
-            swept: 12.0 * DEGREE,
-            swept_m: 1.25,
+            scanned: 12.0 * DEGREE,
+            scanned_m: 1.25,
             pointed: 6.0 * DEGREE,
             pointed_m: 0.40,
             pointed_enough: 4,
-            swept_for_m: 1.5,
+            scanned_for_m: 1.5,
             clear_m: 2.0,
             ahead_of_echo_m: 0.05,
             clear_for_m: 6.0,

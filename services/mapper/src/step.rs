@@ -35,7 +35,7 @@ pub enum Input {
         range: Option<RangeSample>,
     },
     /// The supervisor's reset of the sensed belief.
-    Forget {
+    Reset {
         /// The epoch that begins; one that has begun already is ignored.
         epoch: u64,
     },
@@ -191,8 +191,8 @@ impl Step for Mapper {
     fn step(&mut self, input: Input, _: MissionTime) -> Change {
         match input {
             Input::Tick { pose, range } => Change::Window(self.map(&pose, range.as_ref())),
-            Input::Forget { epoch } if self.forget(epoch) => Change::Whole,
-            Input::Forget { .. } => Change::None,
+            Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
+            Input::Reset { .. } => Change::None,
             Input::Fault(fault) => {
                 self.belief.fault = fault;
                 Change::None
@@ -381,13 +381,13 @@ impl Mapper {
 
     /// Forget what was sensed, if `epoch` is newer than the belief's: back to the perimeter and what
     /// was known beforehand; the evidential method keeps what was heard near the robot. Says whether it did.
-    fn forget(&mut self, epoch: u64) -> bool {
+    fn reset_belief(&mut self, epoch: u64) -> bool {
         if epoch <= self.belief.epoch {
             return false;
         }
         match &mut self.belief.sensed {
             Sensed::Evidence(map) => {
-                self.evidential.forget(map, self.belief.robot, epoch);
+                self.evidential.reset(map, self.belief.robot, epoch);
                 self.redraw(self.frame.whole());
             }
             Sensed::Hits => {
@@ -398,7 +398,7 @@ impl Mapper {
                 }
             }
         }
-        self.belief.fault = fault::after_forgetting(self.belief.fault);
+        self.belief.fault = fault::after_reset(self.belief.fault);
         self.falsify();
         self.belief.epoch = epoch;
         self.belief.version += 1;

@@ -19,12 +19,12 @@ use harmonic::{Field, Guidance};
 
 use crate::{
     near_echoes::{STANDS_BEFORE_M, clear_ahead_m},
-    unheard_faces::UnheardFaces,
+    undetected_surfaces::UndetectedSurfaces,
 };
 
 /// From point to point along a way, metres.
 const STEP_M: f64 = 0.05;
-/// The ground under so much of the way ahead must have been swept, and no face could be touched there unheard, metres.
+/// The ground under so much of the way ahead must have been swept, and no face could be touched there undetected, metres.
 const SWEPT_AHEAD_M: f64 = 0.25;
 /// So far ahead it is looked at at all, metres.
 const AHEAD_M: f64 = 0.6;
@@ -82,24 +82,24 @@ impl ActiveSensing {
         pose: &Pose2,
         direction: DVec2,
     ) -> Advice {
-        let unheard = UnheardFaces::new(belief, self.radius);
+        let undetected = UndetectedSurfaces::new(belief, self.radius);
         let way = view.way(pose.position, direction);
         let steps = (SWEPT_AHEAD_M / STEP_M) as usize;
         let ahead = &way[..steps.min(way.len())];
         let ground = ahead
             .iter()
-            .flat_map(|&at| view.unswept(at, self.radius))
+            .flat_map(|&at| view.unscanned(at, self.radius))
             .filter_map(|at| (at - pose.position).try_normalize());
         let before = std::iter::once(&pose.position).chain(ahead);
         let faces = before.zip(ahead).flat_map(|(&from, &to)| {
             let along = (to - from).normalize_or(direction);
-            unheard.normals(to, along)
+            undetected.normals(to, along)
         });
         let unseen = ground.chain(faces);
         match scan(self.bearing.rotate(pose.axis()), unseen) {
             // The robot turns until its sonar faces it.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
-            None => Advice::Go(self.limit(view, &unheard, belief, pose, direction)),
+            None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }
     }
 
@@ -119,7 +119,7 @@ impl ActiveSensing {
     fn limit(
         &self,
         view: &View<'_>,
-        unheard: &UnheardFaces,
+        undetected: &UndetectedSurfaces,
         belief: &GridHeader,
         pose: &Pose2,
         direction: DVec2,
@@ -131,8 +131,8 @@ impl ActiveSensing {
             let ahead = pose.along_arc(way, way * curvature);
             let at = ahead.position;
             !view.is_hazard(at)
-                && view.unswept(at, self.radius).next().is_none()
-                && unheard.normals(at, ahead.axis()).next().is_none()
+                && view.unscanned(at, self.radius).next().is_none()
+                && undetected.normals(at, ahead.axis()).next().is_none()
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         let on_arc = free as f64 * STEP_M / STOPS_WITHIN_S;
@@ -193,7 +193,7 @@ impl View<'_> {
     }
 
     /// Middles of the cells within `radius` of `at` that nobody looked at and nobody knows.
-    fn unswept(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
+    fn unscanned(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
         let frame = self.frame;
         let last = f64::from(frame.cells) - 1.0;
         let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));

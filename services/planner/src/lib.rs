@@ -18,4 +18,4 @@ pub mod replay;
 mod scheduling;
 pub mod shell;
 pub mod step;
-mod unheard_faces;
+mod undetected_surfaces;

@@ -48,7 +48,7 @@ pub enum Taken<'a> {
         local_update_ns: u64,
     },
     /// The step is asked for a job.
-    Lull,
+    Idle,
     /// The step takes the result of the job with this number; whether that was cancelled.
     Solved(u64, bool),
     /// The step takes a fault for the robot here, metres.
@@ -161,7 +161,7 @@ impl Replay for Generation {
                 });
                 return Ok(published.into_iter().collect());
             }
-            Taken::Lull => self.planner.step(Input::Lull, time),
+            Taken::Idle => self.planner.step(Input::Idle, time),
             Taken::Solved(number, cancelled) => {
                 let solved = self.solved(number, cancelled);
                 self.planner.step(Input::Solved(solved), time)

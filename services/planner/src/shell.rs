@@ -34,7 +34,7 @@ pub struct Shell {
     inputs: InputLog,
     /// A grid sample, encoded.
     encoded: Vec<u8>,
-    /// On a clock of ticks, the tick at which the job that runs is swapped in.
+    /// in lockstep, the tick at which the job that runs is swapped in.
     swap_at: Option<u64>,
     in_ticks: bool,
     latest_pose: Option<PoseSample>,
@@ -160,8 +160,8 @@ impl Shell {
 
     /// Begin the full solve that is called for, if one is.
     fn begin_background_solve(&mut self) -> Result<(), StageError> {
-        self.note(Taken::Lull)?;
-        let outcome = self.planner.step(Input::Lull, self.progress.time);
+        self.note(Taken::Idle)?;
+        let outcome = self.planner.step(Input::Idle, self.progress.time);
         if let Some(job) = outcome.map_err(no_field)?.job {
             let (number, urgent) = (job.number, job.urgent);
             tracing::debug!(number, urgent, "full solve begins");
@@ -193,7 +193,7 @@ impl Shell {
             let at = self.progress;
             let taken = Taken::Grid(&self.encoded);
             self.inputs.note(&Entry { taken, at }, at)?;
-            self.budget.end(Item::Keep);
+            self.budget.end(Item::Persist);
             let began = Instant::now();
             let work = self.work(Input::Grid {
                 header: grid.header(),
@@ -242,7 +242,7 @@ impl Shell {
             full_solve_ns,
             local_update_ns,
         })?;
-        self.budget.end(Item::Keep);
+        self.budget.end(Item::Persist);
         let outcome = self.planner.step(Input::Pose(&pose), time);
         self.budget.end(Item::Step);
         if let Some(guidance) = outcome.map_err(no_field)?.guidance {
@@ -252,7 +252,7 @@ impl Shell {
                 ..guidance
             };
             self.inputs.publish(self.progress)?;
-            self.budget.end(Item::Keep);
+            self.budget.end(Item::Persist);
             self.guidance.publish_quietly(tick, time, guidance)?;
             self.budget.published(tick, Answers::Inputs);
             self.guidance.wake()?;

@@ -135,7 +135,7 @@ impl Step for Planner {
                     ..Outcome::default()
                 }
             }
-            Input::Lull => Outcome {
+            Input::Idle => Outcome {
                 job: self.begin_job(),
                 ..Outcome::default()
             },

@@ -11,7 +11,7 @@ use common::{
     },
 };
 
-use crate::obedience::Means;
+use crate::stop_monitor::StopMethod;
 
 /// Steering rate for each angle that is left, over the ticks of a second: below 1, so that the delay of a speed loop does
 /// not make the steering swing.
@@ -149,13 +149,13 @@ impl Drive {
 
     /// The wheels to rest by these means.
     #[must_use]
-    pub fn stop_by(&self, means: Means) -> Vec<u8> {
+    pub fn stop_by(&self, method: StopMethod) -> Vec<u8> {
         let wheels = [self.robot.left.channel, self.robot.right.channel];
         let disable = |channel: Option<u8>| encoded(Command::Enable { on: false, channel });
-        match means {
-            Means::Velocity => self.stop(),
-            Means::Disable => wheels.map(|wheel| disable(Some(wheel))).concat(),
-            Means::Pwm => {
+        match method {
+            StopMethod::Velocity => self.stop(),
+            StopMethod::Disable => wheels.map(|wheel| disable(Some(wheel))).concat(),
+            StopMethod::Pwm => {
                 let mut targets = [None; CHANNELS];
                 for wheel in wheels {
                     targets[usize::from(wheel.min(1))] = Some(PWM_STANDS);
@@ -166,7 +166,7 @@ impl Drive {
                     limit_ms: None,
                 }))
             }
-            Means::Suspend => disable(None),
+            StopMethod::Suspend => disable(None),
         }
     }
 }

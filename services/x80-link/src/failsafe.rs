@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use common::samples::{Action, Cause, HoldReason, Order};
 
-use crate::{odometry::Belief, streams::Motor};
+use crate::{odometry::Plausibility, streams::Motor};
 
 /// A supervisor that has published nothing for so long watches nobody: ten times the interval of its directives,
 /// so that a loaded machine does not stop the robot, and a second before systemd's watchdog would kill it.
@@ -29,16 +29,16 @@ pub struct Flags {
     /// The worst of the batteries that the robot drives on.
     pub battery: Charge,
     /// What the robot's frames say of it.
-    pub senses: Senses,
+    pub health: HealthFlags,
 }
 
 /// What is known of a robot by its frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Senses {
+pub struct HealthFlags {
     /// It was told to stand and moves.
-    pub disobeys: bool,
+    pub does_not_stop: bool,
     /// Whether its wheels turn as told.
-    pub odometry: Belief,
+    pub odometry: Plausibility,
     /// How its motor frames come.
     pub motor: Motor,
     /// What it sends is old, or may be: that is being found out.
@@ -145,15 +145,15 @@ pub static TABLE: &[Rule] = &[
         when: "commands and encoders have disagreed for 10 s; `x80-link.log` says how",
         action: Action::End,
         until: "it is mended and a mission started",
-        applies: |flags, _| flags.senses.odometry == Belief::GivenUp,
+        applies: |flags, _| flags.health.odometry == Plausibility::GivenUp,
     },
     Rule {
-        cause: Cause::RobotDisobeys,
+        cause: Cause::RobotDoesNotStop,
         name: "robot does not obey",
         when: "it was told to stand, and 0.6 s later its encoders say for 0.5 s that it moves",
         action: Action::Stop,
-        until: "they have said for 0.5 s that it rests; till then other means are tried in turn: disable, pulse width 0, suspend",
-        applies: |flags, _| flags.senses.disobeys,
+        until: "they have said for 0.5 s that it rests; till then other methods are tried in turn: disable, pulse width 0, suspend",
+        applies: |flags, _| flags.health.does_not_stop,
     },
     Rule {
         cause: Cause::OperatorStop,
@@ -207,7 +207,7 @@ pub static TABLE: &[Rule] = &[
         when: "it was lost and has just been found, or it acknowledges later than `robot.command_limit_s` what it is sent",
         action: Action::Stop,
         until: "it is sent nothing for that time and 0.4 s, and acknowledges nothing late; tried every 2 s",
-        applies: |flags, _| flags.senses.late,
+        applies: |flags, _| flags.health.late,
     },
     Rule {
         cause: Cause::FramesSilent,
@@ -215,7 +215,7 @@ pub static TABLE: &[Rule] = &[
         when: "it answers, and no motor frame has come for three times `robot.command_limit_s`; they are asked for",
         action: Action::Stop,
         until: "the next one",
-        applies: |flags, _| flags.senses.motor == Motor::Silent,
+        applies: |flags, _| flags.health.motor == Motor::Silent,
     },
     Rule {
         cause: Cause::FramesSlow,
@@ -223,7 +223,7 @@ pub static TABLE: &[Rule] = &[
         when: "they come less often than every `robot.command_limit_s`, which commands last for: let the robot send faster, or raise it",
         action: Action::Stop,
         until: "they come often enough",
-        applies: |flags, _| matches!(flags.senses.motor, Motor::Slow(_)),
+        applies: |flags, _| matches!(flags.health.motor, Motor::Slow(_)),
     },
     Rule {
         cause: Cause::OdometryImplausible,
@@ -231,7 +231,7 @@ pub static TABLE: &[Rule] = &[
         when: "0.55 s of commanded motion with less than a quarter of it in the encoders, or 3 jumps within 2 s; `x80-link.log` says which",
         action: Action::Stop,
         until: "the robot restarts, or `firsthand stop` and `resume`, or 2 s without jumps",
-        applies: |flags, _| flags.senses.odometry != Belief::Believed,
+        applies: |flags, _| flags.health.odometry != Plausibility::Plausible,
     },
     Rule {
         cause: Cause::RangeSilent,
@@ -239,7 +239,7 @@ pub static TABLE: &[Rule] = &[
         when: "a mission that senses has had no reading of it for three times `robot.command_limit_s`: none came, or 0",
         action: Action::Stop,
         until: "the next reading; 255 is one",
-        applies: |flags, _| flags.senses.range_silent,
+        applies: |flags, _| flags.health.range_silent,
     },
     Rule {
         cause: Cause::CommandStale,

@@ -7,11 +7,11 @@
 //! | [`failsafe`] | THE table of what slows, stops or ends, and why |
 //! | [`transport`] | datagrams, a connection or a serial line |
 //! | [`presence`] | whether the robot answers, and how it is looked for |
-//! | [`lateness`] | whether what the robot sends is old |
+//! | [`latency_monitor`] | whether what the robot sends is old |
 //! | [`restart`] | whether counts can follow those before, or began anew |
 //! | [`odometry`] | whether the wheels turn as told, by their encoders |
-//! | [`obedience`] | whether the robot comes to rest when told, and what else it is told |
-//! | [`senses`] | these together: what the robot says of itself, held against what it was told |
+//! | [`stop_monitor`] | whether the robot comes to rest when told, and what else it is told |
+//! | [`robot_health`] | these together: what the robot says of itself, held against what it was told |
 //! | [`streams`] | whether what the robot streams comes, and often enough |
 //! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
@@ -21,15 +21,15 @@
 pub mod backoff;
 pub mod drive;
 pub mod failsafe;
-pub mod lateness;
-pub mod obedience;
+pub mod latency_monitor;
 pub mod odometry;
 pub mod presence;
 pub mod replay;
 pub mod restart;
-pub mod senses;
+pub mod robot_health;
 pub mod shell;
 pub mod step;
+pub mod stop_monitor;
 pub mod streams;
 pub mod telemetry;
 pub mod transport;

@@ -6,7 +6,7 @@
 //! (9 mm/s) is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for;
 //! real ones give 0.75 to 0.8. Intervals that speak against a wheel add up, those that speak for it count down twice as
 //! fast, up to a limit. A wheel that turns the other way speaks against itself twice as much, and from [`TURNS_AFTER`]
-//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`DOUBTED_AFTER`]
+//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`SUSPECTED_AFTER`]
 //! the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it is at rest 0.2 s later. A wheel that is told to
 //! turn, this way or that, and does not count at all is doubted after [`STILL_AFTER`]: a controller whose pose turns the wrong
 //! way changes direction too often for the rest. Intervals longer than two periods tell nothing, since commands may have been
@@ -32,7 +32,7 @@ const LEAST_TURN_SHARE: f64 = 0.25;
 /// The least share of what it was told that a wheel turns.
 const LEAST_SHARE: f64 = 0.25;
 /// So much evidence is enough: longer than a radio's commands are lost while its frames are heard.
-pub(crate) const DOUBTED_AFTER: Duration = Duration::from_millis(550);
+pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
 /// A wheel that counts nothing for so long while it is told to turn: commands may be lost before.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
 /// So many counts that cannot be are too many.
@@ -48,7 +48,7 @@ pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
 /// What is doubted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doubt {
+pub enum Suspicion {
     /// The left wheel, or that of a car, does not turn as told.
     Left,
     /// The right wheel does not turn as told.
@@ -59,7 +59,7 @@ pub enum Doubt {
     Jumps,
 }
 
-impl Doubt {
+impl Suspicion {
     /// For logs.
     #[must_use]
     pub const fn words(self) -> &'static str {
@@ -80,12 +80,12 @@ impl Doubt {
 
 /// What is known of the odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Belief {
+pub enum Plausibility {
     /// Nothing speaks against it.
     #[default]
-    Believed,
+    Plausible,
     /// It cannot be true.
-    Doubted,
+    Suspected,
     /// It has not been true for [`GIVEN_UP_AFTER`].
     GivenUp,
 }
@@ -152,7 +152,7 @@ pub struct Odometry {
     turn: Evidence,
     jumps: VecDeque<MissionTime>,
     mended: u32,
-    doubt: Option<(Doubt, MissionTime)>,
+    suspicion: Option<(Suspicion, MissionTime)>,
 }
 
 impl Odometry {
@@ -172,7 +172,7 @@ impl Odometry {
             turn: Evidence::default(),
             jumps: VecDeque::new(),
             mended: 0,
-            doubt: None,
+            suspicion: None,
         }
     }
 
@@ -199,9 +199,12 @@ impl Odometry {
     pub fn believed(&mut self, counts: [u16; 2], now: MissionTime) {
         let newest_jump = self.jumps.back().copied();
         let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
-        if calm && self.mended < MOST_MENDED && matches!(self.doubt, Some((Doubt::Jumps, _))) {
+        if calm
+            && self.mended < MOST_MENDED
+            && matches!(self.suspicion, Some((Suspicion::Jumps, _)))
+        {
             self.mended += 1;
-            self.doubt = None;
+            self.suspicion = None;
             self.begin_anew(now);
         }
         let Some((before, then)) = self.frame.replace((counts, now)) else {
@@ -222,62 +225,62 @@ impl Odometry {
         self.right.weigh(right, gap_s, least, now);
         let least = LEAST_TURN_M_S * self.counts_per_m;
         self.turn.weigh(right - left, gap_s, least, now);
-        let doubted = |evidence: &Evidence| {
-            evidence.against_s >= DOUBTED_AFTER.as_secs_f64()
+        let suspected = |evidence: &Evidence| {
+            evidence.against_s >= SUSPECTED_AFTER.as_secs_f64()
                 || evidence.still_s >= STILL_AFTER.as_secs_f64()
         };
         let all = [
-            (&self.left, Doubt::Left),
-            (&self.right, Doubt::Right),
-            (&self.turn, Doubt::Turn),
+            (&self.left, Suspicion::Left),
+            (&self.right, Suspicion::Right),
+            (&self.turn, Suspicion::Turn),
         ];
-        if let Some((_, doubt)) = all.into_iter().find(|(evidence, _)| doubted(evidence)) {
-            self.doubt.get_or_insert((doubt, now));
+        if let Some((_, suspicion)) = all.into_iter().find(|(evidence, _)| suspected(evidence)) {
+            self.suspicion.get_or_insert((suspicion, now));
         }
     }
 
     /// Counts that cannot be true.
-    pub fn disbelieved(&mut self, now: MissionTime) {
+    pub fn implausible(&mut self, now: MissionTime) {
         self.jumps.push_back(now);
         if self.jumps.len() > MOST_JUMPS {
             self.jumps.pop_front();
         }
         let first = self.jumps.front().copied().unwrap_or(now);
         if self.jumps.len() == MOST_JUMPS && now.since(first) <= JUMPS_WITHIN {
-            self.doubt.get_or_insert((Doubt::Jumps, now));
+            self.suspicion.get_or_insert((Suspicion::Jumps, now));
         }
     }
 
     /// The counts of the next frame do not follow those before.
-    pub const fn forget_counts(&mut self) {
+    pub const fn reset_counts(&mut self) {
         self.frame = None;
     }
 
     /// The robot was switched off and on, or an operator has looked at it: nothing is known of it.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.commanded = None;
-        self.forget_counts();
+        self.reset_counts();
         self.left = Evidence::default();
         self.right = Evidence::default();
         self.turn = Evidence::default();
         self.jumps.clear();
         self.mended = 0;
-        self.doubt = None;
+        self.suspicion = None;
     }
 
     /// What is doubted.
     #[must_use]
-    pub fn doubt(&self) -> Option<Doubt> {
-        self.doubt.map(|(doubt, _)| doubt)
+    pub fn suspicion(&self) -> Option<Suspicion> {
+        self.suspicion.map(|(suspicion, _)| suspicion)
     }
 
     /// What is known of it at `now`.
     #[must_use]
-    pub fn belief(&self, now: MissionTime) -> Belief {
-        match self.doubt {
-            None => Belief::Believed,
-            Some((_, since)) if now.since(since) >= GIVEN_UP_AFTER => Belief::GivenUp,
-            Some(_) => Belief::Doubted,
+    pub fn belief(&self, now: MissionTime) -> Plausibility {
+        match self.suspicion {
+            None => Plausibility::Plausible,
+            Some((_, since)) if now.since(since) >= GIVEN_UP_AFTER => Plausibility::GivenUp,
+            Some(_) => Plausibility::Suspected,
         }
     }
 

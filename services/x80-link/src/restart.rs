@@ -11,7 +11,7 @@ use common::{
 };
 
 /// Counts are disbelieved when they are this many times as far as the wheels get at their top speed.
-const BEYOND_BELIEF: f64 = 1.5;
+const IMPLAUSIBLE: f64 = 1.5;
 /// Counts that follow each other in so many frames are where the robot counts now.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
@@ -33,7 +33,7 @@ pub enum Counts {
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
     /// The newest that are disbelieved, and how many of them follow each other.
-    doubted: Option<([u16; 2], MissionTime, u32)>,
+    suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
     restarts: u32,
     /// The most a wheel turns in a second.
@@ -49,7 +49,7 @@ impl RestartWatch {
         let body = mission.body();
         Self {
             last: None,
-            doubted: None,
+            suspected: None,
             away: false,
             restarts: 0,
             top_counts: body.top_speed_m_s / body.metres_per_count(),
@@ -75,24 +75,24 @@ impl RestartWatch {
             self.begin_at(counts, now);
             return Counts::Restarted;
         }
-        if share <= BEYOND_BELIEF {
-            (self.last, self.doubted) = (Some((counts, now)), None);
+        if share <= IMPLAUSIBLE {
+            (self.last, self.suspected) = (Some((counts, now)), None);
             return Counts::Follow;
         }
-        let following = self.doubted.map_or(1, |(doubted, at, following)| {
-            let follows = self.share_of_reach(doubted, at, counts, now) <= BEYOND_BELIEF;
+        let following = self.suspected.map_or(1, |(suspected, at, following)| {
+            let follows = self.share_of_reach(suspected, at, counts, now) <= IMPLAUSIBLE;
             if follows { following + 1 } else { 1 }
         });
         if following >= FOLLOW_EACH_OTHER {
             self.begin_at(counts, now);
             return Counts::Elsewhere;
         }
-        self.doubted = Some((counts, now, following));
+        self.suspected = Some((counts, now, following));
         Counts::Disbelieved
     }
 
     fn begin_at(&mut self, counts: [u16; 2], now: MissionTime) {
-        (self.last, self.doubted) = (Some((counts, now)), None);
+        (self.last, self.suspected) = (Some((counts, now)), None);
         self.restarts += 1;
     }
 

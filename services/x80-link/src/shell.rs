@@ -109,7 +109,7 @@ impl Process for Shell {
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
-        self.tend()?;
+        self.maintain()?;
         if let Some(directive) = self.directive.newest()? {
             let order = Order::from_byte(directive.order);
             let reason = HoldReason::from_byte(directive.reason);
@@ -137,7 +137,7 @@ impl Process for Shell {
             self.budget.end(Item::Read);
             self.inputs.note(&entry, at)?;
             self.carried.received(bytes, now_ns);
-            self.budget.end(Item::Keep);
+            self.budget.end(Item::Persist);
             let input = Input {
                 event: Event::Datagram(bytes),
                 machine_ns: now_ns,
@@ -146,7 +146,7 @@ impl Process for Shell {
             self.budget.end(Item::Step);
             self.carry_out(effects, now_ns)?;
         }
-        self.tend()?;
+        self.maintain()?;
         self.take(Event::Quiet, monotonic_ns())?;
         if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
             self.state()?;
@@ -253,9 +253,9 @@ fn log_decision(before: Decision, now: Decision) {
 
 impl Shell {
     /// Keep the wire open, and let the link know whether it is.
-    fn tend(&mut self) -> Result<(), StageError> {
+    fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
-        if let Some(open) = self.transport.tend(now_ns).map_err(wire_broke)? {
+        if let Some(open) = self.transport.maintain(now_ns).map_err(wire_broke)? {
             self.take(Event::Wire(open), now_ns)?;
         }
         Ok(())
@@ -266,7 +266,7 @@ impl Shell {
         let entry = Entry::Step(Taken::of(&event), machine_ns, now);
         self.budget.end(Item::Read);
         self.inputs.note(&entry, self.carried.progress)?;
-        self.budget.end(Item::Keep);
+        self.budget.end(Item::Persist);
         let effects = self.link.step(Input { event, machine_ns }, now);
         self.budget.end(Item::Step);
         self.carry_out(effects, machine_ns)
@@ -290,7 +290,7 @@ impl Shell {
     fn carry_out(&mut self, effects: Vec<Effect>, machine_ns: u64) -> Result<(), StageError> {
         if !effects.is_empty() {
             self.inputs.publish(self.carried.progress)?;
-            self.budget.end(Item::Keep);
+            self.budget.end(Item::Persist);
         }
         for effect in effects {
             match effect {
@@ -347,8 +347,8 @@ impl Shell {
                 Effect::CountsElsewhere => tracing::warn!(
                     "the counts jumped farther than wheels turn and go on from there; the pose stays"
                 ),
-                Effect::StopBy(means) => {
-                    tracing::warn!(by = means.as_str(), "the robot does not stand; told again");
+                Effect::StopBy(method) => {
+                    tracing::warn!(by = method.as_str(), "the robot does not stand; told again");
                 }
                 Effect::AskedForStreams => {
                     tracing::info!("the robot is asked for its streams again");

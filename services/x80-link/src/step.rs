@@ -1,7 +1,7 @@
 //! The link, pure: what came and what time it is go in, samples and bytes for the robot come out.
 //!
 //! A tick starts with a motor frame and takes the newest sonar frame with it; it ends with the command
-//! computed from it. On a clock of ticks (a simulated robot at `--pace max`) the robot waits for that
+//! computed from it. in lockstep (a simulated robot at `--pace max`) the robot waits for that
 //! command, so a tick that gets none, because a stage ended, is given again. On a wall clock the robot
 //! moves on, so an unanswered tick is abandoned for the next.
 
@@ -27,7 +27,7 @@ use crate::{
     drive::Drive,
     failsafe::{Decision, SLOW_SHARE},
     presence::{Absence, Presence},
-    senses::Senses,
+    robot_health::RobotHealth,
     telemetry::Telemetry,
 };
 
@@ -37,7 +37,7 @@ pub use event::{Effect, Event, Input, State, Tally};
 const PING_EVERY: Duration = Duration::from_millis(200);
 /// An open tick without a command is given again after this: ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
-/// On a clock of ticks the supervisor's word that the next one may begin is waited for so long: longer than a stalled robot's
+/// in lockstep the supervisor's word that the next one may begin is waited for so long: longer than a stalled robot's
 /// planner may take to start anew. A supervisor that is silent stops the robot before.
 const LIMIT_WAITED: Duration = Duration::from_secs(5);
 /// The wire knows whole milliseconds, and to most robots none means no limit.
@@ -89,7 +89,7 @@ pub struct Link {
     directive: Option<NewestDirective>,
     presence: Presence,
     pinged_ns: Option<u64>,
-    senses: Senses,
+    health: RobotHealth,
     telemetry: Telemetry,
     /// The front sonar's byte and the infrared rangers' counts, for the next tick.
     sonar: Option<u8>,
@@ -99,13 +99,13 @@ pub struct Link {
     /// Mission time of the newest tick.
     time: MissionTime,
     open: Option<OpenTick>,
-    /// On a clock of ticks: the last tick that may begin; none if nobody limits them.
+    /// in lockstep: the last tick that may begin; none if nobody limits them.
     last_tick: Option<u64>,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
     stop_sent_ns: Option<u64>,
-    /// On a clock of ticks: motor frames that are due, one for each command and each ping since the order.
+    /// in lockstep: motor frames that are due, one for each command and each ping since the order.
     due: u32,
     tally: Tally,
 }
@@ -127,7 +127,7 @@ impl Step for Link {
             directive: None,
             presence: Presence::new(mission),
             pinged_ns: None,
-            senses: Senses::new(mission),
+            health: RobotHealth::new(mission),
             telemetry: Telemetry::new(mission.robot.low_battery_v),
             sonar: None,
             infrared: None,
@@ -155,7 +155,7 @@ impl Step for Link {
     fn restore(&mut self, state: State) -> Result<(), ForeignState> {
         self.state = state;
         self.presence.set_pace(state.pace);
-        self.senses.set_pace(state.pace);
+        self.health.set_pace(state.pace);
         Ok(())
     }
 
@@ -182,7 +182,7 @@ impl Step for Link {
             .iter()
             .any(|effect| matches!(effect, Effect::Send(_)))
         {
-            self.senses.sent(now_ns);
+            self.health.sent(now_ns);
         }
         effects
     }
@@ -216,23 +216,23 @@ impl Link {
     /// Times the robot was seen to have restarted its counts.
     #[must_use]
     pub const fn restarts(&self) -> u32 {
-        self.senses.restarts()
+        self.health.restarts()
     }
 
-    /// Whether the encoders say that no wheel turns. On a clock of ticks a robot that is held is given no time.
+    /// Whether the encoders say that no wheel turns. in lockstep a robot that is held is given no time.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         if self.in_ticks() {
             self.decision.stops()
         } else {
-            self.presence.connected() && self.senses.is_at_rest()
+            self.presence.connected() && self.health.is_at_rest()
         }
     }
 
     /// What was seen of `cause`, and what to do about it.
     #[must_use]
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
-        self.senses.explain(cause, now_ns, self.presence.silence())
+        self.health.explain(cause, now_ns, self.presence.silence())
     }
 
     /// How long the robot has been away, at `now_ns` of the monotonic clock.
@@ -270,7 +270,7 @@ impl Link {
         self.state.pace == Pace::Max
     }
 
-    /// Whether the newest command was the mission's last: on a clock of ticks there is nothing to go on for.
+    /// Whether the newest command was the mission's last: in lockstep there is nothing to go on for.
     fn arrived(&self) -> bool {
         self.newest_command
             .is_some_and(|command| CommandState::from_byte(command.state) == CommandState::Arrived)
@@ -293,7 +293,7 @@ impl Link {
             self.state.next_tick += 1;
         }
         let wheels = WheelSample {
-            restarts: self.senses.restarts(),
+            restarts: self.health.restarts(),
             ..self.drive.wheels(sensors)
         };
         self.wheels = wheels;
@@ -379,7 +379,7 @@ impl Link {
         let drives = order == Order::Drive && !self.ordered_to_drive();
         let operator = |newest: NewestDirective| newest.reason == HoldReason::Operator;
         if drives && self.directive.is_some_and(operator) {
-            self.senses.forget();
+            self.health.reset();
         }
         self.directive = Some(NewestDirective {
             order,
@@ -392,7 +392,7 @@ impl Link {
         }
     }
 
-    /// Give the open tick to the pipeline when it may begin; on a clock of ticks, again when it has no answer for long.
+    /// Give the open tick to the pipeline when it may begin; in lockstep, again when it has no answer for long.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let Some(mut open) = self.open else {
             return;
@@ -419,7 +419,7 @@ impl Link {
     }
 
     /// Send the newest command once more, halfway to the next tick and with what remains of its time: the
-    /// robot still stands when that has passed since the tick. On a clock of ticks each command draws a
+    /// robot still stands when that has passed since the tick. in lockstep each command draws a
     /// frame, and none is lost unnoticed.
     fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if self.in_ticks() {

@@ -32,7 +32,7 @@ pub enum Motor {
 #[derive(Clone, Debug)]
 pub struct Streams {
     limit: Duration,
-    senses: bool,
+    sensing: bool,
     found_ns: u64,
     motor_ns: u64,
     range_ns: u64,
@@ -47,7 +47,7 @@ impl Streams {
     pub fn new(mission: &Mission) -> Self {
         Self {
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
-            senses: mission.sensing,
+            sensing: mission.sensing,
             found_ns: 0,
             motor_ns: 0,
             range_ns: 0,
@@ -103,7 +103,7 @@ impl Streams {
     #[must_use]
     pub fn range_is_silent(&self, now_ns: u64, silence: Duration) -> bool {
         // One that was found a moment ago must be heard first: what stood ahead before says nothing.
-        self.senses && now_ns.saturating_sub(self.range_ns) >= silence.as_nanos() as u64
+        self.sensing && now_ns.saturating_sub(self.range_ns) >= silence.as_nanos() as u64
     }
 
     /// Whether to ask for the streams again, now. The pauses between requests grow.

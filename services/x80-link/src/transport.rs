@@ -84,13 +84,13 @@ impl Transport {
     ///
     /// # Errors
     /// When the system refuses to watch a descriptor.
-    pub fn tend(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
+    pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
             let tended = match &mut self.wire {
                 Wire::Udp(_) => Ok(()),
-                Wire::Tcp(stream) => stream.tend(now_ns),
-                Wire::Serial(stream) => stream.tend(now_ns),
+                Wire::Tcp(stream) => stream.maintain(now_ns),
+                Wire::Serial(stream) => stream.maintain(now_ns),
             };
             tended.map_err(|source| self.broken(source))?;
         }

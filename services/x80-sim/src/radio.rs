@@ -104,7 +104,7 @@ pub struct Radio<W> {
     in_flight: VecDeque<Flight<W>>,
     sent: u64,
     lost: u64,
-    unheard_ticks: u64,
+    missed_ticks: u64,
 }
 
 impl<W: Copy + PartialEq> Radio<W> {
@@ -119,7 +119,7 @@ impl<W: Copy + PartialEq> Radio<W> {
             in_flight: VecDeque::new(),
             sent: 0,
             lost: 0,
-            unheard_ticks: 0,
+            missed_ticks: 0,
         }
     }
 
@@ -153,7 +153,7 @@ impl<W: Copy + PartialEq> Radio<W> {
     /// Whether the frames of a tick, sent at mission time `now`, are lost: then nobody hears of the tick.
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
-        self.unheard_ticks += u64::from(lost);
+        self.missed_ticks += u64::from(lost);
         lost
     }
 
@@ -260,7 +260,7 @@ impl<W: Copy + PartialEq> Radio<W> {
             sent: self.sent,
             lost: self.lost,
             longest_outage_s: self.fading.longest_seen,
-            unheard_ticks: self.unheard_ticks,
+            missed_ticks: self.missed_ticks,
         }
     }
 }

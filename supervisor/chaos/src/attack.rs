@@ -92,7 +92,7 @@ impl Attack {
         let ended = self.pending.extract_if(.., is_stage);
         self.measured.extend(ended.map(|recovery| recovery.row));
         let mut subscriptions = loop {
-            self.consumers.tend(&mut series.report)?;
+            self.consumers.maintain(&mut series.report)?;
             if child.try_reap().map_err(system("reap"))?.is_some() || began.elapsed() >= patience {
                 return Ok(());
             }
@@ -118,7 +118,7 @@ impl Attack {
                 self.hit(series)?;
                 next = Instant::now() + pause;
             }
-            self.consumers.tend(&mut series.report)?;
+            self.consumers.maintain(&mut series.report)?;
             self.keep_measured(series, robot.as_deref())?;
         }
         if let Some([first, last]) = self.resources {

@@ -121,7 +121,7 @@ impl Consumers {
     }
 
     /// Let those go on whose time has come; count those that ended by themselves.
-    pub(crate) fn tend(&mut self, report: &mut Report) -> Result<(), ChaosError> {
+    pub(crate) fn maintain(&mut self, report: &mut Report) -> Result<(), ChaosError> {
         for running in &mut self.all {
             if running
                 .frozen_until

@@ -18,8 +18,8 @@
 //! | [`Report`] | the result of all missions |
 //! | [`signals`], `page` | the table of signals, THE file format; the page that is drawn from it |
 //! | [`robot_fault`] | THE table of the ways in which a robot lies to its link |
-//! | `robot_faults`, `proxy`, `liar` | missions of such robots; the wire, and what becomes of the bytes on it |
-//! | [`Ledger`] | how long each moved after that |
+//! | `robot_faults`, `proxy`, `fault_injector` | missions of such robots; the wire, and what becomes of the bytes on it |
+//! | [`StopTimeTable`] | how long each moved after that |
 //! | [`ipc_bench`] | five bare hops on the bus |
 //! | [`process_set`] | what a process and all that it started use |
 
@@ -27,11 +27,10 @@ mod attack;
 mod consumer;
 mod consumers;
 mod error;
+mod fault_injector;
 pub mod ipc_bench;
 mod kind;
-mod ledger;
 mod leftovers;
-mod liar;
 mod mission;
 mod options;
 mod page;
@@ -46,6 +45,7 @@ mod robot_faults;
 mod schedule;
 mod series;
 pub mod signals;
+mod stop_time_table;
 mod subscriptions;
 mod terminal;
 mod tick_latencies;
@@ -53,11 +53,11 @@ mod words;
 
 pub use consumer::{Consumer, ConsumerError, GivenConsumer, SUBCOMMAND};
 pub use error::ChaosError;
-pub use ledger::{Entry, Ledger};
 pub use options::Options;
 pub use page::PAGE;
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
+pub use stop_time_table::{Entry, StopTimeTable};
 
 use series::Series;
 

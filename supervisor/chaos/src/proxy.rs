@@ -1,4 +1,4 @@
-//! The wire between link and simulated robot, with a [`Liar`] on it: UDP, in a thread.
+//! The wire between link and simulated robot, with a [`FaultInjector`] on it: UDP, in a thread.
 
 use std::{
     io,
@@ -16,7 +16,7 @@ use common::poll;
 
 use crate::{
     error::{ChaosError, system},
-    liar::{Late, Liar},
+    fault_injector::{FaultInjector, Late},
     robot_fault::RobotFault,
 };
 
@@ -55,7 +55,7 @@ impl Proxy {
             front,
             back,
             host: None,
-            liar: Liar::new(fault, seed),
+            injector: FaultInjector::new(fault, seed),
             held: Vec::new(),
             began: Instant::now(),
             shared: Arc::clone(&shared),
@@ -114,7 +114,7 @@ struct Wire {
     front: UdpSocket,
     back: UdpSocket,
     host: Option<SocketAddr>,
-    liar: Liar,
+    injector: FaultInjector,
     held: Vec<Late>,
     began: Instant,
     shared: Arc<Shared>,
@@ -128,7 +128,7 @@ impl Wire {
         let timeout = due.min().unwrap_or(LOOK).min(LOOK);
         poll::readable(&[self.front.as_fd(), self.back.as_fd()], Some(timeout))?;
         if self.shared.lies.load(Ordering::Relaxed) {
-            self.liar.begin();
+            self.injector.begin();
         }
         let mut buffer = [0; 65_536];
         while let Ok((length, host)) = self.front.recv_from(&mut buffer) {
@@ -138,14 +138,14 @@ impl Wire {
                 let last = shared.last_moving.lock();
                 *last.unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
             };
-            let bytes = self.liar.order(&buffer[..length], &mut moves);
+            let bytes = self.injector.order(&buffer[..length], &mut moves);
             if !bytes.is_empty() {
                 let _ = self.back.send(&bytes);
             }
         }
         let now = self.began.elapsed();
         while let Ok(length) = self.back.recv(&mut buffer) {
-            let passed = self.liar.report(&buffer[..length], now);
+            let passed = self.injector.report(&buffer[..length], now);
             self.held.extend(passed);
         }
         self.held.truncate(MOST_HELD);

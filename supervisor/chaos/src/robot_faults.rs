@@ -26,11 +26,11 @@ use x80_link::failsafe;
 
 use crate::{
     error::{ChaosError, system},
-    ledger::{Entry, Ledger},
     mission,
     options::Options,
     proxy::Proxy,
     robot_fault::RobotFault,
+    stop_time_table::{Entry, StopTimeTable},
 };
 
 /// The robot lies from so long after it has departed, seconds: at least, and how much more at most.
@@ -61,9 +61,9 @@ pub struct FaultOptions {
 /// Run the missions, one after the other. `show` is called after each.
 pub fn run_robot_faults(
     options: &FaultOptions,
-    show: &mut dyn FnMut(&Ledger),
-) -> Result<Ledger, ChaosError> {
-    let mut ledger = Ledger::default();
+    show: &mut dyn FnMut(&StopTimeTable),
+) -> Result<StopTimeTable, ChaosError> {
+    let mut table = StopTimeTable::default();
     for &fault in &options.faults {
         for number in 0..u64::from(options.missions) {
             let seed = options.base.seed + number;
@@ -76,11 +76,11 @@ pub fn run_robot_faults(
             if entry.is_kept() {
                 fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
             }
-            ledger.entries.push(entry);
-            show(&ledger);
+            table.entries.push(entry);
+            show(&table);
         }
     }
-    Ok(ledger)
+    Ok(table)
 }
 
 /// One mission.

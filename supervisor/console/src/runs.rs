@@ -20,7 +20,7 @@ const LARGEST_SUMMARY: u64 = 1 << 20;
 
 /// A run that is kept.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Kept {
+pub struct RunDirectory {
     /// When it began.
     pub began: SystemTime,
     /// Where it is.
@@ -49,7 +49,7 @@ pub enum Outcome {
 
 /// The runs in directories below `runs`, in no order.
 #[must_use]
-pub fn kept(runs: &Path) -> Vec<Kept> {
+pub fn list(runs: &Path) -> Vec<RunDirectory> {
     #[derive(Deserialize)]
     struct Mission {
         name: String,
@@ -64,7 +64,7 @@ pub fn kept(runs: &Path) -> Vec<Kept> {
         let directory = entry.path();
         let file = directory.join(run::FILE_NAME);
         let named: Named = toml::from_str(&fs::read_to_string(&file).ok()?).ok()?;
-        Some(Kept {
+        Some(RunDirectory {
             began: fs::metadata(file).ok()?.modified().ok()?,
             directory,
             robot: named.robot,
@@ -75,7 +75,7 @@ pub fn kept(runs: &Path) -> Vec<Kept> {
     entries.filter_map(read).collect()
 }
 
-impl Kept {
+impl RunDirectory {
     /// Whether it came to its end, or was reported as cut off: nobody goes on with it.
     #[must_use]
     pub fn has_ended(&self) -> bool {
@@ -161,9 +161,9 @@ mod tests {
         fs::write(begun("a-ended").join(SUMMARY), summary).unwrap();
         fs::write(begun("b-broken").join(SUMMARY), "{").unwrap();
         begun("c-cut");
-        let mut kept = kept(runs.path());
+        let mut kept = list(runs.path());
         kept.sort_by_key(|run| run.directory.clone());
-        let outcomes: Vec<_> = kept.iter().map(Kept::outcome).collect();
+        let outcomes: Vec<_> = kept.iter().map(RunDirectory::outcome).collect();
         let ended = |outcome: &str, mission_time_s| Outcome::Ended {
             outcome: outcome.to_owned(),
             mission_time_s,
@@ -176,7 +176,7 @@ mod tests {
         assert_eq!(outcomes, expected);
         assert_eq!(kept[0].mission.as_deref(), Some("trap"));
         assert!(kept[0].size() >= 1024, "{}", kept[0].size());
-        let ended: Vec<_> = kept.iter().map(Kept::has_ended).collect();
+        let ended: Vec<_> = kept.iter().map(RunDirectory::has_ended).collect();
         assert_eq!(ended, [true, true, false]);
     }
 }

@@ -25,7 +25,7 @@ use std::{
 use common::{
     bus::BusError,
     domain::{Domain, RobotName},
-    follower::{Follower, News},
+    follower::{Event, Follower},
     poll,
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
     topics,
@@ -91,10 +91,10 @@ fn run(
     let mut typed = Vec::new();
     while !signals.came() && !is_closed() {
         match follower.wait(LOOK_EVERY)? {
-            News::Here => view.on_here(),
-            News::Gone => view.here = false,
-            News::Nothing => {}
-            News::Samples(feed) => feed.take(&mut view)?,
+            Event::Connected => view.on_connected(),
+            Event::Disconnected => view.connected = false,
+            Event::Nothing => {}
+            Event::Samples(feed) => feed.take(&mut view)?,
         }
         let mut changed = false;
         while poll::is_readable(io::stdin(), Duration::ZERO)? {

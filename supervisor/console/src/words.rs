@@ -71,7 +71,7 @@ pub fn stall(stall: &StallSample) -> String {
     };
     let recovery = match stall.recovery() {
         RecoveryStep::Replan => "new planner",
-        RecoveryStep::Forget => "map forgotten",
+        RecoveryStep::Reset => "map reset",
         RecoveryStep::GiveUp => "given up",
     };
     let at = stall.stamp.time().seconds();

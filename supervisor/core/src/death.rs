@@ -43,7 +43,7 @@ pub struct Death {
     /// What follows.
     pub next: Next,
     /// The end of what it wrote to its log.
-    pub last_words: String,
+    pub log_tail: String,
 }
 
 /// What the supervisor does next.
@@ -82,9 +82,9 @@ impl Death {
             uptime_s,
             deaths_in_window,
             next,
-            last_words,
+            log_tail,
         } = self;
-        tracing::warn!(stage, pid, generation, %cause, hung, ?beat_age_s, uptime_s, deaths_in_window, ?next, last_words, "stage died");
+        tracing::warn!(stage, pid, generation, %cause, hung, ?beat_age_s, uptime_s, deaths_in_window, ?next, log_tail, "stage died");
     }
 
     /// The sample for the bus.
@@ -116,7 +116,7 @@ impl Death {
             cause: cause.into(),
             next: next.into(),
             hung: self.hung.into(),
-            last_words: words(&self.last_words),
+            log_tail: words(&self.log_tail),
             ..DeathSample::default()
         }
     }
@@ -127,7 +127,7 @@ fn nanoseconds(seconds: f64) -> u64 {
 }
 
 /// The end of a stage's log, from where a line begins; empty if there is none.
-pub(crate) fn last_words(log: &Path, since: u64) -> String {
+pub(crate) fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;
         let end = file.metadata()?.len();
@@ -156,14 +156,14 @@ mod tests {
         let log = directory.path().join("stage.log");
         let lines: String = (0..100).map(|line| format!("line {line}\n")).collect();
         std::fs::write(&log, &lines).unwrap();
-        let words = last_words(&log, 0);
+        let words = log_tail(&log, 0);
         assert!(
             words.starts_with("line ") && words.ends_with("line 99"),
             "{words}"
         );
         assert!(words.len() as u64 <= LAST_WORDS);
-        assert_eq!(last_words(&log, lines.len() as u64 - 8), "line 99");
-        assert_eq!(last_words(&directory.path().join("none"), 0), "");
+        assert_eq!(log_tail(&log, lines.len() as u64 - 8), "line 99");
+        assert_eq!(log_tail(&directory.path().join("none"), 0), "");
     }
 
     #[test]
@@ -182,7 +182,7 @@ mod tests {
             uptime_s: 12.5,
             deaths_in_window: 2,
             next: Next::StartLater { after_s: 0.05 },
-            last_words: "ready".to_owned(),
+            log_tail: "ready".to_owned(),
         };
         let sample = death.sample();
         assert_eq!((sample.code, sample.deaths_in_window), (9, 2));

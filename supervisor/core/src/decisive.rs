@@ -33,7 +33,7 @@ pub(crate) struct Decided {
 pub(crate) struct Timeout {
     /// When it is given up.
     pub deadline: Deadline,
-    /// By the simulated robot's own clock, which also counts the ticks that nobody heard: on a clock of ticks.
+    /// By the simulated robot's own clock, which also counts the ticks that nobody heard: in lockstep.
     pub by_robot: bool,
 }
 

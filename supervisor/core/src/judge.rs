@@ -15,7 +15,7 @@ use crate::{
     records,
 };
 
-/// A pipeline that makes no tick for so long although nothing holds it is stuck. Wall-clock: a clock of ticks does not
+/// A pipeline that makes no tick for so long although nothing holds it is stuck. Wall-clock: lockstep does not
 /// advance meanwhile, so the mission's own timeout would not end it.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 

@@ -49,7 +49,7 @@
 //! | [`simulator`] | the simulated robot as a child process |
 //! | `service_manager` | notifications to systemd |
 //! | `progress` | how far a run has come, as shown to its user |
-//! | `lead` | on a clock of ticks: how far the link may go, and from which tick a recovery step holds, pure |
+//! | `lockstep` | in lockstep: how far the link may go, and from which tick a recovery step holds, pure |
 //! | `last_resort` | the end of a run whose supervisor hangs |
 //! | `error`, `domain_error` | why a run could not be carried out |
 
@@ -64,7 +64,7 @@ mod error;
 pub mod executable;
 mod judge;
 mod last_resort;
-mod lead;
+mod lockstep;
 mod observed_time;
 pub mod observer;
 mod order;

@@ -15,7 +15,7 @@ use common::{
 };
 
 use crate::{
-    lead::Published,
+    lockstep::Published,
     stage_processes::StageProcesses,
     totals::{LookTotals, Totals, WheelTotals},
 };

@@ -66,7 +66,7 @@ impl RunClock {
         pose.map_or(self.start, |pose| pose.stamp.time())
     }
 
-    /// From the first motion order until `last_tick`, or else the newest one, seconds. On a clock of ticks the `truth` until
+    /// From the first motion order until `last_tick`, or else the newest one, seconds. in lockstep the `truth` until
     /// then says it: the time of the simulated robot begins with that order, and passes also while nobody hears it.
     pub(crate) fn duration_s(
         &self,

@@ -18,7 +18,7 @@ use rustix::process::Signal;
 use thiserror::Error;
 
 use crate::{
-    death::{Death, Next, last_words},
+    death::{Death, Next, log_tail},
     policy::{Action, Event, Now, Phase, Policy},
     process::{ExitCause, Process, child, firsthand},
     stages::Stage,
@@ -246,7 +246,7 @@ impl StageProcess {
             uptime_s: age(self.started),
             deaths_in_window: 0,
             next: Next::Nothing,
-            last_words: last_words(&self.log(directory), self.log_start),
+            log_tail: log_tail(&self.log(directory), self.log_start),
         };
         (self.process, self.beat) = (None, None);
         (self.stopping, self.found_ended) = (false, false);

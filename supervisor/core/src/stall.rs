@@ -185,7 +185,7 @@ impl StallWatch {
         let after = self.stalls.iter().find(|stall| stall.stamp.tick > tick);
         after.map_or((self.replans, self.epoch), |stall| match stall.recovery() {
             RecoveryStep::Replan => (stall.replans - 1, stall.resets),
-            RecoveryStep::Forget => (stall.replans, stall.resets - 1),
+            RecoveryStep::Reset => (stall.replans, stall.resets - 1),
             RecoveryStep::GiveUp => (stall.replans, stall.resets),
         })
     }
@@ -234,7 +234,7 @@ impl StallWatch {
             _ if self.epoch < MOST_RESETS => {
                 self.epoch += 1;
                 self.replans_here = 0;
-                RecoveryStep::Forget
+                RecoveryStep::Reset
             }
             _ => RecoveryStep::GiveUp,
         };

@@ -7,7 +7,7 @@ use common::samples::{Order, RecoveryStep, StallSample};
 
 use crate::{
     error::SupervisorError,
-    lead::Next,
+    lockstep::Next,
     outcome::{Ending, Outcome},
     records, stages, stall,
     supervisor::Supervisor,
@@ -18,7 +18,7 @@ impl Supervisor<'_> {
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let in_ticks = self.clock.in_ticks();
         if self.decision.order() != Order::Drive {
-            // On a clock of ticks no time passes meanwhile.
+            // in lockstep no time passes meanwhile.
             if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
                 self.stall_watch.hold(pose.stamp.tick);
             }
@@ -33,14 +33,14 @@ impl Supervisor<'_> {
         }
         loop {
             let published = self.bus.observer.record.published();
-            match self.lead.next(published, Instant::now()) {
+            match self.lockstep.next(published, Instant::now()) {
                 Next::Wait => break,
                 Next::Begin(step) => self.carry_out(step)?,
                 Next::Look => match self.next_stall() {
-                    Some(stall) => self.lead.stalled(stall),
+                    Some(stall) => self.lockstep.stalled(stall),
                     None => {
                         if let Some(tick) = published.tick {
-                            self.lead.looked_at(tick);
+                            self.lockstep.looked_at(tick);
                         }
                         break;
                     }
@@ -59,7 +59,7 @@ impl Supervisor<'_> {
         let record = &self.bus.observer.record;
         let in_ticks = self.clock.in_ticks();
         let stopped = record.link.is_none_or(|link| link.stopped());
-        // On a clock of ticks no time passes while something holds the robot.
+        // in lockstep no time passes while something holds the robot.
         let held = !in_ticks && (stopped || !self.stages.all_running());
         // Of a tick without its command not all may be here yet.
         let newest = record.published().tick.filter(|_| in_ticks);
@@ -86,7 +86,7 @@ impl Supervisor<'_> {
         match step {
             RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
             // The new epoch is in the directive.
-            RecoveryStep::Forget => self.publish_state()?,
+            RecoveryStep::Reset => self.publish_state()?,
             RecoveryStep::GiveUp => {}
         }
         Ok(())
@@ -113,7 +113,7 @@ impl Supervisor<'_> {
 
     /// Tell the link how far it may go, if that is news.
     pub(crate) fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
-        let limit = self.lead.limit();
+        let limit = self.lockstep.limit();
         if self.published_limit.replace(limit) != Some(limit) {
             let (tick, time) = self.published_as_of();
             self.bus.publish_tick_limit(tick, time, limit)?;

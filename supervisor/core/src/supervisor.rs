@@ -23,7 +23,7 @@ use crate::{
     error::{SupervisorError, system},
     judge::{self, Deadline, StopClock, TickProgress},
     last_resort::Turns,
-    lead::Lead,
+    lockstep::Lockstep,
     order::{self, Decision},
     outcome::{Ending, Outcome},
     progress::Progress,
@@ -100,7 +100,7 @@ pub(crate) struct Supervisor<'a> {
     pub tick_progress: TickProgress,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
-    pub lead: Lead,
+    pub lockstep: Lockstep,
     pub published_limit: Option<TickLimitSample>,
     cleanup: Cleanup,
     turns: Turns,
@@ -139,7 +139,7 @@ impl<'a> Supervisor<'a> {
             mission: mission.clone(),
         };
         run.save(directory)?;
-        let lead = Lead::new(clock.first_tick(None));
+        let lockstep = Lockstep::new(clock.first_tick(None));
         let mut supervisor = Self {
             options,
             stages: StageProcesses::new(directory.clone(), options.starter, mission),
@@ -152,7 +152,7 @@ impl<'a> Supervisor<'a> {
             tick_progress: TickProgress::new(Instant::now()),
             stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
-            lead,
+            lockstep,
             published_limit: None,
             cleanup: Cleanup::new(),
             turns,
@@ -343,7 +343,7 @@ impl<'a> Supervisor<'a> {
     /// The epoch that holds.
     fn epoch(&self) -> u64 {
         let epoch = self.stall_watch.epoch();
-        epoch - u64::from(self.lead.withholds(epoch))
+        epoch - u64::from(self.lockstep.withholds(epoch))
     }
 
     /// The tick and the time that the supervisor's samples are published as of.

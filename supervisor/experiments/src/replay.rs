@@ -2,7 +2,7 @@
 //!
 //! Mapper and planner are those of a mission whose target is where the log ends. The mapper knows one sonar; a sample of
 //! eight is given to it as eight ticks at the same place, the robot's axis turned to where each sonar looks. A body whose
-//! wheels stand close together rolls little in these turns, so that hardly any swept ground grows stale by them.
+//! wheels stand close together rolls little in these turns, so that hardly any scanned ground grows stale by them.
 
 use std::path::Path;
 

@@ -13,7 +13,7 @@ use std::{
 use common::{
     bus::{Bus, BusError, EncodedReader, Logged},
     domain::Domain,
-    follower::{Follower, News},
+    follower::{Event, Follower},
     run::{self, Run},
     topics::{self, EncodedTopic},
 };
@@ -101,9 +101,9 @@ pub fn record(
     loop {
         let stopped = stop();
         let news = match follower.wait(if stopped { Duration::ZERO } else { POLL })? {
-            News::Here => Some(true),
-            News::Gone => Some(false),
-            News::Samples(_) | News::Nothing => None,
+            Event::Connected => Some(true),
+            Event::Disconnected => Some(false),
+            Event::Samples(_) | Event::Nothing => None,
         };
         if news == Some(true) {
             let holder = options.domain.supervisor().ok().flatten();

@@ -239,7 +239,7 @@ impl Generation {
             computed: is,
             inputs: computed.inputs.iter().filter_map(describe).collect(),
         });
-        self.forget();
+        self.reset();
     }
 
     fn is_over(&self) -> bool {
@@ -248,11 +248,11 @@ impl Generation {
 
     fn give_up(&mut self, why: String) {
         self.not_replayed = Some(why);
-        self.forget();
+        self.reset();
     }
 
     /// Hold nothing of a generation that is over.
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.pieces = Pieces::default();
         self.replay = None;
         self.channels.clear();

@@ -9,7 +9,7 @@ use common::{
 };
 use planner::step::{Input, Planner};
 
-use crate::kept::drop_every_second;
+use crate::downsampled::drop_every_second;
 
 /// At most so many maps are kept. When there are more, every second one is dropped, and from then on half as many are taken.
 const MOST: usize = 8;

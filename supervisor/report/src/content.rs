@@ -12,9 +12,9 @@ use serde_json::{Map, Value};
 
 use crate::{
     beliefs::Beliefs,
+    downsampled::Downsampled,
     error::ReportError,
     events::Events,
-    kept::Kept,
     measured::Measured,
     source::{self, Source},
 };
@@ -29,10 +29,10 @@ pub(crate) struct Content {
     pub(crate) remarks: Vec<String>,
     /// What the run ended with, where that is known.
     pub(crate) summary: Map<String, Value>,
-    pub(crate) poses: Kept<PoseSample>,
-    pub(crate) ranges: Kept<RangeSample>,
-    pub(crate) commands: Kept<CommandSample>,
-    pub(crate) wheels: Kept<WheelSample>,
+    pub(crate) poses: Downsampled<PoseSample>,
+    pub(crate) ranges: Downsampled<RangeSample>,
+    pub(crate) commands: Downsampled<CommandSample>,
+    pub(crate) wheels: Downsampled<WheelSample>,
     pub(crate) grid: Replica<u8>,
     /// What the mapper said of it last.
     pub(crate) grid_header: GridHeader,
@@ -70,10 +70,10 @@ impl Content {
             about,
             remarks: Vec::new(),
             summary: source::summary(recording).unwrap_or_default(),
-            poses: Kept::default(),
-            ranges: Kept::default(),
-            commands: Kept::default(),
-            wheels: Kept::default(),
+            poses: Downsampled::default(),
+            ranges: Downsampled::default(),
+            commands: Downsampled::default(),
+            wheels: Downsampled::default(),
             grid: Replica::default(),
             grid_header: GridHeader::default(),
             beliefs: Beliefs::default(),

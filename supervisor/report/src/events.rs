@@ -117,7 +117,7 @@ impl Events {
         } else {
             ""
         };
-        let words = death.last_words.text();
+        let words = death.log_tail.text();
         let words = words.trim();
         let words = if words.is_empty() {
             String::new()

@@ -24,10 +24,10 @@
 
 mod beliefs;
 mod content;
+mod downsampled;
 mod error;
 mod events;
 mod figures;
-mod kept;
 mod measured;
 mod metrics;
 mod page;

@@ -68,7 +68,7 @@ fn text_of_a_recording_is_never_markup() {
     content.summary.insert("reason".to_owned(), hostile.into());
     content.events.death(&DeathSample {
         stage: name("<b>planner"),
-        last_words: words(hostile),
+        log_tail: words(hostile),
         ..DeathSample::default()
     });
     let figures = figures::all(&content);

@@ -49,7 +49,7 @@ fn what_is_forgotten_does_not_swallow_the_frame_behind_it() {
     // The beginning of a frame of 64 data bytes; its rest never comes.
     decoder.push(&[0x5e, 0x02, 0x00, 0x00, 0x7d, 64, 1, 2, 3]);
     assert!(decoder.next_frame().is_none());
-    decoder.forget();
+    decoder.reset();
     decoder.push(&bytes);
     assert!(decoder.next_frame().is_some());
     assert_eq!(decoder.tally().noise_bytes, 9);

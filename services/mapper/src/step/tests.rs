@@ -16,7 +16,7 @@ impl Mapper {
     }
 
     fn reset(&mut self, epoch: u64) -> bool {
-        self.step(Input::Forget { epoch }, MissionTime(0)) == Change::Whole
+        self.step(Input::Reset { epoch }, MissionTime(0)) == Change::Whole
     }
 }
 

@@ -5,7 +5,7 @@ use glam::DVec2;
 
 use harmonic::{Domain, Field, SolveError};
 
-/// On a clock of ticks the result of a background solve is an input so many ticks after it began, no sooner and no
+/// in lockstep the result of a background solve is an input so many ticks after it began, no sooner and no
 /// later, so that a run can be repeated. At 7 Hz the largest map is solved by then on a wall clock, too.
 const SWAP_AFTER_TICKS: u64 = 2;
 
@@ -22,7 +22,7 @@ pub enum Input<'a> {
     /// The pose of the tick: it is answered with guidance.
     Pose(&'a PoseSample),
     /// The tick has its guidance: a background solve may begin.
-    Lull,
+    Idle,
     /// What became of a job.
     Solved(Solved),
     /// Break like this, on purpose.
@@ -92,7 +92,7 @@ pub struct Job {
 }
 
 impl Job {
-    /// On a clock of ticks, how many ticks after it began its result is an input.
+    /// in lockstep, how many ticks after it began its result is an input.
     #[must_use]
     pub const fn swap_after_ticks(&self) -> u64 {
         // A robot that waits for it waits no longer than it must.

@@ -228,7 +228,7 @@ fn an_evidential_robot_looks_square_to_the_faces_it_could_touch_unheard() {
 }
 
 #[test]
-fn over_swept_ground_an_evidential_robot_goes_at_full_speed() {
+fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
     let guidance = evidential(|_| true).guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");

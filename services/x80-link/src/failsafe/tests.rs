@@ -8,11 +8,11 @@ const GO: Flags = Flags {
     connected: true,
     command: Some(AGES),
     battery: Charge::Well,
-    senses: WELL,
+    health: WELL,
 };
-const WELL: Senses = Senses {
-    disobeys: false,
-    odometry: Belief::Believed,
+const WELL: HealthFlags = HealthFlags {
+    does_not_stop: false,
+    odometry: Plausibility::Plausible,
     motor: Motor::Regular,
     late: false,
     range_silent: false,
@@ -45,18 +45,18 @@ fn cases() -> Vec<(Flags, Action, Cause)> {
     let command = |command| Flags { command, ..GO };
     let ordered = |order| directive(Some(Directive { order, ..DRIVE }));
     let battery = |battery| Flags { battery, ..GO };
-    let senses = |senses| Flags { senses, ..GO };
-    let odometry = |odometry| senses(Senses { odometry, ..WELL });
-    let motor = |motor| senses(Senses { motor, ..WELL });
-    let disobeys = Senses {
-        disobeys: true,
+    let health = |health| Flags { health, ..GO };
+    let odometry = |odometry| health(HealthFlags { odometry, ..WELL });
+    let motor = |motor| health(HealthFlags { motor, ..WELL });
+    let does_not_stop = HealthFlags {
+        does_not_stop: true,
         ..WELL
     };
-    let range_silent = Senses {
+    let range_silent = HealthFlags {
         range_silent: true,
         ..WELL
     };
-    let late_frames = Senses { late: true, ..WELL };
+    let late_frames = HealthFlags { late: true, ..WELL };
     let silent = Directive {
         age: SUPERVISOR_SILENT + MOMENT,
         ..DRIVE
@@ -112,20 +112,20 @@ fn cases() -> Vec<(Flags, Action, Cause)> {
             Cause::GuidanceStale,
         ),
         (
-            odometry(Belief::GivenUp),
+            odometry(Plausibility::GivenUp),
             Action::End,
             Cause::OdometryGivenUp,
         ),
-        (senses(disobeys), Action::Stop, Cause::RobotDisobeys),
+        (health(does_not_stop), Action::Stop, Cause::RobotDoesNotStop),
         (motor(Motor::Silent), Action::Stop, Cause::FramesSilent),
         (motor(Motor::Slow(3.0)), Action::Stop, Cause::FramesSlow),
         (
-            odometry(Belief::Doubted),
+            odometry(Plausibility::Suspected),
             Action::Stop,
             Cause::OdometryImplausible,
         ),
-        (senses(late_frames), Action::Stop, Cause::RobotLate),
-        (senses(range_silent), Action::Stop, Cause::RangeSilent),
+        (health(late_frames), Action::Stop, Cause::RobotLate),
+        (health(range_silent), Action::Stop, Cause::RangeSilent),
         (battery(Charge::Low), Action::Slow, Cause::BatteryLow),
     ]
 }
@@ -200,13 +200,13 @@ fn combinations() -> Vec<Flags> {
         for &command in &commands {
             for connected in [true, false] {
                 for battery in [Charge::Well, Charge::Low, Charge::Empty] {
-                    for senses in sensed() {
+                    for health in sensed() {
                         all.push(Flags {
                             directive,
                             connected,
                             command,
                             battery,
-                            senses,
+                            health,
                         });
                     }
                 }
@@ -217,13 +217,17 @@ fn combinations() -> Vec<Flags> {
 }
 
 /// Every combination of what frames can say.
-fn sensed() -> Vec<Senses> {
+fn sensed() -> Vec<HealthFlags> {
     let mut all = Vec::new();
-    for odometry in [Belief::Believed, Belief::Doubted, Belief::GivenUp] {
+    for odometry in [
+        Plausibility::Plausible,
+        Plausibility::Suspected,
+        Plausibility::GivenUp,
+    ] {
         for motor in [Motor::Regular, Motor::Silent, Motor::Slow(3.0)] {
             for bits in 0..8_u8 {
-                all.push(Senses {
-                    disobeys: bits & 1 != 0,
+                all.push(HealthFlags {
+                    does_not_stop: bits & 1 != 0,
                     odometry,
                     motor,
                     late: bits & 2 != 0,
@@ -277,13 +281,16 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
     assert!((crate::telemetry::EMPTY_SHARE - 10.0 / 11.0).abs() < 1e-9);
     let recovered = format!("{} V", crate::telemetry::RECOVERED_V);
     says(Cause::BatteryLow, &recovered);
-    use crate::odometry::{DOUBTED_AFTER, GIVEN_UP_AFTER, JUMPS_WITHIN, MOST_JUMPS};
+    use crate::odometry::{GIVEN_UP_AFTER, JUMPS_WITHIN, MOST_JUMPS, SUSPECTED_AFTER};
     says(Cause::OdometryGivenUp, &seconds(GIVEN_UP_AFTER));
-    let doubted = format!("{} s", DOUBTED_AFTER.as_secs_f64());
-    says(Cause::OdometryImplausible, &doubted);
+    let suspected = format!("{} s", SUSPECTED_AFTER.as_secs_f64());
+    says(Cause::OdometryImplausible, &suspected);
     let jumps = format!("{MOST_JUMPS} jumps within {}", seconds(JUMPS_WITHIN));
     says(Cause::OdometryImplausible, &jumps);
-    let disobeys = format!("{} s", crate::obedience::DISOBEYS_AFTER.as_secs_f64());
-    says(Cause::RobotDisobeys, &disobeys);
+    let does_not_stop = format!(
+        "{} s",
+        crate::stop_monitor::DOES_NOT_STOP_AFTER.as_secs_f64()
+    );
+    says(Cause::RobotDoesNotStop, &does_not_stop);
     assert!((SLOW_SHARE - 0.5).abs() < 1e-9 && effect(Action::Slow).contains("half"));
 }

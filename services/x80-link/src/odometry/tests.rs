@@ -58,7 +58,7 @@ fn drive(
     tells: impl Fn(u32) -> [i16; 2],
     mut out: impl FnMut(u32) -> bool,
     mut says: impl FnMut(u32, [u16; 2]) -> [u16; 2],
-) -> Option<(f64, Doubt)> {
+) -> Option<(f64, Suspicion)> {
     let mut odometry = odometry();
     let mut wheels = Wheels::default();
     for tick in 0..ticks {
@@ -69,8 +69,8 @@ fn drive(
         }
         let now = MissionTime::from_seconds(time);
         odometry.believed(says(tick, wheels.counts()), now);
-        if let Some(doubt) = odometry.doubt() {
-            return Some((time, doubt));
+        if let Some(suspicion) = odometry.suspicion() {
+            return Some((time, suspicion));
         }
         odometry.commanded(tells(tick), now);
         wheels.tell(tells(tick));
@@ -87,9 +87,12 @@ fn honest(_: u32, counts: [u16; 2]) -> [u16; 2] {
 }
 
 /// At rest within 1.5 s of the first motion: 0.2 s are left for the wheels to come to rest, and a frame's jitter.
-fn in_time(doubted: Option<(f64, Doubt)>, why: Doubt) {
-    let (after, doubt) = doubted.unwrap();
-    assert!(after <= 1.15 && doubt == why, "{doubt:?} after {after} s");
+fn in_time(suspected: Option<(f64, Suspicion)>, why: Suspicion) {
+    let (after, suspicion) = suspected.unwrap();
+    assert!(
+        after <= 1.15 && suspicion == why,
+        "{suspicion:?} after {after} s"
+    );
 }
 
 #[test]
@@ -168,20 +171,21 @@ fn wheels_held_for_half_a_second_are_believed() {
 }
 
 #[test]
-fn the_same_frame_for_ever_is_doubted_in_time() {
+fn the_same_frame_for_ever_is_suspected_in_time() {
     let same = |_, _| [32_767; 2];
-    in_time(drive(40, |_| [TURN, TURN], never, same), Doubt::Left);
-    in_time(drive(40, |_| [-80, 80], never, same), Doubt::Left);
+    in_time(drive(40, |_| [TURN, TURN], never, same), Suspicion::Left);
+    in_time(drive(40, |_| [-80, 80], never, same), Suspicion::Left);
 }
 
 #[test]
-fn one_dead_encoder_is_doubted_in_time_and_named() {
+fn one_dead_encoder_is_suspected_in_time_and_named() {
     let dead = |_, [left, _]: [u16; 2]| [left, 0];
-    in_time(drive(40, |_| [TURN, TURN], never, dead), Doubt::Right);
+    in_time(drive(40, |_| [TURN, TURN], never, dead), Suspicion::Right);
 }
 
 #[test]
-fn a_dead_encoder_is_doubted_though_the_direction_changes_with_every_tick_and_a_live_one_is_not() {
+fn a_dead_encoder_is_suspected_though_the_direction_changes_with_every_tick_and_a_live_one_is_not()
+{
     let to_and_fro = |tick: u32| {
         if tick.is_multiple_of(2) {
             [400, -400]
@@ -191,7 +195,7 @@ fn a_dead_encoder_is_doubted_though_the_direction_changes_with_every_tick_and_a_
     };
     let dead = drive(40, to_and_fro, never, |_, [left, _]| [left, 0]);
     assert!(
-        matches!(dead, Some((after_s, Doubt::Right)) if after_s < 1.5),
+        matches!(dead, Some((after_s, Suspicion::Right)) if after_s < 1.5),
         "{dead:?}"
     );
     assert_eq!(drive(200, to_and_fro, never, honest), None);
@@ -200,7 +204,10 @@ fn a_dead_encoder_is_doubted_though_the_direction_changes_with_every_tick_and_a_
 #[test]
 fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
-    in_time(drive(40, |_| [TURN, TURN], never, reversed), Doubt::Left);
+    in_time(
+        drive(40, |_| [TURN, TURN], never, reversed),
+        Suspicion::Left,
+    );
     // As a controller does whose robot turns away from the target.
     let chatter = |tick: u32| {
         [if (tick / 2).is_multiple_of(2) {
@@ -209,12 +216,15 @@ fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
             -584
         }; 2]
     };
-    in_time(drive(40, chatter, never, reversed), Doubt::Left);
+    in_time(drive(40, chatter, never, reversed), Suspicion::Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
-    in_time(drive(40, |_| [-TURN, TURN], never, swapped), Doubt::Left);
+    in_time(
+        drive(40, |_| [-TURN, TURN], never, swapped),
+        Suspicion::Left,
+    );
     // In a curve both roll forward as told, but the robot turns the other way.
     let curve = drive(40, |_| [TURN / 2, TURN], never, swapped);
-    in_time(curve, Doubt::Turn);
+    in_time(curve, Suspicion::Turn);
 }
 
 #[test]
@@ -224,11 +234,12 @@ fn frames_that_are_two_seconds_late_are_doubted_in_time() {
         said.push_back(counts);
         said.pop_front().unwrap()
     };
-    in_time(drive(40, |_| [TURN, TURN], never, late), Doubt::Left);
+    in_time(drive(40, |_| [TURN, TURN], never, late), Suspicion::Left);
 }
 
 #[test]
-fn a_robot_that_is_doubted_is_given_up_after_10_s_or_believed_again_when_an_operator_has_looked() {
+fn a_robot_that_is_suspected_is_given_up_after_10_s_or_believed_again_when_an_operator_has_looked()
+{
     let at = MissionTime::from_seconds;
     let mut odometry = odometry();
     for tick in 0..8 {
@@ -236,14 +247,14 @@ fn a_robot_that_is_doubted_is_given_up_after_10_s_or_believed_again_when_an_oper
         odometry.believed([5, 5], now);
         odometry.commanded([TURN, TURN], now);
     }
-    assert_eq!(odometry.belief(at(1.0)), Belief::Doubted);
+    assert_eq!(odometry.belief(at(1.0)), Plausibility::Suspected);
     for tick in 8..80 {
         odometry.believed([5, 5], at(f64::from(tick) * PERIOD));
     }
-    assert_eq!(odometry.belief(at(10.8)), Belief::Doubted);
-    assert_eq!(odometry.belief(at(11.0)), Belief::GivenUp);
-    odometry.forget();
-    assert_eq!(odometry.belief(at(11.0)), Belief::Believed);
+    assert_eq!(odometry.belief(at(10.8)), Plausibility::Suspected);
+    assert_eq!(odometry.belief(at(11.0)), Plausibility::GivenUp);
+    odometry.reset();
+    assert_eq!(odometry.belief(at(11.0)), Plausibility::Plausible);
 }
 
 #[test]
@@ -253,22 +264,26 @@ fn three_jumps_within_two_seconds_are_doubted_until_two_seconds_without_twice_at
     for round in 0..3 {
         let start = 10.0 * f64::from(round);
         for jump in 0..3 {
-            assert_eq!(odometry.doubt(), None);
-            odometry.disbelieved(at(start + 0.143 * f64::from(jump)));
+            assert_eq!(odometry.suspicion(), None);
+            odometry.implausible(at(start + 0.143 * f64::from(jump)));
         }
-        assert_eq!(odometry.doubt(), Some(Doubt::Jumps));
+        assert_eq!(odometry.suspicion(), Some(Suspicion::Jumps));
         odometry.believed([5, 5], at(start + 2.2));
-        assert_eq!(odometry.doubt(), Some(Doubt::Jumps));
+        assert_eq!(odometry.suspicion(), Some(Suspicion::Jumps));
         odometry.believed([5, 5], at(start + 2.3));
     }
-    assert_eq!(odometry.doubt(), Some(Doubt::Jumps), "the third time");
+    assert_eq!(
+        odometry.suspicion(),
+        Some(Suspicion::Jumps),
+        "the third time"
+    );
 }
 
 #[test]
 fn an_old_frame_now_and_then_is_no_doubt() {
     let mut odometry = odometry();
     for frame in 0..20 {
-        odometry.disbelieved(MissionTime::from_seconds(2.0 * f64::from(frame)));
-        assert_eq!(odometry.doubt(), None);
+        odometry.implausible(MissionTime::from_seconds(2.0 * f64::from(frame)));
+        assert_eq!(odometry.suspicion(), None);
     }
 }

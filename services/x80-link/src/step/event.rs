@@ -10,13 +10,13 @@ use common::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{failsafe::Decision, obedience::Means, telemetry::BatteryChange};
+use crate::{failsafe::Decision, stop_monitor::StopMethod, telemetry::BatteryChange};
 
 /// How mission time passes, and where the ticks of this link begin. The run says the one, and the supervisor the other:
 /// it hears the ticks, so the link writes no checkpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// [`Pace::Max`] is a clock of ticks: the robot waits for each command. Any other is a wall clock, times a rate.
+    /// [`Pace::Max`] is lockstep: the robot waits for each command. Any other is a wall clock, times a rate.
     pub pace: Pace,
     /// The number of the tick to come.
     pub next_tick: u64,
@@ -52,7 +52,7 @@ pub enum Event<'a> {
     Command(&'a CommandSample),
     /// The supervisor's directive: what it orders, and why that is not drive.
     Order(Order, HoldReason),
-    /// The last tick that may begin, by the supervisor's word; on a clock of ticks.
+    /// The last tick that may begin, by the supervisor's word; in lockstep.
     TickLimit(u64),
     /// Nothing; time passed.
     Quiet,
@@ -98,7 +98,7 @@ pub enum Effect {
     /// The counts jumped farther than wheels turn, and now follow each other where they are.
     CountsElsewhere,
     /// The robot does not stand, and was told to by these means.
-    StopBy(Means),
+    StopBy(StopMethod),
     /// The robot was asked for its streams again.
     AskedForStreams,
     /// Publish what an infrared frame said.

@@ -10,8 +10,8 @@ use common::{
 use super::{Effect, Link, NewestDirective, STOP_AGAIN, passed};
 use crate::{
     failsafe::{self, Ages, Decision, Directive, Flags},
-    obedience::Means,
-    odometry::Belief,
+    odometry::Plausibility,
+    stop_monitor::StopMethod,
 };
 
 impl Link {
@@ -26,28 +26,28 @@ impl Link {
             connected: self.presence.connected(),
             command: self.newest_command.map(|command| self.ages(&command)),
             battery: self.telemetry.charge(),
-            senses: self.senses_say(now_ns),
+            health: self.health_flags(now_ns),
         };
         failsafe::decide(&flags, self.drive.limit())
     }
 
     /// What the failsafe decides by. A robot that does not answer says nothing.
-    fn senses_say(&self, now_ns: u64) -> failsafe::Senses {
+    fn health_flags(&self, now_ns: u64) -> failsafe::HealthFlags {
         if self.in_ticks() || !self.presence.connected() {
-            return failsafe::Senses::default();
+            return failsafe::HealthFlags::default();
         }
-        let said = self.senses.flags(self.now, now_ns, self.presence.silence());
+        let said = self.health.flags(self.now, now_ns, self.presence.silence());
         let odometry = match said.odometry {
             // Nobody waits for a robot that is not to drive.
-            Belief::GivenUp if !self.ordered_to_drive() => Belief::Doubted,
+            Plausibility::GivenUp if !self.ordered_to_drive() => Plausibility::Suspected,
             odometry => odometry,
         };
-        failsafe::Senses { odometry, ..said }
+        failsafe::HealthFlags { odometry, ..said }
     }
 
     pub(super) fn ages(&self, command: &CommandSample) -> Ages {
         let stamp = command.stamp.time();
-        // On a clock of ticks no time passes until the command has come.
+        // in lockstep no time passes until the command has come.
         let now = if self.in_ticks() { stamp } else { self.now };
         // A stamp from the future would never grow old.
         let age = |then: MissionTime| {
@@ -64,10 +64,10 @@ impl Link {
         }
     }
 
-    /// Stop the robot when it must not move. On a clock of ticks it waits for commands, and to let none pass
+    /// Stop the robot when it must not move. in lockstep it waits for commands, and to let none pass
     /// stops its time, too: a run that was held goes on as if it had not been.
     pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.senses.pass(now_ns);
+        self.health.pass(now_ns);
         let now = self.decide(now_ns);
         let before = std::mem::replace(&mut self.decision, now);
         if now.stops() {
@@ -83,11 +83,11 @@ impl Link {
 
     /// Tell the wheels these counts/s.
     pub(super) fn tell(&mut self, counts: [i16; 2], limit: Duration, effects: &mut Vec<Effect>) {
-        if self.senses.means() != Means::Velocity && counts != [0, 0] {
+        if self.health.stop_method() != StopMethod::Velocity && counts != [0, 0] {
             // It was made to stand by other means than those it drives by.
             effects.push(Effect::Send(self.drive.greeting()));
         }
-        self.senses.commanded(counts, self.now);
+        self.health.commanded(counts, self.now);
         effects.push(Effect::Send(self.drive.velocity(counts, limit)));
     }
 
@@ -95,21 +95,21 @@ impl Link {
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
             effects.extend(self.final_stops().into_iter().map(Effect::Send));
-        } else if self.senses.awaits_late_ones() && self.stop_sent_ns.is_some() {
+        } else if self.health.awaits_late_ones() && self.stop_sent_ns.is_some() {
             // Whatever is acknowledged now was sent long ago.
             return;
-        } else if let Some(means) = self.senses.next_means(self.now) {
-            effects.push(Effect::Send(self.drive.stop_by(means)));
-            effects.push(Effect::StopBy(means));
-        } else if self.decision.cause == Cause::RobotDisobeys {
+        } else if let Some(method) = self.health.next_stop_method(self.now) {
+            effects.push(Effect::Send(self.drive.stop_by(method)));
+            effects.push(Effect::StopBy(method));
+        } else if self.decision.cause == Cause::RobotDoesNotStop {
             // What was tried is given time.
             return;
         } else if self.presence.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
-            effects.push(Effect::Send(self.drive.stop_by(self.senses.means())));
+            effects.push(Effect::Send(self.drive.stop_by(self.health.stop_method())));
         } else {
             return;
         }
-        self.senses.commanded([0, 0], self.now);
+        self.health.commanded([0, 0], self.now);
         self.stop_sent_ns = Some(now_ns);
     }
 }

@@ -553,4 +553,4 @@ fn a_successor_numbers_its_ticks_after_its_predecessors() {
 }
 
 mod held;
-mod senses;
+mod robot_health;

@@ -9,7 +9,7 @@ impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.presence.wire(open);
         // Half a frame of one connection does not go on in the next.
-        self.decoder.forget();
+        self.decoder.reset();
         if !open {
             self.lose(now_ns, effects);
         }
@@ -27,7 +27,7 @@ impl Link {
                 Ok(Report::Custom(sensors)) => custom = Some(sensors),
                 Ok(Report::Motor(sensors)) => motor = Some(sensors),
                 Ok(Report::System(SystemSignal::Ping)) => ping = true,
-                Ok(Report::System(SystemSignal::Ack)) => self.senses.acknowledged(now_ns),
+                Ok(Report::System(SystemSignal::Ack)) => self.health.acknowledged(now_ns),
                 // A frame nobody here needs only says that the robot is there.
                 Err(_) => {}
             }
@@ -48,11 +48,11 @@ impl Link {
             }
         }
         if let (Some(_), Some(byte)) = (standard, self.sonar) {
-            self.senses.range(byte, now_ns);
+            self.health.range(byte, now_ns);
         }
         self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
         if heard && self.presence.heard(now_ns) {
-            self.senses.found(now_ns, self.presence.losses() > 0);
+            self.health.found(now_ns, self.presence.losses() > 0);
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
             // It may be driving still by a command of an earlier link.
@@ -77,7 +77,7 @@ impl Link {
         }
     }
 
-    /// What the counts are. On a clock of ticks the robot is a simulated one that runs as long as its mission, and no
+    /// What the counts are. in lockstep the robot is a simulated one that runs as long as its mission, and no
     /// time passes by which to judge.
     pub(super) fn judge_counts(&mut self, sensors: &MotorSensors, now_ns: u64) -> Counts {
         if self.in_ticks() {
@@ -86,7 +86,7 @@ impl Link {
         let wheels = self.drive.wheels(sensors);
         let counts = [wheels.left_counts, wheels.right_counts];
         let was_away = !self.presence.connected();
-        self.senses.motor(counts, was_away, self.now, now_ns)
+        self.health.motor(counts, was_away, self.now, now_ns)
     }
 
     /// What the frames carry besides the tick.
@@ -130,7 +130,7 @@ impl Link {
         }
         if !self.in_ticks()
             && self.presence.connected()
-            && self.senses.wants_streams(now_ns, self.presence.silence())
+            && self.health.wants_streams(now_ns, self.presence.silence())
         {
             effects.push(Effect::Send(self.drive.streams()));
             effects.push(Effect::AskedForStreams);
@@ -149,7 +149,7 @@ impl Link {
         if !self.presence.lose(now_ns) {
             return;
         }
-        self.senses.lost();
+        self.health.lost();
         effects.push(Effect::Connected(false));
     }
 }

@@ -102,7 +102,7 @@ impl<D: Dial> Stream<D> {
     }
 
     /// Begin, finish or give up an opening; send what is left of a message.
-    pub(super) fn tend(&mut self, now_ns: u64) -> io::Result<()> {
+    pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         if matches!(self.state, State::Closed) {
             if !self.backoff.is_due(now_ns) {
                 return Ok(());

@@ -30,7 +30,7 @@ fn ready(descriptor: impl AsFd) {
 
 /// Tend at `now_ns` until the wire says that it is open, or is not.
 fn tend_until(transport: &mut Transport, open: bool, now_ns: u64) {
-    while transport.tend(now_ns).unwrap() != Some(open) {
+    while transport.maintain(now_ns).unwrap() != Some(open) {
         ready(&*transport);
     }
 }
@@ -53,7 +53,7 @@ fn expect_closing(transport: &mut Transport, now_ns: u64) {
         ready(&*transport);
         assert_eq!(transport.receive(now_ns).unwrap(), None);
     }
-    assert_eq!(transport.tend(now_ns).unwrap(), Some(false));
+    assert_eq!(transport.maintain(now_ns).unwrap(), Some(false));
 }
 
 #[test]
@@ -119,12 +119,12 @@ fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
     let (listener, address) = listener();
     drop(listener);
     let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
-    assert_eq!(transport.tend(0).unwrap(), Some(false));
+    assert_eq!(transport.maintain(0).unwrap(), Some(false));
     let (mut now, mut pauses) = (0, Vec::new());
     for _ in 0..7 {
         // Refused at once or in a moment; either way nothing is open.
         while transport.attempts(now).unwrap().next_ns == 0 {
-            assert_eq!(transport.tend(now).unwrap(), None);
+            assert_eq!(transport.maintain(now).unwrap(), None);
         }
         let wait = transport.attempts(now).unwrap().next_ns;
         pauses.push(wait / MS);
@@ -141,8 +141,8 @@ fn a_connection_without_a_word_is_taken_for_dead() {
     let (listener, address) = listener();
     let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
     let _robot = connected(&listener, &mut transport, 0);
-    assert_eq!(transport.tend(4999 * MS).unwrap(), None);
-    assert_eq!(transport.tend(5000 * MS).unwrap(), Some(false));
+    assert_eq!(transport.maintain(4999 * MS).unwrap(), None);
+    assert_eq!(transport.maintain(5000 * MS).unwrap(), Some(false));
     connected(&listener, &mut transport, 5000 * MS);
 }
 
@@ -166,7 +166,7 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
             while decoder.next_frame().is_some() {
                 frames += 1;
             }
-            transport.tend(0).unwrap();
+            transport.maintain(0).unwrap();
         }
         transport.send(&message).unwrap();
         sent += 1;
@@ -266,11 +266,11 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     line.robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     expect_closing(&mut transport, 0);
     for now in [0, 100 * MS, 300 * MS] {
-        assert_eq!(transport.tend(now).unwrap(), None, "it is not there");
+        assert_eq!(transport.maintain(now).unwrap(), None, "it is not there");
     }
     assert_eq!(transport.attempts(300 * MS).unwrap().next_ns, 400 * MS);
     line.robot = plug_in(&line.name);
-    assert_eq!(transport.tend(699 * MS).unwrap(), None);
+    assert_eq!(transport.maintain(699 * MS).unwrap(), None);
     tend_until(&mut transport, true, 700 * MS);
     transport.send(b"stand").unwrap();
     assert_eq!(read_from(&line.robot, 5), b"stand");
@@ -282,7 +282,7 @@ fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     let mut first = Transport::open(&Address::Serial(line.name.clone())).unwrap();
     tend_until(&mut first, true, 0);
     let mut second = Transport::open(&Address::Serial(line.name.clone())).unwrap();
-    assert_eq!(second.tend(0).unwrap(), Some(false));
+    assert_eq!(second.maintain(0).unwrap(), Some(false));
     // Somebody else has the line open all the time, as a simulated robot has.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
     drop(first);
@@ -303,7 +303,7 @@ fn a_line_that_takes_no_more_loses_whole_frames_only() {
 #[test]
 fn a_file_that_is_no_serial_line_is_never_written_to() {
     let mut transport = Transport::open(&Address::Serial("/dev/null".into())).unwrap();
-    assert_eq!(transport.tend(0).unwrap(), Some(false));
+    assert_eq!(transport.maintain(0).unwrap(), Some(false));
     transport.send(b"ping").unwrap();
     assert_eq!(transport.tally().unsent, 1);
 }

@@ -2,7 +2,7 @@
 
 use std::{io, process::ExitCode};
 
-use yardsticks::{shell::Shell, wavefront::Wavefront};
+use baselines::{shell::Shell, wavefront::Wavefront};
 
 fn main() -> ExitCode {
     let log = tracing_subscriber::fmt().with_ansi(false);

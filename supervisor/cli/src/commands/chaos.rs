@@ -215,16 +215,16 @@ fn robot_faults(
     };
     let directory = options.base.directory.clone();
     let of = options.faults.len() as u64 * u64::from(options.missions);
-    let ended = chaos::run_robot_faults(&options, &mut |ledger| {
-        write_stderr(&format!("{} of {of} missions\n", ledger.entries.len()));
+    let ended = chaos::run_robot_faults(&options, &mut |table| {
+        write_stderr(&format!("{} of {of} missions\n", table.entries.len()));
     });
-    let ledger = match ended {
-        Ok(ledger) => ledger,
+    let table = match ended {
+        Ok(table) => table,
         Err(error) => {
             return Err(format!("{error}; see {}", directory.display()).into());
         }
     };
-    if ledger.is_kept() {
+    if table.is_kept() {
         std::fs::remove_dir_all(&directory)?;
     } else {
         let directory = directory.display();
@@ -233,9 +233,9 @@ fn robot_faults(
         ));
     }
     if arguments.json {
-        print_text(&format!("{}\n", serde_json::to_string(&ledger)?))?;
+        print_text(&format!("{}\n", serde_json::to_string(&table)?))?;
     } else {
-        print_text(&ledger.to_string())?;
+        print_text(&table.to_string())?;
     }
-    Ok(ExitCode::from(if ledger.is_kept() { 0 } else { NOT_CLEAN }))
+    Ok(ExitCode::from(if table.is_kept() { 0 } else { NOT_CLEAN }))
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use common::domain::RobotName;
-use console::runs::{self, CUT_OFF, Kept};
+use console::runs::{self, CUT_OFF, RunDirectory};
 
 use super::Failure;
 use crate::progress_line::write_stderr;
@@ -65,10 +65,10 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
 /// removed stays: no mission is given up for it.
 pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     let mut ended = runs_of(robot, runs);
-    ended.retain(Kept::has_ended);
+    ended.retain(RunDirectory::has_ended);
     ended.sort();
     let surplus = ended.len().saturating_sub(keep);
-    for Kept { directory, .. } in &ended[..surplus] {
+    for RunDirectory { directory, .. } in &ended[..surplus] {
         if let Err(error) = fs::remove_dir_all(directory) {
             let directory = directory.display();
             write_stderr(&format!("firsthand: cannot remove {directory}: {error}\n"));
@@ -77,8 +77,8 @@ pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
 }
 
 /// The runs of `robot` in directories below `runs`.
-fn runs_of(robot: &RobotName, runs: &Path) -> Vec<Kept> {
-    let mut kept = runs::kept(runs);
+fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
+    let mut kept = runs::list(runs);
     kept.retain(|run| run.robot == *robot);
     kept
 }

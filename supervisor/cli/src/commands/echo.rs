@@ -6,7 +6,7 @@ use clap::Args;
 use common::{
     bus::ReadableTopic,
     domain::{Domain, RobotName},
-    follower::{Follower, News},
+    follower::{Event, Follower},
     topics::{self, AnyTopic},
 };
 use console::sample_text;
@@ -47,10 +47,10 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut left = arguments.number.unwrap_or(u64::MAX);
     while left > 0 && !stream.has_ended() {
         match follower.wait(LOOK_EVERY)? {
-            News::Here => waiting.is_here(),
-            News::Gone => waiting.is_gone(&arguments.robot),
-            News::Nothing => waiting.nothing(&arguments.robot),
-            News::Samples(samples) => {
+            Event::Connected => waiting.on_connected(),
+            Event::Disconnected => waiting.on_disconnected(&arguments.robot),
+            Event::Nothing => waiting.nothing(&arguments.robot),
+            Event::Samples(samples) => {
                 while left > 0
                     && !stream.has_ended()
                     && let Some(sample) = samples.take()?
@@ -94,12 +94,12 @@ pub(super) struct Waiting {
 
 impl Waiting {
     /// The robot is there.
-    pub(super) const fn is_here(&mut self) {
+    pub(super) const fn on_connected(&mut self) {
         (self.here, self.said) = (true, false);
     }
 
     /// Its run has ended.
-    pub(super) fn is_gone(&mut self, robot: &RobotName) {
+    pub(super) fn on_disconnected(&mut self, robot: &RobotName) {
         self.here = false;
         self.say(robot, "has ended its run");
     }

@@ -55,7 +55,7 @@ pub(crate) struct Arguments {
     /// evidential or paper; several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     method: Vec<String>,
-    /// harmonic; the yardsticks wavefront (shortest paths) and bug (Bug2); any executable of a planner. Several, with
+    /// harmonic; the baselines wavefront (shortest paths) and bug (Bug2); any executable of a planner. Several, with
     /// commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,
@@ -251,8 +251,8 @@ fn executable(planner: &str) -> Result<Option<String>, Failure> {
     if planner == HARMONIC {
         return Ok(None);
     }
-    let yardstick = YARDSTICKS.iter().find(|(name, _)| *name == planner);
-    let named = yardstick.map_or(planner, |(_, executable)| executable);
+    let baseline = YARDSTICKS.iter().find(|(name, _)| *name == planner);
+    let named = baseline.map_or(planner, |(_, executable)| executable);
     // Told before anything starts, rather than by each mission.
     planner_executable::find(Path::new(named))?;
     let value = toml::Value::from(named);

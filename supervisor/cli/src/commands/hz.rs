@@ -9,7 +9,7 @@ use clap::Args;
 use common::{
     bus::{AnyReader, Bus, BusError, ReadableTopic},
     domain::{Domain, RobotName},
-    follower::{Follower, News},
+    follower::{Event, Follower},
     topics::{self, AnyTopic},
 };
 use console::rates::{self, TopicRates};
@@ -103,16 +103,16 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut due = None;
     while left > 0 && !stream.has_ended() {
         match follower.wait(LOOK_EVERY)? {
-            News::Here => {
-                waiting.is_here();
+            Event::Connected => {
+                waiting.on_connected();
                 due = Some(Instant::now() + REPORT_EVERY);
             }
-            News::Gone => {
-                waiting.is_gone(&arguments.robot);
+            Event::Disconnected => {
+                waiting.on_disconnected(&arguments.robot);
                 due = None;
             }
-            News::Nothing => waiting.nothing(&arguments.robot),
-            News::Samples(readers) => readers.take()?,
+            Event::Nothing => waiting.nothing(&arguments.robot),
+            Event::Samples(readers) => readers.take()?,
         }
         if due.is_some_and(|due| Instant::now() >= due)
             && let Some(readers) = follower.topics()

@@ -58,7 +58,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn newest(arguments: &Arguments) -> Option<PathBuf> {
     let robot = &arguments.robot;
     Robot::find(robot.clone()).run.or_else(|| {
-        let kept = runs::kept(&arguments.runs).into_iter();
+        let kept = runs::list(&arguments.runs).into_iter();
         let newest = kept.filter(|run| run.robot == *robot).max();
         newest.map(|run| run.directory)
     })
@@ -98,13 +98,13 @@ fn follow(arguments: &Arguments, stream: &mut Stream) -> Result<(), Failure> {
         }
         match goes_on {
             Some(directory) if followed.as_ref().is_none_or(|(last, _)| *last != directory) => {
-                waiting.is_here();
+                waiting.on_connected();
                 let logs = Logs::of(&directory, arguments.stage.as_deref());
                 followed = Some((directory, logs));
             }
             Some(_) => thread::sleep(LOOK_EVERY),
             None => {
-                waiting.is_gone(&arguments.robot);
+                waiting.on_disconnected(&arguments.robot);
                 thread::sleep(LOOK_EVERY);
             }
         }

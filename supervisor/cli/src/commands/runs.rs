@@ -10,7 +10,7 @@ use std::{
 use clap::Args;
 use common::domain::RobotName;
 use console::{
-    runs::{self, Kept, Outcome},
+    runs::{self, Outcome, RunDirectory},
     words,
 };
 use serde::Serialize;
@@ -76,8 +76,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn kept(arguments: &Arguments) -> Vec<Kept> {
-    let mut kept = runs::kept(&arguments.runs);
+fn kept(arguments: &Arguments) -> Vec<RunDirectory> {
+    let mut kept = runs::list(&arguments.runs);
     if let Some(robot) = &arguments.robot {
         kept.retain(|run| run.robot == *robot);
     }
@@ -89,7 +89,7 @@ fn robots(arguments: &Arguments) -> BTreeSet<RobotName> {
     kept(arguments).into_iter().map(|run| run.robot).collect()
 }
 
-fn listed(run: &Kept) -> Listed<'_> {
+fn listed(run: &RunDirectory) -> Listed<'_> {
     let (outcome, mission_time_s) = match run.outcome() {
         Outcome::Running => ("running".to_owned(), None),
         Outcome::CutOff => ("cut off".to_owned(), None),

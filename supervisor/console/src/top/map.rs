@@ -23,7 +23,7 @@ pub(super) const WAY: char = '·';
 const FIELD_EVERY: (usize, usize) = (4, 2);
 
 /// Nothing was sensed there, and the sonar looked.
-const SWEPT: Color = Color::Indexed(236);
+const SCANNED: Color = Color::Indexed(236);
 pub(super) const FIELD_STYLE: Style = Style::new().fg(Color::Indexed(67));
 pub(super) const WAY_STYLE: Style = Style::new().fg(Color::Magenta);
 pub(super) const TARGET_STYLE: Style = Style::new().fg(Color::Green).add_modifier(Modifier::BOLD);
@@ -167,7 +167,7 @@ fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) 
     };
     let (above, below) = (square(2 * line), square(2 * line + 1));
     let ground = |square| match square {
-        Square::Swept => SWEPT,
+        Square::Swept => SCANNED,
         _ => Color::Reset,
     };
     match (above.hazard(), below.hazard()) {

@@ -85,7 +85,7 @@ fn message_height(message: &str, width: u16) -> u16 {
 fn heading(view: &View) -> Line<'static> {
     let robot = format!("robot {}", view.robot);
     let Some(supervisor) = view.supervisor else {
-        let state = if view.here {
+        let state = if view.connected {
             " is here"
         } else {
             " is not running here; waiting for it"
@@ -97,7 +97,7 @@ fn heading(view: &View) -> Line<'static> {
     } else {
         ": "
     };
-    let state = if view.here {
+    let state = if view.connected {
         let order = words::order(
             Order::from_byte(supervisor.order),
             HoldReason::from_byte(supervisor.reason),
@@ -132,7 +132,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         .collect();
     if let Some(supervisor) = view.supervisor {
         let pid = supervisor.supervisor_pid.to_string();
-        let state = if view.here { "running" } else { "ended" };
+        let state = if view.connected { "running" } else { "ended" };
         let usage = view.supervisor_usage;
         let blank = String::new;
         rows.push(Cells {
@@ -187,7 +187,7 @@ struct Cells {
 fn stage_row(view: &View, stage: &Stage) -> Cells {
     let entry = &stage.entry;
     let state = StageState::from_byte(entry.state);
-    let runs = view.here && entry.pid != 0;
+    let runs = view.connected && entry.pid != 0;
     Cells {
         texts: [
             name_str(&entry.stage).to_owned(),

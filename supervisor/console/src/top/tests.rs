@@ -27,7 +27,7 @@ const STAGES: [&str; 5] = [
 /// A robot in the middle of a mission: a wall to the east of it, the field to the north, where the target is.
 fn view() -> View {
     let mut view = View::of("robot-of-16-char".parse().unwrap());
-    view.on_here();
+    view.on_connected();
     let stamp = Stamp {
         tick: 8641,
         stamp_ns: 1_234_500_000_000,
@@ -279,6 +279,6 @@ fn a_screen_of_any_size_is_drawn_and_one_without_a_robot_says_so() {
         screen(&empty, width, height);
     }
     let mut gone = view();
-    gone.here = false;
+    gone.connected = false;
     assert!(screen(&gone, 80, 24)[0].contains("has ended its run; waiting for it"));
 }

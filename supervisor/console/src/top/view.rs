@@ -27,7 +27,7 @@ pub(super) struct View {
     /// The robot.
     pub(super) robot: RobotName,
     /// Whether it is there.
-    pub(super) here: bool,
+    pub(super) connected: bool,
     /// The supervisor; none before its first roster.
     pub(super) supervisor: Option<RosterHeader>,
     /// What its process uses.
@@ -77,7 +77,7 @@ impl View {
     pub(super) fn of(robot: RobotName) -> Self {
         Self {
             robot,
-            here: false,
+            connected: false,
             supervisor: None,
             supervisor_usage: Usage::default(),
             stages: Vec::new(),
@@ -97,10 +97,10 @@ impl View {
     }
 
     /// A run of the robot is there: nothing of the last one holds.
-    pub(super) fn on_here(&mut self) {
+    pub(super) fn on_connected(&mut self) {
         let chosen = self.chosen;
         *self = Self::of(self.robot.clone());
-        (self.here, self.chosen) = (true, chosen);
+        (self.connected, self.chosen) = (true, chosen);
     }
 
     /// The name of the chosen stage; none before the first roster.

@@ -58,7 +58,7 @@ fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
     let want = [
         (cause, RecoveryStep::Replan, 0),
         (cause, RecoveryStep::Replan, 0),
-        (cause, RecoveryStep::Forget, 1),
+        (cause, RecoveryStep::Reset, 1),
     ];
     assert_eq!(stalls, want);
 }
@@ -122,9 +122,9 @@ fn a_robot_cut_off_forgets_three_times_and_gives_up() {
     }
     let cause = StallCause::CutOff;
     let want = [
-        (cause, RecoveryStep::Forget, 1),
-        (cause, RecoveryStep::Forget, 2),
-        (cause, RecoveryStep::Forget, 3),
+        (cause, RecoveryStep::Reset, 1),
+        (cause, RecoveryStep::Reset, 2),
+        (cause, RecoveryStep::Reset, 3),
         (cause, RecoveryStep::GiveUp, 3),
     ];
     assert_eq!(stalls, want);
@@ -167,7 +167,7 @@ fn an_answer_from_before_the_reset_does_not_reset_again() {
     let old = guidance(GuidanceStatus::Unreachable, 0);
     watch.step(&pose(0.0, 0.0), &old, false);
     let reset = watch.step(&pose(1.0, 0.0), &old, false);
-    let want = (StallCause::CutOff, RecoveryStep::Forget, 1);
+    let want = (StallCause::CutOff, RecoveryStep::Reset, 1);
     assert_eq!(reset.map(|stall| parts(&stall)), Some(want));
     assert_eq!(watch.step(&pose(2.5, 0.1), &old, false), None);
 }
@@ -193,7 +193,7 @@ fn a_robot_that_moves_and_stays_where_it_is_gets_a_fresh_planner_twice_then_a_fr
     let want = [
         (cause, RecoveryStep::Replan, 0),
         (cause, RecoveryStep::Replan, 0),
-        (cause, RecoveryStep::Forget, 1),
+        (cause, RecoveryStep::Reset, 1),
     ];
     let stalls: Vec<_> = rock(&mut watch(), 0..60).iter().map(parts).collect();
     assert_eq!(stalls, want);
@@ -263,7 +263,7 @@ fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
         let stall = driving.find_map(|pose| watch.step(&pose, &way_out, false));
         stall.map(|stall| parts(&stall))
     };
-    let want = (StallCause::InsideHazard, RecoveryStep::Forget, 1);
+    let want = (StallCause::InsideHazard, RecoveryStep::Reset, 1);
     assert_eq!(drive(&mut watch(), 0..12), Some(want));
     let mut watch = watch();
     assert_eq!(drive(&mut watch, 0..8), None);

@@ -201,7 +201,7 @@ fn an_echo_beyond_reach_is_not_mapped() {
 }
 
 #[test]
-fn swept_ground_grows_stale_as_the_wheels_roll() {
+fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
     hear(&mut mapper, 0, 0.0, 0.0, None);
     assert_eq!(state(&mapper, 0.9, 0.0), CellState::Swept);
@@ -280,6 +280,6 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     }
     assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
     // A reset forgets them: a wrong pose may be why.
-    mapper.forget(1);
+    mapper.reset(1);
     assert!(beams(&mapper).is_empty());
 }

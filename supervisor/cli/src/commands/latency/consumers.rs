@@ -2,7 +2,7 @@
 
 use common::{
     domain::{Domain, RobotName},
-    follower::{Follower, News},
+    follower::{Event, Follower},
     signals::{SIGTERM, Signals},
     start::become_child,
     topics,
@@ -34,7 +34,7 @@ pub(super) fn run(robot: &RobotName, supervisor: u32) -> Result<(), Failure> {
         ))
     });
     while !terminated.came() {
-        if let News::Samples((grids, fields)) = follower.wait(LOOK_EVERY)? {
+        if let Event::Samples((grids, fields)) = follower.wait(LOOK_EVERY)? {
             while grids.take()?.is_some() {}
             while fields.take()?.is_some() {}
         }

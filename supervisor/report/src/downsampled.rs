@@ -15,13 +15,13 @@ pub(crate) fn drop_every_second<T>(items: &mut Vec<T>) {
 /// Samples in the order in which they came. When there are too many, every second one is dropped, and from then on every
 /// second one is taken.
 #[derive(Clone, Debug)]
-pub(crate) struct Kept<T> {
+pub(crate) struct Downsampled<T> {
     items: Vec<T>,
     seen: usize,
     stride: usize,
 }
 
-impl<T> Default for Kept<T> {
+impl<T> Default for Downsampled<T> {
     fn default() -> Self {
         Self {
             items: Vec::new(),
@@ -31,7 +31,7 @@ impl<T> Default for Kept<T> {
     }
 }
 
-impl<T> Kept<T> {
+impl<T> Downsampled<T> {
     /// One came.
     pub(crate) fn push(&mut self, item: T) {
         if self.items.len() == MOST {
@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn of_very_many_samples_a_bounded_number_is_kept_at_equal_steps() {
-        let mut kept = Kept::default();
+        let mut kept = Downsampled::default();
         (0..1_000_000).for_each(|nth| kept.push(nth));
         assert!((MOST / 2..=MOST).contains(&kept.items().len()));
         let step = kept.stride();

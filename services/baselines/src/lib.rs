@@ -1,4 +1,4 @@
-//! Yardsticks: planner stages to compare the harmonic planner with, on the same map, with the same sonar and controller.
+//! Baselines: planner stages to compare the harmonic planner with, on the same map, with the same sonar and controller.
 //!
 //! | module | holds |
 //! |---|---|

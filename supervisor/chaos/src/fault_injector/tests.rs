@@ -57,12 +57,12 @@ fn reports(passed: &[Late]) -> Vec<Report> {
 }
 
 /// What the host gets of a tick with `counts`, of a robot that stood at (100, 200) when it began to lie.
-fn lied(fault: RobotFault, counts: [u16; 2]) -> (Liar, Vec<Late>) {
-    let mut liar = Liar::new(fault, 1);
-    liar.report(&tick([100, 200]), at(1.0));
-    liar.begin();
-    let passed = liar.report(&tick(counts), at(1.1));
-    (liar, passed)
+fn faulted(fault: RobotFault, counts: [u16; 2]) -> (FaultInjector, Vec<Late>) {
+    let mut injector = FaultInjector::new(fault, 1);
+    injector.report(&tick([100, 200]), at(1.0));
+    injector.begin();
+    let passed = injector.report(&tick(counts), at(1.1));
+    (injector, passed)
 }
 
 fn counts(passed: &[Late]) -> Option<[u16; 2]> {
@@ -83,17 +83,17 @@ fn sonar(passed: &[Late]) -> Option<u8> {
 #[test]
 fn a_robot_tells_the_truth_until_it_lies_and_every_lie_is_a_sound_frame() {
     for row in TABLE {
-        let mut liar = Liar::new(row.fault, 1);
-        let honest = liar.report(&tick([100, 200]), at(1.0));
+        let mut injector = FaultInjector::new(row.fault, 1);
+        let honest = injector.report(&tick([100, 200]), at(1.0));
         assert_eq!(honest.len(), 1, "{}", row.name);
         assert_eq!(
             (honest[0].at, &honest[0].bytes),
             (at(1.0), &tick([100, 200]))
         );
-        liar.begin();
+        injector.begin();
         for number in 0..50 {
             let now = at(1.1 + 0.1 * f64::from(number));
-            let passed = liar.report(&tick([110, 210]), now);
+            let passed = injector.report(&tick([110, 210]), now);
             // Panics where one is broken.
             let reports = reports(&passed);
             let acknowledged = reports.contains(&Report::System(SystemSignal::Ack));
@@ -110,7 +110,7 @@ fn a_robot_tells_the_truth_until_it_lies_and_every_lie_is_a_sound_frame() {
 #[test]
 fn the_encoders_lie_as_the_table_says() {
     use RobotFault as F;
-    let told = |fault| counts(&lied(fault, [150, 190]).1);
+    let told = |fault| counts(&faulted(fault, [150, 190]).1);
     assert_eq!(told(F::MotorOnes), Some([0x7fff; 2]));
     assert_eq!(told(F::MotorZeros), Some([0, 0]));
     assert_eq!(told(F::MotorRepeated), Some([100, 200]));
@@ -128,14 +128,14 @@ fn the_encoders_lie_as_the_table_says() {
         reversed == Some([50, 190]) || reversed == Some([150, 210]),
         "{reversed:?}"
     );
-    let (mut liar, first) = lied(F::CountsRandom, [150, 190]);
-    let second = liar.report(&tick([150, 190]), at(1.2));
+    let (mut injector, first) = faulted(F::CountsRandom, [150, 190]);
+    let second = injector.report(&tick([150, 190]), at(1.2));
     assert_ne!(counts(&first), counts(&second));
 }
 
 #[test]
 fn the_sonar_lies_as_the_table_says() {
-    let told = |fault| sonar(&lied(fault, [150, 190]).1);
+    let told = |fault| sonar(&faulted(fault, [150, 190]).1);
     assert_eq!(told(RobotFault::SonarZero), Some(0));
     assert_eq!(told(RobotFault::SonarMissing), None);
     assert_eq!(told(RobotFault::SonarStuck), Some(STUCK_CM));
@@ -144,25 +144,25 @@ fn the_sonar_lies_as_the_table_says() {
 
 #[test]
 fn frames_are_late_old_or_rare_as_the_table_says() {
-    let (_, late) = lied(RobotFault::FramesLate, [150, 190]);
+    let (_, late) = faulted(RobotFault::FramesLate, [150, 190]);
     assert_eq!(late[0].at, at(1.1) + LATE);
 
-    let mut liar = Liar::new(RobotFault::OldFrames, 1);
+    let mut injector = FaultInjector::new(RobotFault::OldFrames, 1);
     for number in 0..40 {
-        liar.report(&tick([number, 200]), at(0.1 * f64::from(number)));
+        injector.report(&tick([number, 200]), at(0.1 * f64::from(number)));
     }
-    liar.begin();
-    let passed = liar.report(&tick([40, 200]), at(4.0));
+    injector.begin();
+    let passed = injector.report(&tick([40, 200]), at(4.0));
     assert_eq!(passed.len(), 2);
     assert_eq!(counts(&passed[..1]), Some([40, 200]));
     assert_eq!(counts(&passed[1..]), Some([10, 200]), "3 s old");
-    let next = liar.report(&tick([41, 200]), at(4.1));
+    let next = injector.report(&tick([41, 200]), at(4.1));
     assert_eq!(next.len(), 1, "the next in 2 s");
 
-    let mut liar = Liar::new(RobotFault::FramesSlow, 1);
-    liar.begin();
+    let mut injector = FaultInjector::new(RobotFault::FramesSlow, 1);
+    injector.begin();
     let came = (0..30).filter(|&number| {
-        let passed = liar.report(&tick([number, 200]), at(0.1 * f64::from(number)));
+        let passed = injector.report(&tick([number, 200]), at(0.1 * f64::from(number)));
         counts(&passed).is_some()
     });
     assert!((7..=9).contains(&came.count()), "3 s");
@@ -182,14 +182,15 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
         channel: None,
     });
     let mut moved = 0;
-    let mut liar = Liar::new(RobotFault::DoesNotStop, 1);
-    let mut heard = |liar: &mut Liar, bytes: &[u8]| liar.order(bytes, &mut || moved += 1);
-    assert_eq!(heard(&mut liar, &go), go);
-    assert_eq!(heard(&mut liar, &stop), stop, "it obeys before it lies");
-    liar.begin();
-    assert_eq!(heard(&mut liar, &stop), go);
-    assert_eq!(heard(&mut liar, &suspend), suspend);
-    assert_eq!(heard(&mut liar, &stop), stop);
+    let mut injector = FaultInjector::new(RobotFault::DoesNotStop, 1);
+    let mut heard =
+        |injector: &mut FaultInjector, bytes: &[u8]| injector.order(bytes, &mut || moved += 1);
+    assert_eq!(heard(&mut injector, &go), go);
+    assert_eq!(heard(&mut injector, &stop), stop, "it obeys before it lies");
+    injector.begin();
+    assert_eq!(heard(&mut injector, &stop), go);
+    assert_eq!(heard(&mut injector, &suspend), suspend);
+    assert_eq!(heard(&mut injector, &stop), stop);
     assert_eq!(
         moved, 1,
         "what the host ordered, not what the robot was told"

@@ -1,4 +1,4 @@
-//! The stop ledger: how long a robot moved after it began to lie.
+//! The stop-time table: how long a robot moved after it began to lie.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -44,12 +44,12 @@ impl Entry {
 
 /// All missions.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Ledger {
+pub struct StopTimeTable {
     /// In the order they were run.
     pub entries: Vec<Entry>,
 }
 
-impl Ledger {
+impl StopTimeTable {
     /// Whether every promise was kept.
     #[must_use]
     pub fn is_kept(&self) -> bool {
@@ -57,7 +57,7 @@ impl Ledger {
     }
 }
 
-impl fmt::Display for Ledger {
+impl fmt::Display for StopTimeTable {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             to,
@@ -162,7 +162,7 @@ mod tests {
         for (entry, kept) in rows {
             assert_eq!(entry.is_kept(), kept, "{entry:?}");
             assert_eq!(
-                Ledger {
+                StopTimeTable {
                     entries: vec![entry]
                 }
                 .is_kept(),
@@ -172,15 +172,15 @@ mod tests {
     }
 
     #[test]
-    fn the_ledger_shows_the_longest_time_of_each_kind_and_who_still_moved() {
+    fn the_table_shows_the_longest_time_of_each_kind_and_who_still_moved() {
         let moved = Entry {
             last_moving_s: Some(9.9),
             ..entry(RobotFault::Silence)
         };
-        let ledger = Ledger {
+        let table = StopTimeTable {
             entries: vec![entry(RobotFault::Silence), moved],
         };
-        let text = ledger.to_string();
+        let text = table.to_string();
         let row = text.lines().nth(1).unwrap_or_default();
         let words: Vec<_> = row.split_whitespace().collect();
         let want = "silence > 9.90 s 0.90 s 0 1 of 2 goes on: robot lost";

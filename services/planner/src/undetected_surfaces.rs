@@ -1,4 +1,4 @@
-//! Faces that could stand in the way unheard.
+//! Faces that could stand in the way undetected.
 //!
 //! A smooth face answers from the foot of the sonar's perpendicular on it, and only a sonar whose axis is near its normal
 //! (Kuc and Siegel 1987: what is hit at a slant throws the sound away). So that a beam ahead was silent says nothing of
@@ -40,7 +40,7 @@ const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
 /// The readings, and the body they are asked for.
 #[derive(Clone, Debug)]
-pub(crate) struct UnheardFaces {
+pub(crate) struct UndetectedSurfaces {
     beams: Vec<Beam>,
     rays: Vec<Beam>,
     reach: f64,
@@ -58,7 +58,7 @@ struct Beam {
     clear: f64,
 }
 
-impl UnheardFaces {
+impl UndetectedSurfaces {
     /// From the readings in `belief`, for a body of `radius` metres.
     pub(crate) fn new(belief: &GridHeader, radius: f64) -> Self {
         let beam = |beam: &ClearBeam| Beam {
@@ -156,12 +156,12 @@ mod tests {
     }
 
     /// Angles of the normals nothing speaks against, degrees, for a body at the origin on its way along x.
-    fn unheard(beams: &[ClearBeam]) -> Vec<i32> {
-        unheard_and_unseen(beams, &[])
+    fn undetected(beams: &[ClearBeam]) -> Vec<i32> {
+        undetected_by(beams, &[])
     }
 
-    fn unheard_and_unseen(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
-        let faces = UnheardFaces::new(&belief(beams, rays), BODY_M);
+    fn undetected_by(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
+        let faces = UndetectedSurfaces::new(&belief(beams, rays), BODY_M);
         let normals = faces.normals(DVec2::ZERO, DVec2::X);
         normals
             .map(|normal| normal.to_angle().to_degrees().round() as i32)
@@ -170,13 +170,13 @@ mod tests {
 
     #[test]
     fn a_silent_beam_speaks_only_against_faces_square_to_it() {
-        assert_eq!(unheard(&[]).len(), 11);
+        assert_eq!(undetected(&[]).len(), 11);
         assert_eq!(
-            unheard(&[beam(0.0, 0.0, 2.0)]),
+            undetected(&[beam(0.0, 0.0, 2.0)]),
             [-75, -60, -45, -30, 30, 45, 60, 75]
         );
         assert_eq!(
-            unheard(&[beam(0.0, 45.0, 2.0)]),
+            undetected(&[beam(0.0, 45.0, 2.0)]),
             [-75, -60, -45, -30, -15, 0, 15, 75]
         );
     }
@@ -186,20 +186,20 @@ mod tests {
         let scan: Vec<_> = (-4..=4)
             .map(|step| beam(-0.3, f64::from(step) * 16.0, 2.0))
             .collect();
-        assert_eq!(unheard(&scan), [0; 0]);
+        assert_eq!(undetected(&scan), [0; 0]);
     }
 
     #[test]
     fn a_beam_speaks_against_nothing_beyond_its_echo() {
         // At 0.5 m before the body, which reaches 0.21 m ahead.
-        assert!(!unheard(&[beam(-0.5, 0.0, 0.72)]).contains(&0));
-        assert!(unheard(&[beam(-0.5, 0.0, 0.70)]).contains(&0));
+        assert!(!undetected(&[beam(-0.5, 0.0, 0.72)]).contains(&0));
+        assert!(undetected(&[beam(-0.5, 0.0, 0.70)]).contains(&0));
     }
 
     #[test]
     fn a_face_is_not_supposed_to_reach_farther_than_a_metre_along_itself() {
-        assert!(!unheard(&[beam(-0.9, 75.0, 2.0)]).contains(&75));
-        assert!(unheard(&[beam(-1.1, 75.0, 2.0)]).contains(&75));
+        assert!(!undetected(&[beam(-0.9, 75.0, 2.0)]).contains(&75));
+        assert!(undetected(&[beam(-1.1, 75.0, 2.0)]).contains(&75));
     }
 
     /// The front four of the ring, free so far, on a robot `behind` the origin.
@@ -215,9 +215,9 @@ mod tests {
 
     #[test]
     fn infrared_rays_speak_against_faces_at_any_angle_as_far_as_they_are_free() {
-        assert_eq!(unheard_and_unseen(&[], &ring(0.25, 0.7)), [0; 0]);
+        assert_eq!(undetected_by(&[], &ring(0.25, 0.7)), [0; 0]);
         // Square ahead the ray at 11.25 degrees meets a face after 0.28 m.
-        let unseen = unheard_and_unseen(&[], &ring(0.25, 0.25));
+        let unseen = undetected_by(&[], &ring(0.25, 0.25));
         assert!(unseen.contains(&0), "{unseen:?}");
     }
 
@@ -228,14 +228,14 @@ mod tests {
             y_m: 0.5,
             ..beam(0.0, 0.0, 0.7)
         };
-        assert!(unheard_and_unseen(&[], &[ray]).contains(&0));
+        assert!(undetected_by(&[], &[ray]).contains(&0));
     }
 
     #[test]
     fn a_lost_ping_does_not_outweigh_the_echoes_beside_it() {
         let echo = beam(0.0, 0.0, 0.15);
         let silence = beam(0.0, 0.0, 2.0);
-        assert!(!unheard(&[echo, silence]).contains(&0));
-        assert!(unheard(&[echo, silence, echo]).contains(&0));
+        assert!(!undetected(&[echo, silence]).contains(&0));
+        assert!(undetected(&[echo, silence, echo]).contains(&0));
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct Late {
 
 /// A robot that tells the truth until it is told to lie.
 #[derive(Debug)]
-pub(crate) struct Liar {
+pub(crate) struct FaultInjector {
     fault: RobotFault,
     lies: bool,
     chance: Pcg64,
@@ -56,7 +56,7 @@ pub(crate) struct Liar {
     disabled: bool,
 }
 
-impl Liar {
+impl FaultInjector {
     /// One that will lie like that, seeded.
     pub(crate) fn new(fault: RobotFault, seed: u64) -> Self {
         let mut chance = Pcg64::new(u128::from(seed), 13);

@@ -30,7 +30,7 @@ enum State {
 
 /// How late one robot is. Times of the machine's clock, nanoseconds.
 #[derive(Clone, Debug)]
-pub struct Lateness {
+pub struct LatencyMonitor {
     command_limit: Duration,
     limit_ns: u64,
     window_ns: u64,
@@ -40,7 +40,7 @@ pub struct Lateness {
     state: State,
 }
 
-impl Lateness {
+impl LatencyMonitor {
     /// Of the robot of `mission`, which was not heard yet.
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
@@ -116,7 +116,7 @@ impl Lateness {
 
     /// Whether the robot must stand: it is late, or may be.
     #[must_use]
-    pub const fn doubted(&self) -> bool {
+    pub const fn suspected(&self) -> bool {
         !matches!(self.state, State::Timely)
     }
 
@@ -135,45 +135,45 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     /// A robot that acknowledges what it gets every 70 ms after `delay_ms`, found at 0 and then left alone for `quiet_ms`.
-    fn found(delay_ms: u64, quiet_ms: u64) -> Lateness {
+    fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
         let text = "target = [3, 0]";
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
-        let mut lateness = Lateness::new(&mission);
-        lateness.sent(10_000 * MS);
-        lateness.found(10_000 * MS);
+        let mut latency_monitor = LatencyMonitor::new(&mission);
+        latency_monitor.sent(10_000 * MS);
+        latency_monitor.found(10_000 * MS);
         let last_acknowledged = delay_ms.min(quiet_ms);
         for now in (0..=quiet_ms).step_by(70) {
             if now <= last_acknowledged {
-                lateness.acknowledged((10_000 + now) * MS);
+                latency_monitor.acknowledged((10_000 + now) * MS);
             }
-            lateness.pass((10_000 + now) * MS);
+            latency_monitor.pass((10_000 + now) * MS);
         }
-        lateness
+        latency_monitor
     }
 
     #[test]
     fn a_robot_whose_acknowledgements_come_in_time_may_go_after_the_window() {
-        assert!(found(20, 300).doubted(), "not known yet");
-        assert!(!found(20, 700).doubted());
-        assert!(!found(200, 700).doubted());
+        assert!(found(20, 300).suspected(), "not known yet");
+        assert!(!found(20, 700).suspected());
+        assert!(!found(200, 700).suspected());
     }
 
     #[test]
     fn a_robot_that_acknowledges_what_was_sent_long_ago_is_late() {
-        assert!(found(2000, 700).doubted());
+        assert!(found(2000, 700).suspected());
     }
 
     #[test]
     fn a_late_robot_is_asked_again_and_believed_when_nothing_late_comes() {
-        let mut lateness = found(2000, 700);
-        assert!(!lateness.asks());
-        lateness.pass(13_000 * MS);
-        assert!(lateness.asks());
-        lateness.acknowledged(13_400 * MS);
-        lateness.pass(13_700 * MS);
-        assert!(lateness.doubted());
-        lateness.pass(16_000 * MS);
-        lateness.pass(16_700 * MS);
-        assert!(!lateness.doubted());
+        let mut latency_monitor = found(2000, 700);
+        assert!(!latency_monitor.asks());
+        latency_monitor.pass(13_000 * MS);
+        assert!(latency_monitor.asks());
+        latency_monitor.acknowledged(13_400 * MS);
+        latency_monitor.pass(13_700 * MS);
+        assert!(latency_monitor.suspected());
+        latency_monitor.pass(16_000 * MS);
+        latency_monitor.pass(16_700 * MS);
+        assert!(!latency_monitor.suspected());
     }
 }

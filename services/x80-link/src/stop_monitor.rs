@@ -8,7 +8,7 @@ use common::{clock::MissionTime, mission::Mission, wire::counts_between};
 /// were lost.
 const COMES_TO_REST: Duration = Duration::from_millis(600);
 /// So much of motion after that is disobedience: longer than it takes from a stop sent again until it shows.
-pub(crate) const DISOBEYS_AFTER: Duration = Duration::from_millis(500);
+pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
 /// A wheel moves from this speed on, m/s at the rim.
 const MOVES_M_S: f64 = 0.03;
 /// A wheel is at rest below this speed, m/s, or this many counts between two frames: encoders tremble.
@@ -21,7 +21,7 @@ const OBEYS_AFTER: Duration = Duration::from_millis(500);
 
 /// A way to make the robot stand. Each is tried in turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Means {
+pub enum StopMethod {
     /// Velocity 0.
     #[default]
     Velocity,
@@ -33,7 +33,7 @@ pub enum Means {
     Suspend,
 }
 
-impl Means {
+impl StopMethod {
     /// The one to try after it.
     #[must_use]
     pub const fn next(self) -> Self {
@@ -57,20 +57,20 @@ impl Means {
     }
 }
 
-/// The obedience of one robot.
+/// The stop_monitor of one robot.
 #[derive(Clone, Debug)]
-pub struct Obedience {
+pub struct StopMonitor {
     counts_per_m: f64,
     longest_gap: Duration,
     told_to_stand: Option<MissionTime>,
     frame: Option<([u16; 2], MissionTime)>,
     moving: Duration,
     resting: Duration,
-    disobeys: bool,
-    means: Means,
+    does_not_stop: bool,
+    method: StopMethod,
 }
 
-impl Obedience {
+impl StopMonitor {
     /// Of the robot of `mission`, of which nothing is known.
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
@@ -81,8 +81,8 @@ impl Obedience {
             frame: None,
             moving: Duration::ZERO,
             resting: Duration::ZERO,
-            disobeys: false,
-            means: Means::Velocity,
+            does_not_stop: false,
+            method: StopMethod::Velocity,
         }
     }
 
@@ -97,7 +97,7 @@ impl Obedience {
         } else {
             self.told_to_stand = None;
             self.moving = Duration::ZERO;
-            self.means = Means::Velocity;
+            self.method = StopMethod::Velocity;
         }
     }
 
@@ -108,7 +108,7 @@ impl Obedience {
         };
         let gap = now.since(then);
         if gap > self.longest_gap {
-            self.unheard();
+            self.not_heard();
             return;
         }
         let farthest = [0, 1]
@@ -129,29 +129,29 @@ impl Obedience {
         } else if self.told_to_stand.is_some_and(due) {
             self.moving += gap;
         }
-        self.disobeys = if self.disobeys {
+        self.does_not_stop = if self.does_not_stop {
             self.resting < OBEYS_AFTER
         } else {
-            self.moving >= DISOBEYS_AFTER
+            self.moving >= DOES_NOT_STOP_AFTER
         };
     }
 
     /// It is unknown how the wheels turn.
-    pub const fn unheard(&mut self) {
+    pub const fn not_heard(&mut self) {
         self.moving = Duration::ZERO;
         self.resting = Duration::ZERO;
     }
 
     /// The counts began anew.
-    pub const fn forget_counts(&mut self) {
+    pub const fn reset_counts(&mut self) {
         self.frame = None;
-        self.unheard();
+        self.not_heard();
     }
 
     /// Whether it moves although it was told to stand.
     #[must_use]
-    pub const fn disobeys(&self) -> bool {
-        self.disobeys
+    pub const fn does_not_stop(&self) -> bool {
+        self.does_not_stop
     }
 
     /// Whether its encoders say that no wheel turns.
@@ -162,13 +162,13 @@ impl Obedience {
 
     /// How it is told to stand.
     #[must_use]
-    pub const fn means(&self) -> Means {
-        self.means
+    pub const fn method(&self) -> StopMethod {
+        self.method
     }
 
     /// That did not help.
     pub const fn try_next(&mut self) {
-        self.means = self.means.next();
+        self.method = self.method.next();
     }
 }
 

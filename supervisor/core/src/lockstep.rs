@@ -1,4 +1,4 @@
-//! On a clock of ticks: how far the link may go ahead of the supervisor, and the tick from which a recovery step holds.
+//! in lockstep: how far the link may go ahead of the supervisor, and the tick from which a recovery step holds.
 //! Pure.
 //!
 //! The link begins no tick later than the newest [`TickLimitSample`] says, which is [`LEAD`] ticks after the last one that
@@ -55,12 +55,12 @@ struct Step {
 
 /// How far the link may go.
 #[derive(Debug)]
-pub(crate) struct Lead {
+pub(crate) struct Lockstep {
     limit: TickLimitSample,
     step: Option<Step>,
 }
 
-impl Lead {
+impl Lockstep {
     /// No tick from `first_tick` on was looked at.
     pub(crate) fn new(first_tick: u64) -> Self {
         let limit = TickLimitSample {
@@ -89,7 +89,7 @@ impl Lead {
     /// Whether `epoch` of the newest stall is not to be published yet.
     pub(crate) fn withholds(&self, epoch: u64) -> bool {
         self.step.is_some_and(|step| {
-            let forgets = step.stall.recovery() == RecoveryStep::Forget;
+            let forgets = step.stall.recovery() == RecoveryStep::Reset;
             forgets && step.stall.epoch == epoch && step.begun.is_none()
         })
     }
@@ -126,7 +126,7 @@ fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool
         RecoveryStep::Replan => {
             now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + LEAD
         }
-        RecoveryStep::Forget => {
+        RecoveryStep::Reset => {
             let guided = commanded && now.epoch >= stall.epoch;
             now.grid_epoch >= stall.epoch && (guided || !now.grid_changed)
         }
@@ -180,37 +180,37 @@ mod tests {
             grid_changed: false,
             ..reset
         };
-        use RecoveryStep::{Forget, Replan};
+        use RecoveryStep::{Replan, Reset};
         #[rustfmt::skip]
         let rows = [
             (Replan, at_rest, false), (Replan, Published { planner: (2, 0), ..at_rest }, false), (Replan, replanned, true),
-            (Forget, at_rest, false), (Forget, reset, false), (Forget, steered, true), (Forget, unchanged, true),
+            (Reset, at_rest, false), (Reset, reset, false), (Reset, steered, true), (Reset, unchanged, true),
         ];
         for (recovery, published, answered) in rows {
-            let mut lead = Lead::new(0);
-            assert_eq!(lead.limit().last_tick, 4);
-            lead.stalled(stall(recovery));
-            assert_eq!(lead.limit().last_tick, 14);
-            assert_eq!(lead.withholds(1), recovery == Forget);
+            let mut lockstep = Lockstep::new(0);
+            assert_eq!(lockstep.limit().last_tick, 4);
+            lockstep.stalled(stall(recovery));
+            assert_eq!(lockstep.limit().last_tick, 14);
+            assert_eq!(lockstep.withholds(1), recovery == Reset);
             let early = Published {
                 tick: Some(13),
                 ..at_rest
             };
-            assert_eq!(lead.next(early, now), Next::Wait);
-            assert_eq!(lead.next(at_rest, now), Next::Begin(recovery));
-            assert!(!lead.withholds(1));
+            assert_eq!(lockstep.next(early, now), Next::Wait);
+            assert_eq!(lockstep.next(at_rest, now), Next::Begin(recovery));
+            assert!(!lockstep.withholds(1));
             let next = if answered { Next::Look } else { Next::Wait };
             assert_eq!(
-                lead.next(published, now),
+                lockstep.next(published, now),
                 next,
                 "{recovery:?} {published:?}"
             );
-            assert_eq!(lead.next(published, now + ANSWERED), Next::Look);
+            assert_eq!(lockstep.next(published, now + ANSWERED), Next::Look);
             let TickLimitSample {
                 holds_from_tick,
                 epoch,
                 ..
-            } = lead.limit();
+            } = lockstep.limit();
             assert_eq!((holds_from_tick, epoch), (15, 1));
         }
     }

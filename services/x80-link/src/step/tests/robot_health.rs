@@ -36,13 +36,13 @@ fn ack() -> Vec<u8> {
 fn a_robot_whose_counts_stay_while_it_is_told_to_drive_stands_in_time_and_its_mission_ends() {
     let mut link = driving(on_the_wall());
     let decisions = drive(&mut link, 0..90, |_| datagram(255, 0, 0));
-    let doubted = (Action::Stop, Cause::OdometryImplausible);
+    let suspected = (Action::Stop, Cause::OdometryImplausible);
     let given_up = (Action::End, Cause::OdometryGivenUp);
     let what: Vec<_> = decisions
         .iter()
         .map(|&(_, action, cause)| (action, cause))
         .collect();
-    assert_eq!(what[what.len() - 2..], [doubted, given_up]);
+    assert_eq!(what[what.len() - 2..], [suspected, given_up]);
     let [(stood, ..), (ended, ..)] = decisions[what.len() - 2..] else {
         panic!();
     };
@@ -97,7 +97,7 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_means_in_turn() {
         let mut effects = link.at(Event::Order(Order::Hold, HoldReason::Operator), now);
         effects.extend(link.at(Event::Datagram(&frames), now));
         effects.extend(link.at(Event::Quiet, now + 70 * MS));
-        if decided(&effects).contains(&(Action::Stop, Cause::RobotDisobeys)) {
+        if decided(&effects).contains(&(Action::Stop, Cause::RobotDoesNotStop)) {
             seen.get_or_insert(now / MS);
         }
         for command in sent(&effects) {

@@ -21,12 +21,12 @@ const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
 
 /// The names of one making's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Making {
+pub struct BusInstance {
     domain: Domain,
     name: String,
 }
 
-impl Making {
+impl BusInstance {
     /// A new one. Its name is random: nobody can make files of it before.
     #[must_use]
     pub fn new(domain: &Domain) -> Self {
@@ -112,17 +112,17 @@ mod tests {
 
     #[test]
     fn the_bus_that_is_there_is_the_one_made_last() {
-        let domain = Domain::of("making".parse().unwrap());
+        let domain = Domain::of("instance".parse().unwrap());
         fs::create_dir_all(domain.directory()).unwrap();
-        assert!(Making::current(&domain).is_err());
+        assert!(BusInstance::current(&domain).is_err());
         for _ in 0..2 {
-            let made = Making::new(&domain);
+            let made = BusInstance::new(&domain);
             made.make_current().unwrap();
-            assert_eq!(Making::current(&domain).unwrap(), made);
+            assert_eq!(BusInstance::current(&domain).unwrap(), made);
         }
         fs::remove_file(domain.middleware_config()).unwrap();
         symlink("../../etc/passwd", domain.middleware_config()).unwrap();
-        let foreign = Making::current(&domain).unwrap_err();
+        let foreign = BusInstance::current(&domain).unwrap_err();
         assert!(foreign.to_string().contains("passwd"), "{foreign}");
         fs::remove_dir_all(domain.directory()).unwrap();
     }

@@ -1,7 +1,7 @@
 //! What the robot's frames say of the robot, held against what it was told: is it believed, does it obey, does what is
 //! needed come.
 //!
-//! On a clock of ticks the robot is a simulated one, and no time passes by which to judge: it is believed.
+//! in lockstep the robot is a simulated one, and no time passes by which to judge: it is believed.
 
 use std::time::Duration;
 
@@ -14,39 +14,39 @@ use common::{
 
 use crate::{
     failsafe,
-    lateness::Lateness,
-    obedience::{Means, Obedience},
+    latency_monitor::LatencyMonitor,
     odometry::Odometry,
     restart::{Counts, RestartWatch},
+    stop_monitor::{StopMethod, StopMonitor},
     streams::{Motor, Streams},
 };
 
 /// A robot that does not obey is told to stand by other means after so long.
-const NEXT_MEANS_AFTER: Duration = Duration::from_millis(300);
+const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 /// The senses of one robot.
 #[derive(Clone, Debug)]
-pub struct Senses {
+pub struct RobotHealth {
     restart: RestartWatch,
     odometry: Odometry,
-    obedience: Obedience,
+    stop_monitor: StopMonitor,
     streams: Streams,
-    lateness: Lateness,
+    latency_monitor: LatencyMonitor,
     limit: Duration,
     sonar_index: u8,
     tried: Option<MissionTime>,
 }
 
-impl Senses {
+impl RobotHealth {
     /// Of the robot of `mission`, of which nothing is known.
     #[must_use]
     pub fn new(mission: &Mission) -> Self {
         Self {
             restart: RestartWatch::new(mission),
             odometry: Odometry::new(mission),
-            obedience: Obedience::new(mission),
+            stop_monitor: StopMonitor::new(mission),
             streams: Streams::new(mission),
-            lateness: Lateness::new(mission),
+            latency_monitor: LatencyMonitor::new(mission),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             sonar_index: mission.sonar.index,
             tried: None,
@@ -55,54 +55,54 @@ impl Senses {
 
     /// Mission time passes at that pace.
     pub fn set_pace(&mut self, pace: Pace) {
-        self.lateness.set_pace(pace);
+        self.latency_monitor.set_pace(pace);
     }
 
     /// Something was sent to the robot.
     pub const fn sent(&mut self, now_ns: u64) {
-        self.lateness.sent(now_ns);
+        self.latency_monitor.sent(now_ns);
     }
 
     /// It acknowledged something.
     pub const fn acknowledged(&mut self, now_ns: u64) {
-        self.lateness.acknowledged(now_ns);
+        self.latency_monitor.acknowledged(now_ns);
     }
 
     /// Time passes.
     pub fn pass(&mut self, now_ns: u64) {
-        self.lateness.pass(now_ns);
+        self.latency_monitor.pass(now_ns);
     }
 
     /// Whether nothing is to be sent to the robot: what it acknowledges meanwhile tells its age.
     #[must_use]
     pub const fn awaits_late_ones(&self) -> bool {
-        self.lateness.asks()
+        self.latency_monitor.asks()
     }
 
     /// The wheels were told these counts/s, forward positive.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         self.odometry.commanded(counts, now);
-        self.obedience.commanded(counts, now);
+        self.stop_monitor.commanded(counts, now);
     }
 
     /// The robot answers since `now_ns`, `again` after it was lost, and was asked for its streams.
     pub fn found(&mut self, now_ns: u64, again: bool) {
         self.streams.found(now_ns);
         if again {
-            self.lateness.found(now_ns);
+            self.latency_monitor.found(now_ns);
         }
     }
 
     /// The robot does not answer.
     pub const fn lost(&mut self) {
         self.restart.lost();
-        self.lateness.lost();
-        self.obedience.unheard();
+        self.latency_monitor.lost();
+        self.stop_monitor.not_heard();
     }
 
     /// An operator lets the robot go on: what was wrong is taken for mended.
-    pub fn forget(&mut self) {
-        self.odometry.forget();
+    pub fn reset(&mut self) {
+        self.odometry.reset();
     }
 
     /// The front sonar's byte came; 0 is no reading.
@@ -126,20 +126,20 @@ impl Senses {
         match are {
             Counts::Follow => {
                 self.odometry.believed(counts, now);
-                self.obedience.heard(counts, now);
+                self.stop_monitor.heard(counts, now);
             }
             Counts::Disbelieved => {
-                self.odometry.disbelieved(now);
-                self.obedience.unheard();
+                self.odometry.implausible(now);
+                self.stop_monitor.not_heard();
             }
             Counts::Restarted | Counts::Elsewhere => {
                 if are == Counts::Restarted && was_away {
-                    self.odometry.forget();
+                    self.odometry.reset();
                 } else {
-                    self.odometry.disbelieved(now);
+                    self.odometry.implausible(now);
                 }
-                self.odometry.forget_counts();
-                self.obedience.forget_counts();
+                self.odometry.reset_counts();
+                self.stop_monitor.reset_counts();
             }
         }
         are
@@ -153,48 +153,48 @@ impl Senses {
 
     /// What the failsafe decides by; a robot that answers may send nothing for `silence` of the machine's clock.
     #[must_use]
-    pub fn flags(&self, now: MissionTime, now_ns: u64, silence: Duration) -> failsafe::Senses {
-        failsafe::Senses {
-            disobeys: self.obedience.disobeys(),
+    pub fn flags(&self, now: MissionTime, now_ns: u64, silence: Duration) -> failsafe::HealthFlags {
+        failsafe::HealthFlags {
+            does_not_stop: self.stop_monitor.does_not_stop(),
             odometry: self.odometry.belief(now),
             motor: self.streams.motor_frames(now_ns, silence),
-            late: self.lateness.doubted(),
+            late: self.latency_monitor.suspected(),
             range_silent: self.streams.range_is_silent(now_ns, silence),
         }
     }
 
     /// Whether to ask for the streams again, now.
     pub fn wants_streams(&mut self, now_ns: u64, silence: Duration) -> bool {
-        !self.lateness.asks() && self.streams.wants_request(now_ns, silence)
+        !self.latency_monitor.asks() && self.streams.wants_request(now_ns, silence)
     }
 
     /// Whether the encoders say that no wheel turns.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        self.obedience.is_at_rest()
+        self.stop_monitor.is_at_rest()
     }
 
     /// How the robot is told to stand.
     #[must_use]
-    pub const fn means(&self) -> Means {
-        self.obedience.means()
+    pub const fn stop_method(&self) -> StopMethod {
+        self.stop_monitor.method()
     }
 
     /// Other means to make a robot stand that does not, when it is time for them.
-    pub fn next_means(&mut self, now: MissionTime) -> Option<Means> {
-        if !self.obedience.disobeys() {
+    pub fn next_stop_method(&mut self, now: MissionTime) -> Option<StopMethod> {
+        if !self.stop_monitor.does_not_stop() {
             self.tried = None;
             return None;
         }
         if self
             .tried
-            .is_some_and(|tried| now.since(tried) < NEXT_MEANS_AFTER)
+            .is_some_and(|tried| now.since(tried) < NEXT_METHOD_AFTER)
         {
             return None;
         }
         self.tried = Some(now);
-        self.obedience.try_next();
-        Some(self.obedience.means())
+        self.stop_monitor.try_next();
+        Some(self.stop_monitor.method())
     }
 
     /// What an operator should know of `cause` besides its name: what was seen, and what to do about it.
@@ -202,7 +202,7 @@ impl Senses {
     pub fn explain(&self, cause: Cause, now_ns: u64, silence: Duration) -> Option<String> {
         match cause {
             Cause::OdometryImplausible | Cause::OdometryGivenUp => {
-                self.odometry.doubt().map(|doubt| doubt.words().to_owned())
+                self.odometry.suspicion().map(|suspicion| suspicion.words().to_owned())
             }
             Cause::FramesSlow => match self.streams.motor_frames(now_ns, silence) {
                 Motor::Slow(hz) => Some(format!(
@@ -222,8 +222,8 @@ impl Senses {
             Cause::RobotLate => Some(
                 "what it sends may be old: look at the network and the radio between, which hold it back".to_owned(),
             ),
-            Cause::RobotDisobeys => Some(
-                "it was told to stand and its encoders say that it moves; every means is tried in turn: velocity 0, disable, pulse width 0, suspend"
+            Cause::RobotDoesNotStop => Some(
+                "it was told to stand and its encoders say that it moves; every method is tried in turn: velocity 0, disable, pulse width 0, suspend"
                     .to_owned(),
             ),
             _ => None,
