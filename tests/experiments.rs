@@ -1,4 +1,4 @@
-//! The paper's experiments: their rows, and going on with those that were cut off; logs of real sonars.
+//! The paper's experiments: their rows, and going on with those that were cut off.
 
 use std::{fs, path::Path};
 
@@ -87,34 +87,4 @@ fn an_unknown_experiment_is_answered_with_those_there_are() {
     assert!(!output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("5-modulated"), "{said}");
-}
-
-#[test]
-fn a_log_of_sonars_becomes_a_picture_and_a_damaged_one_is_refused_with_file_and_line() {
-    let directory = tempfile::tempdir().unwrap();
-    let (log, picture) = (
-        directory.path().join("log.csv"),
-        directory.path().join("log.svg"),
-    );
-    let [log_name, picture_name] = [&log, &picture].map(|path| path.to_str().unwrap());
-    let mut text = "t_s,x_m,y_m,theta_rad,z0_m,z1_m,z2_m,z3_m,z4_m,z5_m,z6_m,z7_m\n".to_owned();
-    for sample in 0..20 {
-        text += &format!(
-            "{sample},{:.1},0,0,1.0,1.3,2.0,inf,inf,2.0,1.3,1.0\n",
-            0.1 * f64::from(sample)
-        );
-    }
-    fs::write(&log, &text).unwrap();
-    let replay = || output(&["replay-log", log_name, "--out", picture_name]);
-    let replayed = replay();
-    assert!(replayed.status.success(), "{replayed:?}");
-    assert!(fs::read_to_string(&picture).unwrap().contains("replayed"));
-
-    fs::write(&log, text + "20,2.0,0\n").unwrap();
-    let refused = replay();
-    let said = String::from_utf8(refused.stderr).unwrap();
-    assert!(
-        !refused.status.success() && said.contains("log.csv:22: "),
-        "{said}"
-    );
 }

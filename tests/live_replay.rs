@@ -5,8 +5,7 @@ use std::{
     process::{ChildStderr, Stdio},
 };
 
-use recording::Recording;
-use replay::diff::diff;
+use recording::{Recording, replay::diff::diff};
 use rustix::process::Signal;
 use serde_json::Value;
 

@@ -8,8 +8,10 @@ use std::{
 };
 
 use common::{poll, samples::name_str, topics};
-use recording::{End, Recording};
-use replay::{Options, Report, replay};
+use recording::{
+    End, Recording,
+    replay::{Options, Report, diff::diff, replay},
+};
 use rustix::process::Signal;
 
 use crate::support::{PATIENCE, Run, STAGES, assert_nothing_left, firsthand, golden, output};
@@ -59,7 +61,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
         let least = ticks.len() as u64 / 2;
         assert!(report.stages[stage].compared > least, "{report}");
     }
-    let parting = replay::diff::diff(&recording, &recording).unwrap();
+    let parting = diff(&recording, &recording).unwrap();
     assert_eq!(parting.first, None);
     assert_eq!(parting.ticks, ticks.len() as u64);
     assert_nothing_left("rec-whole");

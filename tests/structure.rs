@@ -36,7 +36,7 @@ fn files(folder: &Path, end: &str) -> Vec<PathBuf> {
 
 /// The manifests of all crates, without what needs another compiler.
 fn manifests() -> Vec<PathBuf> {
-    let folders = ["common", "services", "supervisor"];
+    let folders = ["common", "services", "supervisor", "tests"];
     let all = folders
         .iter()
         .flat_map(|folder| files(&root().join(folder), "/Cargo.toml"));
@@ -187,7 +187,7 @@ fn no_stage_knows_another_nor_the_supervisor() {
     for stage in &stages {
         for name in dependencies(&services.join(stage).join("Cargo.toml")) {
             let foreign = stages.contains(&name)
-                || ["supervisor", "firsthand", "chaos", "picture", "maps"].contains(&&*name);
+                || ["supervisor", "firsthand", "bench", "picture", "evaluation"].contains(&&*name);
             assert!(!foreign, "{stage} depends on {name}");
         }
     }
@@ -235,9 +235,9 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
             "rand",
             "rand_pcg",
             "ratatui",
-            "chaos",
+            "bench",
             "picture",
-            "maps",
+            "evaluation",
             "x80-sim",
         ] {
             assert!(!names.contains(tool), "{arguments:?} contains {tool}");

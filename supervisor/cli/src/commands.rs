@@ -36,8 +36,6 @@ pub(crate) mod record;
 #[cfg(feature = "tools")]
 pub(crate) mod replay;
 #[cfg(feature = "tools")]
-pub(crate) mod replay_log;
-#[cfg(feature = "tools")]
 pub(crate) mod report;
 pub(crate) mod run;
 mod run_recorder;

@@ -25,8 +25,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use commands::sim;
 #[cfg(feature = "tools")]
 use commands::{
-    chaos, command_line, consumer, evaluate, experiments, field, latency, replay, replay_log,
-    report, top,
+    chaos, command_line, consumer, evaluate, experiments, field, latency, replay, report, top,
 };
 use commands::{
     check, echo, exit_code, fault, help, hz, install, list, logs, missions, operate, other_user,
@@ -64,8 +63,6 @@ enum Command {
     Evaluate(evaluate::Arguments),
     #[cfg(feature = "tools")]
     Experiments(experiments::Arguments),
-    #[cfg(feature = "tools")]
-    ReplayLog(replay_log::Arguments),
     Record(record::Arguments),
     #[cfg(feature = "tools")]
     Replay(replay::Arguments),
@@ -146,8 +143,6 @@ fn main() -> ExitCode {
         Command::Evaluate(arguments) => evaluate::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Experiments(arguments) => experiments::main(&arguments),
-        #[cfg(feature = "tools")]
-        Command::ReplayLog(arguments) => replay_log::main(&arguments),
         Command::Record(arguments) => record::main(&arguments),
         #[cfg(feature = "tools")]
         Command::Replay(arguments) => replay::main(&arguments),

@@ -13,11 +13,17 @@
 //! | [`statistics`], [`totals`] | shares with their intervals; the result of each setting, and paired differences |
 //! | [`report`], [`page`] | all of it as a page; what every page has |
 //! | [`directory`] | where all of it lies |
+//! | [`experiments`] | the paper's experiments with many seeds |
+//! | [`maps`] | readers of ROS, PGM, PNG and MovingAI maps |
+//! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
 //!
 //! Every setting runs on the same worlds with the same noise, so that two of them differ by what was set alone.
 
+pub mod baselines;
 pub mod directory;
+pub mod experiments;
 pub mod latency;
+pub mod maps;
 pub mod page;
 pub mod report;
 pub mod results;

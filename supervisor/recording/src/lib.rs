@@ -1,4 +1,4 @@
-//! Recordings: everything on a robot's bus in one file, written by a consumer like any other, read by reports and replays.
+//! Recordings: everything on a robot's bus in one file, written by a consumer like any other, read by reports, replayed.
 //!
 //! # The file
 //! MCAP, in chunks compressed with LZ4; each chunk is written whole, at least once a second. A recorder that is killed
@@ -48,6 +48,7 @@
 //! | `losses` | which samples did not come |
 //! | [`recorder`] | the consumer |
 //! | [`reader`] | reading the file |
+//! | [`replay`] | recordings replayed to the bit (feature `replay`) |
 //! | `error` | what can go wrong |
 
 mod error;
@@ -57,6 +58,8 @@ mod log_files;
 mod losses;
 pub mod reader;
 pub mod recorder;
+#[cfg(feature = "replay")]
+pub mod replay;
 pub mod schema;
 
 pub use self::{

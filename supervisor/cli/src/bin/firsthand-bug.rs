@@ -2,7 +2,7 @@
 
 use std::{io, process::ExitCode};
 
-use baselines::{bug::Bug, shell::Shell};
+use evaluation::baselines::{bug::Bug, shell::Shell};
 
 fn main() -> ExitCode {
     let log = tracing_subscriber::fmt().with_ansi(false);

@@ -2,7 +2,7 @@
 
 use std::{io, process::ExitCode};
 
-use baselines::{shell::Shell, wavefront::Wavefront};
+use evaluation::baselines::{shell::Shell, wavefront::Wavefront};
 
 fn main() -> ExitCode {
     let log = tracing_subscriber::fmt().with_ansi(false);

@@ -7,9 +7,10 @@ use common::{clock::Pace, domain::RobotName, mission::Mission};
 
 use super::{Failure, missions, print_text};
 use crate::progress_line::write_stderr;
-use chaos::{
-    Consumer, FaultOptions, GivenConsumer, Options,
+use bench::chaos::{
+    self, Consumer, FaultOptions, GivenConsumer, Options,
     robot_fault::{RobotFault, TABLE},
+    signals,
 };
 
 /// Send random signals to random stages at random times, mission after mission, and report.
@@ -53,7 +54,7 @@ pub(crate) struct Arguments {
     /// KEY=VALUE over the mission file, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Keep a row for each signal in DIR/signals.csv, as it is measured, and at the end DIR/report.html.
+    /// Keep a row for each signal in DIR/signals.csv, as it is measured.
     #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
     out: Option<PathBuf>,
     /// Name of the robot, which also names its shared memory.
@@ -147,8 +148,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     };
     if let Some(out) = &arguments.out {
-        let page = out.join(chaos::PAGE);
-        write_stderr(&format!("results: {}\n", page.display()));
+        let table = out.join(signals::FILE_NAME);
+        write_stderr(&format!("results: {}\n", table.display()));
     }
     if report.is_right() {
         std::fs::remove_dir_all(&directory)?;

@@ -6,14 +6,14 @@ use clap::Args;
 use common::mission::Realism;
 use evaluation::{
     directory::{self, PAGE_FILE},
+    experiments::{
+        experiment::{self, Experiment},
+        method::Method,
+        report::Report,
+    },
     results::Results,
     runner::{self, NoiseSeeds, Plan},
     trial::Trial,
-};
-use experiments::{
-    experiment::{self, Experiment},
-    method::Method,
-    report::Report,
 };
 
 use super::{

@@ -19,7 +19,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::{Failure, print_text};
-use maps::Map;
+use evaluation::maps::{self, Map};
 use picture::FieldOnMap;
 
 /// Solve the harmonic field of a map: numbers for NumPy, a picture, how long it took.

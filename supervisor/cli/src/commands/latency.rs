@@ -1,22 +1,12 @@
 //! `firsthand latency`: what a tick takes, compared with what the bus alone takes.
 
-mod budget;
-mod consumers;
-mod mission;
-mod regime;
-mod report;
-
 use std::process::ExitCode;
 
-use chaos::ipc_bench;
+use bench::tick::{self, Options, Regime, consumers, hops, parse_hz};
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, latency::Histogram};
+use common::{clock::Pace, domain::RobotName};
 
 use super::{Failure, missions, print_text};
-use budget::Budget;
-use mission::Mission;
-use regime::{Regime, parse_hz};
-use report::Report;
 
 /// Measure a tick, datagram in to datagram out, and five bare hops between processes.
 #[derive(Debug, Args)]
@@ -62,11 +52,6 @@ pub(crate) struct Arguments {
     supervisor: Option<u32>,
 }
 
-/// Samples of a round that follow each other without a pause.
-const TRIPS: u64 = 2000;
-/// The same with the pause of a tick between them.
-const PACED_TRIPS: u64 = 50;
-
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let robot = match &arguments.robot {
         Some(robot) => robot.clone(),
@@ -77,36 +62,23 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
-        ipc_bench::run_forwarder(&robot, place, supervisor)?;
+        hops::run_forwarder(&robot, place, supervisor)?;
         return Ok(ExitCode::SUCCESS);
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?
         .robot
         .rate_hz;
-    let regime = Regime::new(arguments.rate, arguments.pace, rate_hz);
-    let trips = match regime {
-        Regime::BackToBack => TRIPS,
-        Regime::Rate { .. } => PACED_TRIPS,
-    };
-    let mission = Mission {
-        name: &arguments.mission,
+    let report = tick::measure(&Options {
+        mission: &arguments.mission,
         set: &arguments.set,
+        rate_hz,
         robot: &robot,
-        pace: regime.pace(rate_hz),
+        regime: Regime::new(arguments.rate, arguments.pace, rate_hz),
+        rounds: arguments.rounds,
+        budget: arguments.budget,
         record: arguments.record,
         consumers: arguments.consumers,
-    };
-    let mut budget = arguments.budget.then(Budget::default);
-    let mut hops = Histogram::default();
-    let mut rounds = Vec::new();
-    for _ in 0..arguments.rounds {
-        let round = ipc_bench::measure(&robot, trips, regime.period())?;
-        hops.add(round.counts(), round.max_ns());
-        rounds.push(mission.measure(budget.as_mut())?);
-    }
-    let mut report = Report::new(regime, &hops, u64::from(arguments.rounds) * trips, &rounds)
-        .ok_or("nothing was measured; does the mission drive at all?")?;
-    report.budget = budget.map(Budget::rows);
+    })?;
     if arguments.json {
         print_text(&format!("{}\n", serde_json::to_string(&report)?))?;
     } else {

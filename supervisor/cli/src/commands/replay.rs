@@ -9,10 +9,12 @@ use common::{
     domain::RobotName,
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
 };
-use recording::Recording;
-use replay::{
-    Options,
-    live::{self, Happened},
+use recording::{
+    Recording,
+    replay::{
+        self, Options, diff,
+        live::{self, Happened},
+    },
 };
 use supervisor::{
     planner_executable,
@@ -133,7 +135,7 @@ fn play(arguments: &Arguments, recording: &Recording) -> Result<ExitCode, Failur
 pub(crate) fn diff(arguments: &Diff) -> Result<ExitCode, Failure> {
     let open = |path: &PathBuf| Recording::open(path);
     let (first, second) = (open(&arguments.first)?, open(&arguments.second)?);
-    let parting = replay::diff::diff(&first, &second)?;
+    let parting = diff::diff(&first, &second)?;
     print_text(&if arguments.json {
         format!("{}\n", serde_json::to_string(&parting)?)
     } else {

@@ -1,0 +1,240 @@
+//! Bug2 (V. J. Lumelsky and A. A. Stepanov, Path-planning strategies for a point mobile automaton, Algorithmica 2, 1987):
+//! straight to the target; where a hazard is in the way, around it with the hazard on the right, until the robot is on
+//! the line from start to target again, nearer to the target than where it met the hazard, and the way is free.
+//!
+//! The point of the algorithm is the robot's centre: the map's hazards have the margin of the body. It sees no farther
+//! than [`AHEAD_M`]. A robot that comes back to where it met the hazard has no way.
+
+mod boundary;
+
+use common::{
+    clock::MissionTime,
+    grid::Cell,
+    mission::Mission,
+    samples::PoseSample,
+    step::{ForeignState, Step},
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::baselines::{
+    belief::{Belief, Map},
+    planner::{Guide, Input, Outcome, Way},
+};
+use boundary::Place;
+
+/// A hazard so near ahead is met; the robot heads for a point of the boundary no farther than this; metres.
+const AHEAD_M: f64 = 0.3;
+/// A robot that was so far from where it met a hazard has left that place, metres.
+const AWAY_M: f64 = 0.5;
+/// On the line from start to target: so near to it, in cells and at least in metres.
+const ON_LINE_CELLS: f64 = 0.75;
+const ON_LINE_M: f64 = 0.05;
+/// The most cells of a boundary that are looked at ahead.
+const MOST_CELLS: usize = 256;
+
+/// What must survive the process.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// The epoch of the belief that the rest is of: all begins anew when what was sensed is forgotten.
+    epoch: u64,
+    /// Where the line to the target begins, metres; none before the first pose.
+    line_from: Option<DVec2>,
+    /// The hazard that the robot goes around.
+    following: Option<Following>,
+    /// The robot came back to where it met the hazard.
+    enclosed: bool,
+}
+
+/// A hazard that is gone around.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Following {
+    /// Where the robot met it, metres.
+    hit: DVec2,
+    /// Where on the boundary it is.
+    place: Place,
+    /// Whether it was away from there.
+    was_away: bool,
+}
+
+/// The planner of Bug2.
+#[derive(Clone, Debug)]
+pub struct Bug {
+    guide: Guide,
+    belief: Belief,
+    state: State,
+}
+
+impl Step for Bug {
+    type Input<'a> = Input<'a>;
+    type Output = Outcome;
+    type State = State;
+
+    fn new(mission: &Mission) -> Self {
+        Self {
+            guide: Guide::new(mission),
+            belief: Belief::default(),
+            state: State::default(),
+        }
+    }
+
+    fn state(&self) -> &State {
+        &self.state
+    }
+
+    fn restore(&mut self, state: State) -> Result<(), ForeignState> {
+        self.state = state;
+        Ok(())
+    }
+
+    fn step(&mut self, input: Input<'_>, _: MissionTime) -> Outcome {
+        match input {
+            Input::Grid { header, cells } if self.belief.follow(header, cells) => Outcome::Followed,
+            Input::Grid { .. } => Outcome::Missed,
+            Input::Pose(pose) => {
+                let way = self.way(pose);
+                Outcome::Guidance(self.guide.sample(pose, way, self.belief.header()))
+            }
+        }
+    }
+}
+
+impl Bug {
+    fn way(&mut self, pose: &PoseSample) -> Way {
+        let here = pose.pose().position;
+        let Some(map) = self.belief.map() else {
+            return Way::Unknown;
+        };
+        let epoch = self.belief.header().epoch;
+        if self.state.epoch != epoch {
+            self.state = State {
+                epoch,
+                ..State::default()
+            };
+        }
+        let line_from = *self.state.line_from.get_or_insert(here);
+        if map.free_cell_at(here).is_none() {
+            return Way::out(&map, here);
+        }
+        let way = Straight {
+            map: &map,
+            line_from,
+            target: self.guide.target,
+        };
+        if let Some(following) = &mut self.state.following
+            && (!following.is_led_on(&map, here, way.left(here)) || way.is_resumed(here, following))
+        {
+            self.state.following = None;
+        }
+        if self.state.following.is_none() {
+            let Some(following) = way.hit(here) else {
+                return Way::To(self.guide.target);
+            };
+            self.state.following = Some(following);
+        }
+        let following = self.state.following.as_ref();
+        self.state.enclosed |= following.is_some_and(|it| it.is_back(&map));
+        match following {
+            Some(following) if !self.state.enclosed => Way::To(following.aim(&map, here)),
+            _ => Way::None,
+        }
+    }
+}
+
+/// The straight way to the target.
+#[derive(Clone, Copy, Debug)]
+struct Straight<'a> {
+    map: &'a Map<'a>,
+    line_from: DVec2,
+    target: DVec2,
+}
+
+impl Straight<'_> {
+    /// The last free point before the hazard that is near ahead of `here`; none if the way is free.
+    fn blocked(&self, here: DVec2) -> Option<DVec2> {
+        let ahead = here + (self.target - here).clamp_length_max(AHEAD_M);
+        self.map.last_free(here, ahead)
+    }
+
+    /// To the left of the way from `here`, a unit vector.
+    fn left(&self, here: DVec2) -> DVec2 {
+        (self.target - here).normalize_or(DVec2::X).perp()
+    }
+
+    /// The hazard that is near ahead of `here`, to be gone around to the left; none if the way is free.
+    fn hit(&self, here: DVec2) -> Option<Following> {
+        let hit = self.blocked(here)?;
+        let cell = self.map.free_cell_at(hit)?;
+        let place = Place::at(self.map, cell, self.left(here))?;
+        Some(Following {
+            hit,
+            place,
+            was_away: false,
+        })
+    }
+
+    /// Whether the robot leaves the hazard here.
+    fn is_resumed(&self, here: DVec2, following: &Following) -> bool {
+        let cell = self.map.frame.resolution_m;
+        let along = (self.target - self.line_from).normalize_or(DVec2::X);
+        let off = along.perp_dot(here - self.line_from).abs();
+        let nearer = here.distance(self.target) + cell < following.hit.distance(self.target);
+        let on_line = off <= (ON_LINE_CELLS * cell).max(ON_LINE_M);
+        on_line && nearer && self.blocked(here).is_none()
+    }
+}
+
+impl Following {
+    /// Go on along the boundary to the place nearest to `here`. Says whether there is a boundary still; the map may have
+    /// changed since, then it is followed on from near the robot, most nearly to the `left` of the way to the target.
+    fn is_led_on(&mut self, map: &Map<'_>, here: DVec2, left: DVec2) -> bool {
+        if !self.place.is_on(map) {
+            let cells = [Some(self.place.cell), map.free_cell_at(here)];
+            let mut cells = cells.into_iter().flatten();
+            let Some(place) = cells.find_map(|cell| Place::at(map, cell, left)) else {
+                return false;
+            };
+            self.place = place;
+        }
+        let away = |place: &Place| map.frame.centre_of(place.cell).distance(here);
+        let mut nearest = self.place;
+        for place in self.ahead(map) {
+            if away(&place) <= away(&nearest) {
+                nearest = place;
+            }
+        }
+        self.place = nearest;
+        self.was_away |= here.distance(self.hit) > AWAY_M;
+        true
+    }
+
+    /// The boundary from here on, as far as it is looked at.
+    fn ahead<'a>(&self, map: &'a Map<'_>) -> impl Iterator<Item = Place> + 'a {
+        // A boundary of steps is up to sqrt(2) times as long as it is wide, and folds.
+        let cells = (2.0 * AHEAD_M / map.frame.resolution_m).ceil() as usize;
+        let from = self.place;
+        std::iter::successors(Some(from), |place| place.next(map)).take(cells.min(MOST_CELLS) + 1)
+    }
+
+    /// Whether the robot has come back to where it met the hazard.
+    fn is_back(&self, map: &Map<'_>) -> bool {
+        let here = map.frame.centre_of(self.place.cell);
+        self.was_away && here.distance(self.hit) <= map.frame.resolution_m
+    }
+
+    /// The farthest point of the boundary, along it, that a robot at `here` (metres) sees near by.
+    fn aim(&self, map: &Map<'_>, here: DVec2) -> DVec2 {
+        let centre = |cell: Cell| map.frame.centre_of(cell);
+        let mut aim = centre(self.place.cell);
+        for place in self.ahead(map) {
+            let point = centre(place.cell);
+            if here.distance(point) <= AHEAD_M && map.sees(here, point) {
+                aim = point;
+            }
+        }
+        aim
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+use super::*;
+use crate::baselines::testing::{drawn, mission, pose};
+use common::samples::{GuidanceSample, GuidanceStatus};
+
+const WALL: [&str; 9] = [
+    ".........",
+    ".........",
+    "....#....",
+    "....#....",
+    "....#....",
+    "....#....",
+    "....#....",
+    "....#....",
+    "....#....",
+];
+
+/// What a planner with target (0.3, 0) says on the map `rows` of a robot at (x, y).
+fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
+    let mut planner = Wavefront::new(&mission([0.3, 0.0]));
+    let (header, cells) = drawn(rows);
+    let input = Input::Grid {
+        header: &header,
+        cells: &cells,
+    };
+    assert_eq!(
+        planner.step(input, MissionTime::default()),
+        Outcome::Followed
+    );
+    match planner.step(Input::Pose(&pose(at)), MissionTime::default()) {
+        Outcome::Guidance(guidance) => guidance,
+        outcome => panic!("{outcome:?}"),
+    }
+}
+
+#[test]
+fn the_way_leads_around_a_wall_and_cuts_no_corner() {
+    let mut at = DVec2::new(-0.3, 0.0);
+    let (header, cells) = drawn(&WALL);
+    let mut belief = Belief::default();
+    belief.follow(&header, &cells);
+    let mut driven = 0.0;
+    while at.distance(DVec2::new(0.3, 0.0)) > 0.03 {
+        let guidance = guidance(&WALL, at.into());
+        assert_eq!(
+            guidance.status,
+            u8::from(GuidanceStatus::Along),
+            "at {at}, after {driven} m"
+        );
+        at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
+        driven += 0.02;
+        assert!(
+            belief.map().unwrap().free_cell_at(at).is_some(),
+            "in the wall at {at}"
+        );
+        assert!(driven < 2.0, "no end of it, at {at}");
+    }
+    // Over the end of the wall, the corner kept: two legs of 0.3 by 0.3 m and back, 0.85 m; cells round them up.
+    assert!((0.8..1.1).contains(&driven), "{driven}");
+}
+
+#[test]
+fn a_target_behind_a_closed_wall_or_inside_hazard_is_unreachable() {
+    let closed = ["....#...."; 9];
+    let on_target = [
+        ".........",
+        ".........",
+        ".........",
+        ".........",
+        ".......#.",
+        ".........",
+        ".........",
+        ".........",
+        ".........",
+    ];
+    for rows in [closed, on_target] {
+        let status = guidance(&rows, [-0.3, 0.0]).status;
+        assert_eq!(status, u8::from(GuidanceStatus::Unreachable));
+    }
+}
+
+#[test]
+fn a_robot_inside_hazard_leaves_by_the_nearest_free_cell() {
+    let guidance = guidance(&WALL, [0.02, 0.15]);
+    assert_eq!(guidance.status, u8::from(GuidanceStatus::WayOut));
+    assert!(guidance.ex.abs() > 0.8, "{guidance:?}");
+    assert!(guidance.speed_limit_m_s < 0.1);
+}
+
+#[test]
+fn without_a_map_the_robot_waits() {
+    let mut planner = Wavefront::new(&mission([0.3, 0.0]));
+    let outcome = planner.step(Input::Pose(&pose([0.0, 0.0])), MissionTime::default());
+    let Outcome::Guidance(guidance) = outcome else {
+        panic!("{outcome:?}");
+    };
+    assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
+}

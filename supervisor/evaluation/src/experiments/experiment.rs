@@ -1,0 +1,250 @@
+//! THE table of experiments. The paper gives no dimensions of its worlds: they are laid out here, and are the missions
+//! that ship.
+
+use std::path::Path;
+
+use common::mission::{Mission, MissionError};
+use thiserror::Error;
+
+use crate::{
+    experiments::method::Method,
+    trial::{BodySize, Trial},
+};
+
+/// Free ground that a world leaves the body on both sides of its narrowest way, metres.
+const MARGIN_M: f64 = 0.05;
+/// Experiment 3: the drum here is not known, metres. A robot that does not sense touches what it does not know on its
+/// way; by the field of the others the way does not lead past this one.
+const UNKNOWN_AT_M: (f64, f64) = (2.3, -1.7);
+
+/// An experiment of section V.B of the paper.
+#[derive(Debug)]
+pub struct Experiment {
+    /// Its number there, and what varies.
+    pub name: &'static str,
+    /// What it is.
+    pub title: &'static str,
+    /// What the paper reports of it.
+    pub reported: &'static str,
+    /// The time the paper reports, seconds.
+    pub reported_time_s: Option<f64>,
+    /// Name and text of the shipped mission it starts from.
+    mission: (&'static str, &'static str),
+    /// What differs from that mission.
+    change: fn(&mut Mission),
+    /// Which methods it makes a difference to.
+    methods: &'static [Method],
+}
+
+/// No experiment has that name, or its mission is not what it should be.
+#[derive(Debug, Error)]
+pub enum ExperimentError {
+    /// No such experiment.
+    #[error("no experiment is called {name:?}; give some of {}", names())]
+    Unknown {
+        /// The name.
+        name: String,
+    },
+    /// The mission does not hold.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// The robot cannot get through.
+    #[error(
+        "experiment {name}: the robot cannot get to the target; move what stands in its mission"
+    )]
+    Unsolvable {
+        /// The experiment.
+        name: &'static str,
+    },
+}
+
+fn names() -> String {
+    let names: Vec<_> = TABLE.iter().map(|experiment| experiment.name).collect();
+    names.join(", ")
+}
+
+macro_rules! shipped {
+    ($name:literal) => {
+        (
+            $name,
+            include_str!(concat!("../../../missions/", $name, ".toml")),
+        )
+    };
+}
+
+const BOTH: &[Method] = &Method::ALL;
+
+/// Every experiment, in the paper's order.
+pub static TABLE: [Experiment; 9] = [
+    Experiment {
+        name: "1a",
+        title: "open passage, heading 0",
+        reported: "a straight line, no safety event",
+        reported_time_s: None,
+        mission: shipped!("passage"),
+        change: |_| {},
+        methods: BOTH,
+    },
+    Experiment {
+        name: "1b",
+        title: "open passage, heading 90",
+        reported: "false registrations block 50 % of the passage; minor deviation",
+        reported_time_s: None,
+        mission: shipped!("passage"),
+        change: |mission| mission.start.heading_deg = 90.0,
+        methods: BOTH,
+    },
+    Experiment {
+        name: "2",
+        title: "obstacle course, sensor-based",
+        reported: "almost 60 s; sonar unavailable more than 50 % of the time",
+        reported_time_s: Some(60.0),
+        mission: shipped!("obstacle-course"),
+        change: |_| {},
+        methods: BOTH,
+    },
+    Experiment {
+        name: "3",
+        title: "obstacle course, partial a-priori map, no sensing",
+        reported: "30 s; good clearance; dynamic range of the wheels less than in 2",
+        reported_time_s: Some(30.0),
+        mission: shipped!("obstacle-course"),
+        change: |mission| {
+            mission.sensing = false;
+            mission.known = mission.world.clone();
+            let drums = &mut mission.known.drums;
+            drums.retain(|drum| (drum.at.x, drum.at.y) != UNKNOWN_AT_M);
+        },
+        methods: BOTH,
+    },
+    Experiment {
+        name: "4-180",
+        title: "U trap, heading 180",
+        reported: "arrives",
+        reported_time_s: None,
+        mission: shipped!("trap"),
+        change: |mission| mission.start.heading_deg = 180.0,
+        methods: BOTH,
+    },
+    Experiment {
+        name: "4-90",
+        title: "U trap, heading 90",
+        reported: "arrives",
+        reported_time_s: None,
+        mission: shipped!("trap"),
+        change: |mission| mission.start.heading_deg = 90.0,
+        methods: BOTH,
+    },
+    Experiment {
+        name: "4-0",
+        title: "U trap, heading 0",
+        reported: "arrives",
+        reported_time_s: None,
+        mission: shipped!("trap"),
+        change: |_| {},
+        methods: BOTH,
+    },
+    Experiment {
+        name: "5-constant",
+        title: "one drum, constant speed",
+        reported: "35 s",
+        reported_time_s: Some(35.0),
+        mission: shipped!("one-drum"),
+        change: |mission| mission.controller.modulated = false,
+        // The default method has no constant speed.
+        methods: &[Method::Paper],
+    },
+    Experiment {
+        name: "5-modulated",
+        title: "one drum, modulated speed",
+        reported: "25 s; fewer safety events, more clearance, less dynamic range than constant",
+        reported_time_s: Some(25.0),
+        mission: shipped!("one-drum"),
+        change: |_| {},
+        methods: BOTH,
+    },
+];
+
+impl Experiment {
+    /// Whether it is run by `method`.
+    #[must_use]
+    pub fn is_run_by(&self, method: Method) -> bool {
+        self.methods.contains(&method)
+    }
+
+    /// Its mission, but for the method.
+    ///
+    /// # Errors
+    /// When the shipped mission does not hold, which its test rules out.
+    pub fn mission(&self) -> Result<Mission, MissionError> {
+        let (name, text) = self.mission;
+        let mut mission = Mission::parse(text, Path::new(name))?;
+        mission.name = self.name.to_owned();
+        mission.description = self.title.to_owned();
+        (self.change)(&mut mission);
+        Ok(mission)
+    }
+
+    /// The same as a trial of the evaluation.
+    ///
+    /// # Errors
+    /// Also when the robot cannot get to the target.
+    pub fn trial(&self) -> Result<Trial, ExperimentError> {
+        let mission = self.mission()?;
+        let body = BodySize {
+            radius_m: mission.body().radius_m,
+            margin_m: MARGIN_M,
+        };
+        let trial = Trial::of_mission(self.name.to_owned(), mission, &body);
+        trial.ok_or(ExperimentError::Unsolvable { name: self.name })
+    }
+}
+
+/// The experiments of these names in the order of the table, all if there are none.
+///
+/// # Errors
+/// When there is none of a name.
+pub fn named(names: &[String]) -> Result<Vec<&'static Experiment>, ExperimentError> {
+    let is_known = |name: &String| TABLE.iter().any(|experiment| experiment.name == name);
+    if let Some(name) = names.iter().find(|name| !is_known(name)) {
+        return Err(ExperimentError::Unknown { name: name.clone() });
+    }
+    let asked = |experiment: &&Experiment| {
+        names.is_empty() || names.iter().any(|name| name == experiment.name)
+    };
+    Ok(TABLE.iter().filter(asked).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_experiment_can_be_crossed_and_by_the_papers_method_the_field_is_as_printed() {
+        for experiment in &TABLE {
+            let mut mission = experiment.trial().unwrap().mission;
+            mission.method = common::mission::Method::Paper;
+            assert_eq!(mission.screening_length_m(), None, "{}", experiment.name);
+        }
+    }
+
+    #[test]
+    fn only_experiment_3_knows_anything_and_it_alone_does_not_sense() {
+        for experiment in &TABLE {
+            let mission = experiment.mission().unwrap();
+            let knows = !mission.known.is_empty();
+            let is_third = experiment.name == "3";
+            assert_eq!((knows, !mission.sensing), (is_third, is_third));
+        }
+        let third = named(&["3".to_owned()]).unwrap()[0].mission().unwrap();
+        let unknown = third.world.drums.len() - third.known.drums.len();
+        assert_eq!(unknown, 1, "its map is partial");
+    }
+
+    #[test]
+    fn an_unknown_experiment_is_answered_with_those_there_are() {
+        let error = named(&["6".to_owned()]).unwrap_err().to_string();
+        assert!(error.contains("5-modulated"), "{error}");
+        assert_eq!(named(&[]).unwrap().len(), TABLE.len());
+    }
+}

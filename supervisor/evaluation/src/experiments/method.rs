@@ -1,0 +1,50 @@
+//! How the experiments are run.
+
+use common::mission::Realism;
+
+use crate::setting::{HARMONIC, Setting};
+
+/// Share of the time that the radio is out with measured realism: the paper's link fades, and it does not say how much.
+const OUTAGE_SHARE: f64 = 0.2;
+
+/// The methods that are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// The paper's, exactly as printed: also its dead reckoning, (21).
+    Paper,
+    /// The default one.
+    Evidential,
+}
+
+impl Method {
+    /// Both, in the order of the reports.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Evidential];
+
+    /// Its name.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Evidential => "evidential",
+        }
+    }
+
+    /// What it sets in every mission.
+    #[must_use]
+    pub fn setting(self, realism: Realism) -> Setting {
+        let own: &[&str] = match self {
+            Self::Paper => &["method='paper'", "dead_reckoning.integration='euler'"],
+            Self::Evidential => &["method='evidential'"],
+        };
+        let mut set: Vec<String> = own.iter().map(|&text| text.to_owned()).collect();
+        if realism == Realism::Measured {
+            set.push("simulation.realism='measured'".to_owned());
+            set.push(format!("simulation.radio.outage_share={OUTAGE_SHARE}"));
+        }
+        Setting {
+            name: self.as_str().to_owned(),
+            planner: HARMONIC.to_owned(),
+            set,
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Map files of the ROS map_server: a YAML that names an image and says how to read it.
+//!
+//! [`load`] does not read resolution and origin: a field is solved in cells. [`load_placed`] does.
+
+use std::{
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, de::DeserializeOwned};
+
+use crate::maps::{
+    error::MapError,
+    file::read,
+    image::{self, Lightness},
+    map::{Map, PlacedMap},
+};
+
+/// A map file says a dozen short things.
+const LONGEST: u64 = 64 << 10;
+/// Sides of a cell that a map of a building may have, metres.
+const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
+/// Nothing lies farther from the origin than this, metres.
+const FARTHEST_M: f64 = 1e6;
+
+/// The keys that matter here; other programs keep theirs in the same file.
+#[derive(Deserialize)]
+struct MapFile {
+    image: PathBuf,
+    #[serde(default)]
+    negate: Negate,
+    free_thresh: Option<f64>,
+    occupied_thresh: Option<f64>,
+    mode: Option<String>,
+}
+
+/// The keys that say where the map lies.
+#[derive(Deserialize)]
+struct Place {
+    resolution: f64,
+    origin: Vec<f64>,
+}
+
+/// The map_server writes 0 and 1, people write false and true.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Negate {
+    Word(bool),
+    Number(i64),
+}
+
+impl Default for Negate {
+    fn default() -> Self {
+        Self::Word(false)
+    }
+}
+
+/// The map a YAML describes.
+pub(super) fn load(file: &Path) -> Result<Map, MapError> {
+    image_of(file, &text(file)?)
+}
+
+/// The map that the YAML `file` of the ROS map_server describes, and where it lies.
+pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
+    let text = text(file)?;
+    let place: Place = parse(file, &text, "resolution: METRES` and `origin: [x, y, 0]")?;
+    if !CELL_M.contains(&place.resolution) {
+        let problem = format!(
+            "resolution: {} is not the side of a cell; set it to {} to {} m",
+            place.resolution,
+            CELL_M.start(),
+            CELL_M.end()
+        );
+        return Err(MapError::malformed(file, problem));
+    }
+    match place.origin[..] {
+        [x, y, turn] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && turn == 0.0 => {
+            Ok(PlacedMap {
+                map: image_of(file, &text)?,
+                cell_m: place.resolution,
+                corner_m: [x, y],
+            })
+        }
+        _ => Err(MapError::malformed(
+            file,
+            format!(
+                "origin: {:?} is not read here; set it to [x, y, 0] in metres, the image not turned",
+                place.origin.get(..3).unwrap_or(&place.origin)
+            ),
+        )),
+    }
+}
+
+fn text(file: &Path) -> Result<String, MapError> {
+    String::from_utf8(read(file, LONGEST)?)
+        .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
+}
+
+/// The keys of `text` that `T` has; `needed` says what that is at least.
+fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T, MapError> {
+    serde_saphyr::from_str(text).map_err(|error| {
+        let problem = error.to_string();
+        // What follows shows the source over several lines.
+        let cause = problem.lines().next().unwrap_or_default();
+        MapError::malformed(
+            file,
+            format!("not a map_server map: {cause}; it needs at least `{needed}`"),
+        )
+    })
+}
+
+/// The image that the YAML `text` of `file` names.
+fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
+    let parsed: MapFile = parse(file, text, "image: FILE")?;
+    let lightness = parsed.lightness(file)?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    // `join` leaves an absolute path as it is.
+    image::load(&folder.join(&parsed.image), lightness)
+}
+
+impl MapFile {
+    fn lightness(&self, file: &Path) -> Result<Lightness, MapError> {
+        match self.mode.as_deref() {
+            None | Some("trinary") => {}
+            Some(mode) => {
+                return Err(MapError::malformed(
+                    file,
+                    format!("mode: {mode:?} is not read here; set it to trinary"),
+                ));
+            }
+        }
+        let negate = match self.negate {
+            Negate::Word(negate) => negate,
+            Negate::Number(0) => false,
+            Negate::Number(1) => true,
+            Negate::Number(other) => {
+                return Err(MapError::malformed(
+                    file,
+                    format!("negate: {other} is neither 0 nor 1; set it to one of them"),
+                ));
+            }
+        };
+        let usual = Lightness::default();
+        let share = |key: &str, value: Option<f64>, usual: f64| match value.unwrap_or(usual) {
+            value if (0.0..=1.0).contains(&value) => Ok(value),
+            value => Err(MapError::malformed(
+                file,
+                format!("{key}: {value} is not a share of darkness; set it to 0 to 1"),
+            )),
+        };
+        Ok(Lightness {
+            negate,
+            free_thresh: share("free_thresh", self.free_thresh, usual.free_thresh)?,
+            occupied_thresh: share(
+                "occupied_thresh",
+                self.occupied_thresh,
+                usual.occupied_thresh,
+            )?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The map of that YAML beside an image of 5 x 5 pixels of one grey.
+    fn map_of(yaml: &str, grey: u8) -> Result<Map, MapError> {
+        read_by(load, yaml, grey)
+    }
+
+    fn read_by<T>(
+        read: fn(&Path) -> Result<T, MapError>,
+        yaml: &str,
+        grey: u8,
+    ) -> Result<T, MapError> {
+        let directory = tempfile::tempdir().unwrap();
+        let image = [b"P5 5 5 255\n".as_slice(), &[grey; 25]].concat();
+        std::fs::write(directory.path().join("grey.pgm"), image).unwrap();
+        let file = directory.path().join("map.yaml");
+        std::fs::write(&file, yaml).unwrap();
+        read(&file)
+    }
+
+    fn is_free(yaml: &str, grey: u8) -> bool {
+        !map_of(yaml, grey).unwrap().blocked[12]
+    }
+
+    #[test]
+    fn thresholds_and_negation_are_those_of_the_file() {
+        let whole = "# saved\nimage: grey.pgm\nmode: trinary\nresolution: 0.05\norigin: [0.0, -1, 0]\n\
+                     negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n";
+        assert!(is_free(whole, 200));
+        assert!(!is_free(whole, 190));
+        assert!(!is_free("image: grey.pgm", 200), "0.196 unless it says so");
+        for negate in ["1", "true"] {
+            let negated = format!("image: ./grey.pgm\nnegate: {negate}");
+            assert!(is_free(&negated, 20) && !is_free(&negated, 235));
+        }
+        assert!(!is_free(
+            "image: grey.pgm\nfree_thresh: 0.9\noccupied_thresh: 0.2",
+            128
+        ));
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_meant_is_refused_with_its_key() {
+        let cases = [
+            ("", "image"),
+            ("free_thresh: 0.2", "image"),
+            ("image: [1, 2]", "image"),
+            ("image: grey.pgm\nmode: scale", "mode"),
+            ("image: grey.pgm\nnegate: 7", "negate"),
+            ("image: grey.pgm\nfree_thresh: 1.5", "free_thresh"),
+            ("image: grey.pgm\noccupied_thresh: .nan", "occupied_thresh"),
+            ("image: elsewhere.pgm", "elsewhere.pgm"),
+            ("image: {{{{", "map_server"),
+            ("\u{0}\u{1}", "map_server"),
+        ];
+        for (yaml, named) in cases {
+            let error = map_of(yaml, 255).unwrap_err().to_string();
+            assert!(
+                error.contains(named) && error.lines().count() == 1,
+                "{yaml:?} gave {error}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_yaml_made_to_explode_is_refused() {
+        let mut bomb = String::from("a0: &a0 [x, x, x, x, x, x, x, x, x]\n");
+        for nth in 1..12 {
+            let last = nth - 1;
+            bomb +=
+                &format!("a{nth}: &a{nth} [*a{last}, *a{last}, *a{last}, *a{last}, *a{last}]\n");
+        }
+        bomb += "image: *a11\n";
+        assert!(map_of(&bomb, 255).is_err());
+        assert!(matches!(
+            map_of(&"#".repeat(1 << 17), 255),
+            Err(MapError::TooLong { .. })
+        ));
+    }
+
+    #[test]
+    fn a_placed_map_has_its_cells_in_metres_and_one_that_lies_nowhere_is_refused_with_its_key() {
+        let placed = |place: &str| read_by(load_placed, &format!("image: grey.pgm\n{place}"), 255);
+        let map = placed("resolution: 0.05\norigin: [-2.5, 3, 0.0]").unwrap();
+        assert_eq!((map.cell_m, map.corner_m), (0.05, [-2.5, 3.0]));
+        let cases = [
+            ("origin: [0, 0, 0]", "resolution"),
+            ("resolution: 0.05", "origin"),
+            ("resolution: 0\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: -1\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: .nan\norigin: [0, 0, 0]", "resolution"),
+            ("resolution: 0.05\norigin: [0, 0]", "origin"),
+            ("resolution: 0.05\norigin: [0, .inf, 0]", "origin"),
+            ("resolution: 0.05\norigin: [0, 0, 0.7]", "origin"),
+        ];
+        for (place, named) in cases {
+            let error = placed(place).unwrap_err().to_string();
+            assert!(error.contains(named), "{place:?} gave {error}");
+        }
+    }
+}

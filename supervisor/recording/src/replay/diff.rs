@@ -1,0 +1,162 @@
+//! Where two recordings part: the first tick in which a stage published something else, and what it had read by then.
+
+use std::fmt;
+
+use common::topics::AnyTopic;
+use serde::Serialize;
+
+use crate::{
+    Message, Recording, RecordingError,
+    replay::samples::{COMPARED, First, difference, is_keyframe, tick_of},
+};
+
+/// Where two recordings part.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Parting {
+    /// Lines of the run file that differ: mission, seed, clock. Where the robot answers and what it is called are left out.
+    pub run: Vec<String>,
+    /// The builds, where they differ.
+    pub builds: Option<[String; 2]>,
+    /// The first difference.
+    pub first: Option<First>,
+    /// Ticks that both have.
+    pub ticks: u64,
+}
+
+/// Find where `first` and `second` part.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingError> {
+    let mut parting = Parting {
+        run: run_differences(first.run_text(), second.run_text()),
+        ..Parting::default()
+    };
+    if first.build() != second.build() {
+        parting.builds = Some([first, second].map(|recording| recording.build().to_owned()));
+    }
+    for topic in COMPARED {
+        let (found, ticks) = first_in(topic, first, second)?;
+        parting.ticks = parting.ticks.max(ticks);
+        if let Some(found) = found
+            && parting
+                .first
+                .as_ref()
+                .is_none_or(|held| found.tick < held.tick)
+        {
+            parting.first = Some(found);
+        }
+    }
+    Ok(parting)
+}
+
+fn run_differences(first: &str, second: &str) -> Vec<String> {
+    let own = |line: &&str| {
+        !["robot =", "address =", "epoch_ns ="]
+            .iter()
+            .any(|key| line.starts_with(key))
+    };
+    let (first, second): (Vec<_>, Vec<_>) = (
+        first.lines().filter(own).collect(),
+        second.lines().filter(own).collect(),
+    );
+    let only = |mark: &'static str, lines: &[&str], others: &[&str]| -> Vec<String> {
+        let lines = lines.iter().filter(|line| !others.contains(line));
+        lines.map(|line| format!("{mark} {line}")).collect()
+    };
+    let mut lines = only("-", &first, &second);
+    lines.extend(only("+", &second, &first));
+    lines
+}
+
+/// The last sample of each tick on one topic.
+struct Ticks<I> {
+    messages: I,
+    /// Read already: of the next tick.
+    next: Option<Message>,
+    slices: bool,
+}
+
+impl<I: Iterator<Item = Result<Message, RecordingError>>> Ticks<I> {
+    fn tick(&mut self) -> Result<Option<Message>, RecordingError> {
+        let mut last = self.next.take();
+        for message in self.messages.by_ref() {
+            let message = message?;
+            // The whole map, published again for new readers, may come in any tick.
+            if self.slices && is_keyframe(&message.data) {
+                continue;
+            }
+            match &last {
+                Some(held) if tick_of(&held.data) < tick_of(&message.data) => {
+                    self.next = Some(message);
+                    break;
+                }
+                // An earlier tick is given again.
+                _ => last = Some(message),
+            }
+        }
+        Ok(last)
+    }
+}
+
+fn first_in(
+    topic: &'static dyn AnyTopic,
+    first: &Recording,
+    second: &Recording,
+) -> Result<(Option<First>, u64), RecordingError> {
+    let ticks = |recording: &Recording| -> Result<_, RecordingError> {
+        Ok(Ticks {
+            messages: recording.messages(&[topic.spec().name])?,
+            next: None,
+            slices: topic.layout().1.is_some(),
+        })
+    };
+    let (mut one, mut other) = (ticks(first)?, ticks(second)?);
+    let (mut left, mut right) = (one.tick()?, other.tick()?);
+    let mut both = 0;
+    while let (Some(a), Some(b)) = (&left, &right) {
+        // A sample that a recorder lost says nothing.
+        match tick_of(&a.data).cmp(&tick_of(&b.data)) {
+            std::cmp::Ordering::Less => left = one.tick()?,
+            std::cmp::Ordering::Greater => right = other.tick()?,
+            std::cmp::Ordering::Equal => {
+                both += 1;
+                if let Some(found) = difference(topic, &a.data, &b.data) {
+                    return Ok((Some(found), both));
+                }
+                (left, right) = (one.tick()?, other.tick()?);
+            }
+        }
+    }
+    Ok((None, both))
+}
+
+impl fmt::Display for Parting {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for line in &self.run {
+            writeln!(to, "run: {line}")?;
+        }
+        if let Some([first, second]) = &self.builds {
+            writeln!(to, "builds: {first}; {second}")?;
+        }
+        let Some(first) = &self.first else {
+            return writeln!(to, "equal in the {} ticks that both have", self.ticks);
+        };
+        let [one, other] = &first.values;
+        writeln!(
+            to,
+            "they part at tick {}, {:.3} s: {} of {}, field {}\n  first  {one}\n  second {other}",
+            first.tick, first.time_s, first.topic, first.writer, first.field
+        )?;
+        let before: Vec<_> = COMPARED
+            .iter()
+            .map(|topic| topic.spec().name)
+            .take_while(|topic| *topic != first.topic)
+            .collect();
+        if before.is_empty() {
+            writeln!(to, "the robot's sensors differ first")
+        } else {
+            writeln!(to, "equal in that tick: {}", before.join(", "))
+        }
+    }
+}

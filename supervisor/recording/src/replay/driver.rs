@@ -1,0 +1,188 @@
+//! A recording, replayed: one pass over the file, all generations side by side.
+
+use std::{
+    collections::BTreeMap,
+    thread,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::decode_slice,
+    clock::{MissionTime, Pace},
+    run::Run,
+    samples::{DeathSample, HealthSample, HealthState, InputsHeader, name_str},
+    topics::{self, AnyTopic as _},
+};
+use supervisor::stages::{self, Stage};
+
+use crate::{
+    End, Message, Recording, RecordingError,
+    replay::{
+        generation::{Generation, Setting},
+        report::Report,
+        samples::time_of,
+    },
+};
+
+/// What to replay, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The stages, by their names; all without names.
+    pub stages: Vec<String>,
+    /// Compare from this mission time on: a state follows from all that was taken before, so that is computed, too.
+    pub from: MissionTime,
+    /// As fast as the machine can, or so many times mission time.
+    pub pace: Pace,
+    /// The run to replay in place of the recorded one: what another mission would have done with the same inputs.
+    pub run: Option<Run>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            stages: Vec::new(),
+            from: MissionTime::default(),
+            pace: Pace::Max,
+            run: None,
+        }
+    }
+}
+
+/// A link's own account of itself follows from what its process did, besides its step.
+const NOT_COMPUTED: [&str; 1] = ["link"];
+
+/// Replay `recording`.
+///
+/// # Errors
+/// When the file cannot be read, or holds a message that this version does not know.
+pub fn replay(recording: &Recording, options: &Options) -> Result<Report, RecordingError> {
+    let counts = recording.counts();
+    let recorded = |topic: &str| counts.contains_key(topic);
+    let cut = match recording.end() {
+        End::Complete => None,
+        End::Cut { after, .. } => Some(after.as_secs_f64()),
+    };
+    let setting = Setting {
+        run: options.run.as_ref().unwrap_or_else(|| recording.run()),
+        recorded: &recorded,
+        from: options.from,
+        cut: cut.is_some(),
+    };
+    let chosen: Vec<&'static Stage> = stages::TABLE
+        .iter()
+        .filter(|stage| {
+            options.stages.is_empty() || options.stages.iter().any(|name| name == stage.name)
+        })
+        .collect();
+    let mut wanted = vec![
+        topics::INPUTS.spec().name,
+        topics::HEALTH.spec().name,
+        topics::DEATHS.spec().name,
+    ];
+    for stage in &chosen {
+        let outputs = stage.outputs.iter().map(|topic| topic.spec().name);
+        wanted.extend(outputs.filter(|topic| !NOT_COMPUTED.contains(topic)));
+    }
+    let mut report = Report {
+        cut_after_s: cut,
+        ..Report::default()
+    };
+    for stage in &chosen {
+        report.stages.entry(stage.name).or_default();
+    }
+    let mut generations = Generations {
+        chosen,
+        all: BTreeMap::new(),
+    };
+    let began = Instant::now();
+    for message in recording.messages(&wanted)? {
+        let message = message?;
+        if let Pace::Rate(rate) = options.pace {
+            wait_for(&message, rate, began);
+        }
+        generations
+            .take(&setting, message)
+            .map_err(|topic| RecordingError::Message {
+                file: recording.path().to_path_buf(),
+                topic: topic.to_owned(),
+            })?;
+    }
+    for ((_, stage, _), generation) in generations.all {
+        let found = report.stages.entry(stage).or_default();
+        if let Some(difference) = generation.end(&setting, found) {
+            report.differs(difference);
+        }
+    }
+    Ok(report)
+}
+
+/// Wait until the mission time of `message` has come.
+fn wait_for(message: &Message, rate: f64, began: Instant) {
+    let due =
+        Duration::try_from_secs_f64(time_of(&message.data).seconds() / rate).unwrap_or_default();
+    thread::sleep(due.saturating_sub(began.elapsed()));
+}
+
+struct Generations {
+    chosen: Vec<&'static Stage>,
+    /// By the stage's place in the table, its name, and number.
+    all: BTreeMap<(usize, &'static str, u32), Generation>,
+}
+
+impl Generations {
+    fn of(&mut self, stage: &str, number: u32) -> Option<&mut Generation> {
+        let (place, stage) = self
+            .chosen
+            .iter()
+            .enumerate()
+            .find(|(_, chosen)| chosen.name == stage)?;
+        let key = (place, stage.name, number);
+        Some(
+            self.all
+                .entry(key)
+                .or_insert_with(|| Generation::new(stage, number)),
+        )
+    }
+
+    /// Take a message; an error names the topic that it is not of.
+    fn take(&mut self, setting: &Setting<'_>, message: Message) -> Result<(), &'static str> {
+        let topic = &*message.topic;
+        if topic == topics::INPUTS.spec().name {
+            let piece = decode_slice::<InputsHeader, u8>(&message.data);
+            let (header, piece) = piece.ok_or("inputs")?;
+            let stamp = header.stamp;
+            if let Some(generation) = self.of(name_str(&header.stage), stamp.generation) {
+                generation.piece(setting, stamp.sequence, &piece);
+            }
+        } else if topic == topics::HEALTH.spec().name {
+            let health: HealthSample = common::bus::decode_sample(&message.data).ok_or("health")?;
+            let ready = HealthState::from_byte(health.state) == HealthState::Ready;
+            let number = health.stamp.generation;
+            if let Some(generation) = self.of(name_str(&health.stage), number)
+                && ready
+            {
+                generation.worked();
+            }
+        } else if topic == topics::DEATHS.spec().name {
+            let death: DeathSample = common::bus::decode_sample(&message.data).ok_or("deaths")?;
+            self.of(name_str(&death.stage), death.generation);
+        } else {
+            let writer = topics::TABLE
+                .iter()
+                .find(|known| known.spec().name == topic);
+            let writer = writer.map_or("", |topic| topic.spec().writer);
+            let number = message.data.get(20..).and_then(|rest| rest.first_chunk());
+            let number = number.map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            if let Some(generation) = self.of(writer, number) {
+                let Message {
+                    topic,
+                    sequence,
+                    data,
+                    ..
+                } = message;
+                generation.output(setting, &topic, sequence, data);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,333 @@
+//! One generation, replayed while its inputs come. Its outputs may come before its inputs or after: what has no partner yet
+//! waits for it.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    rc::Rc,
+};
+
+use common::{
+    clock::MissionTime,
+    replay::{Beginning, Replay},
+    run::Run,
+    topics::{self, AnyTopic},
+};
+use supervisor::stages::Stage;
+
+use crate::replay::{
+    pieces::Pieces,
+    report::{Difference, StageReport, Verdict},
+    samples::{tick_of, time_of},
+    values,
+};
+
+/// Where the stamp's generation and sequence stand in a message, behind the encoding's header.
+const GENERATION: usize = 20;
+const SEQUENCE: usize = 24;
+/// Entries before an output that a difference shows.
+const SHOWN_INPUTS: usize = 4;
+/// Characters of each.
+const SHOWN_LENGTH: usize = 600;
+
+/// What all generations of a recording have in common.
+pub(crate) struct Setting<'a> {
+    pub(crate) run: &'a Run,
+    /// Topics that were recorded.
+    pub(crate) recorded: &'a dyn Fn(&str) -> bool,
+    /// Outputs before this time are computed and not compared.
+    pub(crate) from: MissionTime,
+    /// Whether the file ends before its recorder did.
+    pub(crate) cut: bool,
+}
+
+/// The body of an entry.
+type Body = Rc<Vec<u8>>;
+
+/// An output that was computed, and what went in before.
+struct Computed {
+    sequence: u32,
+    message: Vec<u8>,
+    inputs: Vec<Body>,
+}
+
+#[derive(Default)]
+struct Channel {
+    next: u32,
+    computed: VecDeque<Computed>,
+    recorded: VecDeque<(u32, Vec<u8>)>,
+}
+
+/// One generation.
+pub(crate) struct Generation {
+    stage: &'static Stage,
+    number: u32,
+    pieces: Pieces,
+    replay: Option<Box<dyn Replay>>,
+    channels: BTreeMap<String, Channel>,
+    last_inputs: VecDeque<Body>,
+    not_replayed: Option<String>,
+    difference: Option<Difference>,
+    inputs: u64,
+    compared: u64,
+    unrecorded: u64,
+    pieces_came: bool,
+    /// It beat as ready, or published an output: it took something.
+    worked: bool,
+}
+
+impl Generation {
+    pub(crate) fn new(stage: &'static Stage, number: u32) -> Self {
+        Self {
+            stage,
+            number,
+            pieces: Pieces::default(),
+            replay: None,
+            channels: BTreeMap::new(),
+            last_inputs: VecDeque::new(),
+            not_replayed: None,
+            difference: None,
+            inputs: 0,
+            compared: 0,
+            unrecorded: 0,
+            pieces_came: false,
+            worked: false,
+        }
+    }
+
+    /// It is known to have taken something.
+    pub(crate) const fn worked(&mut self) {
+        self.worked = true;
+    }
+
+    /// A piece of its inputs came.
+    pub(crate) fn piece(&mut self, setting: &Setting<'_>, sequence: u32, piece: &[u8]) {
+        self.pieces_came = true;
+        if self.is_over() {
+            return;
+        }
+        if let Err(broken) = self.pieces.push(sequence, piece) {
+            self.give_up(broken.to_string());
+            return;
+        }
+        loop {
+            match self.pieces.entry() {
+                Ok(Some(body)) => self.entry(setting, body),
+                Ok(None) => return,
+                Err(broken) => {
+                    self.give_up(broken.to_string());
+                    return;
+                }
+            }
+            if self.is_over() {
+                return;
+            }
+        }
+    }
+
+    fn entry(&mut self, setting: &Setting<'_>, body: Vec<u8>) {
+        let Some(replay) = &mut self.replay else {
+            let fields = (setting.recorded)(topics::FIELD.spec().name);
+            let beginning = Beginning {
+                run: setting.run,
+                start: &body,
+                fields,
+            };
+            match (self.stage.replay)(beginning) {
+                Ok(replay) => self.replay = Some(replay),
+                Err(error) => self.give_up(error.to_string()),
+            }
+            return;
+        };
+        self.inputs += 1;
+        let outputs = match replay.take(&body) {
+            Ok(outputs) => outputs,
+            Err(error) => {
+                self.give_up(error.to_string());
+                return;
+            }
+        };
+        if self.last_inputs.len() == SHOWN_INPUTS {
+            self.last_inputs.pop_front();
+        }
+        self.last_inputs.push_back(Rc::new(body));
+        for output in outputs {
+            if !(setting.recorded)(output.topic) {
+                continue;
+            }
+            let channel = self.channels.entry(output.topic.to_owned()).or_default();
+            let sequence = channel.next;
+            channel.next = sequence.wrapping_add(1);
+            let mut message = output.message;
+            for (at, number) in [(GENERATION, self.number), (SEQUENCE, sequence)] {
+                if let Some(field) = message.get_mut(at..at + 4) {
+                    field.copy_from_slice(&number.to_le_bytes());
+                }
+            }
+            channel.computed.push_back(Computed {
+                sequence,
+                message,
+                inputs: self.last_inputs.iter().cloned().collect(),
+            });
+            self.compare(setting, output.topic);
+        }
+    }
+
+    /// A sample that it published came.
+    pub(crate) fn output(
+        &mut self,
+        setting: &Setting<'_>,
+        topic: &str,
+        sequence: u32,
+        message: Vec<u8>,
+    ) {
+        self.worked = true;
+        if !self.is_over() {
+            let channel = self.channels.entry(topic.to_owned()).or_default();
+            channel.recorded.push_back((sequence, message));
+            self.compare(setting, topic);
+        }
+    }
+
+    /// Compare what has a partner on `topic`.
+    fn compare(&mut self, setting: &Setting<'_>, topic: &str) {
+        while let Some(channel) = self.channels.get_mut(topic) {
+            let (Some((sequence, _)), Some(computed)) =
+                (channel.recorded.front(), channel.computed.front())
+            else {
+                return;
+            };
+            if computed.sequence < *sequence {
+                channel.computed.pop_front();
+                self.unrecorded += 1;
+                continue;
+            }
+            let recorded = channel.recorded.pop_front();
+            let computed = channel.computed.pop_front();
+            let (Some((_, recorded)), Some(computed)) = (recorded, computed) else {
+                return;
+            };
+            if time_of(&recorded) < setting.from {
+                continue;
+            }
+            self.compared += 1;
+            if recorded != computed.message {
+                self.differs(topic, &recorded, &computed);
+                return;
+            }
+        }
+    }
+
+    fn differs(&mut self, topic: &str, recorded: &[u8], computed: &Computed) {
+        let tick = tick_of(recorded);
+        let known = topics::TABLE
+            .iter()
+            .find(|known| known.spec().name == topic);
+        let (field, was, is) = known.map_or_else(Default::default, |topic| {
+            values::first_difference(*topic, recorded, &computed.message)
+        });
+        let describe = |body: &Body| {
+            let said = self.replay.as_ref()?.describe(body).ok()?;
+            Some(said.chars().take(SHOWN_LENGTH).collect())
+        };
+        self.difference = Some(Difference {
+            stage: self.stage.name,
+            generation: self.number,
+            tick,
+            topic: topic.to_owned(),
+            field,
+            recorded: was,
+            computed: is,
+            inputs: computed.inputs.iter().filter_map(describe).collect(),
+        });
+        self.reset();
+    }
+
+    fn is_over(&self) -> bool {
+        self.not_replayed.is_some() || self.difference.is_some()
+    }
+
+    fn give_up(&mut self, why: String) {
+        self.not_replayed = Some(why);
+        self.reset();
+    }
+
+    /// Hold nothing of a generation that is over.
+    fn reset(&mut self) {
+        self.pieces = Pieces::default();
+        self.replay = None;
+        self.channels.clear();
+        self.last_inputs.clear();
+    }
+
+    /// The recording has ended.
+    pub(crate) fn end(
+        mut self,
+        setting: &Setting<'_>,
+        report: &mut StageReport,
+    ) -> Option<Difference> {
+        if !self.is_over() && !setting.cut {
+            self.find_what_was_not_computed(setting);
+        }
+        let waiting = self
+            .channels
+            .values()
+            .map(|channel| channel.computed.len() as u64);
+        self.unrecorded += waiting.sum::<u64>();
+        report.inputs += self.inputs;
+        report.compared += self.compared;
+        report.unrecorded += self.unrecorded;
+        let verdict = self.verdict(setting);
+        match verdict {
+            Verdict::Equal => report.equal += 1,
+            Verdict::WithoutStep => report.without_step += 1,
+            Verdict::Different => report.different += 1,
+            Verdict::NotReplayed(why) => {
+                report.not_replayed.insert(self.number, why);
+            }
+        }
+        self.difference
+    }
+
+    fn find_what_was_not_computed(&mut self, setting: &Setting<'_>) {
+        let late = |(topic, channel): (&String, &Channel)| {
+            let (_, message) = channel.recorded.front()?;
+            (time_of(message) >= setting.from).then(|| (topic.clone(), message.clone()))
+        };
+        if self.replay.is_some()
+            && let Some((topic, message)) = self.channels.iter().find_map(late)
+        {
+            let nothing = Computed {
+                sequence: 0,
+                message: Vec::new(),
+                inputs: self.last_inputs.iter().cloned().collect(),
+            };
+            self.differs(&topic, &message, &nothing);
+        }
+    }
+
+    fn verdict(&self, setting: &Setting<'_>) -> Verdict {
+        if self.difference.is_some() {
+            return Verdict::Different;
+        }
+        if let Some(why) = &self.not_replayed {
+            return Verdict::NotReplayed(why.clone());
+        }
+        if self.pieces_came {
+            return if self.inputs == 0 {
+                Verdict::WithoutStep
+            } else {
+                Verdict::Equal
+            };
+        }
+        if !self.worked {
+            return Verdict::WithoutStep;
+        }
+        Verdict::NotReplayed(match self.stage.executable(&setting.run.mission) {
+            Some(executable) => format!(
+                "it was {}, which publishes no `inputs`",
+                executable.display()
+            ),
+            None => "none of its `inputs` is recorded".to_owned(),
+        })
+    }
+}

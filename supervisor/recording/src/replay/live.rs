@@ -1,0 +1,381 @@
+//! A recording, played: what was recorded is published again on a robot's bus, where any consumer reads it as it reads a robot,
+//! and stages run in processes of their own in place of the recorded ones, which take what is played.
+//!
+//! Played as fast as the machine can, a tick is over when every live stage has answered it as often as the recorded one did,
+//! so a stage that a debugger holds holds the time. Played at a pace, time goes on whatever they do.
+//!
+//! A live stage starts as at the beginning of a mission, and is not started again. The link has no live process: it would
+//! doubt a robot that drives as the recording says and not as it is told.
+
+mod error;
+mod order;
+mod report;
+mod stage;
+
+use std::{
+    collections::BTreeMap,
+    io,
+    os::unix::fs::symlink,
+    rc::Rc,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, EncodedWriter, Reader},
+    clock::{MissionClock, MissionTime, Pace},
+    domain::{Domain, RobotName},
+    mission::Mission,
+    run::Run,
+    samples::{HealthSample, HealthState, name_str},
+    topics::{self, AnyTopic, EncodedTopic},
+    waiter::Waiter,
+};
+use supervisor::{
+    domain::DomainLock,
+    stages::{self, Stage},
+};
+use tempfile::TempDir;
+
+use self::{order::ByTick, stage::LiveStage};
+use crate::{
+    Message, Recording, RecordingError,
+    replay::samples::{First, tick_of, time_of},
+};
+
+pub use self::{
+    error::LiveError,
+    report::{LiveReport, LiveStageReport},
+};
+
+/// Not played: who was there and what they were asked for; a process of that number is another one now.
+static NOT_PLAYED: [&dyn AnyTopic; 5] = [
+    &topics::ROSTER,
+    &topics::HEALTH,
+    &topics::INPUTS,
+    &topics::REQUESTS,
+    &topics::FAULTS,
+];
+/// A slice of a topic that is no map has at most so many elements.
+const LONGEST_PIECE: usize = 1 << 16;
+/// How often it is looked whether to stop.
+const POLL: Duration = Duration::from_millis(50);
+/// An answer that is waited for this long is told.
+const TELL_AFTER: Duration = Duration::from_secs(2);
+
+/// What to play, and how.
+pub struct Options {
+    /// Name of the robot whose place the recording takes.
+    pub robot: RobotName,
+    /// The stages that run in processes of their own.
+    pub stages: Vec<&'static Stage>,
+    /// As fast as the machine can, or so many times mission time.
+    pub pace: Pace,
+    /// Played as fast as the machine can until this time.
+    pub from: MissionTime,
+    /// What the live stages are given in place of the recorded mission.
+    pub mission: Option<Mission>,
+}
+
+/// What happens, for who plays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Happened {
+    /// This stage is ready, in this process.
+    Ready(&'static str, u32),
+    /// It is played.
+    Playing,
+    /// This stage has not answered this tick.
+    Waiting(&'static str, u64),
+}
+
+/// Play `recording` until its end, or until `stop` says so.
+///
+/// # Errors
+/// When the file cannot be read, the robot's name is taken, or a live stage ends.
+pub fn play(
+    recording: &Recording,
+    options: &Options,
+    stop: &mut dyn FnMut() -> bool,
+    tell: &mut dyn FnMut(Happened),
+) -> Result<LiveReport, LiveError> {
+    if options
+        .stages
+        .iter()
+        .any(|stage| stage.name == error::NEVER_LIVE)
+    {
+        return Err(LiveError::Link);
+    }
+    let mut player = Player::open(recording, options)?;
+    if !player.wait_until_ready(stop, tell)? {
+        return Ok(player.report());
+    }
+    tell(Happened::Playing);
+    player.began = Instant::now();
+    for message in ByTick::new(recording.messages(&[])?) {
+        let message = message?;
+        let Some(writer) = writer_of(&message.topic) else {
+            continue;
+        };
+        let tick = tick_of(&message.data);
+        if tick > player.tick {
+            let (answered, come) = (
+                player.await_answers(stop, tell)?,
+                player.await_time(time_of(&message.data), stop)?,
+            );
+            if !(answered && come) {
+                return Ok(player.report());
+            }
+            player.tick = tick;
+        }
+        player.play(recording, writer, &message)?;
+    }
+    player.await_answers(stop, tell)?;
+    Ok(player.report())
+}
+
+/// The topic of a message that may be played.
+fn writer_of(topic: &str) -> Option<&'static dyn EncodedTopic> {
+    let named = |known: &str| known == topic;
+    if NOT_PLAYED.iter().any(|other| named(other.spec().name)) {
+        return None;
+    }
+    let mut known = topics::ENCODED.iter();
+    known.find(|known| named(known.spec().name)).copied()
+}
+
+/// The robot's place, taken by a recording. Fields are dropped in this order: the bus last.
+struct Player {
+    stages: Vec<LiveStage>,
+    writers: BTreeMap<&'static str, Box<dyn EncodedWriter>>,
+    health: Reader<HealthSample>,
+    waiter: Waiter,
+    bus: Rc<Bus>,
+    _lock: DomainLock,
+    /// Of the run file and the logs of the live stages.
+    _directory: TempDir,
+    longest: usize,
+    pace: Pace,
+    from: MissionTime,
+    began: Instant,
+    tick: u64,
+    played: u64,
+}
+
+impl Player {
+    fn open(recording: &Recording, options: &Options) -> Result<Self, LiveError> {
+        let recorded = recording.run();
+        let mission = options.mission.as_ref().unwrap_or(&recorded.mission);
+        let run = Run {
+            robot: options.robot.clone(),
+            // What a live stage does follows from what is played, not from when.
+            clock: MissionClock::Ticks {
+                period_ns: (1e9 / mission.robot.rate_hz) as u64,
+            },
+            mission: mission.clone(),
+            ..recorded.clone()
+        };
+        let cells = run.mission.grid_frame().area();
+        let domain = Domain::of(options.robot.clone());
+        let link = domain.run_directory();
+        let lock = DomainLock::acquire(domain, cells)?;
+        let directory = tempfile::Builder::new()
+            .prefix("firsthand-replay-")
+            .tempdir();
+        let directory = directory.map_err(LiveError::Directory)?;
+        run.save(directory.path())?;
+        symlink(directory.path(), link).map_err(LiveError::Directory)?;
+        let bus = lock
+            .bus()
+            .ok_or_else(|| LiveError::Directory(io::Error::from(io::ErrorKind::NotConnected)))?;
+        let mut waiter = Waiter::default();
+        waiter.on(bus.wakeup(&topics::HEALTH)?);
+        let health = bus.reader(&topics::HEALTH)?.of_all_generations();
+        let start = |stage: &&'static Stage| {
+            LiveStage::start(stage, &run, directory.path(), &bus, &mut waiter)
+        };
+        let stages = options.stages.iter().map(start);
+        let stages = stages.collect::<Result<_, _>>()?;
+        Ok(Self {
+            stages,
+            writers: BTreeMap::new(),
+            health,
+            waiter,
+            bus,
+            _lock: lock,
+            _directory: directory,
+            longest: cells.max(LONGEST_PIECE),
+            pace: options.pace,
+            from: options.from,
+            began: Instant::now(),
+            tick: 0,
+            played: 0,
+        })
+    }
+
+    /// Wait until every live stage beats as ready. Says whether they do; they do not where it was asked to stop.
+    fn wait_until_ready(
+        &mut self,
+        stop: &mut dyn FnMut() -> bool,
+        tell: &mut dyn FnMut(Happened),
+    ) -> Result<bool, LiveError> {
+        let mut waiting: Vec<_> = self.stages.iter().map(|live| live.stage.name).collect();
+        while !waiting.is_empty() {
+            while let Some(health) = self.health.take()? {
+                let ready = HealthState::from_byte(health.state) == HealthState::Ready;
+                let named = |stage: &&str| *stage == name_str(&health.stage);
+                if let Some(place) = waiting.iter().position(|stage| ready && named(stage)) {
+                    tell(Happened::Ready(waiting.remove(place), health.pid));
+                }
+            }
+            if stop() {
+                return Ok(false);
+            }
+            self.check_stages()?;
+            self.wait(POLL)?;
+        }
+        Ok(true)
+    }
+
+    fn wait(&self, patience: Duration) -> Result<(), LiveError> {
+        self.waiter.wait(patience)?;
+        Ok(())
+    }
+
+    /// An error where a live stage has ended.
+    fn check_stages(&mut self) -> Result<(), LiveError> {
+        for live in &mut self.stages {
+            let stage = live.stage.name;
+            let ended = live.ended();
+            let ended = ended.map_err(|source| LiveError::Start { stage, source })?;
+            if let Some((cause, words)) = ended {
+                return Err(LiveError::Ended {
+                    stage,
+                    tick: self.tick,
+                    cause,
+                    words,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Take what the live stages published. Returns one that has not answered the tick under way.
+    fn look(&mut self) -> Result<Option<&'static str>, LiveError> {
+        // Whoever beats wakes this process, too.
+        while self.health.take()?.is_some() {}
+        let mut waiting = None;
+        for live in &mut self.stages {
+            if !live.has_answered(self.tick)? {
+                waiting = waiting.or(Some(live.stage.name));
+            }
+        }
+        self.check_stages()?;
+        Ok(waiting)
+    }
+
+    /// The tick under way is over: wait for the answers of live stages where time waits for them, and compare. Says
+    /// whether to go on.
+    fn await_answers(
+        &mut self,
+        stop: &mut dyn FnMut() -> bool,
+        tell: &mut dyn FnMut(Happened),
+    ) -> Result<bool, LiveError> {
+        let began = Instant::now();
+        let mut told = false;
+        while let (Some(stage), Pace::Max) = (self.look()?, self.pace) {
+            if stop() {
+                return Ok(false);
+            }
+            if !told && began.elapsed() >= TELL_AFTER {
+                told = true;
+                tell(Happened::Waiting(stage, self.tick));
+            }
+            self.wait(POLL)?;
+        }
+        for live in &mut self.stages {
+            live.compare(self.tick);
+        }
+        Ok(!stop())
+    }
+
+    /// Wait until `time` has come. Says whether to go on.
+    fn await_time(
+        &mut self,
+        time: MissionTime,
+        stop: &mut dyn FnMut() -> bool,
+    ) -> Result<bool, LiveError> {
+        let Pace::Rate(rate) = self.pace else {
+            return Ok(true);
+        };
+        if time <= self.from {
+            self.began = Instant::now();
+            return Ok(true);
+        }
+        let due = Duration::try_from_secs_f64(time.since(self.from).as_secs_f64() / rate);
+        let due = due.unwrap_or_default();
+        loop {
+            let left = due.saturating_sub(self.began.elapsed());
+            if left.is_zero() {
+                return Ok(true);
+            }
+            if stop() {
+                return Ok(false);
+            }
+            self.look()?;
+            self.wait(left.min(POLL))?;
+        }
+    }
+
+    fn play(
+        &mut self,
+        recording: &Recording,
+        topic: &'static dyn EncodedTopic,
+        message: &Message,
+    ) -> Result<(), LiveError> {
+        let mut stages = self.stages.iter_mut();
+        if stages.any(|live| live.recorded(&message.topic, &message.data)) {
+            return Ok(());
+        }
+        let name = topic.spec().name;
+        if !self.writers.contains_key(name) {
+            let writer = topic.encoded_writer(&self.bus, self.longest)?;
+            self.writers.insert(name, writer);
+        }
+        if let Some(writer) = self.writers.get_mut(name)
+            && !writer.publish(&message.data)?
+        {
+            return Err(RecordingError::Message {
+                file: recording.path().to_path_buf(),
+                topic: name.to_owned(),
+            }
+            .into());
+        }
+        self.played += 1;
+        Ok(())
+    }
+
+    fn report(&self) -> LiveReport {
+        let mut report = LiveReport {
+            played: self.played,
+            ..LiveReport::default()
+        };
+        for live in &self.stages {
+            let (found, first) = live.report();
+            report.stages.insert(live.stage.name, found);
+            let earlier = |found: &First| {
+                let held = report.first.as_ref();
+                held.is_none_or(|held| found.tick < held.tick)
+            };
+            if let Some(first) = first.filter(earlier) {
+                report.first = Some(first);
+            }
+        }
+        report
+    }
+}
+
+/// The stages that can be live: all but the link.
+pub fn live_stages() -> impl Iterator<Item = &'static Stage> {
+    stages::TABLE
+        .iter()
+        .filter(|stage| stage.name != error::NEVER_LIVE)
+}

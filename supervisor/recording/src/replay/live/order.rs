@@ -1,0 +1,83 @@
+//! Messages in the order of their ticks: a recorder that was kept waiting takes each topic's samples of several ticks at once.
+
+use std::collections::BTreeMap;
+
+use common::topics;
+
+use crate::{Message, RecordingError, replay::samples::tick_of};
+
+/// So many messages are held: those of some hundred ticks, which is more than a bus holds for its recorder.
+const HELD: usize = 4096;
+
+/// Gives messages by tick, those of a tick in the order of the table of topics, those of a topic as they come.
+pub(super) struct ByTick<I> {
+    messages: I,
+    held: BTreeMap<(u64, usize, u64), Message>,
+    came: u64,
+}
+
+impl<I: Iterator<Item = Result<Message, RecordingError>>> ByTick<I> {
+    pub(super) const fn new(messages: I) -> Self {
+        Self {
+            messages,
+            held: BTreeMap::new(),
+            came: 0,
+        }
+    }
+}
+
+impl<I: Iterator<Item = Result<Message, RecordingError>>> Iterator for ByTick<I> {
+    type Item = Result<Message, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.held.len() < HELD {
+            let message = match self.messages.next() {
+                Some(Ok(message)) => message,
+                Some(Err(error)) => return Some(Err(error)),
+                None => break,
+            };
+            let place = topics::TABLE
+                .iter()
+                .position(|topic| topic.spec().name == &*message.topic);
+            let key = (
+                tick_of(&message.data),
+                place.unwrap_or(topics::TABLE.len()),
+                self.came,
+            );
+            self.came += 1;
+            self.held.insert(key, message);
+        }
+        self.held.pop_first().map(|(_, message)| Ok(message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(topic: &str, tick: u64) -> Message {
+        let mut data = vec![0; 4];
+        data.extend_from_slice(&tick.to_le_bytes());
+        Message {
+            topic: topic.into(),
+            log_ns: 0,
+            sequence: 0,
+            data,
+        }
+    }
+
+    #[test]
+    fn samples_that_were_recorded_topic_by_topic_come_tick_by_tick() {
+        let recorded = [("range", 1), ("range", 2), ("pose", 1), ("pose", 2)];
+        let messages = recorded.map(|(topic, tick)| Ok(message(topic, tick)));
+        let ordered: Vec<_> = ByTick::new(messages.into_iter())
+            .map(|message| message.unwrap())
+            .map(|message| (message.topic.to_string(), tick_of(&message.data)))
+            .collect();
+        let expected = [("range", 1), ("pose", 1), ("range", 2), ("pose", 2)];
+        assert_eq!(
+            ordered,
+            expected.map(|(topic, tick)| (topic.to_owned(), tick))
+        );
+    }
+}

@@ -1,0 +1,60 @@
+//! What live stages did.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::Serialize;
+
+use crate::replay::samples::First;
+
+/// What live stages published beside what was recorded.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LiveReport {
+    /// By stage.
+    pub stages: BTreeMap<&'static str, LiveStageReport>,
+    /// Where one first differs from what was recorded.
+    pub first: Option<First>,
+    /// Samples that were played.
+    pub played: u64,
+}
+
+/// What one published.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LiveStageReport {
+    /// Ticks that both it and the recorded stage answered.
+    pub answered: u64,
+    /// Of these, with the same values.
+    pub equal: u64,
+    /// Ticks that only the recorded stage answered in time.
+    pub unanswered: u64,
+}
+
+impl fmt::Display for LiveReport {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(to, "{} samples played", self.played)?;
+        if self.stages.is_empty() {
+            return Ok(());
+        }
+        writeln!(
+            to,
+            "{:<16} {:>9} {:>12} {:>11}",
+            "live stage", "answered", "as recorded", "unanswered"
+        )?;
+        for (stage, found) in &self.stages {
+            let LiveStageReport {
+                answered,
+                equal,
+                unanswered,
+            } = found;
+            writeln!(to, "{stage:<16} {answered:>9} {equal:>12} {unanswered:>11}")?;
+        }
+        let Some(first) = &self.first else {
+            return Ok(());
+        };
+        let [recorded, live] = &first.values;
+        writeln!(
+            to,
+            "first difference: tick {}, {:.3} s: {} of {}, field {}\n  recorded {recorded}\n  live     {live}",
+            first.tick, first.time_s, first.topic, first.writer, first.field
+        )
+    }
+}

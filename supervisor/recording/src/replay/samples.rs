@@ -1,0 +1,93 @@
+//! Samples of a tick as they are recorded: when they are of, and where two of them differ.
+
+use common::{
+    clock::MissionTime,
+    topics::{self, AnyTopic},
+};
+use serde::Serialize;
+
+use crate::replay::values;
+
+/// The topics of a tick that are compared, in the order in which one follows from the other.
+pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
+    &topics::RANGE,
+    &topics::WHEELS,
+    &topics::POSE,
+    &topics::GRID,
+    &topics::GUIDANCE,
+    &topics::COMMAND,
+];
+/// What a process measures of itself, or how often it was replaced: no two runs have the same.
+const OWN: [&str; 6] = [
+    "stamp.generation",
+    "stamp.sequence",
+    "full_solve_ns",
+    "local_update_ns",
+    "full_solves",
+    "local_updates",
+];
+
+/// The first difference.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct First {
+    /// The tick.
+    pub tick: u64,
+    /// Its mission time, seconds.
+    pub time_s: f64,
+    /// The first of the topics of that tick that differs.
+    pub topic: &'static str,
+    /// Who wrote it.
+    pub writer: &'static str,
+    /// The first field that does.
+    pub field: String,
+    /// Its value in both.
+    pub values: [String; 2],
+}
+
+/// The tick of a message.
+pub(crate) fn tick_of(message: &[u8]) -> u64 {
+    number(message, 4)
+}
+
+/// The mission time of a message.
+pub(crate) fn time_of(message: &[u8]) -> MissionTime {
+    MissionTime(number(message, 12))
+}
+
+fn number(message: &[u8], at: usize) -> u64 {
+    let bytes = message.get(at..).and_then(|rest| rest.first_chunk());
+    bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes))
+}
+
+/// `keyframe` of a grid's part: behind stamp, version and five numbers.
+pub(crate) fn is_keyframe(message: &[u8]) -> bool {
+    message.get(4 + 24 + 8 + 20) == Some(&1)
+}
+
+/// What differs between two samples of the same tick on `topic`, but for what a process measures of itself.
+pub(crate) fn difference(topic: &'static dyn AnyTopic, a: &[u8], b: &[u8]) -> Option<First> {
+    // Behind the stamp's generation and sequence.
+    if a.get(..20) == b.get(..20) && a.get(28..) == b.get(28..) {
+        return None;
+    }
+    let own = |(field, _): &(String, String)| !OWN.iter().any(|own| field.ends_with(own));
+    let one: Vec<_> = values::of(topic, a).into_iter().filter(own).collect();
+    let other: Vec<_> = values::of(topic, b).into_iter().filter(own).collect();
+    let differs = one.iter().zip(&other).find(|(one, other)| one != other);
+    let (field, values) = match differs {
+        Some(((field, one), (_, other))) => (field.clone(), [one.clone(), other.clone()]),
+        None if one.len() == other.len() => return None,
+        None => (
+            "number of elements".to_owned(),
+            [one.len(), other.len()].map(|count| count.to_string()),
+        ),
+    };
+    Some(First {
+        tick: tick_of(a),
+        time_s: time_of(a).seconds(),
+        topic: topic.spec().name,
+        writer: topic.spec().writer,
+        field,
+        values,
+    })
+}

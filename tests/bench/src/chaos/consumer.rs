@@ -1,0 +1,179 @@
+//! The consumers that are hit beside the stages, and how each is started.
+
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
+    process::Command,
+    str::FromStr,
+};
+
+use common::domain::RobotName;
+use supervisor::{
+    executable::{self, ExecutableError},
+    process::firsthand,
+};
+use thiserror::Error;
+
+use crate::chaos::{
+    terminal,
+    words::{self, WordsError},
+};
+
+/// The subcommand that becomes a consumer's program, and ends with its parent.
+pub const SUBCOMMAND: &str = "consumer";
+
+/// A consumer that is hit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Consumer {
+    /// The recorder that the run itself starts. Nobody starts it again within its run.
+    RunRecorder,
+    /// One more `firsthand record`.
+    Record,
+    /// `firsthand top`, on a terminal of its own.
+    Top,
+    /// `firsthand hz`.
+    Hz,
+    /// `firsthand logs -f`.
+    Logs,
+    /// A user's.
+    Given(GivenConsumer),
+}
+
+/// A user's consumer: a command without a shell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GivenConsumer {
+    command: String,
+    program: PathBuf,
+    arguments: Vec<String>,
+}
+
+/// A user's consumer that cannot be started.
+#[derive(Debug, Error)]
+#[error(
+    "the consumer {command:?} cannot be started: {problem}; give a program, by its path or by a name on PATH, and its arguments, \
+     in quotes where they contain spaces (no shell reads them)"
+)]
+pub struct ConsumerError {
+    command: String,
+    problem: ConsumerProblem,
+}
+
+#[derive(Debug, Error)]
+enum ConsumerProblem {
+    #[error(transparent)]
+    Words(#[from] WordsError),
+    #[error("{program}: {problem}")]
+    Program {
+        program: String,
+        problem: ExecutableError,
+    },
+}
+
+impl FromStr for GivenConsumer {
+    type Err = ConsumerError;
+
+    fn from_str(command: &str) -> Result<Self, Self::Err> {
+        let found = || {
+            let mut words = words::split(command)?.into_iter();
+            let program = words.next().ok_or(WordsError::Nothing)?;
+            match executable::find(Path::new(&program)) {
+                Ok(path) => Ok((path, words.collect())),
+                Err(problem) => Err(ConsumerProblem::Program { program, problem }),
+            }
+        };
+        let (program, arguments) = found().map_err(|problem| ConsumerError {
+            command: command.to_owned(),
+            problem,
+        })?;
+        Ok(Self {
+            command: command.to_owned(),
+            program,
+            arguments,
+        })
+    }
+}
+
+impl Consumer {
+    /// Those of this executable. Without terminals `hz` stands in for `top`.
+    #[must_use]
+    pub fn own() -> Vec<Self> {
+        let shows = match terminal::open() {
+            Ok(_) => Self::Top,
+            Err(_) => Self::Hz,
+        };
+        vec![Self::RunRecorder, Self::Record, shows, Self::Logs]
+    }
+
+    /// What it is called in results.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::RunRecorder => "run's recorder",
+            Self::Record => "record",
+            Self::Top => "top",
+            Self::Hz => "hz",
+            Self::Logs => "logs -f",
+            Self::Given(given) => &given.command,
+        }
+    }
+
+    /// The command that starts it for `robot`; one that records, into `recording`. None of the run's own recorder.
+    pub(crate) fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
+        let own = |arguments: &[&str]| {
+            let mut words: Vec<OsString> = vec!["/proc/self/exe".into()];
+            words.extend(arguments.iter().map(OsString::from));
+            words.extend(["--robot".into(), robot.to_string().into()]);
+            words
+        };
+        let words = match self {
+            Self::RunRecorder => return None,
+            Self::Record => {
+                let mut words = own(&["record"]);
+                words.extend(["--out".into(), recording.into()]);
+                words
+            }
+            Self::Top => own(&["top"]),
+            Self::Hz => own(&["hz"]),
+            Self::Logs => own(&["logs", "--follow"]),
+            Self::Given(given) => {
+                let mut words = vec![given.program.clone().into_os_string()];
+                words.extend(given.arguments.iter().map(OsString::from));
+                words
+            }
+        };
+        let mut command = firsthand(&[SUBCOMMAND, &std::process::id().to_string()]);
+        command.args(words);
+        Some(command)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_without_a_program_is_refused_with_what_is_wrong_and_the_remedy() {
+        for (command, problem) in [
+            ("no-such-logger x80", "no-such-logger: it is neither"),
+            ("./no/such/logger", "No such file"),
+            ("/tmp x", "is a directory"),
+            ("sh 'x", "within quotes"),
+            ("", "nothing in it"),
+        ] {
+            let said = command.parse::<GivenConsumer>().unwrap_err().to_string();
+            assert!(said.contains(&format!("{command:?}")), "{said}");
+            assert!(
+                said.contains(problem) && said.contains("; give a program"),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_command_is_its_program_and_its_words() {
+        let given: GivenConsumer = "sh -c 'exit 1'".parse().unwrap();
+        assert!(given.program.is_absolute() && given.program.ends_with("sh"));
+        assert_eq!(given.arguments, ["-c", "exit 1"]);
+        assert_eq!(Consumer::Given(given).name(), "sh -c 'exit 1'");
+    }
+}

@@ -1,0 +1,37 @@
+//! Why chaos ended early.
+
+use common::bus::BusError;
+use supervisor::simulator::SimulatorError;
+use thiserror::Error;
+
+use crate::chaos::signals::SignalsError;
+
+/// Why chaos ended early.
+#[derive(Debug, Error)]
+pub enum ChaosError {
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The simulated robot.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    /// The table of signals.
+    #[error(transparent)]
+    Signals(#[from] SignalsError),
+    /// A process or a file.
+    #[error("cannot {action}: {source}")]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// A mission ended without a summary.
+    #[error("a mission gave no summary: {0}")]
+    NoSummary(String),
+}
+
+/// The system refused to do `action`.
+pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> ChaosError {
+    move |source| ChaosError::System { action, source }
+}

@@ -1,0 +1,261 @@
+//! What a lying robot's bytes become on their way. Pure: bytes and times in, bytes and times out.
+
+use std::{collections::VecDeque, time::Duration};
+
+use common::wire::{
+    Addressing, COUNT_CYCLE, Command, Decoder, Frame, Motion, MotorSensors, Quantity, Report, did,
+};
+use rand_pcg::{Pcg64, rand_core::Rng};
+
+use crate::chaos::robot_fault::RobotFault;
+
+/// How late frames are that are late.
+const LATE: Duration = Duration::from_secs(2);
+/// How old a frame is that comes again, ...
+const OLD: Duration = Duration::from_secs(3);
+/// ... and how often.
+const AGAIN_EVERY: Duration = Duration::from_secs(2);
+/// Between slow frames: three times a second.
+const SLOW: Duration = Duration::from_millis(333);
+/// The stuck echo, centimetres.
+const STUCK_CM: u8 = 8;
+/// Ultrasonic bytes at the front of a standard frame's data.
+const ULTRASONIC: usize = 6;
+/// Motor frames that are kept: as many as come in [`OLD`] at ten times the usual rate.
+const MOST_KEPT: usize = 1024;
+
+/// Bytes for the host, and when.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Late {
+    /// On the clock that the bytes came by.
+    pub(crate) at: Duration,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// A robot that tells the truth until it is told to lie.
+#[derive(Debug)]
+pub(crate) struct FaultInjector {
+    fault: RobotFault,
+    lies: bool,
+    chance: Pcg64,
+    /// The channel of faults of one encoder.
+    channel: usize,
+    from_robot: Decoder,
+    from_host: Decoder,
+    /// The motor frame that came last, and the last one before it lied.
+    last: MotorSensors,
+    base: MotorSensors,
+    base_data: Vec<u8>,
+    /// Motor frames of the last seconds, oldest first.
+    kept: VecDeque<Late>,
+    next_again: Duration,
+    next_slow: [Duration; 256],
+    /// The last command that moved the wheels.
+    moving: Option<Motion>,
+    /// The robot was stopped by other means than speed 0.
+    disabled: bool,
+}
+
+impl FaultInjector {
+    /// One that will lie like that, seeded.
+    pub(crate) fn new(fault: RobotFault, seed: u64) -> Self {
+        let mut chance = Pcg64::new(u128::from(seed), 13);
+        let channel = (chance.next_u64() % 2) as usize;
+        Self {
+            fault,
+            lies: false,
+            chance,
+            channel,
+            from_robot: Decoder::default(),
+            from_host: Decoder::default(),
+            last: MotorSensors::default(),
+            base: MotorSensors::default(),
+            base_data: Vec::new(),
+            kept: VecDeque::new(),
+            next_again: Duration::ZERO,
+            next_slow: [Duration::ZERO; 256],
+            moving: None,
+            disabled: false,
+        }
+    }
+
+    /// Lie from now on.
+    pub(crate) fn begin(&mut self) {
+        if !self.lies {
+            self.lies = true;
+            self.base = self.last;
+        }
+    }
+
+    /// Bytes of the robot that came at `now`: what the host gets, and when.
+    pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
+        let mut decoder = std::mem::take(&mut self.from_robot);
+        decoder.push(bytes);
+        let (mut out, mut more) = (Vec::new(), Vec::new());
+        while let Some(frame) = decoder.next_frame() {
+            if let Ok(Report::Motor(sensors)) = Report::parse(&frame) {
+                self.last = sensors;
+                if !self.lies {
+                    self.base_data = frame.data.to_vec();
+                }
+                self.keep(&frame, now);
+            }
+            if self.lies {
+                self.pass(&frame, now, &mut out);
+            } else {
+                frame.encode(&mut out);
+            }
+        }
+        self.from_robot = decoder;
+        if self.lies && self.fault == RobotFault::OldFrames && now >= self.next_again {
+            self.next_again = now + AGAIN_EVERY;
+            let old = self.kept.iter().rfind(|kept| kept.at + OLD <= now);
+            more.extend(old.map(|old| Late {
+                at: now,
+                bytes: old.bytes.clone(),
+            }));
+        }
+        let at = if self.lies && self.fault == RobotFault::FramesLate {
+            now + LATE
+        } else {
+            now
+        };
+        let first = (!out.is_empty()).then_some(Late { at, bytes: out });
+        first.into_iter().chain(more).collect()
+    }
+
+    /// Bytes of the host: what the robot gets. `moves` is called for each command that moves its wheels.
+    pub(crate) fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
+        let mut decoder = std::mem::take(&mut self.from_host);
+        decoder.push(bytes);
+        let mut out = Vec::new();
+        while let Some(frame) = decoder.next_frame() {
+            let command = Command::parse(&frame);
+            match command {
+                Ok(Command::Motion(motion)) if is_moving(&motion) => {
+                    (self.moving, self.disabled) = (Some(motion), false);
+                    moves();
+                }
+                Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => {
+                    if let (true, false, Some(moving)) =
+                        (self.keeps_speed(), self.disabled, self.moving)
+                    {
+                        let addressing = Addressing::of_robot(frame.rid).unwrap_or_default();
+                        Command::Motion(moving).encode(addressing, &mut out);
+                        continue;
+                    }
+                }
+                Ok(Command::Motion(_) | Command::Enable { on: false, .. }) => self.disabled = true,
+                _ => {}
+            }
+            frame.encode(&mut out);
+        }
+        self.from_host = decoder;
+        out
+    }
+
+    fn keeps_speed(&self) -> bool {
+        self.lies && self.fault == RobotFault::DoesNotStop
+    }
+
+    fn keep(&mut self, frame: &Frame<'_>, now: Duration) {
+        let mut bytes = Vec::new();
+        frame.encode(&mut bytes);
+        self.kept.push_back(Late { at: now, bytes });
+        // One that is older than asked for stays, as the oldest.
+        while self.kept.len() > MOST_KEPT
+            || self.kept.get(1).is_some_and(|next| next.at + OLD <= now)
+        {
+            self.kept.pop_front();
+        }
+    }
+
+    /// Append what becomes of a frame of the robot.
+    fn pass(&mut self, frame: &Frame<'_>, now: Duration, out: &mut Vec<u8>) {
+        let is_sensor = matches!(frame.did, did::MOTOR | did::CUSTOM | did::STANDARD);
+        let with_data = |data: &[u8], out: &mut Vec<u8>| Frame { data, ..*frame }.encode(out);
+        match (self.fault, frame.did) {
+            (RobotFault::Silence, _) | (RobotFault::SonarMissing, did::STANDARD) => {}
+            (RobotFault::StreamsStop, _) if is_sensor => {}
+            (RobotFault::FramesSlow, _) if is_sensor => {
+                let next = &mut self.next_slow[usize::from(frame.did)];
+                if now >= *next {
+                    *next = now + SLOW;
+                    frame.encode(out);
+                }
+            }
+            (RobotFault::MotorOnes, did::MOTOR) => with_data(&vec![0xff; frame.data.len()], out),
+            (RobotFault::MotorZeros, did::MOTOR) => with_data(&vec![0; frame.data.len()], out),
+            (RobotFault::MotorRepeated, did::MOTOR) => with_data(&self.base_data, out),
+            (RobotFault::SonarZero | RobotFault::SonarStuck, did::STANDARD) => {
+                let stuck = self.fault == RobotFault::SonarStuck;
+                let mut data = frame.data.to_vec();
+                for byte in data.iter_mut().take(ULTRASONIC) {
+                    *byte = if stuck { STUCK_CM } else { 0 };
+                }
+                with_data(&data, out);
+            }
+            (fault, did::MOTOR) => {
+                let sensors = self.counted(fault, self.last);
+                let addressing = Addressing::of_host(frame.rid).unwrap_or_default();
+                Report::Motor(sensors).encode(addressing, out);
+            }
+            _ => frame.encode(out),
+        }
+    }
+
+    /// What the encoders say instead of `true_ones`.
+    fn counted(&mut self, fault: RobotFault, true_ones: MotorSensors) -> MotorSensors {
+        let mut told = true_ones;
+        let base = self.base.encoders;
+        let channel = self.channel;
+        match fault {
+            RobotFault::EncoderDead => {
+                told.encoders[channel] = base[channel];
+                told.encoders[channel].speed = 0;
+            }
+            RobotFault::EncodersSwapped => {
+                for channel in [0, 1] {
+                    let other = true_ones.encoders[1 - channel];
+                    let turned = other.counts_since(&base[1 - channel]);
+                    told.encoders[channel] = other;
+                    told.encoders[channel].position = wrapped(base[channel].position, turned);
+                }
+            }
+            RobotFault::EncoderReversed => {
+                let turned = true_ones.encoders[channel].counts_since(&base[channel]);
+                told.encoders[channel].position = wrapped(base[channel].position, -turned);
+                told.encoders[channel].positive = !true_ones.encoders[channel].positive;
+            }
+            RobotFault::CountsRandom => {
+                for encoder in &mut told.encoders {
+                    let chance = self.chance.next_u64();
+                    encoder.position = chance as u16 % COUNT_CYCLE;
+                    encoder.speed = (chance >> 16) as u16 % 1000;
+                    encoder.positive = chance >> 32 & 1 == 1;
+                }
+            }
+            RobotFault::CountsReset => {
+                for (encoder, base) in told.encoders.iter_mut().zip(&base) {
+                    encoder.position = wrapped(0, encoder.counts_since(base));
+                }
+            }
+            _ => {}
+        }
+        told
+    }
+}
+
+/// Whether a command turns a wheel.
+fn is_moving(motion: &Motion) -> bool {
+    let target = |channel| motion.targets.of(channel).unwrap_or_default();
+    motion.quantity == Quantity::Velocity && [0, 1].into_iter().any(|channel| target(channel) != 0)
+}
+
+/// `turned` counts on from `position`.
+fn wrapped(position: u16, turned: i32) -> u16 {
+    (i32::from(position) + turned).rem_euclid(i32::from(COUNT_CYCLE)) as u16
+}
+
+#[cfg(test)]
+mod tests;

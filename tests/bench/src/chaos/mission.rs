@@ -1,0 +1,224 @@
+//! One mission, undisturbed and under attack.
+
+use std::{
+    fs::{self, File},
+    path::Path,
+    process::{Command, Stdio},
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use common::{clock::Pace, mission::Mission};
+use serde_json::Value;
+
+use crate::chaos::{
+    attack::Attack,
+    consumers::Consumers,
+    error::{ChaosError, system},
+    options::Options,
+    report::End,
+    series::Series,
+};
+use supervisor::{
+    DEATHS,
+    process::{Process, firsthand},
+    simulator::Simulator,
+};
+
+/// A mission that takes longer is stopped; at a wall-clock pace it takes half a minute.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+pub(crate) fn command(
+    options: &Options,
+    seed: u64,
+    pace: &str,
+    out: &Path,
+    records: bool,
+) -> Result<Command, ChaosError> {
+    let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
+    command.args(["--robot", &options.robot.to_string()]);
+    command.args(["--seed", &seed.to_string(), "--out"]);
+    command.arg(out);
+    if !records {
+        command.arg("--no-record");
+    }
+    for setting in &options.set {
+        command.args(["--set", setting]);
+    }
+    child(command, out)
+}
+
+/// Go on with the run whose supervisor was hit.
+fn resume(directory: &Path, records: bool) -> Result<Command, ChaosError> {
+    let mut command = firsthand(&["run", "--json", "--resume"]);
+    command.arg(directory);
+    if !records {
+        command.arg("--no-record");
+    }
+    child(command, directory)
+}
+
+/// As a child that ends with this process; standard output is piped, standard error goes to a file beside the run's
+/// directory.
+fn child(mut command: Command, directory: &Path) -> Result<Command, ChaosError> {
+    let stderr = directory.with_extension("stderr");
+    let stderr = File::options().create(true).append(true).open(stderr);
+    let stderr = stderr.map_err(system("write a mission's standard error"))?;
+    command.args(["--parent", &std::process::id().to_string()]);
+    command.stdout(Stdio::piped()).stderr(stderr);
+    Ok(command)
+}
+
+fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
+    let text = String::from_utf8_lossy(stdout);
+    serde_json::from_str(text.trim()).map_err(|_| ChaosError::NoSummary(text.into_owned()))
+}
+
+/// The summary of the mission without an attack, to compare with: at the same pace where ticks are compared, too.
+pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
+    let directory = options.directory.join("undisturbed");
+    let pace = if options.only_consumers {
+        options.pace
+    } else {
+        Pace::Max
+    };
+    let output = command(options, seed, &pace.to_string(), &directory, false)?
+        .output()
+        .map_err(system("start a mission"))?;
+    fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
+    parse(&output.stdout)
+}
+
+/// Attack the mission, and report. Its files stay if it went wrong.
+pub(crate) fn attack(
+    series: &mut Series<'_>,
+    seed: u64,
+    undisturbed: &Value,
+) -> Result<(), ChaosError> {
+    let options = series.options;
+    let before = series.report.kills();
+    let files = options.directory.join(format!("seed-{seed}"));
+    fs::create_dir(&files).map_err(system("make a directory"))?;
+    let directory = files.join("run");
+    let mut robot = options
+        .supervisor
+        .then(|| robot(options, seed, &files.join("robot")))
+        .transpose()?;
+    let mut start = command(
+        options,
+        seed,
+        &options.pace.to_string(),
+        &directory,
+        options.records(),
+    )?;
+    if let Some(robot) = &robot {
+        let address = robot.address();
+        start.args(["--set", &format!("robot.address='udp://{address}'")]);
+    }
+    let consumers = files.join("consumers");
+    let consumers = Consumers::start(options, consumers, &mut series.report)?;
+    let mut attack = Attack::new(seed, consumers);
+    let began = Instant::now();
+    let summary = loop {
+        let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
+        // A supervisor that was hit leaves no summary, unless it had just ended the run.
+        if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
+            break parse(&summary)?;
+        }
+        start = resume(&directory, options.records())?;
+    };
+    attack.end(series, robot.as_ref())?;
+    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
+    let kills = series.report.kills() - before;
+    let mut end = End {
+        seed,
+        outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
+        reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
+        collisions: summary["collisions"].as_u64().unwrap_or_default(),
+        pose_excess_m: number(&summary, "pose_error_m") - number(undisturbed, "pose_error_m"),
+        stopping_time_s: number(&summary, "stopping_time_s"),
+        pose_allowance_m: pose_allowance_m(&options.loaded, kills),
+        kills,
+        healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
+    };
+    if let Some(mut robot) = robot {
+        robot.stop()?;
+        let truth = robot.truth();
+        let last = truth.last();
+        end.collisions = last.map_or(0, |tick| tick.contacts);
+        end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
+        let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
+        end.pose_excess_m = error - number(undisturbed, "pose_error_m");
+    }
+    let mut right = series.report.add_mission(&end);
+    if options.only_consumers {
+        series.report.tick_latencies().add(undisturbed, &summary);
+    }
+    if options.replay {
+        let (hit, others) = attack.hit_recordings();
+        right &= series.report.replays().add(seed, &directory, hit, &others);
+    }
+    if right {
+        fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
+    }
+    Ok(())
+}
+
+/// The records of the deaths of the run in `directory`.
+fn deaths(directory: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.filter_map(Result::ok).collect()
+}
+
+/// How much worse than the undisturbed run's the pose may be at the end, metres.
+///
+/// Each signal may cost one wheel count of way. And a run that was hit goes another way, so its wheels are read at other
+/// fractions of a count: one count between the wheels turns the heading by `count / track`, which is that much of the
+/// distance to the target across it.
+fn pose_allowance_m(mission: &Mission, kills: u32) -> f64 {
+    let body = mission.body();
+    let target = mission.start_pose().position.distance(mission.target);
+    body.metres_per_count() * (f64::from(kills) + target / body.track_m)
+}
+
+/// A robot that does not end with its supervisor.
+pub(crate) fn robot(
+    options: &Options,
+    seed: u64,
+    directory: &Path,
+) -> Result<Simulator, ChaosError> {
+    fs::create_dir(directory).map_err(system("make a directory"))?;
+    let mission = Mission {
+        seed,
+        ..options.loaded.clone()
+    };
+    Ok(Simulator::start(directory, &mission, options.pace)?)
+}
+
+/// One generation of a supervisor under attack. Returns its standard output.
+fn one_supervisor(
+    series: &mut Series<'_>,
+    start: Command,
+    robot: Option<&mut Simulator>,
+    attack: &mut Attack,
+) -> Result<Vec<u8>, ChaosError> {
+    let mut child = Process::spawn(start).map_err(system("start a mission"))?;
+    let summary = read_stdout(&mut child);
+    let attacked = attack.run(series, &mut child, robot, PATIENCE);
+    child.end(Duration::from_secs(2));
+    let summary = summary.join().unwrap_or_default();
+    attacked.map(|()| summary)
+}
+
+/// Read its standard output to the end, by a thread: a long summary would fill the pipe.
+pub(crate) fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
+    let stdout = child.take_stdout();
+    std::thread::spawn(move || {
+        let mut text = Vec::new();
+        if let Some(mut stdout) = stdout {
+            let _ = std::io::Read::read_to_end(&mut stdout, &mut text);
+        }
+        text
+    })
+}

@@ -1,0 +1,380 @@
+//! The result of all missions under attack.
+
+use std::{
+    collections::BTreeMap,
+    fmt,
+    time::{Duration, Instant},
+};
+
+use common::{latency::Histogram, topics::SUPERVISOR};
+use serde::Serialize;
+
+use crate::chaos::{
+    kind::Kind, replays::Replays, resources::Resources, tick_latencies::TickLatencies,
+};
+use supervisor::stages::TABLE;
+
+/// What is hit where supervisor and stages are frozen together.
+pub(crate) const EVERYTHING: &str = "everything";
+
+/// So many of what outlived missions are named.
+const NAMED: usize = 20;
+
+/// The result of all missions under attack. Times in milliseconds.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    missions: u64,
+    reached: u64,
+    collisions: u64,
+    /// Missions that did not reach the target, touched something or lost the pose: their seeds and what was wrong.
+    wrong: Vec<String>,
+    /// Stages aborted as hung that were not frozen alone.
+    healthy_aborted: u64,
+    /// Signals by stage and kind.
+    kills: BTreeMap<&'static str, BTreeMap<Kind, u32>>,
+    /// Signals to consumers, by their names.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    consumers: BTreeMap<String, ConsumerCounts>,
+    #[serde(serialize_with = "recoveries")]
+    recovery_ms: BTreeMap<&'static str, Recovery>,
+    /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and in that mission the
+    /// signals sent.
+    worst_pose_excess_m: f64,
+    worst_pose_kills: u32,
+    /// The longest that a wheel turned after the last command the robot had received, mission seconds.
+    longest_stopping_time_s: f64,
+    /// Files, shared memory, processes that outlived a mission.
+    pub leftovers: usize,
+    /// The first of them: after which mission, and what.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    left_behind: Vec<String>,
+    /// The most that a supervisor held more at its end than when its robot began to drive.
+    supervisor_growth: Resources,
+    /// What became of the missions' recordings, if they were replayed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    replays: Option<Replays>,
+    /// Ticks with and without consumers, if nothing else is hit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tick_latencies: Option<TickLatencies>,
+    took_s: f64,
+    #[serde(skip)]
+    began: Instant,
+}
+
+/// What became of a consumer in all missions.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct ConsumerCounts {
+    /// Times it was killed, at any moment since its start.
+    pub killed: u32,
+    /// Times it was frozen for a moment.
+    pub frozen: u32,
+    /// Times it was started by chaos.
+    pub started: u32,
+    /// Times it ended without a signal of chaos.
+    pub ended_by_itself: u32,
+    /// How it did that last, and the last line that it said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_end: Option<String>,
+}
+
+impl fmt::Display for ConsumerCounts {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            killed,
+            frozen,
+            started,
+            ended_by_itself,
+            last_end,
+        } = self;
+        write!(
+            to,
+            "{killed} killed, {frozen} frozen, {started} started, {ended_by_itself} ended by themselves"
+        )?;
+        match last_end {
+            Some(last) => write!(to, " ({last})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// From the signal to the successor.
+#[derive(Debug, Default)]
+pub(crate) struct Recovery {
+    /// To its first beat that says ready, after which it works; of those that were not frozen, which are noticed
+    /// because they do not beat.
+    pub ready: Histogram,
+    /// The same of those that were frozen.
+    pub after_freeze: Histogram,
+    /// To its first sample of a tick; up to a tick longer.
+    pub output: Histogram,
+}
+
+/// The end of one mission.
+#[derive(Debug)]
+pub struct End {
+    pub seed: u64,
+    pub outcome: String,
+    pub reason: String,
+    pub collisions: u64,
+    pub pose_excess_m: f64,
+    /// The most that is allowed.
+    pub pose_allowance_m: f64,
+    pub stopping_time_s: f64,
+    pub kills: u32,
+    /// Stages aborted as hung that were not frozen alone.
+    pub healthy_aborted: Vec<String>,
+}
+
+impl Report {
+    pub(crate) fn new() -> Self {
+        Self {
+            missions: 0,
+            reached: 0,
+            collisions: 0,
+            wrong: Vec::new(),
+            healthy_aborted: 0,
+            kills: BTreeMap::new(),
+            consumers: BTreeMap::new(),
+            recovery_ms: BTreeMap::new(),
+            worst_pose_excess_m: 0.0,
+            worst_pose_kills: 0,
+            longest_stopping_time_s: 0.0,
+            leftovers: 0,
+            left_behind: Vec::new(),
+            supervisor_growth: Resources::default(),
+            replays: None,
+            tick_latencies: None,
+            took_s: 0.0,
+            began: Instant::now(),
+        }
+    }
+
+    /// Missions that ended.
+    pub const fn missions(&self) -> u64 {
+        self.missions
+    }
+
+    /// Signals sent.
+    pub fn signals(&self) -> u32 {
+        let consumers = self.consumers.values();
+        let to_consumers: u32 = consumers.map(|counts| counts.killed + counts.frozen).sum();
+        self.kills() + to_consumers
+    }
+
+    pub(crate) fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
+        self.consumers.entry(name.to_owned()).or_default()
+    }
+
+    /// Signals sent to stages and supervisor.
+    pub(crate) fn kills(&self) -> u32 {
+        self.kills.values().flat_map(BTreeMap::values).sum()
+    }
+
+    pub(crate) fn hit(&mut self, stage: &'static str, kind: Kind) {
+        *self
+            .kills
+            .entry(stage)
+            .or_default()
+            .entry(kind)
+            .or_default() += 1;
+    }
+
+    pub(crate) fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
+        self.recovery_ms.entry(stage).or_default()
+    }
+
+    /// Count a mission. Says whether it reached the target without a touch, and knew its pose.
+    pub fn add_mission(&mut self, end: &End) -> bool {
+        self.missions += 1;
+        self.collisions += end.collisions;
+        self.longest_stopping_time_s = self.longest_stopping_time_s.max(end.stopping_time_s);
+        if end.pose_excess_m > self.worst_pose_excess_m {
+            self.worst_pose_excess_m = end.pose_excess_m;
+            self.worst_pose_kills = end.kills;
+        }
+        let reached = end.outcome == "reached";
+        self.reached += u64::from(reached);
+        let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
+        let before = self.wrong.len();
+        if !reached {
+            let (outcome, reason) = (&end.outcome, &end.reason);
+            self.wrong.push(format!("seed {seed}: {outcome}: {reason}"));
+        }
+        if end.collisions > 0 {
+            self.wrong.push(format!(
+                "seed {seed}: touched something {} times",
+                end.collisions
+            ));
+        }
+        self.healthy_aborted += end.healthy_aborted.len() as u64;
+        for stage in &end.healthy_aborted {
+            self.wrong
+                .push(format!("seed {seed}: aborted although healthy: {stage}"));
+        }
+        if excess > allowance {
+            self.wrong.push(format!(
+                "seed {seed}: pose off by {excess:.4} m more than undisturbed, of {allowance:.4} m allowed"
+            ));
+        }
+        self.wrong.len() == before
+    }
+
+    /// What becomes of the missions' recordings.
+    pub(crate) fn replays(&mut self) -> &mut Replays {
+        self.replays.get_or_insert_default()
+    }
+
+    /// Ticks with and without consumers.
+    pub(crate) fn tick_latencies(&mut self) -> &mut TickLatencies {
+        self.tick_latencies.get_or_insert_default()
+    }
+
+    /// A supervisor held `first` when its robot began to drive, and `last` at its end.
+    pub fn add_growth(&mut self, first: Resources, last: Resources) {
+        let most = &mut self.supervisor_growth;
+        most.descriptors = most.descriptors.max(last.descriptors - first.descriptors);
+        most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
+    }
+
+    pub(crate) fn end(&mut self) {
+        self.took_s = self.began.elapsed().as_secs_f64();
+    }
+
+    /// Whether every mission reached the target without a touch and knew its pose. The files of one that did not stay.
+    pub fn is_right(&self) -> bool {
+        let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
+        self.wrong.is_empty() && replayed
+    }
+
+    /// These outlived the mission that has just ended.
+    pub(crate) fn left_behind(&mut self, found: Vec<String>) {
+        self.leftovers += found.len();
+        let missing = NAMED.saturating_sub(self.left_behind.len());
+        let missions = self.missions;
+        let named = found.into_iter().take(missing);
+        let named = named.map(|what| format!("by mission {missions}: {what}"));
+        self.left_behind.extend(named);
+    }
+
+    /// Whether every mission did, and left nothing behind.
+    pub fn is_clean(&self) -> bool {
+        self.is_right() && self.leftovers == 0
+    }
+}
+
+/// Milliseconds of a quantile.
+fn ms(histogram: &Histogram, share: f64) -> Option<f64> {
+    histogram.quantile_us(share).map(|us| us / 1e3)
+}
+
+fn recoveries<S: serde::Serializer>(
+    all: &BTreeMap<&'static str, Recovery>,
+    to: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Quantiles {
+        p50: Option<f64>,
+        p99: Option<f64>,
+        max: Option<f64>,
+    }
+    let quantiles = |histogram: &Histogram| Quantiles {
+        p50: ms(histogram, 0.5),
+        p99: ms(histogram, 0.99),
+        max: ms(histogram, 1.0),
+    };
+    to.collect_map(all.iter().map(|(stage, recovery)| {
+        let parts = [
+            ("ready", quantiles(&recovery.ready)),
+            ("ready_when_frozen", quantiles(&recovery.after_freeze)),
+            ("output", quantiles(&recovery.output)),
+        ];
+        (stage, parts.into_iter().collect::<BTreeMap<_, _>>())
+    }))
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let took = Duration::from_secs_f64(self.took_s);
+        writeln!(
+            to,
+            "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} healthy stages aborted, {} leftovers",
+            self.signals(),
+            self.missions,
+            took.as_secs_f64(),
+            self.reached,
+            self.collisions,
+            self.healthy_aborted,
+            self.leftovers
+        )?;
+        for wrong in &self.wrong {
+            writeln!(to, "  {wrong}")?;
+        }
+        for left in &self.left_behind {
+            writeln!(to, "  left behind {left}")?;
+        }
+        writeln!(
+            to,
+            "{:<16} {:>6} {:>22} {:>22} {:>22}",
+            "stage", "hit", "ready, ms", "frozen, ms", "a tick's output, ms"
+        )?;
+        let nothing = Recovery::default();
+        let stages = TABLE.iter().map(|stage| stage.name);
+        let hit_supervisor = self.kills.contains_key(SUPERVISOR).then_some(SUPERVISOR);
+        for name in stages.chain(hit_supervisor) {
+            let hit: u32 = self.kills.get(name).map_or(0, |kinds| kinds.values().sum());
+            let recovery = self.recovery_ms.get(name).unwrap_or(&nothing);
+            let quantiles = |histogram: &Histogram| match (
+                ms(histogram, 0.5),
+                ms(histogram, 0.99),
+                ms(histogram, 1.0),
+            ) {
+                (Some(p50), Some(p99), Some(max)) => format!("{p50:.1} {p99:.1} {max:.1}"),
+                _ => "-".to_owned(),
+            };
+            writeln!(
+                to,
+                "{name:<16} {hit:>6} {:>22} {:>22} {:>22}",
+                quantiles(&recovery.ready),
+                quantiles(&recovery.after_freeze),
+                quantiles(&recovery.output)
+            )?;
+        }
+        let mut kinds: BTreeMap<Kind, u32> = BTreeMap::new();
+        for (&kind, &count) in self.kills.values().flatten() {
+            *kinds.entry(kind).or_default() += count;
+        }
+        let kinds: Vec<_> = kinds
+            .iter()
+            .map(|(kind, count)| format!("{count} {}", kind.as_str()))
+            .collect();
+        writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
+        for (name, counts) in &self.consumers {
+            writeln!(to, "consumer {name}: {counts}")?;
+        }
+        writeln!(
+            to,
+            "pose error beyond the undisturbed run at most {:.4} m ({} signals in that mission)",
+            self.worst_pose_excess_m, self.worst_pose_kills
+        )?;
+        writeln!(
+            to,
+            "a wheel turned at most {:.2} s of mission time after the last command",
+            self.longest_stopping_time_s
+        )?;
+        let Resources {
+            descriptors,
+            memory_kib,
+        } = self.supervisor_growth;
+        writeln!(
+            to,
+            "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"
+        )?;
+        if let Some(ticks) = &self.tick_latencies {
+            writeln!(to, "{ticks}")?;
+        }
+        match &self.replays {
+            Some(replays) => write!(to, "{replays}"),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! THE table of the ways in which a robot lies to its link, and what is promised under each.
+
+use serde::{Serialize, Serializer};
+
+/// From the fault to the last moving command, and to wheels at rest, at most: 1.5 s of motion until what was commanded and
+/// what is reported are known to disagree, half a second to come to rest. Seconds.
+pub const REST_WITHIN_S: f64 = 2.0;
+/// Where the motion that shows the fault comes later: counts that become 0 are first those of a robot that restarted; wheels
+/// that are swapped are seen in turns; nine slow frames make a rate. Each command lasts for 0.25 s meanwhile.
+pub const REST_LATER_S: f64 = 4.0;
+
+/// What is promised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Promise {
+    /// The robot is at rest within [`REST_WITHIN_S`] and stays so, with a reason, and touches nothing.
+    Rests,
+    /// The same within [`REST_LATER_S`].
+    RestsLater,
+    /// It touches nothing, and does not call a wrong place its target: what it is told is poor, and not false.
+    Unharmed,
+}
+
+/// One way to lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RobotFault {
+    /// Nothing comes from the robot.
+    Silence,
+    /// The data of every motor frame are 0xFF.
+    MotorOnes,
+    /// They are 0.
+    MotorZeros,
+    /// They are those of the first one, for ever.
+    MotorRepeated,
+    /// One encoder does not count.
+    EncoderDead,
+    /// The encoders of left and right are swapped.
+    EncodersSwapped,
+    /// One encoder counts backwards.
+    EncoderReversed,
+    /// Counts and speeds are random in each frame.
+    CountsRandom,
+    /// Counts begin again from 0 without silence.
+    CountsReset,
+    /// Every ultrasonic byte is 0, which is not a valid reading.
+    SonarZero,
+    /// No standard frame comes.
+    SonarMissing,
+    /// Every ultrasonic byte is 8 cm.
+    SonarStuck,
+    /// All that the robot sends comes 2 s late.
+    FramesLate,
+    /// Every 2 s a motor frame of 3 s ago comes again.
+    OldFrames,
+    /// No sensor frame comes, acknowledgements do.
+    StreamsStop,
+    /// The robot keeps to the last speed it was given when it is given 0.
+    DoesNotStop,
+    /// Sensor frames come three times a second.
+    FramesSlow,
+}
+
+/// A row of the table.
+#[derive(Debug)]
+pub struct Row {
+    /// Which.
+    pub fault: RobotFault,
+    /// Its name on the command line and in reports.
+    pub name: &'static str,
+    /// What the robot does, in words.
+    pub what: &'static str,
+    /// What is promised.
+    pub promise: Promise,
+}
+
+const fn row(fault: RobotFault, name: &'static str, promise: Promise, what: &'static str) -> Row {
+    Row {
+        fault,
+        name,
+        what,
+        promise,
+    }
+}
+
+/// Every way to lie.
+#[rustfmt::skip]
+pub static TABLE: &[Row] = &[
+    row(RobotFault::Silence, "silence", Promise::Rests, "nothing comes from the robot any more"),
+    row(RobotFault::MotorOnes, "motor-ones", Promise::Rests, "the data of every motor frame are 0xFF"),
+    row(RobotFault::MotorZeros, "motor-zeros", Promise::RestsLater, "the data of every motor frame are 0"),
+    row(RobotFault::MotorRepeated, "motor-repeated", Promise::Rests, "the same motor frame for ever"),
+    row(RobotFault::EncoderDead, "encoder-dead", Promise::Rests, "one encoder does not count"),
+    row(RobotFault::EncodersSwapped, "encoders-swapped", Promise::RestsLater, "the encoders of left and right are swapped"),
+    row(RobotFault::EncoderReversed, "encoder-reversed", Promise::Rests, "one encoder counts backwards"),
+    row(RobotFault::CountsRandom, "counts-random", Promise::Rests, "random counts in each frame"),
+    row(RobotFault::CountsReset, "counts-reset", Promise::Unharmed, "counts begin again from 0 without silence"),
+    row(RobotFault::SonarZero, "sonar-zero", Promise::Rests, "every ultrasonic byte is 0, which is not valid"),
+    row(RobotFault::SonarMissing, "sonar-missing", Promise::Rests, "no standard frame comes"),
+    row(RobotFault::SonarStuck, "sonar-stuck", Promise::Unharmed, "every ultrasonic byte is 8 cm"),
+    row(RobotFault::FramesLate, "frames-late", Promise::Rests, "all frames come 2 s late"),
+    row(RobotFault::OldFrames, "old-frames", Promise::Unharmed, "every 2 s a motor frame of 3 s ago comes again"),
+    row(RobotFault::StreamsStop, "streams-stop", Promise::Rests, "no sensor frame comes, acknowledgements do"),
+    row(RobotFault::DoesNotStop, "does-not-stop", Promise::Rests, "after `firsthand stop`: given speed 0 the robot keeps its speed"),
+    row(RobotFault::FramesSlow, "frames-slow", Promise::RestsLater, "sensor frames come three times a second"),
+];
+
+impl Promise {
+    /// Within which time of the fault the robot rests, seconds; none where it may go on.
+    #[must_use]
+    pub const fn rest_within_s(self) -> Option<f64> {
+        match self {
+            Self::Rests => Some(REST_WITHIN_S),
+            Self::RestsLater => Some(REST_LATER_S),
+            Self::Unharmed => None,
+        }
+    }
+}
+
+impl RobotFault {
+    /// Its row.
+    #[must_use]
+    pub fn row(self) -> &'static Row {
+        // Every fault has one: `every_fault_has_one_row`.
+        TABLE
+            .iter()
+            .find(|row| row.fault == self)
+            .unwrap_or(&TABLE[0])
+    }
+
+    /// The fault of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let row = TABLE.iter().find(|row| row.name == name)?;
+        Some(row.fault)
+    }
+}
+
+impl Serialize for RobotFault {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.row().name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_has_one_row_and_a_name_that_finds_it() {
+        for (index, row) in TABLE.iter().enumerate() {
+            assert_eq!(row.fault as usize, index, "{}", row.name);
+            assert_eq!(RobotFault::named(row.name), Some(row.fault));
+            assert_eq!(row.fault.row().name, row.name);
+        }
+        assert_eq!(RobotFault::FramesSlow as usize + 1, TABLE.len());
+        assert_eq!(RobotFault::named("honest"), None);
+    }
+
+    #[test]
+    fn the_guides_table_is_this_one() {
+        let guide = include_str!("../../../../supervisor/guide/break-it.md");
+        for row in TABLE {
+            let promise = match row.promise.rest_within_s() {
+                Some(within_s) => format!("rests within {within_s} s"),
+                None => "unharmed".to_owned(),
+            };
+            let what = row.what;
+            let line = format!("| `{}` | {what} | {promise} |\n", row.name);
+            assert!(guide.contains(&line), "missing in break-it.md: {line}");
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! Missions of a robot that lies from some moment on, and what became of the robot.
+
+use std::{
+    fs,
+    net::SocketAddr,
+    path::Path,
+    process::Stdio,
+    time::{Duration, Instant},
+};
+
+use common::{
+    bus::{Bus, Reader},
+    domain::Domain,
+    ground_truth::GroundTruthTick,
+    mission::Mission,
+    samples::LinkSample,
+    topics,
+};
+use rand_pcg::{Pcg64, rand_core::Rng};
+use supervisor::{
+    outcome::RIGHT_PLACE_M,
+    process::{Process, firsthand},
+    simulator::Simulator,
+};
+use x80_link::failsafe;
+
+use crate::chaos::{
+    error::{ChaosError, system},
+    mission,
+    options::Options,
+    proxy::Proxy,
+    robot_fault::RobotFault,
+    stop_time_table::{Entry, StopTimeTable},
+};
+
+/// The robot lies from so long after it has departed, seconds: at least, and how much more at most.
+const LIES_AFTER_S: (f64, f64) = (1.0, 4.0);
+/// A robot that has moved so far has departed, metres.
+const DEPARTED_M: f64 = 0.1;
+/// How long a robot that lies is watched: several times as long as it may move, ...
+const WATCHED: Duration = Duration::from_secs(10);
+/// ... or until it has arrived, where it may go on: only there it can call a wrong place its target.
+const WATCHED_ON_ITS_WAY: Duration = Duration::from_secs(90);
+/// A mission that does not depart within this is given up.
+const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
+/// Time that a mission has to end in order.
+const END_GRACE: Duration = Duration::from_secs(5);
+/// Between looks at the robot.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Which robots lie how, and how often.
+pub struct FaultOptions {
+    /// The mission, the robot and the first seed; the rest is not asked.
+    pub base: Options,
+    /// The ways to lie.
+    pub faults: Vec<RobotFault>,
+    /// Missions for each.
+    pub missions: u32,
+}
+
+/// Run the missions, one after the other. `show` is called after each.
+pub fn run_robot_faults(
+    options: &FaultOptions,
+    show: &mut dyn FnMut(&StopTimeTable),
+) -> Result<StopTimeTable, ChaosError> {
+    let mut table = StopTimeTable::default();
+    for &fault in &options.faults {
+        for number in 0..u64::from(options.missions) {
+            let seed = options.base.seed + number;
+            let files = options
+                .base
+                .directory
+                .join(format!("{}-{seed}", fault.row().name));
+            fs::create_dir(&files).map_err(system("make a directory"))?;
+            let entry = one(&options.base, fault, seed, &files)?;
+            if entry.is_kept() {
+                fs::remove_dir_all(&files).map_err(system("remove its directory"))?;
+            }
+            table.entries.push(entry);
+            show(&table);
+        }
+    }
+    Ok(table)
+}
+
+/// One mission.
+fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, ChaosError> {
+    let mut robot = mission::robot(options, seed, &files.join("robot"))?;
+    let proxy = Proxy::start(robot.address(), fault, seed)?;
+    let mut child = start(options, seed, proxy.address(), &files.join("run"))?;
+    let summary = mission::read_stdout(&mut child);
+    let mut observed = Observed::default();
+    let watched = observed.watch(options, fault, seed, &mut child, &mut robot, &proxy);
+    child.end(END_GRACE);
+    let summary = summary.join().unwrap_or_default();
+    robot.stop()?;
+    watched?;
+    Ok(observed.entry(options, fault, seed, robot.truth(), &summary))
+}
+
+fn start(
+    options: &Options,
+    seed: u64,
+    robot: SocketAddr,
+    directory: &Path,
+) -> Result<Process, ChaosError> {
+    let mut start = mission::command(options, seed, "1", directory, false)?;
+    start.args(["--set", &format!("robot.address='udp://{robot}'")]);
+    Process::spawn(start).map_err(system("start a mission"))
+}
+
+/// What was seen of a mission.
+#[derive(Debug, Default)]
+struct Observed {
+    /// When the robot began to lie, and which tick of the ground truth was the newest then.
+    lies: Option<(Instant, usize)>,
+    /// The last command that moved a wheel.
+    last_moving: Option<Instant>,
+    /// When the watch ended.
+    ended: Option<Instant>,
+    /// Whether the mission had ended by itself by then.
+    ended_by_itself: bool,
+    /// The newest word of the link.
+    link: Option<LinkSample>,
+    /// The machine's time at mission time 0 of the robot: the least that any tick says, because none is read before it is
+    /// written.
+    epoch: Option<Instant>,
+    ticks: usize,
+}
+
+impl Observed {
+    /// Until the mission ends, or the robot was watched for long enough.
+    fn watch(
+        &mut self,
+        options: &Options,
+        fault: RobotFault,
+        seed: u64,
+        child: &mut Process,
+        robot: &mut Simulator,
+        proxy: &Proxy,
+    ) -> Result<(), ChaosError> {
+        let began = Instant::now();
+        let (least, more) = LIES_AFTER_S;
+        let chance = Pcg64::new(u128::from(seed), 17 + fault as u128).next_u64() >> 11;
+        let lies_after_s = least + more * chance as f64 / (1_u64 << 53) as f64;
+        let (mut departed, mut stop, mut link) = (None, None, None);
+        loop {
+            self.ended = Some(Instant::now());
+            self.last_moving = proxy.last_moving();
+            robot.poll()?;
+            self.take(robot.truth());
+            if let Some(reader) = link.get_or_insert_with(|| self::link(options)) {
+                self.hear(reader)?;
+            } else {
+                // The bus is not there yet.
+                link = None;
+            }
+            self.ended_by_itself = child.try_reap().map_err(system("reap"))?.is_some();
+            let watched = match fault.row().promise.rest_within_s() {
+                Some(_) => WATCHED,
+                None => WATCHED_ON_ITS_WAY,
+            };
+            let patience = self
+                .lies
+                .map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
+            if self.ended_by_itself || Instant::now() >= patience {
+                break;
+            }
+            let newest = robot.truth().last();
+            if departed.is_none() {
+                let gone = newest.filter(|tick| tick.x.hypot(tick.y) >= DEPARTED_M);
+                departed = gone.map(|tick| tick.time_s);
+            }
+            let due = |tick: &GroundTruthTick| {
+                departed.is_some_and(|departed| tick.time_s >= departed + lies_after_s)
+            };
+            if self.lies.is_none() && newest.is_some_and(due) {
+                proxy.lie();
+                self.lies = Some((Instant::now(), self.ticks));
+                if fault == RobotFault::DoesNotStop {
+                    stop = Some(operator_stop(options)?);
+                }
+            }
+            std::thread::park_timeout(LOOK);
+        }
+        if let Some(mut stop) = stop {
+            stop.end(END_GRACE);
+        }
+        Ok(())
+    }
+
+    /// Look at what the robot wrote.
+    fn take(&mut self, truth: &[GroundTruthTick]) {
+        let now = Instant::now();
+        for tick in truth.get(self.ticks..).unwrap_or_default() {
+            let since = Duration::try_from_secs_f64(tick.time_s).unwrap_or_default();
+            let epoch = now.checked_sub(since);
+            self.epoch = match (self.epoch, epoch) {
+                (Some(known), Some(epoch)) => Some(known.min(epoch)),
+                (known, epoch) => known.or(epoch),
+            };
+        }
+        self.ticks = truth.len();
+    }
+
+    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), ChaosError> {
+        while let Some(sample) = link.take()? {
+            self.link = Some(sample);
+        }
+        Ok(())
+    }
+
+    /// What it comes to.
+    fn entry(
+        &self,
+        options: &Options,
+        fault: RobotFault,
+        seed: u64,
+        truth: &[GroundTruthTick],
+        summary: &[u8],
+    ) -> Entry {
+        let summary: serde_json::Value = serde_json::from_slice(summary).unwrap_or_default();
+        let word = |key: &str| summary[key].as_str().unwrap_or_default().to_owned();
+        let stopped = self.link.filter(LinkSample::stopped);
+        let cause = stopped.map_or("", |link| failsafe::name(link.cause()));
+        let (mut outcome, reason) = if self.ended_by_itself {
+            (word("outcome"), word("reason"))
+        } else {
+            ("goes on".to_owned(), cause.to_owned())
+        };
+        let last = truth.last();
+        let target = options.loaded.target;
+        let wrong =
+            last.is_some_and(|tick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M);
+        if outcome == "reached" && wrong {
+            outcome = "wrong_place".to_owned();
+        }
+        let mut entry = Entry {
+            fault,
+            seed,
+            lied: false,
+            last_moving_s: None,
+            rest_s: None,
+            watched_s: 0.0,
+            collisions: 0,
+            outcome,
+            reason,
+        };
+        let (Some((lies, tick)), Some(epoch), Some(ended)) = (self.lies, self.epoch, self.ended)
+        else {
+            return entry;
+        };
+        let since_lies = |time: Instant| time.saturating_duration_since(lies).as_secs_f64();
+        let at_time = |time_s: f64| {
+            epoch.checked_add(Duration::try_from_secs_f64(time_s).unwrap_or_default())
+        };
+        entry.lied = true;
+        entry.watched_s = since_lies(ended);
+        entry.last_moving_s = Some(self.last_moving.map_or(0.0, since_lies));
+        // The run's own end stops the robot: only what it did until then counts.
+        let counts = |tick: &&GroundTruthTick| at_time(tick.time_s).is_some_and(|at| at <= ended);
+        let track_m = options.loaded.body().track_m;
+        let mut watched = truth.get(tick..).unwrap_or_default().iter().filter(counts);
+        let moving = watched.clone().rfind(|tick| !is_at_rest(tick, track_m));
+        let moved_until = moving.and_then(|tick| at_time(tick.time_s));
+        entry.rest_s = Some(moved_until.map_or(0.0, since_lies));
+        let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
+        let before = tick.checked_sub(1).and_then(|before| truth.get(before));
+        entry.collisions = contacts(watched.next_back()).saturating_sub(contacts(before));
+        entry
+    }
+}
+
+/// Whether both wheels are.
+fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
+    tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
+}
+
+/// The link's words, as soon as they can be read.
+fn link(options: &Options) -> Option<Reader<LinkSample>> {
+    let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos").ok()?;
+    bus.reader(&topics::LINK).ok()
+}
+
+/// An operator's stop.
+fn operator_stop(options: &Options) -> Result<Process, ChaosError> {
+    let mut command = firsthand(&["stop", "--robot", &options.robot.to_string()]);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    Process::spawn(command).map_err(system("stop the robot"))
+}
+
+/// What a mission must be for this: the robot is brought along, and its time is the machine's.
+pub fn check(mission: &Mission) -> Result<(), &'static str> {
+    if mission.robot.address.is_some() {
+        return Err("chaos brings its own robot; leave robot.address out");
+    }
+    if mission.body().steering.is_some() {
+        return Err(
+            "robot faults are of a robot with two driven wheels; leave robot.model = 'car' out",
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,199 @@
+//! `signals.csv`: a row for each signal that was sent, written when all that is measured of it is known. A chaos that is killed
+//! leaves the rows it had.
+
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::chaos::kind::Kind;
+
+/// The file's name in the directory of results.
+pub const FILE_NAME: &str = "signals.csv";
+
+/// A signal. What was not measured is an empty cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Row {
+    /// The mission, by its seed.
+    pub(crate) mission: u64,
+    /// Mission time of the newest wheel sample that was read before the signal, seconds.
+    pub(crate) time_s: Option<f64>,
+    /// The stage, `supervisor`, `everything`, or the consumer's name.
+    pub(crate) stage: String,
+    /// How it was hit.
+    pub(crate) kind: Kind,
+    /// Its generation; of a consumer, how often it was started in that mission. None of the supervisor, of everything
+    /// and of the run's own recorder.
+    pub(crate) generation: Option<u32>,
+    /// Whether it was hit in its first milliseconds, on purpose.
+    pub(crate) start_up: bool,
+    /// From the signal until the supervisor's record of the death was read, milliseconds. Of stages alone.
+    pub(crate) noticed_ms: Option<f64>,
+    /// Until the successor's first sign of work was read, milliseconds. Of stages and the supervisor.
+    pub(crate) ready_ms: Option<f64>,
+    /// Until the successor's first sample of a tick was read, milliseconds. Likewise.
+    pub(crate) first_output_ms: Option<f64>,
+    /// Until the first sample in which no wheel turned, milliseconds; none where that did not come before the first output.
+    pub(crate) rest_ms: Option<f64>,
+    /// From the newest pose to the true one when the row was written, metres; known where the robot is a process of its
+    /// own, so that its ground truth is read during the mission.
+    pub(crate) pose_error_m: Option<f64>,
+}
+
+/// Names of the columns.
+const HEADER: [&str; 11] = [
+    "mission",
+    "time_s",
+    "stage",
+    "kind",
+    "generation",
+    "start_up",
+    "noticed_ms",
+    "ready_ms",
+    "first_output_ms",
+    "rest_ms",
+    "pose_error_m",
+];
+
+impl Row {
+    /// Of a signal of `kind` to that generation of `stage`.
+    pub(crate) fn new(
+        mission: u64,
+        time_s: Option<f64>,
+        stage: &str,
+        kind: Kind,
+        generation: Option<u32>,
+    ) -> Self {
+        Self {
+            mission,
+            time_s,
+            stage: stage.to_owned(),
+            kind,
+            generation,
+            start_up: kind == Kind::KillAtStart,
+            noticed_ms: None,
+            ready_ms: None,
+            first_output_ms: None,
+            rest_ms: None,
+            pose_error_m: None,
+        }
+    }
+}
+
+/// Milliseconds since `at`, to the microsecond.
+pub(crate) fn ms_since(at: Instant) -> f64 {
+    (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
+}
+
+/// The table of signals cannot be written or read.
+#[derive(Debug, Error)]
+#[error("cannot {action} {}: {problem}", file.display())]
+pub struct SignalsError {
+    action: &'static str,
+    file: PathBuf,
+    problem: String,
+}
+
+/// The file, while signals are sent.
+#[derive(Debug)]
+pub(crate) struct SignalsFile {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+impl SignalsFile {
+    /// A new file in `directory`, which is made.
+    pub(crate) fn create(directory: &Path) -> Result<Self, SignalsError> {
+        let path = directory.join(FILE_NAME);
+        fs::create_dir_all(directory).map_err(failed("make the directory of", &path))?;
+        let file = File::create_new(&path).map_err(|error| {
+            let remedy = match error.kind() {
+                std::io::ErrorKind::AlreadyExists => "; give another directory",
+                _ => "",
+            };
+            failed("make", &path)(format!("{error}{remedy}"))
+        })?;
+        let mut writer = csv::WriterBuilder::new()
+            .has_headers(false)
+            .from_writer(file);
+        writer
+            .write_record(HEADER)
+            .map_err(failed("write", &path))?;
+        writer.flush().map_err(failed("write", &path))?;
+        Ok(Self { path, writer })
+    }
+
+    /// Write `row`, whole.
+    pub(crate) fn add(&mut self, row: &Row) -> Result<(), SignalsError> {
+        let written = self.writer.serialize(row);
+        written.map_err(failed("write", &self.path))?;
+        self.writer.flush().map_err(failed("write", &self.path))
+    }
+}
+
+fn failed<E: ToString>(action: &'static str, file: &Path) -> impl FnOnce(E) -> SignalsError {
+    let file = file.to_path_buf();
+    move |problem| SignalsError {
+        action,
+        file,
+        problem: problem.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(path: &Path) -> Vec<Row> {
+        let mut reader = csv::Reader::from_path(path).unwrap();
+        reader.deserialize().map(Result::unwrap).collect()
+    }
+
+    #[test]
+    fn rows_are_in_the_file_as_soon_as_they_are_added_and_are_read_as_they_were() {
+        let folder = tempfile::tempdir().unwrap();
+        let directory = folder.path().join("results");
+        let mut file = SignalsFile::create(&directory).unwrap();
+        assert_eq!(read(&directory.join(FILE_NAME)), []);
+        let plain = Row::new(3, Some(1.25), "mapper", Kind::KillAtStart, Some(4));
+        let odd = Row {
+            noticed_ms: Some(0.125),
+            ..Row::new(3, None, "sh -c 'a, \"b\"\n'", Kind::Freeze, None)
+        };
+        for row in [&plain, &odd] {
+            file.add(row).unwrap();
+        }
+        // As another process reads it, while the writer is there.
+        assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
+        let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
+        assert!(
+            text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,,,\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn results_that_are_there_are_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        SignalsFile::create(folder.path()).unwrap();
+        let refused = SignalsFile::create(folder.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains(FILE_NAME) && refused.contains("give another directory"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn the_columns_are_the_fields_of_a_row_in_order() {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer
+            .serialize(Row::new(1, None, "a", Kind::Kill, None))
+            .unwrap();
+        let text = String::from_utf8(writer.into_inner().unwrap()).unwrap();
+        assert_eq!(text.lines().next(), Some(&*HEADER.join(",")));
+    }
+}

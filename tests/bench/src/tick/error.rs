@@ -1,0 +1,56 @@
+//! Why a tick could not be measured.
+
+use std::{io, path::PathBuf};
+
+use common::{bus::BusError, start::StageError};
+use supervisor::DomainError;
+use thiserror::Error;
+
+use super::hops::LOST;
+
+/// Why a tick could not be measured.
+#[derive(Debug, Error)]
+pub enum TickError {
+    /// The domain.
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A forwarder's or consumer's process, from within.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A process or a file.
+    #[error("cannot {action}: {source}")]
+    System {
+        /// The action that failed.
+        action: &'static str,
+        /// The system's error.
+        source: io::Error,
+    },
+    /// A sample went out and none came back.
+    #[error("no sample came back within {LOST:?}; is the machine overloaded?")]
+    Lost,
+    /// No such forwarder.
+    #[error("no forwarder stands for {0:?}")]
+    Place(String),
+    /// A mission ended without a summary.
+    #[error("the mission gave no summary: {0}")]
+    NoSummary(String),
+    /// A mission that measured nothing.
+    #[error("nothing was measured; does the mission drive at all?")]
+    Nothing,
+    /// A file of measured times that cannot be read.
+    #[error("{}: {problem}", file.display())]
+    Times {
+        /// The file.
+        file: PathBuf,
+        /// The problem with it.
+        problem: String,
+    },
+}
+
+/// The system refused to do `action`.
+pub(super) fn system(action: &'static str) -> impl FnOnce(io::Error) -> TickError {
+    move |source| TickError::System { action, source }
+}

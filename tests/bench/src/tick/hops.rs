@@ -1,0 +1,161 @@
+//! The latency of five hops between processes that do no work: what the bus alone costs.
+//!
+//! The same topics, payloads, wakeups and waits as a tick's, each forwarded at once: wheels, pose, grid, guidance,
+//! command. What a tick takes beyond that is the stages' work.
+
+use std::time::{Duration, Instant};
+
+use common::{
+    bus::{Bus, BusError},
+    clock::{MissionTime, monotonic_ns},
+    domain::{Domain, RobotName},
+    latency::Histogram,
+    samples::{CommandSample, GridHeader, GuidanceSample, PoseSample, WheelSample},
+    signals::{SIGTERM, Signals},
+    start::become_child,
+    topics,
+    waiter::Waiter,
+};
+use supervisor::{
+    domain::DomainLock,
+    process::{Process, firsthand},
+};
+
+use super::error::{TickError, system};
+
+/// Cells of the smallest map, which no forwarder looks at.
+const CELLS: usize = 64;
+/// The forwarders, by the stage that each stands for.
+const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
+/// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
+pub(super) const LOST: Duration = Duration::from_secs(5);
+/// Between samples sent to forwarders that may not be up yet.
+const SEND_AGAIN: Duration = Duration::from_millis(20);
+/// Trips before those that count: all memory is mapped by then.
+const WARM_UP: u64 = 200;
+
+/// Send `trips` samples around the forwarders, one every `period`, or one behind the other; those that warm up, always
+/// one behind the other.
+pub fn measure(
+    robot: &RobotName,
+    trips: u64,
+    period: Option<Duration>,
+) -> Result<Histogram, TickError> {
+    let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
+    let bus = lock.bus().ok_or(TickError::Lost)?;
+    let mut start = bus.writer(&topics::WHEELS, 1)?;
+    let mut end = bus.reader(&topics::COMMAND)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::COMMAND)?);
+    let own = std::process::id().to_string();
+    let mut forwarders = Vec::new();
+    for place in PLACES {
+        let arguments = ["latency", "--forwarder", place, "--supervisor", &own];
+        let mut command = firsthand(&arguments);
+        command.args(["--robot", &robot.to_string()]);
+        forwarders.push(Process::spawn(command).map_err(system("start a forwarder"))?);
+    }
+    let mut latencies = Histogram::default();
+    for trip in 0..WARM_UP + trips {
+        let began = Instant::now();
+        let mut sent_ns = 0;
+        let mut arrived = false;
+        while !arrived {
+            if began.elapsed() >= LOST {
+                return Err(TickError::Lost);
+            }
+            // While warming up a forwarder may be missing; then the sample is sent again.
+            if sent_ns == 0 || trip < WARM_UP {
+                sent_ns = monotonic_ns();
+                start.publish(trip, MissionTime::default(), WheelSample::default())?;
+            }
+            waiter.wait(if trip < WARM_UP { SEND_AGAIN } else { LOST })?;
+            while let Some(command) = end.take()? {
+                arrived |= command.stamp.tick == trip;
+            }
+        }
+        if trip >= WARM_UP {
+            latencies.record(monotonic_ns() - sent_ns);
+        }
+        let pause = period.filter(|_| trip >= WARM_UP);
+        if let Some(rest) = pause.and_then(|period| period.checked_sub(began.elapsed())) {
+            waiter.wait(rest)?;
+        }
+    }
+    for forwarder in &mut forwarders {
+        forwarder.end(LOST);
+    }
+    Ok(latencies)
+}
+
+/// Be the forwarder that stands for the stage `place`.
+pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), TickError> {
+    let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
+    become_child(place, supervisor)?;
+    let domain = Domain::of(robot.clone());
+    let _stage_lock = domain.enter().map_err(system("enter the domain"))?;
+    let bus = Bus::join(&domain, place)?;
+    let mut waiter = Waiter::default();
+    waiter.on_readable(&terminated)?;
+    let mut forward = forwarder(&bus, place, &mut waiter)?;
+    while !terminated.came() {
+        forward()?;
+        waiter.wait(LOST)?;
+    }
+    Ok(())
+}
+
+/// Forwards all that came.
+type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
+
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, TickError> {
+    let now = MissionTime::default();
+    Ok(match PLACES.iter().position(|name| *name == place) {
+        Some(0) => {
+            waiter.on(bus.wakeup(&topics::WHEELS)?);
+            let (mut from, mut to) = (bus.reader(&topics::WHEELS)?, bus.writer(&topics::POSE, 1)?);
+            Box::new(move || {
+                while let Some(sample) = from.take()? {
+                    to.publish(sample.stamp.tick, now, PoseSample::default())?;
+                }
+                Ok(())
+            })
+        }
+        Some(1) => {
+            waiter.on(bus.wakeup(&topics::POSE)?);
+            let mut from = bus.reader(&topics::POSE)?;
+            let mut to = bus.slice_writer(&topics::GRID, 1, CELLS)?;
+            Box::new(move || {
+                while let Some(sample) = from.take()? {
+                    let nothing = std::iter::empty();
+                    to.publish(sample.stamp.tick, now, GridHeader::default(), nothing)?;
+                }
+                Ok(())
+            })
+        }
+        Some(2) => {
+            waiter.on(bus.wakeup(&topics::GRID)?);
+            let mut from = bus.slice_reader(&topics::GRID)?;
+            let mut to = bus.writer(&topics::GUIDANCE, 1)?;
+            Box::new(move || {
+                while let Some(sample) = from.take()? {
+                    let tick = sample.header().stamp.tick;
+                    to.publish(tick, now, GuidanceSample::default())?;
+                }
+                Ok(())
+            })
+        }
+        Some(_) => {
+            waiter.on(bus.wakeup(&topics::GUIDANCE)?);
+            let mut from = bus.reader(&topics::GUIDANCE)?;
+            let mut to = bus.writer(&topics::COMMAND, 1)?;
+            Box::new(move || {
+                while let Some(sample) = from.take()? {
+                    to.publish(sample.stamp.tick, now, CommandSample::default())?;
+                }
+                Ok(())
+            })
+        }
+        None => return Err(TickError::Place(place.to_owned())),
+    })
+}

@@ -1,0 +1,128 @@
+//! A mission whose ticks are measured.
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Output, Stdio},
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::Duration,
+};
+
+use common::{clock::Pace, domain::RobotName, latency_budget};
+use supervisor::process;
+
+use super::{
+    budget::Budget,
+    consumers,
+    error::{TickError, system},
+    process_set::{ProcessSet, Used},
+};
+
+/// The mission, as `run` is asked for it.
+pub(super) struct Mission<'a> {
+    pub(super) name: &'a str,
+    pub(super) set: &'a [String],
+    pub(super) robot: &'a RobotName,
+    pub(super) pace: Pace,
+    pub(super) record: bool,
+    /// So many processes read its grid and field.
+    pub(super) consumers: u32,
+}
+
+/// One mission's ticks.
+#[derive(Debug)]
+pub(super) struct Ticks {
+    pub(super) count: u64,
+    pub(super) p50_us: f64,
+    pub(super) p99_us: f64,
+    pub(super) max_us: f64,
+    /// What its processes used; none of a short one.
+    pub(super) used: Option<Used>,
+}
+
+/// How often its processes are looked at.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// The directory of the run, removed in the end.
+struct Directory(PathBuf);
+
+impl Directory {
+    /// Made by this process, so that it may remove it: `firsthand-UID` there is all robots of a user.
+    fn make() -> Result<Self, TickError> {
+        let name = format!("firsthand-latency-{}", std::process::id());
+        let directory = std::env::temp_dir().join(name);
+        fs::create_dir(&directory).map_err(system("make a directory for the mission"))?;
+        Ok(Self(directory))
+    }
+}
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+impl Mission<'_> {
+    /// Run it. Its stages measure their items only for a `budget`: that takes time itself.
+    pub(super) fn measure(&self, budget: Option<&mut Budget>) -> Result<Ticks, TickError> {
+        let directory = Directory::make()?;
+        let (robot, pace) = (self.robot.to_string(), self.pace.to_string());
+        let mut command = process::firsthand(&["run", self.name, "--json", "--pace", &pace]);
+        command.args(["--robot", &robot, "--out"]).arg(&directory.0);
+        if !self.record {
+            command.arg("--no-record");
+        }
+        for setting in self.set {
+            command.args(["--set", setting]);
+        }
+        if budget.is_some() {
+            command.env(latency_budget::ASKED_FOR, "1");
+        }
+        // They wait for the bus, and follow it; they are none of the mission's processes.
+        let _consumers = consumers::start(self.robot, self.consumers)?;
+        let run = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(system("start the mission"))?;
+        let mut processes = ProcessSet::of(run.id());
+        let (ended, end) = channel();
+        let waiting = thread::spawn(move || ended.send(run.wait_with_output()));
+        let output = loop {
+            match end.recv_timeout(LOOK_EVERY) {
+                Ok(output) => break output.map_err(system("wait for the mission"))?,
+                Err(RecvTimeoutError::Timeout) => processes.look(),
+                Err(RecvTimeoutError::Disconnected) => return Err(TickError::Nothing),
+            }
+        };
+        // It has sent what it had.
+        let _ = waiting.join();
+        let ticks = ticks(&output, processes.used())?;
+        if let Some(budget) = budget {
+            budget.add(&directory.0)?;
+        }
+        Ok(ticks)
+    }
+}
+
+/// What the mission's summary says.
+fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, TickError> {
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        TickError::NoSummary(errors.trim().to_owned())
+    })?;
+    let latency = |share| summary["tick_latency_us"][share].as_f64();
+    let (Some(p50_us), Some(p99_us), Some(max_us)) =
+        (latency("p50"), latency("p99"), latency("max"))
+    else {
+        return Err(TickError::Nothing);
+    };
+    Ok(Ticks {
+        count: summary["ticks"].as_u64().unwrap_or_default(),
+        p50_us,
+        p99_us,
+        max_us,
+        used,
+    })
+}

@@ -1,0 +1,93 @@
+//! How ticks follow each other, which decides what they cost: caches are warm or cold, cores awake or asleep.
+
+use std::{fmt, time::Duration};
+
+use common::clock::Pace;
+
+/// How ticks follow each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Regime {
+    /// At once.
+    BackToBack,
+    /// One every period.
+    Rate {
+        /// Ticks a second.
+        hz: f64,
+    },
+}
+
+impl Regime {
+    /// Of a mission of `rate_hz` ticks a mission second, at `pace`; or of `asked_hz` ticks a second.
+    pub fn new(asked_hz: Option<f64>, pace: Pace, rate_hz: f64) -> Self {
+        match (asked_hz, pace) {
+            (Some(hz), _) => Self::Rate { hz },
+            (None, Pace::Max) => Self::BackToBack,
+            (None, Pace::Rate(rate)) => Self::Rate { hz: rate * rate_hz },
+        }
+    }
+
+    /// The pace at which a mission of `rate_hz` ticks a mission second has it.
+    pub fn pace(self, rate_hz: f64) -> Pace {
+        match self {
+            Self::BackToBack => Pace::Max,
+            Self::Rate { hz } => Pace::Rate(hz / rate_hz),
+        }
+    }
+
+    /// From tick to tick; none when they follow at once.
+    pub fn period(self) -> Option<Duration> {
+        match self {
+            Self::BackToBack => None,
+            Self::Rate { hz } => Some(Duration::from_secs_f64(1.0 / hz)),
+        }
+    }
+}
+
+impl fmt::Display for Regime {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BackToBack => to.write_str("back to back"),
+            Self::Rate { hz } => write!(to, "at {hz} Hz"),
+        }
+    }
+}
+
+/// Ticks a second, as the command line gives them.
+pub fn parse_hz(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(hz),
+        _ => Err(format!(
+            "{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}"
+        )),
+    }
+}
+
+const SLOWEST_HZ: f64 = 0.1;
+/// A tick takes a good part of a millisecond: faster is back to back.
+const FASTEST_HZ: f64 = 1000.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_asked_for_is_a_pace_of_the_mission_and_a_period_of_the_hops() {
+        let regime = Regime::new(Some(7.0), Pace::Max, 3.5);
+        assert_eq!(regime.pace(3.5), Pace::Rate(2.0));
+        assert_eq!(regime.period(), Some(Duration::from_secs_f64(1.0 / 7.0)));
+        assert_eq!(regime.to_string(), "at 7 Hz");
+        assert_eq!(Regime::new(None, Pace::Rate(2.0), 3.5), regime);
+        let at_once = Regime::new(None, Pace::Max, 7.0);
+        assert_eq!((at_once.pace(7.0), at_once.period()), (Pace::Max, None));
+        assert_eq!(at_once.to_string(), "back to back");
+    }
+
+    #[test]
+    fn a_rate_that_is_none_is_refused_with_what_to_give() {
+        for text in ["0", "-7", "nan", "inf", "1e9", "seven", ""] {
+            let said = parse_hz(text).unwrap_err();
+            assert!(said.contains("ticks a second"), "{text}: {said}");
+        }
+        assert_eq!(parse_hz("7"), Ok(7.0));
+    }
+}
