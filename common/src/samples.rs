@@ -11,8 +11,7 @@
 //! `robot`, `navigation` and `supervision` hold them; here is what they have in common.
 #![allow(unsafe_code)]
 
-use crate::bus::layouts;
-pub use crate::bus::{Stamp, Stamped};
+pub use bus::{Stamp, Stamped};
 
 macro_rules! stamped {
     ($($payload:ty),* $(,)?) => {$(
@@ -52,10 +51,6 @@ macro_rules! wire_enum {
     };
 }
 
-layouts! {
-    Stamp { tick stamp_ns generation sequence }
-}
-
 // Below the macros they are written with.
 mod navigation;
 mod robot;
@@ -89,6 +84,8 @@ stamped!(
 
 #[cfg(test)]
 mod tests {
+    use bus::{decode_sample, decode_slice, encode_sample, encode_slice};
+
     use super::*;
 
     #[test]
@@ -105,5 +102,31 @@ mod tests {
         assert_eq!(name_str(&name("dead-reckoning")), "dead-reckoning");
         assert_eq!(name_str(&name(&"x".repeat(40))).len(), 24);
         assert_eq!(name_str(&[0xff; 24]), "");
+    }
+
+    #[test]
+    fn a_sample_is_read_as_it_was_written_and_none_from_half_of_it() {
+        let mut link = LinkSample {
+            losses: 7,
+            ..LinkSample::default()
+        };
+        link.latency_histogram[3] = 11;
+        let mut message = Vec::new();
+        encode_sample(&link, &mut message);
+        assert_eq!(decode_sample(&message), Some(link));
+        message.pop();
+        assert_eq!(decode_sample::<LinkSample>(&message), None);
+    }
+
+    #[test]
+    fn a_slice_is_read_as_it_was_written_and_none_where_its_length_is_a_lie() {
+        let cells = [FieldCell::default(); 3];
+        let mut message = Vec::new();
+        encode_slice(&FieldHeader::default(), &cells, &mut message);
+        let read = decode_slice::<FieldHeader, FieldCell>(&message);
+        assert_eq!(read, Some((FieldHeader::default(), cells.to_vec())));
+        let length = message.len() - 3 * 12 - 4;
+        message[length..length + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert_eq!(decode_slice::<FieldHeader, FieldCell>(&message), None);
     }
 }

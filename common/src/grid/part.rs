@@ -7,8 +7,8 @@
 
 use glam::DVec2;
 
-use super::frame::{GridFrame, Window};
-use crate::bus::{ZeroCopySend, layouts};
+use bus::{ZeroCopySend, layouts};
+use mission::grid::{GridFrame, Window};
 
 /// How a map lies and which part of which version came along, as it lies in the headers of `grid` and `field`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]

@@ -1,9 +1,8 @@
 //! A follower's copy of a map that is published in keyframes and windows.
 
-use super::{
-    frame::{Cell, GridFrame, MAX_CELLS, Window},
-    part::Part,
-};
+use mission::grid::{Cell, GridFrame, MAX_CELLS, Window};
+
+use super::part::Part;
 
 /// What became of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

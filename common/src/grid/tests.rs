@@ -10,28 +10,6 @@ fn frame(cells: u32) -> GridFrame {
 }
 
 #[test]
-fn equation_19_rounds_to_the_cell_with_the_origin_at_the_centre() {
-    let frame = frame(50);
-    let at = |x, y| frame.cell_at(DVec2::new(x, y));
-    assert_eq!(at(0.0, 0.0), Some(Cell { col: 25, row: 25 }));
-    assert_eq!(at(0.26, -0.14), Some(Cell { col: 28, row: 24 }));
-    assert_eq!(at(2.4, -2.5), Some(Cell { col: 49, row: 0 }));
-    assert_eq!(at(2.46, 0.0), None, "one past the last column");
-    assert_eq!(at(f64::NAN, 0.0), None);
-}
-
-#[test]
-fn a_cell_centre_falls_in_its_own_cell() {
-    let frame = GridFrame {
-        centre: DVec2::new(1.3, -0.7),
-        ..frame(41)
-    };
-    for cell in [Cell { col: 0, row: 40 }, Cell { col: 17, row: 3 }] {
-        assert_eq!(frame.cell_at(frame.centre_of(cell)), Some(cell));
-    }
-}
-
-#[test]
 fn a_replica_follows_windows_and_drops_the_map_when_one_is_missing() {
     let frame = frame(4);
     let mut replica = Replica::default();

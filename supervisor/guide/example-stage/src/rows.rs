@@ -32,7 +32,7 @@ impl Stamped for DistanceSample {
     }
 }
 
-common::layouts! {
+common::bus::layouts! {
     DistanceSample { stamp driven_m moving_s }
 }
 

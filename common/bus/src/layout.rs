@@ -3,7 +3,7 @@
 
 use super::{
     cdr::{Decoder, Encoder},
-    payload::{Payload, type_name},
+    payload::{Payload, Stamp, type_name},
 };
 
 /// A payload, or a part of one, whose layout is known.
@@ -223,64 +223,34 @@ impl<T: Layout + Default, const N: usize> Layout for [T; N] {
 #[macro_export]
 macro_rules! layouts {
     ($($payload:ident { $($field:ident)* })*) => {$(
-        impl $crate::bus::Layout for $payload {
-            fn kind() -> $crate::bus::Kind {
+        impl $crate::Layout for $payload {
+            fn kind() -> $crate::Kind {
                 let _all = |&Self { $($field: _),* }: &Self| ();
-                $crate::bus::Structure::of::<Self>(vec![$($crate::bus::Field {
+                $crate::Structure::of::<Self>(vec![$($crate::Field {
                     name: stringify!($field),
                     offset: std::mem::offset_of!(Self, $field),
-                    kind: $crate::bus::kind_of(|payload: &Self| &payload.$field),
+                    kind: $crate::kind_of(|payload: &Self| &payload.$field),
                 }),*])
             }
 
-            fn value(&self) -> $crate::bus::Value {
-                $crate::bus::Value::Struct(vec![$(
-                    (stringify!($field), $crate::bus::Layout::value(&self.$field))
+            fn value(&self) -> $crate::Value {
+                $crate::Value::Struct(vec![$(
+                    (stringify!($field), $crate::Layout::value(&self.$field))
                 ),*])
             }
 
-            fn encode(&self, to: &mut $crate::bus::cdr::Encoder<'_>) {
-                $($crate::bus::Layout::encode(&self.$field, to);)*
+            fn encode(&self, to: &mut $crate::cdr::Encoder<'_>) {
+                $($crate::Layout::encode(&self.$field, to);)*
             }
 
-            fn decode(from: &mut $crate::bus::cdr::Decoder<'_>) -> Option<Self> {
+            fn decode(from: &mut $crate::cdr::Decoder<'_>) -> Option<Self> {
                 Some(Self {
-                    $($field: $crate::bus::Layout::decode(from)?),*
+                    $($field: $crate::Layout::decode(from)?),*
                 })
             }
         }
     )*};
 }
-pub(crate) use layouts;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::samples::{FieldCell, FieldHeader, LinkSample};
-
-    #[test]
-    fn a_sample_is_read_as_it_was_written_and_none_from_half_of_it() {
-        let mut link = LinkSample {
-            losses: 7,
-            ..LinkSample::default()
-        };
-        link.latency_histogram[3] = 11;
-        let mut message = Vec::new();
-        encode_sample(&link, &mut message);
-        assert_eq!(decode_sample(&message), Some(link));
-        message.pop();
-        assert_eq!(decode_sample::<LinkSample>(&message), None);
-    }
-
-    #[test]
-    fn a_slice_is_read_as_it_was_written_and_none_where_its_length_is_a_lie() {
-        let cells = [FieldCell::default(); 3];
-        let mut message = Vec::new();
-        encode_slice(&FieldHeader::default(), &cells, &mut message);
-        let read = decode_slice::<FieldHeader, FieldCell>(&message);
-        assert_eq!(read, Some((FieldHeader::default(), cells.to_vec())));
-        let length = message.len() - 3 * 12 - 4;
-        message[length..length + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-        assert_eq!(decode_slice::<FieldHeader, FieldCell>(&message), None);
-    }
+layouts! {
+    Stamp { tick stamp_ns generation sequence }
 }

@@ -4,7 +4,7 @@ use super::{
     ALONE, ALSO_ALONE, CHANNELS, Command, Feedback, Gains, Mode, Motion, Parameter, Quantity,
     Request, Stream, TIME_FOLLOWS, Targets,
 };
-use crate::wire::{
+use crate::{
     did,
     frame::{Frame, MessageError, SystemSignal, length},
 };

@@ -78,7 +78,7 @@ pub trait AnyTopic: Sync + CreateServices {
     }
 }
 
-/// What only [`Bus::make`](crate::bus::Bus::make) does with a topic: the trait has no name outside this folder.
+/// What only [`Bus::make`](crate::Bus::make) does with a topic: the trait has no name outside this crate.
 pub trait CreateServices {
     /// Create its services; they exist as long as the result is held.
     ///

@@ -1,4 +1,4 @@
-//! The inputs that fuzzing found are the lines of `decoder-corpus.hex`. In `common/fuzz`, make them files, as cargo-fuzz wants them:
+//! The inputs that fuzzing found are the lines of `decoder-corpus.hex`. In `common/x80-protocol/fuzz`, make them files, as cargo-fuzz wants them:
 //!
 //! ```sh
 //! mkdir -p corpus/decoder

@@ -1,6 +1,6 @@
 //! What must hold for any bytes whatever. Shared by the fuzz target and by the plain test that runs the corpus.
 
-use common::wire::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report};
+use x80_protocol::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report};
 
 const PING: [u8; 10] = [0x5e, 0x02, 0x01, 0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d];
 

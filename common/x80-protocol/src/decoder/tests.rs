@@ -1,7 +1,7 @@
 //! Promises of the decoder, by example and by property.
 
 use super::*;
-use crate::wire::{Addressing, Command, MAX_FRAME_BYTES, SystemSignal};
+use crate::{Addressing, Command, MAX_FRAME_BYTES, SystemSignal};
 use proptest::prelude::*;
 
 type Owned = (u8, u8, u8, Vec<u8>);

@@ -1,8 +1,13 @@
-//! The bus between processes on one machine: writers, readers and wakeups of the topics. This folder alone names
+//! The bus between processes on one machine: writers, readers and wakeups of the topics. This crate alone names
 //! the middleware (iceoryx2).
 //!
 //! | file | holds |
 //! |---|---|
+//! | [`clock`] | mission time, pace, the monotonic clock |
+//! | [`domain`] | a robot's directory, locks and shared memory on this machine |
+//! | [`lock_holders`] | who holds a lock on a file |
+//! | [`bus_instance`] | the names of one instance of its bus |
+//! | [`poll`], [`waiter`] | waiting for descriptors; one wait for topics, sockets, signals, processes |
 //! | `payload` | what may lie in shared memory, and the stamp that every sample begins with |
 //! | `layout` | how payloads lie in memory, for other languages; what they hold; how they are written elsewhere |
 //! | [`cdr`] | the encoding they are written in elsewhere |
@@ -26,20 +31,25 @@
 //! - events only wake; data come from receiving until there is none.
 
 mod any;
+pub mod bus_instance;
 pub mod cdr;
+pub mod clock;
+pub mod domain;
 mod encoded;
 mod error;
 mod layout;
 mod leftovers;
+pub mod lock_holders;
 mod make;
 mod ownership;
 mod payload;
+pub mod poll;
 mod read;
 mod spec;
 mod topic;
+pub mod waiter;
 mod write;
 
-pub(crate) use self::layout::layouts;
 pub use self::{
     any::{AnyReader, AnySample, ReadableTopic},
     encoded::{EncodedReader, EncodedTopic, EncodedWriter},

@@ -5,10 +5,7 @@ use std::{
     time::Duration,
 };
 
-use crate::{
-    bus::{BusError, Wakeup},
-    poll,
-};
+use crate::{error::BusError, poll, read::Wakeup};
 
 /// Waits for wakeups and other descriptors (sockets, signals, processes) at once.
 #[derive(Debug, Default)]

@@ -4,10 +4,26 @@
 //! the mission frame: its origin is where the robot starts and, unless `start.heading_deg` says
 //! otherwise, its x-axis is the robot's own.
 
+//!
+//! | module | holds |
+//! |---|---|
+//! | `check` | reading it: syntax, keys, ranges |
+//! | `robot`, `simulation` | its two largest parts |
+//! | [`geometry`], [`grid`] | shapes; cells and metres, windows of cells |
+//! | [`kinematics`] | equations (1)-(3) and their inverses |
+//! | [`infrared`], [`sonar`] | how the rangers are mounted, (19) |
+//! | [`address`] | where a robot answers, and over which transport |
+
+pub mod address;
 mod check;
 mod error;
+pub mod geometry;
+pub mod grid;
+pub mod infrared;
+pub mod kinematics;
 mod robot;
 mod simulation;
+pub mod sonar;
 
 use std::path::PathBuf;
 
@@ -212,7 +228,7 @@ pub struct Planner {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screening_m: Option<f64>,
     /// The executable of the planner stage, in place of `firsthand`'s own; it is given the command line of
-    /// [`stage_command`](crate::stage_command). A run file has it absolute.
+    /// `common::stage_command`. A run file has it absolute.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub executable: Option<PathBuf>,
 }

@@ -1,6 +1,6 @@
 //! The decoder on the inputs that fuzzing found, and on bounded random changes of it.
 //!
-//! The long run is `common/fuzz`: its target says how.
+//! The long run is `common/x80-protocol/fuzz`: its target says how.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test")]
 
 #[path = "../fuzz/oracle.rs"]

@@ -68,7 +68,7 @@ impl Spec {
 pub struct Limits {
     /// Samples a reader that falls behind still gets; then the oldest are dropped.
     pub buffer: usize,
-    /// The same of a reader that keeps everything ([`crate::bus::EncodedReader`]).
+    /// The same of a reader that keeps everything ([`crate::EncodedReader`]).
     pub recorder_buffer: usize,
     /// Samples a reader may hold at once.
     pub borrowed: usize,

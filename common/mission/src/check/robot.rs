@@ -1,10 +1,11 @@
 //! The robot's part of a mission.
 
+use x80_protocol::MOTOR_SCALE_V;
+
 use super::objection::{Objection, objection, within};
 use crate::{
+    Mission,
     address::{Address, AddressError, FORMS},
-    mission::Mission,
-    wire::MOTOR_SCALE_V,
 };
 
 pub(super) fn check(mission: &Mission) -> Result<(), Objection> {

@@ -1,7 +1,7 @@
 //! The simulation's part of a mission.
 
 use super::{Checker, MAX_TIMEOUT_S, Objection, objection, within};
-use crate::mission::simulation::{OutOfRange, Ranger, Simulation, Thing};
+use crate::simulation::{OutOfRange, Ranger, Simulation, Thing};
 
 /// More things that come and go than this are a mistake.
 const MAX_THINGS: usize = 1000;
@@ -83,7 +83,7 @@ fn ranger(ranger: &Ranger) -> Result<(), Objection> {
 mod tests {
     use std::path::Path;
 
-    use crate::mission::{Mission, MissionError};
+    use crate::{Mission, MissionError};
 
     fn parse(text: &str) -> Result<Mission, MissionError> {
         Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml"))

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mission::Method;
+use crate::Method;
 
 fn refusal(text: &str) -> String {
     match parse(text, Path::new("m.toml")) {

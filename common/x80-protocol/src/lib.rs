@@ -23,7 +23,7 @@
 //! drivers that are in use, so everything is sent in the commonest form and accepted in any of them.
 //!
 //! ```
-//! use common::wire::{Addressing, Command, Decoder, Report, SystemSignal};
+//! use x80_protocol::{Addressing, Command, Decoder, Report, SystemSignal};
 //!
 //! let mut bytes = Vec::new();
 //! Command::velocity([Some(400), Some(-400)], Some(1000)).encode(Addressing::Numbered, &mut bytes);
