@@ -11,9 +11,9 @@ pub(crate) mod command_line;
 pub(crate) mod consumer;
 mod directories;
 pub(crate) mod echo;
+pub(crate) mod error_code;
 #[cfg(feature = "tools")]
 pub(crate) mod evaluate;
-pub(crate) mod exit_code;
 #[cfg(feature = "tools")]
 pub(crate) mod experiments;
 pub(crate) mod fault;

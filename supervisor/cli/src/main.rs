@@ -28,7 +28,7 @@ use commands::{
     chaos, command_line, consumer, evaluate, experiments, field, latency, replay, report, top,
 };
 use commands::{
-    check, echo, exit_code, fault, help, hz, install, list, logs, missions, operate, other_user,
+    check, echo, error_code, fault, help, hz, install, list, logs, missions, operate, other_user,
     record, run, runs, stage, status, tables,
 };
 
@@ -112,7 +112,9 @@ const EXIT_CODES: &str = "Exit codes of run:
   6  aborted by a fault
   7  an earlier run was cut off (--resume-last)
   9  in the wrong place by the ground truth (simulated robot)
- 78  the mission is wrongly written: to try again is of no use";
+ 78  the mission is wrongly written: to try again is of no use
+
+A message ends with the code of its error in brackets, where there is one: a script matches that.";
 
 /// Run the command line of this process.
 fn main() -> ExitCode {
@@ -185,11 +187,13 @@ fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            progress_line::write_stderr(&format!("firsthand: {error}\n"));
+            let code = error_code::of(error.as_ref());
+            let code = code.map_or(String::new(), |code| format!(" [{code}]"));
+            progress_line::write_stderr(&format!("firsthand: {error}{code}\n"));
             if let Some(remark) = other_user::remark(error.as_ref()) {
                 progress_line::write_stderr(&format!("firsthand: {remark}\n"));
             }
-            exit_code::of(error.as_ref())
+            error_code::exit_code(error.as_ref())
         }
     }
 }

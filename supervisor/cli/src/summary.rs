@@ -33,6 +33,8 @@ impl From<&Histogram> for Quantiles {
 pub(crate) struct Summary {
     pub(crate) outcome: Outcome,
     pub(crate) reason: String,
+    /// The row of the failsafe table that ended the mission, by its name (`firsthand failsafe`).
+    pub(crate) cause: Option<&'static str>,
     /// From the first motion order to the end by the robot's clock, which counts the time when nobody heard it.
     pub(crate) mission_time_s: f64,
     pub(crate) path_length_m: f64,
@@ -100,6 +102,7 @@ impl Summary {
         Self {
             outcome: ending.outcome,
             reason: ending.reason.clone(),
+            cause: ending.cause,
             mission_time_s: finished.duration_s,
             path_length_m: match ended {
                 Some(_) if *resumes == 0 => path_length(truth),

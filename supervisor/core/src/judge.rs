@@ -118,7 +118,10 @@ fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
     let link = snapshot.link.filter(|link| link.action() == Action::End)?;
     let rule = failsafe::rule(link.cause())?;
     let reason = format!("{}: {}", rule.name, rule.when);
-    Some(Ending::failed(Outcome::Aborted, reason))
+    Some(Ending {
+        cause: Some(rule.name),
+        ..Ending::failed(Outcome::Aborted, reason)
+    })
 }
 
 fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {

@@ -46,6 +46,8 @@ pub struct Ending {
     pub outcome: Outcome,
     /// Why, in a few words.
     pub reason: String,
+    /// The row of the failsafe table that ended the mission, by its name.
+    pub cause: Option<&'static str>,
     /// Whether it is what the user asked for: the target reached, or a stop by hand.
     pub asked_for: bool,
 }
@@ -56,6 +58,7 @@ impl Ending {
         Self {
             outcome,
             reason: reason.into(),
+            cause: None,
             asked_for: false,
         }
     }

@@ -8,7 +8,7 @@ use std::{
 use common::domain::RobotName;
 use console::runs::{self, CUT_OFF, RunDirectory};
 
-use super::Failure;
+use super::{Failure, error_code::Refused};
 use crate::progress_line::write_stderr;
 
 /// The directory asked for; results of an earlier run are not mixed with this one's.
@@ -20,11 +20,11 @@ pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
         )
     })?;
     if directory.join(common::run::FILE_NAME).exists() {
-        return Err(format!(
+        let message = format!(
             "{} holds an earlier run; give an empty or new directory with --out",
             directory.display()
-        )
-        .into());
+        );
+        return Err(Refused::new("results-there", message).into());
     }
     Ok(fs::canonicalize(directory)?)
 }

@@ -13,6 +13,7 @@ use console::sample_text;
 
 use super::{
     Failure,
+    error_code::Refused,
     stream::{LOOK_EVERY, Stream},
 };
 use crate::progress_line::write_stderr;
@@ -81,7 +82,8 @@ pub(super) fn readable(name: &str) -> Result<&'static dyn ReadableTopic, Failure
                 .iter()
                 .map(|topic| topic.spec().name)
                 .collect();
-            format!("there is no topic {name:?}; there are {}", names.join(", ")).into()
+            let message = format!("there is no topic {name:?}; there are {}", names.join(", "));
+            Refused::new("unknown-topic", message).into()
         })
 }
 

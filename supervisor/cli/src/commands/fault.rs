@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
 
 /// Why nothing was broken.
 #[derive(Debug, Error)]
-enum FaultError {
+pub(crate) enum FaultError {
     #[error("{stage} has no fault called {fault:?}; it has {known}")]
     NoSuchFault {
         stage: &'static str,

@@ -69,7 +69,7 @@ impl FromStr for TargetCell {
 
 /// What goes wrong once the map is read.
 #[derive(Debug, Error)]
-enum FieldError {
+pub(crate) enum FieldError {
     /// The target is blocked or outside.
     #[error("{}: {cause}; the free cell nearest to it is --target-cell {},{}", map.display(), nearest.0, nearest.1)]
     Target {

@@ -13,6 +13,7 @@ use console::{logs::Logs, robots::Robot, runs};
 use super::{
     Failure,
     echo::Waiting,
+    error_code::Refused,
     operate,
     stream::{LOOK_EVERY, Stream},
 };
@@ -71,7 +72,8 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     let processes = Logs::processes(directory).map_err(unreadable)?;
     if let Some(stage) = stage.filter(|stage| !processes.iter().any(|it| it == stage)) {
         let (directory, there) = (directory.display(), processes.join(", "));
-        return Err(format!("{stage:?} has no log in {directory}; there are {there}").into());
+        let message = format!("{stage:?} has no log in {directory}; there are {there}");
+        return Err(Refused::new("unknown-process", message).into());
     }
     Ok(Logs::of(directory, stage))
 }

@@ -23,8 +23,8 @@ use common::{
 use rustix::process::Signal;
 use x80_link::failsafe;
 
-use super::Failure;
-use supervisor::stages;
+use super::{Failure, error_code::Refused};
+use supervisor::stages::{self, Stage};
 
 /// Which robot.
 #[derive(Debug, Args)]
@@ -131,7 +131,11 @@ fn await_rest(robot: &RobotName) -> Result<ExitCode, Failure> {
         }
         Some(link) => format!("{}: it moves", failsafe::name(link.cause())),
     };
-    Err(format!("robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`", REST_PATIENCE.as_secs()).into())
+    let message = format!(
+        "robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`",
+        REST_PATIENCE.as_secs()
+    );
+    Err(Refused::new("not-at-rest", message).into())
 }
 
 /// Whether the link has obeyed the operator, or ends the mission, and the robot obeys the link.
@@ -163,10 +167,12 @@ pub(crate) fn thaw(arguments: &Thaw) -> Result<ExitCode, Failure> {
 
 /// A stage of the table.
 pub(crate) fn known(stage: &str) -> Result<&'static str, Failure> {
-    match stages::find(stage) {
-        Some(stage) => Ok(stage.name),
-        None => Err(stages::unknown(stage).into()),
-    }
+    Ok(known_stage(stage)?.name)
+}
+
+/// The row of a stage in the table.
+pub(crate) fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
+    stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
 /// Send a request to the supervisor, and wait until it has taken it.
@@ -205,7 +211,10 @@ pub(crate) fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result<Exi
         (pid_of(&domain, known(stage)?)?, domain.stages_lock_file())
     };
     let pid = pid.ok_or_else(|| {
-        format!("{stage} of robot {robot} has no process at the moment; see `firsthand status`")
+        let message = format!(
+            "{stage} of robot {robot} has no process at the moment; see `firsthand status`"
+        );
+        Refused::new("no-process", message)
     })?;
     File::open(&lock)
         .and_then(|lock| lock_holders::signal(pid, &lock, signal))
@@ -231,10 +240,10 @@ pub(crate) fn find<T>(
 ) -> Result<T, Failure> {
     let found = roster.find(PATIENCE, find)?;
     found.ok_or_else(|| {
-        format!(
+        let message = format!(
             "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand thaw supervisor`)"
-        )
-        .into()
+        );
+        Refused::new("no-answer", message).into()
     })
 }
 

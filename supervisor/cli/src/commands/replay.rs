@@ -21,7 +21,7 @@ use supervisor::{
     stages::{self, Stage},
 };
 
-use super::{Failure, missions, print_text};
+use super::{Failure, missions, operate, print_text};
 use crate::progress_line::write_stderr;
 
 /// Replay a recording: feed each stage's generations what they took, and compare what comes out with what was recorded, to the
@@ -75,7 +75,7 @@ const DIFFERENT: u8 = 1;
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     for name in &arguments.stage {
-        stages::find(name).ok_or_else(|| stages::unknown(name))?;
+        operate::known_stage(name)?;
     }
     let recording = Recording::open(&arguments.recording)?;
     if arguments.live {

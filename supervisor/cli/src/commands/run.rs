@@ -6,7 +6,9 @@ use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
 use console::robots::SUPERVISOR_LOG;
 
-use super::{Failure, directories, missions, print_text, run_recorder::RunRecorder};
+use super::{
+    Failure, directories, error_code::Refused, missions, print_text, run_recorder::RunRecorder,
+};
 #[cfg(feature = "tools")]
 use crate::run_picture;
 use crate::{
@@ -94,10 +96,11 @@ impl Default for Arguments {
 fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
-            format!(
+            let message = format!(
                 "cannot resume the run in {}: {error}; give the directory of a run",
                 directory.display()
-            )
+            );
+            Refused::new("no-run", message)
         })?;
         return resumed(arguments, found).map(Some);
     }

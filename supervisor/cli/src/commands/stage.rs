@@ -14,9 +14,9 @@ use common::{
     start::Start,
 };
 
-use super::Failure;
+use super::{Failure, operate};
 use crate::progress_line::write_stderr;
-use supervisor::stages::{self, Stage};
+use supervisor::stages::Stage;
 
 /// Be one stage of a run. The supervisor starts these, unless it was given --watch-only: then you do, or systemd.
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let stage = stages::find(&arguments.name).ok_or_else(|| stages::unknown(&arguments.name))?;
+    let stage = operate::known_stage(&arguments.name)?;
     let start = stage_command::start_with(stage.name, arguments.options.iter().cloned())?;
     if let Start::External { robot, .. } = &start {
         become_executable(stage, &external::mission(robot)?, &arguments.options)?;

@@ -10,7 +10,7 @@ use common::{domain::RobotName, samples::RequestKind};
 use console::top::{self, Action};
 use rustix::process::Signal;
 
-use super::{Failure, operate, stream::let_stages_go_first};
+use super::{Failure, error_code::Refused, operate, stream::let_stages_go_first};
 
 /// Show a robot on the terminal: stages, believed map, field; keys kill, freeze, restart, stop, resume.
 #[derive(Debug, Args)]
@@ -22,10 +22,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
-        return Err(
-            "top draws on a terminal; elsewhere there are `firsthand status` and `firsthand hz`"
-                .into(),
-        );
+        let message =
+            "top draws on a terminal; elsewhere there are `firsthand status` and `firsthand hz`";
+        return Err(Refused::new("no-terminal", message).into());
     }
     let_stages_go_first();
     top::show(&arguments.robot, act)?;
