@@ -1,87 +1,191 @@
-//! The subcommands: one file each.
+//! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
 
-use std::io::{self, Write as _};
-
-#[cfg(feature = "tools")]
-pub(crate) mod chaos;
 pub(crate) mod check;
-#[cfg(feature = "tools")]
-pub(crate) mod command_line;
-#[cfg(feature = "tools")]
-pub(crate) mod consumer;
-mod directories;
-pub(crate) mod echo;
-pub(crate) mod error_code;
-#[cfg(feature = "tools")]
-pub(crate) mod evaluate;
-#[cfg(feature = "tools")]
-pub(crate) mod experiments;
-pub(crate) mod fault;
-#[cfg(feature = "tools")]
-pub(crate) mod field;
 pub(crate) mod help;
-pub(crate) mod hz;
 pub(crate) mod install;
-#[cfg(feature = "tools")]
-pub(crate) mod latency;
-pub(crate) mod list;
 pub(crate) mod logs;
-#[cfg(feature = "tools")]
-mod mission_progress;
 pub(crate) mod missions;
-pub(crate) mod operate;
-pub(crate) mod other_user;
-mod python;
 pub(crate) mod record;
-#[cfg(feature = "tools")]
-pub(crate) mod replay;
-#[cfg(feature = "tools")]
-pub(crate) mod report;
+pub(crate) mod resume;
 pub(crate) mod run;
-mod run_recorder;
 pub(crate) mod runs;
 #[cfg(feature = "simulator")]
 pub(crate) mod sim;
 pub(crate) mod stage;
 pub(crate) mod status;
-mod stream;
-pub(crate) mod tables;
+pub(crate) mod stop;
+pub(crate) mod table;
+pub(crate) mod topic;
+
+use std::{
+    ffi::{OsStr, OsString},
+    fmt::Write as _,
+    process::ExitCode,
+};
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+
 #[cfg(feature = "tools")]
-pub(crate) mod top;
+use crate::tools::{bench, completions, evaluate, experiments, field, man, replay, report, top};
+use crate::{console::failure::Failure, renamed};
 
-/// What a subcommand fails with: one clear sentence.
-type Failure = Box<dyn std::error::Error>;
+/// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, which takes in
+/// addition what stands in parentheses. `@tools` and `@simulator` are the features without which it does not exist.
+macro_rules! commands {
+    ($($heading:literal {
+        $($name:ident $module:ident $(($whole:ident))?,)*
+        $(@tools { $($tool:ident $tool_module:ident $(($tool_whole:ident))?,)* })?
+        $(@simulator { $sim:ident $sim_module:ident })?
+    })*) => {
+        #[derive(Debug, Subcommand)]
+        pub(crate) enum Command {
+            $(
+                $($name($module::Arguments),)*
+                $($(#[cfg(feature = "tools")] $tool($tool_module::Arguments),)*)?
+                $(#[cfg(feature = "simulator")] $sim($sim_module::Arguments),)?
+            )*
+        }
 
-/// Write `text` to standard output, at once. A reader that went away has read enough (`firsthand help tables | head`).
-fn print_text(text: &str) -> io::Result<()> {
-    let mut stdout = io::stdout();
-    unless_closed(
-        stdout
-            .write_all(text.as_bytes())
-            .and_then(|()| stdout.flush()),
-    )
+        /// Headings, and the subcommands below each.
+        const GROUPS: &[(&str, &[&str])] = &[$((
+            $heading,
+            &[
+                $(stringify!($name),)*
+                $($(#[cfg(feature = "tools")] stringify!($tool),)*)?
+                $(#[cfg(feature = "simulator")] stringify!($sim),)?
+            ],
+        )),*];
+
+        impl Command {
+            pub(crate) fn execute(&self) -> Result<ExitCode, Failure> {
+                match self {
+                    $(
+                        $(Self::$name(arguments) => $module::main(arguments $(, $whole())?),)*
+                        $($(
+                            #[cfg(feature = "tools")]
+                            Self::$tool(arguments) => $tool_module::main(arguments $(, $tool_whole())?),
+                        )*)?
+                        $(
+                            #[cfg(feature = "simulator")]
+                            Self::$sim(arguments) => $sim_module::main(arguments),
+                        )?
+                    )*
+                }
+            }
+        }
+    };
 }
 
-/// A pipe whose reader has ended, or a terminal that was closed, is no failure.
-fn unless_closed(written: io::Result<()>) -> io::Result<()> {
-    match written {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        Err(error) if error.raw_os_error() == Some(CLOSED_TERMINAL) => Ok(()),
-        written => written,
+commands! {
+    "Operate a robot" {
+        Run run,
+        Status status,
+        Stop stop,
+        Resume resume,
+        @tools { Top top, }
+    }
+    "Look at it" {
+        Topic topic,
+        Logs logs,
+        Runs runs,
+        Table table,
+    }
+    "Record it" {
+        Record record,
+        @tools { Replay replay, Report report, }
+    }
+    "Judge it" {
+        Check check,
+        @tools { Evaluate evaluate, Experiments experiments, Field field, }
+    }
+    "Break it" {
+        Stage stage,
+        @tools { Bench bench, }
+    }
+    "Set up" {
+        Missions missions,
+        Install install,
+        Help help(command_line),
+        @tools { Completions completions, Man man(command_line), }
+        @simulator { Sim sim }
     }
 }
 
-/// What the kernel answers who writes to a terminal that was closed.
-const CLOSED_TERMINAL: i32 = rustix::io::Errno::IO.raw_os_error();
+/// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
+///
+/// Without a subcommand: `firsthand run obstacle-course`.
+#[derive(Debug, Parser)]
+#[command(
+    name = "firsthand",
+    version,
+    disable_help_subcommand = true,
+    help_template = format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{{options}}{{after-help}}", listed()),
+    after_help = format!("{}\n{EXIT_CODES}", help::pages())
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The exit codes of `run`.
+const EXIT_CODES: &str = "Exit codes of run:
+  0  target reached, or stopped by Ctrl-C or SIGTERM
+  1  could not start, or something failed
+  2  wrong usage
+  3  target unreachable
+  4  timeout
+  5  collision (simulated robot)
+  6  aborted by a fault
+  7  an earlier run was cut off (--resume-last)
+  9  in the wrong place by the ground truth (simulated robot)
+ 78  invalid mission file; do not retry
 
-    #[test]
-    fn a_reader_that_went_away_is_no_failure() {
-        assert!(unless_closed(Err(io::ErrorKind::BrokenPipe.into())).is_ok());
-        assert!(unless_closed(Err(io::Error::from_raw_os_error(CLOSED_TERMINAL))).is_ok());
-        assert!(unless_closed(Err(io::ErrorKind::StorageFull.into())).is_err());
+An error message ends with a code in brackets, which scripts can match.";
+
+/// The command line of the executable, for help, completions and the manual page.
+pub(crate) fn command_line() -> clap::Command {
+    Arguments::command()
+}
+
+/// The subcommand that `words` name, those after the executable.
+pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
+    let executable = OsString::from("firsthand");
+    let words = std::iter::once(executable).chain(renamed::words(words));
+    let arguments = Arguments::try_parse_from(words)?;
+    Ok(arguments
+        .command
+        .unwrap_or_else(|| Command::Run(run::Arguments::default())))
+}
+
+impl Command {
+    /// From which level on standard error shows the log; none where the command sees to its log itself.
+    pub(crate) fn log_level(&self) -> Option<&'static str> {
+        match self {
+            Self::Run(_) => None,
+            Self::Stage(arguments) if arguments.is_process() => Some("info"),
+            #[cfg(feature = "simulator")]
+            Self::Sim(_) => Some("info"),
+            _ => Some("error"),
+        }
     }
+}
+
+/// The subcommands by groups, each with the first line of its help.
+fn listed() -> String {
+    let all = Command::augment_subcommands(clap::Command::new(""));
+    let mut text = String::new();
+    for (heading, names) in GROUPS {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{heading}:");
+        for name in *names {
+            let name = name.to_lowercase();
+            let about = all
+                .find_subcommand(&name)
+                .and_then(clap::Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            let _ = writeln!(text, "  {name:<12} {about}");
+        }
+        text.push('\n');
+    }
+    text + "Options:\n"
 }

@@ -5,10 +5,12 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 use common::mission::Mission;
 
-use super::{Failure, print_text};
-use crate::progress_line::write_stderr;
+use crate::console::{
+    failure::Failure,
+    output::{print_text, write_stderr},
+};
 
-/// Say whether a mission file is one, and if not, line, key and remedy.
+/// Check a mission file: what is wrong is told with line, key and remedy.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A mission file.

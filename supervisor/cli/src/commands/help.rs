@@ -1,21 +1,27 @@
-//! `firsthand help [TOPIC]`: a page of the guide, or the options of a subcommand.
+//! `firsthand help [PAGE]`: a page of the guide, or the options of a subcommand.
+
+mod markdown;
+mod pager;
 
 use std::{fmt::Write as _, process::ExitCode};
 
 use clap::{Args, Command, error::ErrorKind};
 
-use super::{Failure, print_text};
+use crate::{
+    console::{failure::Failure, output::print_text},
+    renamed,
+};
 
-/// Print a page of the guide, or the options of a subcommand; without a topic, list both.
+/// Print a page of the guide, or the options of a subcommand; without a name, list both.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A page of the guide or a subcommand.
-    topic: Option<String>,
+    /// A page of the guide, or the words of a subcommand: `stage kill`.
+    page: Vec<String>,
 }
 
 /// A page of the guide.
 struct Page {
-    /// Its name below `supervisor/guide/`, without `.md`; the topic is the same in small letters.
+    /// The name of its file in `supervisor/guide/`, without `.md`. In small letters it is the name of the page.
     file: &'static str,
     /// Markdown; the first line is its title.
     text: &'static str,
@@ -55,7 +61,7 @@ static GUIDE: &[Page] = guide! {
 };
 
 impl Page {
-    fn topic(&self) -> String {
+    fn name(&self) -> String {
         self.file.to_ascii_lowercase()
     }
 
@@ -68,41 +74,59 @@ impl Page {
     }
 }
 
-fn page(topic: &str) -> Option<&'static Page> {
+fn page(name: &str) -> Option<&'static Page> {
     GUIDE
         .iter()
-        .find(|page| page.file.eq_ignore_ascii_case(topic))
+        .find(|page| page.file.eq_ignore_ascii_case(name))
 }
 
-/// The pages, one a line, as the help of the whole command line lists them.
-pub(crate) fn topics() -> String {
-    let mut list = String::from("Guide (firsthand help TOPIC):\n");
+/// The names of all pages.
+#[cfg(feature = "tools")]
+pub(crate) fn page_names() -> Vec<String> {
+    GUIDE.iter().map(Page::name).collect()
+}
+
+/// The pages, one a line, for the help of the whole command line.
+pub(crate) fn pages() -> String {
+    let mut list = String::from("Guide (firsthand help PAGE):\n");
     for page in GUIDE {
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "  {:<22} {}", page.topic(), page.title());
+        let _ = writeln!(list, "  {:<22} {}", page.name(), page.title());
     }
     list
 }
 
 /// `whole` is the command line of the executable.
 pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<ExitCode, Failure> {
+    if let [name] = &arguments.page[..]
+        && let Some(page) = page(name)
+    {
+        match pager::width() {
+            Some(width) => pager::show(&markdown::render(page.text, width))?,
+            None => print_text(page.text)?,
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     // Usage lines name the whole command only once it is built.
     whole.build();
-    let text = match arguments.topic.as_deref() {
-        None => whole.render_long_help().to_string(),
-        Some(topic) => match (page(topic), whole.find_subcommand_mut(topic)) {
-            (Some(page), _) => page.text.to_owned(),
-            (None, Some(subcommand)) => subcommand.render_long_help().to_string(),
-            (None, None) => {
-                let message = format!(
-                    "{topic:?} is neither a page of the guide nor a subcommand; `firsthand help` lists both"
-                );
-                whole.error(ErrorKind::InvalidValue, message).exit();
-            }
-        },
-    };
-    print_text(&text)?;
+    match subcommand(&mut whole, &arguments.page) {
+        Some(command) => print_text(&command.render_long_help().to_string())?,
+        None => {
+            let name = arguments.page.join(" ");
+            let message = format!(
+                "{name:?} is neither a page of the guide nor a subcommand; `firsthand help` lists both"
+            );
+            whole.error(ErrorKind::InvalidValue, message).exit();
+        }
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The subcommand of `whole` that `words` name.
+fn subcommand<'a>(whole: &'a mut Command, words: &[String]) -> Option<&'a mut Command> {
+    let words = renamed::words(words);
+    let mut words = words.iter();
+    words.try_fold(whole, |command, word| command.find_subcommand_mut(word))
 }
 
 #[cfg(all(test, feature = "simulator", feature = "tools"))]

@@ -9,10 +9,10 @@ use std::{
 };
 
 use clap::Args;
+use supervisor::stages;
 use thiserror::Error;
 
-use super::{Failure, print_text};
-use supervisor::stages;
+use crate::console::{failure::Failure, output::print_text};
 
 /// Make this executable a service of systemd: units, user, configuration.
 ///
@@ -137,7 +137,6 @@ fn remaining() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser as _;
 
     fn unit(name: &str) -> &'static str {
         let found = PARTS.iter().find(|part| part.path.ends_with(name));
@@ -167,8 +166,8 @@ mod tests {
                 let command = command
                     .replace("${FIRSTHAND_ROBOT}", "x80")
                     .replace("%i", "planner");
-                let words = command.split_whitespace();
-                crate::Arguments::try_parse_from(words)
+                let words: Vec<_> = command.split_whitespace().skip(1).collect();
+                crate::commands::parse(&words)
                     .unwrap_or_else(|error| panic!("{}: {error}", part.path));
             }
         }

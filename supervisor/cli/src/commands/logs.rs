@@ -1,5 +1,7 @@
 //! `firsthand logs`: the logs of a run, merged by time.
 
+mod merged;
+
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
@@ -8,25 +10,26 @@ use std::{
 
 use clap::Args;
 use common::domain::RobotName;
-use console::{logs::Logs, robots::Robot, runs};
 
-use super::{
-    Failure,
-    echo::Waiting,
-    error_code::Refused,
-    operate,
+use self::merged::Logs;
+use crate::console::{
+    failure::{Failure, Refused},
+    operator,
+    robots::Robot,
+    runs,
     stream::{LOOK_EVERY, Stream},
+    waiting::Waiting,
 };
 
-/// Print the logs of a run, those of all its processes merged by time.
+/// Print the logs of all processes of a run, merged by time.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Of this process alone: a stage, `supervisor` or `x80-sim`.
+    /// Only the log of this process: a stage, `supervisor` or `x80-sim`.
     stage: Option<String>,
-    /// Go on with what is written, and with the robot's next run, until Ctrl-C.
+    /// Print also what is logged from now on, in this run and the robot's next ones, until Ctrl-C.
     #[arg(short, long, conflicts_with = "run")]
     follow: bool,
-    /// Name of the robot: its run that goes on, or else its newest below --runs.
+    /// Name of the robot: the logs of its present run, or else of its newest run below --runs.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
     /// Where the directories of runs are.
@@ -47,7 +50,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(directory) => directory.clone(),
         None => newest(arguments).ok_or_else(|| {
             let (robot, runs) = (&arguments.robot, arguments.runs.display());
-            format!("no run of robot {robot} goes on or is kept in {runs}; name its directory with --run, or see `firsthand runs`")
+            format!("robot {robot} has no run now and none in {runs}; name its directory with --run, or see `firsthand runs`")
         })?,
     };
     let mut logs = opened(arguments, &directory)?;
@@ -55,17 +58,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The robot's run that goes on, or else its newest that is kept.
+/// The directory of the robot's present run, or else of its newest.
 fn newest(arguments: &Arguments) -> Option<PathBuf> {
     let robot = &arguments.robot;
     Robot::find(robot.clone()).run.or_else(|| {
-        let kept = runs::list(&arguments.runs).into_iter();
-        let newest = kept.filter(|run| run.robot == *robot).max();
+        let runs = runs::list(&arguments.runs).into_iter();
+        let newest = runs.filter(|run| run.robot == *robot).max();
         newest.map(|run| run.directory)
     })
 }
 
-/// The logs in `directory`, that of the process asked for among them.
+/// The logs in `directory`, which must have the one that is asked for.
 fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     let stage = arguments.stage.as_deref();
     let unreadable = |error| format!("cannot read logs in {}: {error}", directory.display());
@@ -78,22 +81,22 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs, Failure> {
     Ok(Logs::of(directory, stage))
 }
 
-/// Print what the robot's runs log, one after the other.
+/// Print the logs of the robot's runs, one run after the other.
 fn follow(arguments: &Arguments, stream: &mut Stream) -> Result<(), Failure> {
-    // Its log may not be there yet.
+    // The log of a stage may not be there yet.
     if let Some(stage) = arguments.stage.as_deref()
         && !OTHERS.contains(&stage)
     {
-        operate::known(stage)?;
+        operator::known(stage)?;
     }
     let mut waiting = Waiting::default();
     let mut followed: Option<(PathBuf, Logs)> = None;
     while !stream.has_ended() {
         let goes_on = Robot::find(arguments.robot.clone()).run;
         if let Some((directory, logs)) = &mut followed {
-            // What was written until it ended was written before that was seen.
+            // The end of the run was looked for first: its last lines are printed in this round.
             match print_round(logs, stream) {
-                // It was removed.
+                // The directory was removed.
                 Err(_) if !directory.exists() => followed = None,
                 printed => printed?,
             }
@@ -129,7 +132,7 @@ fn print_round(logs: &mut Logs, stream: &mut Stream) -> std::io::Result<()> {
     stream.write(&text)
 }
 
-/// Processes of a run that are no stages.
+/// The processes of a run that are no stages.
 const OTHERS: [&str; 2] = ["supervisor", "x80-sim"];
-/// Lines are written together up to so many bytes.
+/// Lines are written together until they have this many bytes.
 const PRINTED_AT_ONCE: usize = 64 << 10;

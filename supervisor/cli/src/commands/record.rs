@@ -11,8 +11,10 @@ use common::{
 };
 use recording::{Options, recorder::Happened};
 
-use super::{Failure, print_text};
-use crate::progress_line::write_stderr;
+use crate::console::{
+    failure::Failure,
+    output::{print_text, write_stderr},
+};
 
 /// Record what a robot's processes publish, from run to run, until Ctrl-C. `run` starts one by itself.
 #[derive(Debug, Args)]
@@ -42,7 +44,7 @@ fn topic(name: &str) -> Result<&'static dyn EncodedTopic, String> {
         .iter()
         .find(|topic| topic.spec().name == name);
     found.copied().ok_or_else(|| {
-        format!("no topic is called {name:?}; `firsthand topics` prints the table of topics")
+        format!("no topic is called {name:?}; `firsthand topic list` prints the table of topics")
     })
 }
 

@@ -1,27 +1,33 @@
 //! `firsthand run MISSION`: a mission from start to summary.
 
+mod recorder;
+pub(crate) mod summary;
+mod summary_file;
+
 use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission, start::become_child};
-use console::robots::SUPERVISOR_LOG;
-
-use super::{
-    Failure, directories, error_code::Refused, missions, print_text, run_recorder::RunRecorder,
-};
-#[cfg(feature = "tools")]
-use crate::run_picture;
-use crate::{
-    logging,
-    progress_line::{ProgressLine, write_stderr},
-    summary::Summary,
-    summary_file::SummaryFile,
-};
 use supervisor::{
     Finished, Options, Progress, Starter,
     outcome::{Ending, Outcome},
     planner_executable,
     recovery::{self, RecoveredRun},
+};
+
+use self::{recorder::RunRecorder, summary::Summary, summary_file::SummaryFile};
+#[cfg(feature = "tools")]
+use crate::tools::run_picture;
+use crate::{
+    console::{
+        failure::{Failure, Refused},
+        missions,
+        output::{print_text, write_stderr},
+        progress_line::ProgressLine,
+        robots::SUPERVISOR_LOG,
+        run_directories as directories,
+    },
+    logging,
 };
 
 /// Carry out a mission: start a robot's stages, let it drive, summarise.

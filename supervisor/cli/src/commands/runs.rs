@@ -1,4 +1,4 @@
-//! `firsthand runs`: the runs that are kept.
+//! `firsthand runs`: the directories of runs.
 
 use std::{
     collections::BTreeSet,
@@ -7,26 +7,51 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use common::domain::RobotName;
-use console::{
-    runs::{self, Outcome, RunDirectory},
-    words,
-};
 use serde::Serialize;
 
-use super::{Failure, directories, print_text};
+use crate::console::{
+    failure::Failure,
+    output::{json_lines, print_text},
+    run_directories,
+    runs::{self, Outcome, RunDirectory},
+    table::{
+        Align::{Left, Right},
+        Table,
+    },
+    words,
+};
+#[cfg(feature = "tools")]
+use crate::tools::diff;
 
-/// List the runs that are kept, the newest last: outcome, size; or remove the oldest.
+/// List runs, remove the oldest, find where two differ. Without a subcommand: `firsthand runs list`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    list: List,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    List(List),
+    #[cfg(feature = "tools")]
+    Diff(diff::Arguments),
+}
+
+/// List the runs, the newest last, with outcome and size; or first remove the oldest.
+#[derive(Debug, Args)]
+struct List {
     /// Where the directories of runs are.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// Those of this robot alone.
+    /// Only the runs of this robot.
     #[arg(long)]
     robot: Option<RobotName>,
-    /// First remove the oldest runs that ended, beyond N of each robot.
+    /// First remove all but the newest N runs of each robot that have ended.
     #[arg(long, value_name = "N")]
     prune: Option<usize>,
     /// One JSON object a line.
@@ -34,7 +59,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// A line.
+/// A row of the list.
 #[derive(Serialize)]
 struct Listed<'a> {
     run: &'a Path,
@@ -48,6 +73,15 @@ struct Listed<'a> {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    match &arguments.command {
+        None => list(&arguments.list),
+        Some(Command::List(arguments)) => list(arguments),
+        #[cfg(feature = "tools")]
+        Some(Command::Diff(arguments)) => diff::main(arguments),
+    }
+}
+
+fn list(arguments: &List) -> Result<ExitCode, Failure> {
     let runs = &arguments.runs;
     if !runs.is_dir() {
         return Err(format!(
@@ -58,17 +92,14 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     if let Some(keep) = arguments.prune {
         for robot in robots(arguments) {
-            directories::prune(runs, &robot, keep);
+            run_directories::prune(runs, &robot, keep);
         }
     }
-    let mut kept = kept(arguments);
-    kept.sort();
-    let listed: Vec<_> = kept.iter().map(listed).collect();
+    let mut chosen = chosen(arguments);
+    chosen.sort();
+    let listed: Vec<_> = chosen.iter().map(listed).collect();
     let text = if arguments.json {
-        let lines = listed.iter().map(serde_json::to_string);
-        lines
-            .map(|line| Ok(line? + "\n"))
-            .collect::<serde_json::Result<String>>()?
+        json_lines(&listed)?
     } else {
         table(&listed)
     };
@@ -76,17 +107,18 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn kept(arguments: &Arguments) -> Vec<RunDirectory> {
-    let mut kept = runs::list(&arguments.runs);
+/// The runs that are asked for.
+fn chosen(arguments: &List) -> Vec<RunDirectory> {
+    let mut runs = runs::list(&arguments.runs);
     if let Some(robot) = &arguments.robot {
-        kept.retain(|run| run.robot == *robot);
+        runs.retain(|run| run.robot == *robot);
     }
-    kept
+    runs
 }
 
-/// The robots whose runs are kept, each once.
-fn robots(arguments: &Arguments) -> BTreeSet<RobotName> {
-    kept(arguments).into_iter().map(|run| run.robot).collect()
+/// The robots of these runs, each once.
+fn robots(arguments: &List) -> BTreeSet<RobotName> {
+    chosen(arguments).into_iter().map(|run| run.robot).collect()
 }
 
 fn listed(run: &RunDirectory) -> Listed<'_> {
@@ -111,14 +143,14 @@ fn listed(run: &RunDirectory) -> Listed<'_> {
 }
 
 fn table(listed: &[Listed<'_>]) -> String {
-    let row = |cells: [&str; 7]| {
-        let [run, robot, mission, began, outcome, time, size] = cells;
-        format!(
-            "{run:<24} {robot:<16} {mission:<18} {began:>12} {outcome:<12} {time:>9} {size:>9}\n"
-        )
-    };
-    let mut text = row([
-        "run", "robot", "mission", "began", "outcome", "time", "size",
+    let mut table = Table::new([
+        ("run", Left),
+        ("robot", Left),
+        ("mission", Left),
+        ("began", Right),
+        ("outcome", Left),
+        ("time", Right),
+        ("size", Right),
     ]);
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
@@ -130,17 +162,17 @@ fn table(listed: &[Listed<'_>]) -> String {
             .mission_time_s
             .map_or("-".to_owned(), |time_s| format!("{time_s:.1} s"));
         let name = run.run.file_name().unwrap_or_default().to_string_lossy();
-        text += &row([
-            &name,
-            &run.robot.to_string(),
-            run.mission.unwrap_or("-"),
-            &(words::age(Some(began)) + " ago"),
-            &run.outcome,
-            &time,
-            &words::size(run.size_bytes),
+        table.row([
+            name.into_owned(),
+            run.robot.to_string(),
+            run.mission.unwrap_or("-").to_owned(),
+            words::age(Some(began)) + " ago",
+            run.outcome.clone(),
+            time,
+            words::size(run.size_bytes),
         ]);
         all += run.size_bytes;
     }
     let runs = if listed.len() == 1 { "run" } else { "runs" };
-    text + &format!("{} {runs}, {}\n", listed.len(), words::size(all))
+    format!("{table}{} {runs}, {}\n", listed.len(), words::size(all))
 }

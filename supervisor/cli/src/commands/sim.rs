@@ -8,9 +8,12 @@ use common::{
     signals::{SIGINT, SIGTERM, Signals},
     start::become_child,
 };
-use x80_sim::SimOptions;
+use x80_sim::{SimError, SimOptions};
 
-use super::{Failure, missions};
+use crate::console::{
+    failure::{Failure, Refused},
+    missions,
+};
 
 /// Be a simulated X80 in a mission's world, for `run` or for any other software that drives an X80.
 #[derive(Debug, Args)]
@@ -81,6 +84,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             .ground_truth
             .then(|| Box::new(std::io::stdout()) as Box<_>),
     };
-    x80_sim::run(options, &signals)?;
+    x80_sim::run(options, &signals).map_err(|error| match error {
+        SimError::Bind { .. } => Failure::from(Refused::new("address-in-use", error.to_string())),
+        error => error.into(),
+    })?;
     Ok(ExitCode::SUCCESS)
 }

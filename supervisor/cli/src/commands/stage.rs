@@ -1,62 +1,103 @@
-//! `firsthand stage NAME`: the process of one stage, started by the supervisor, by systemd or by a person.
+//! `firsthand stage`: the stages of a robot, one by one.
 
-use std::{
-    ffi::OsString,
-    os::unix::process::CommandExt as _,
-    process::{Command, ExitCode},
-};
+mod fault;
+mod process;
 
-use clap::Args;
-use common::{
-    external,
-    mission::Mission,
-    stage_command::{self, SUBCOMMAND},
-    start::Start,
-};
+use std::{ffi::OsString, process::ExitCode};
 
-use super::{Failure, operate};
-use crate::progress_line::write_stderr;
-use supervisor::stages::Stage;
+use clap::{Args, Subcommand};
+use common::{domain::RobotName, samples::RequestKind};
+use rustix::process::Signal;
 
-/// Be one stage of a run. The supervisor starts these, unless it was given --watch-only: then you do, or systemd.
+use super::table;
+use crate::console::{failure::Failure, operator, output::print_text};
+
+/// List, kill, freeze, restart and break the stages of a robot; or be one of them.
+///
+/// `firsthand stage NAME [--robot R]` is the process of the stage NAME. The supervisor starts these, unless it was given
+/// --watch-only: then you do, or systemd. Without a subcommand: `firsthand stage list`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Its name in the table (`firsthand stages`).
-    name: String,
-    /// Name of the robot, where the supervisor only watches: `--robot x80` if unsaid.
-    #[arg(
-        value_name = "--robot NAME",
-        trailing_var_arg = true,
-        allow_hyphen_values = true
-    )]
-    options: Vec<OsString>,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Print the table of stages.
+    List,
+    /// Send a signal to the process of a stage: SIGKILL unless another one is named.
+    Kill {
+        #[command(flatten)]
+        process: StageProcess,
+        /// KILL, TERM, INT, ABRT, STOP or CONT.
+        #[arg(long, default_value = "KILL", value_parser = signal)]
+        signal: Signal,
+    },
+    /// Freeze the process of a stage, so that it hangs.
+    Freeze(StageProcess),
+    /// Let the frozen process of a stage go on.
+    Thaw(StageProcess),
+    /// Replace a stage by a new generation; a stage that is held because it died too often is released.
+    Restart {
+        /// The stage (`firsthand stage list`).
+        stage: String,
+        /// Name of the robot.
+        #[arg(long, default_value = "x80")]
+        robot: RobotName,
+    },
+    Fault(fault::Arguments),
+    #[command(external_subcommand)]
+    Process(Vec<OsString>),
+}
+
+/// A process of a robot.
+#[derive(Debug, Args)]
+struct StageProcess {
+    /// The stage (`firsthand stage list`), or `supervisor`.
+    stage: String,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+}
+
+impl Arguments {
+    /// Whether this process is a stage.
+    pub(crate) const fn is_process(&self) -> bool {
+        matches!(self.command, Some(Command::Process(_)))
+    }
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let stage = operate::known_stage(&arguments.name)?;
-    let start = stage_command::start_with(stage.name, arguments.options.iter().cloned())?;
-    if let Start::External { robot, .. } = &start {
-        become_executable(stage, &external::mission(robot)?, &arguments.options)?;
+    match arguments.command.as_ref().unwrap_or(&Command::List) {
+        Command::List => print_text(&table::stages())?,
+        Command::Kill { process, signal } => process.send(*signal)?,
+        Command::Freeze(process) => process.send(Signal::STOP)?,
+        Command::Thaw(process) => process.send(Signal::CONT)?,
+        Command::Restart { stage, robot } => {
+            operator::ask(robot, RequestKind::Restart, operator::known(stage)?)?;
+        }
+        Command::Fault(arguments) => fault::main(arguments)?,
+        Command::Process(words) => process::run(words)?,
     }
-    (stage.run)(&start).map_or_else(
-        |error| {
-            write_stderr(&format!("firsthand: {error}\n"));
-            Ok(ExitCode::from(error.exit_code()))
-        },
-        |()| Ok(ExitCode::SUCCESS),
-    )
+    Ok(ExitCode::SUCCESS)
 }
 
-/// Become the executable that `mission` names for `stage`, if it names one.
-fn become_executable(
-    stage: &Stage,
-    mission: &Mission,
-    options: &[OsString],
-) -> Result<(), Failure> {
-    let Some(executable) = stage.executable(mission) else {
-        return Ok(());
-    };
-    let mut command = Command::new(executable);
-    let error = command.args([SUBCOMMAND, stage.name]).args(options).exec();
-    Err(format!("cannot execute {}: {error}", executable.display()).into())
+impl StageProcess {
+    fn send(&self, signal: Signal) -> Result<(), Failure> {
+        operator::send(&self.robot, &self.stage, signal)
+    }
+}
+
+/// The signal of that name.
+fn signal(name: &str) -> Result<Signal, String> {
+    Ok(match name.strip_prefix("SIG").unwrap_or(name) {
+        "KILL" => Signal::KILL,
+        "TERM" => Signal::TERM,
+        "INT" => Signal::INT,
+        "ABRT" => Signal::ABORT,
+        "STOP" => Signal::STOP,
+        "CONT" => Signal::CONT,
+        _ => return Err("give KILL, TERM, INT, ABRT, STOP or CONT".to_owned()),
+    })
 }

@@ -1,4 +1,6 @@
-//! `firsthand status`: the stages of a robot, its link and its batteries.
+//! `firsthand status`: the stages of a robot, its link and its batteries; or all robots.
+
+mod all;
 
 use std::{
     fmt,
@@ -16,11 +18,18 @@ use common::{
     },
     topics,
 };
-use console::words::{age, order, seconds, state};
 use serde::Serialize;
 use x80_link::failsafe;
 
-use super::{Failure, print_text};
+use crate::console::{
+    failure::Failure,
+    output::print,
+    table::{
+        Align::{Left, Right},
+        Table,
+    },
+    words::{age, order, seconds, state},
+};
 
 /// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its link and its batteries.
 #[derive(Debug, Args)]
@@ -28,7 +37,10 @@ pub(crate) struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// One line of JSON; an age of null is never.
+    /// List all robots that run on this machine for this user instead.
+    #[arg(long, conflicts_with = "robot")]
+    all: bool,
+    /// One line of JSON for each robot; an age of null is never.
     #[arg(long)]
     json: bool,
 }
@@ -95,12 +107,22 @@ struct StageStatus<'a> {
     output_age_s: Option<f64>,
 }
 
-/// The roster comes five times a second.
+/// The roster is published five times a second.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The link publishes ten times a second, and a robot reports its batteries several times.
+/// The link publishes ten times a second, and a robot reports its batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if arguments.all {
+        all::print(arguments.json)?;
+    } else {
+        print_one(arguments)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Print the status of one robot.
+fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut roster = Roster::open(&bus)?;
     let mut links = bus.reader(&topics::LINK)?;
@@ -143,12 +165,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         power: power.as_ref().map(power_status),
         stages: entries.iter().map(stage_status).collect(),
     };
-    if arguments.json {
-        print_text(&format!("{}\n", serde_json::to_string(&status)?))?;
-    } else {
-        print_text(&status.to_string())?;
-    }
-    Ok(ExitCode::SUCCESS)
+    print(&status, arguments.json)?;
+    Ok(())
 }
 
 fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
@@ -208,26 +226,29 @@ impl fmt::Display for Status<'_> {
         if let Some(power) = &self.power {
             writeln!(f, "{power}")?;
         }
-        writeln!(
-            f,
-            "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
-            "stage", "state", "pid", "gen", "uptime", "restarts", "last beat", "last output"
-        )?;
+        let mut table = Table::new([
+            ("stage", Left),
+            ("state", Left),
+            ("pid", Right),
+            ("gen", Right),
+            ("uptime", Right),
+            ("restarts", Right),
+            ("last beat", Right),
+            ("last output", Right),
+        ]);
         for stage in &self.stages {
-            writeln!(
-                f,
-                "{:<16} {:<12} {:>8} {:>4} {:>9} {:>8} {:>10} {:>11}",
-                stage.name,
-                stage.state,
-                stage.pid,
-                stage.generation,
+            table.row([
+                stage.name.to_owned(),
+                stage.state.to_owned(),
+                stage.pid.to_string(),
+                stage.generation.to_string(),
                 age(stage.uptime_s),
-                stage.restarts,
+                stage.restarts.to_string(),
                 age(stage.beat_age_s),
                 age(stage.output_age_s),
-            )?;
+            ]);
         }
-        Ok(())
+        write!(f, "{table}")
     }
 }
 

@@ -7,10 +7,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::{CommandFactory as _, Parser as _};
-
 use super::*;
-use crate::commands::missions;
+use crate::{
+    commands::{self, parse},
+    console::missions,
+};
 
 fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
@@ -137,6 +138,16 @@ fn arguments(command: &[String]) -> Option<&[String]> {
     Some(&command[at..])
 }
 
+/// Whether a command line lacks no more than arguments.
+fn is_incomplete(error: &clap::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::MissingRequiredArgument
+            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+            | ErrorKind::MissingSubcommand
+    )
+}
+
 #[test]
 fn every_command_line_in_readme_and_guide_is_understood() {
     let mut checked = 0;
@@ -146,14 +157,9 @@ fn every_command_line_in_readme_and_guide_is_understood() {
         for command in commands.iter().filter_map(|command| arguments(command)) {
             let line = command.join(" ");
             let at = document.path.display();
-            let words = std::iter::once("firsthand").chain(command.iter().map(String::as_str));
-            let parsed = match crate::Arguments::try_parse_from(words) {
+            let parsed = match parse(command) {
                 // A subcommand alone is named rather than called.
-                Err(error)
-                    if error.kind() == ErrorKind::MissingRequiredArgument && command.len() == 1 =>
-                {
-                    continue;
-                }
+                Err(error) if is_incomplete(&error) && command.len() <= 2 => continue,
                 parsed => parsed.unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}")),
             };
             let set: Vec<String> = command
@@ -163,14 +169,10 @@ fn every_command_line_in_readme_and_guide_is_understood() {
                 .collect();
             missions::load("obstacle-course", &set)
                 .unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}"));
-            if let Some(crate::Command::Help(Arguments { topic: Some(topic) })) = parsed.command {
-                assert!(
-                    page(&topic).is_some()
-                        || crate::Arguments::command()
-                            .find_subcommand(&topic)
-                            .is_some(),
-                    "{at}: firsthand help {topic}"
-                );
+            if let commands::Command::Help(Arguments { page: words }) = parsed {
+                let is_page = matches!(&words[..], [name] if page(name).is_some());
+                let known = is_page || subcommand(&mut commands::command_line(), &words).is_some();
+                assert!(known, "{at}: firsthand {line}");
             }
             checked += 1;
         }
@@ -184,13 +186,13 @@ fn a_command_line_with_an_option_or_key_that_does_not_exist_is_found() {
         "firsthand run --sed 7",
         "for s in $(seq 50); do firsthand runs --seed $s; done",
         "sudo -u firsthand firsthand states",
-        "firsthand kill --signal ABRT",
+        "firsthand stage kill --signal ABRT",
+        "firsthand topic ehco pose",
     ];
     for line in wrong {
         let found = commands(line);
         let command = found.iter().find_map(|command| arguments(command)).unwrap();
-        let words = std::iter::once("firsthand").chain(command.iter().map(String::as_str));
-        assert!(crate::Arguments::try_parse_from(words).is_err(), "{line}");
+        assert!(parse(command).is_err(), "{line}");
     }
 }
 
@@ -295,22 +297,26 @@ fn every_crate_has_a_row_in_the_readme_and_every_row_a_crate() {
 
 #[test]
 fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
-    let help = crate::Arguments::command().render_long_help().to_string();
+    let help = commands::command_line().render_long_help().to_string();
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let package = fs::read_to_string(root().join(".ci/package-files")).unwrap();
     for page in GUIDE {
-        let topic = page.topic();
-        assert!(page.text.starts_with("# "), "{topic} has no title");
-        assert!(help.contains(page.title()), "{topic}");
-        assert!(readme.contains(&format!("`{topic}`")), "{topic}");
+        let name = page.name();
+        assert!(page.text.starts_with("# "), "{name} has no title");
+        assert!(help.contains(page.title()), "{name}");
+        assert!(readme.contains(&format!("`{name}`")), "{name}");
         let file = format!("supervisor/guide/{}.md", page.file);
         assert!(package.contains(&file), "{file}");
-        let commands = crate::Arguments::command();
-        assert!(commands.find_subcommand(&topic).is_none(), "{topic}");
+        let commands = commands::command_line();
+        assert!(commands.find_subcommand(&name).is_none(), "{name}");
     }
     let files = fs::read_dir(root().join("supervisor/guide")).unwrap();
     let written = files.filter(|file| file.as_ref().unwrap().path().extension().is_some());
-    assert_eq!(written.count(), GUIDE.len(), "a page that no topic shows");
+    assert_eq!(
+        written.count(),
+        GUIDE.len(),
+        "a page that is not in the list"
+    );
 }
 
 #[test]

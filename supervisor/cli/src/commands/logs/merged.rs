@@ -1,0 +1,242 @@
+//! The logs of a run: one file a process, merged by the time that begins each line.
+
+use std::{
+    fs::{self, File},
+    io::{self, BufRead as _, BufReader, Read as _},
+    path::{Path, PathBuf},
+};
+
+/// The extension of a log.
+const LOG: &str = "log";
+/// A longer line is cut, because a process may write lines of any length.
+const LONGEST_LINE: u64 = 64 << 10;
+/// The length of a time like 2026-11-21T06:04:22.729158Z.
+const TIME: usize = 27;
+
+/// The logs of a run, which may still be written.
+#[derive(Debug)]
+pub(crate) struct Logs {
+    directory: PathBuf,
+    /// If named, only this process has its log read.
+    process: Option<String>,
+    logs: Vec<Log>,
+}
+
+/// The log of one process.
+#[derive(Debug)]
+struct Log {
+    process: String,
+    file: BufReader<File>,
+    /// Its length at the beginning of this round.
+    end: u64,
+    position: u64,
+    /// The beginning of a line whose end is not written yet.
+    unfinished: Vec<u8>,
+    /// The next line.
+    head: Option<Line>,
+    /// The time of the last line that began with one.
+    time: String,
+}
+
+/// A line of a log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Line {
+    /// The time in UTC as the process wrote it. A line without a time has the time of the line before.
+    pub(crate) time: String,
+    /// The process: a stage, `supervisor`, `x80-sim`.
+    pub(crate) process: String,
+    /// The rest of the line.
+    pub(crate) text: String,
+}
+
+impl std::fmt::Display for Line {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            time,
+            process,
+            text,
+        } = self;
+        write!(to, "{time:TIME$} {process:<14} {text}")
+    }
+}
+
+impl Logs {
+    /// The logs in `directory`, or only the log of `process`.
+    pub(crate) fn of(directory: &Path, process: Option<&str>) -> Self {
+        Self {
+            directory: directory.to_path_buf(),
+            process: process.map(str::to_owned),
+            logs: Vec::new(),
+        }
+    }
+
+    /// The processes that have a log in `directory`, sorted.
+    pub(crate) fn processes(directory: &Path) -> io::Result<Vec<String>> {
+        let mut processes = Vec::new();
+        for entry in fs::read_dir(directory)? {
+            let path = entry?.path();
+            let name = path.file_stem().and_then(|name| name.to_str());
+            if let Some(name) = name
+                && path.extension().is_some_and(|end| end == LOG)
+            {
+                processes.push(name.to_owned());
+            }
+        }
+        processes.sort();
+        Ok(processes)
+    }
+
+    /// Begin a round: [`Logs::next_line`] reads what the logs hold now. Later lines belong to the next round.
+    pub(crate) fn look(&mut self) -> io::Result<()> {
+        for process in Self::processes(&self.directory)? {
+            let wanted = self.process.as_ref().is_none_or(|only| *only == process);
+            if wanted && self.logs.iter().all(|log| log.process != process) {
+                let file = File::open(self.directory.join(&process).with_extension(LOG))?;
+                self.logs.push(Log::new(process, file));
+            }
+        }
+        // All lengths are read before any line, so that no line is earlier than one of the round before.
+        for log in &mut self.logs {
+            log.end = log.file.get_ref().metadata()?.len();
+        }
+        self.logs.iter_mut().try_for_each(Log::advance)
+    }
+
+    /// The next line of this round by time; none at its end.
+    pub(crate) fn next_line(&mut self) -> io::Result<Option<Line>> {
+        let with_line = self.logs.iter_mut().filter(|log| log.head.is_some());
+        let time = |log: &&mut Log| log.head.as_ref().map(|line| line.time.clone());
+        let Some(log) = with_line.min_by_key(time) else {
+            return Ok(None);
+        };
+        let line = log.head.take();
+        log.advance()?;
+        Ok(line)
+    }
+}
+
+impl Log {
+    fn new(process: String, file: File) -> Self {
+        Self {
+            process,
+            file: BufReader::new(file),
+            end: 0,
+            position: 0,
+            unfinished: Vec::new(),
+            head: None,
+            time: String::new(),
+        }
+    }
+
+    /// Read the next line, unless there is one.
+    fn advance(&mut self) -> io::Result<()> {
+        if self.head.is_some() {
+            return Ok(());
+        }
+        let room = LONGEST_LINE.saturating_sub(self.unfinished.len() as u64);
+        let most = room.min(self.end.saturating_sub(self.position));
+        let read = (&mut self.file)
+            .take(most)
+            .read_until(b'\n', &mut self.unfinished)?;
+        self.position += read as u64;
+        let finished = self.unfinished.ends_with(b"\n");
+        if !finished && (self.unfinished.len() as u64) < LONGEST_LINE {
+            return Ok(());
+        }
+        let line = String::from_utf8_lossy(&self.unfinished);
+        let line = line.trim_end_matches('\n');
+        let text = match split_time(line) {
+            Some((time, text)) => {
+                time.clone_into(&mut self.time);
+                text
+            }
+            None => line,
+        };
+        self.head = Some(Line {
+            time: self.time.clone(),
+            process: self.process.clone(),
+            text: text.chars().filter(|letter| !letter.is_control()).collect(),
+        });
+        self.unfinished.clear();
+        Ok(())
+    }
+}
+
+/// The time that begins a line, and what follows it.
+fn split_time(line: &str) -> Option<(&str, &str)> {
+    let (time, text) = line.split_at_checked(TIME)?;
+    let is_time = time.ends_with('Z') && time.as_bytes()[10] == b'T' && text.starts_with(' ');
+    is_time.then(|| (time, text.trim_start()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    fn append(directory: &Path, file: &str, text: &str) {
+        let file = File::options()
+            .create(true)
+            .append(true)
+            .open(directory.join(file));
+        file.unwrap().write_all(text.as_bytes()).unwrap();
+    }
+
+    fn round(logs: &mut Logs) -> Vec<String> {
+        logs.look().unwrap();
+        let lines = std::iter::from_fn(|| logs.next_line().unwrap());
+        lines
+            .map(|line| format!("{} {}", line.process, line.text))
+            .collect()
+    }
+
+    const AT: &str = "2026-11-21T06:04:22.72915";
+
+    #[test]
+    fn lines_of_all_processes_come_in_the_order_of_their_times() {
+        let directory = tempfile::tempdir().unwrap();
+        let directory = directory.path();
+        append(
+            directory,
+            "b.log",
+            &format!("{AT}1Z  INFO one\n{AT}4Z  WARN four\nand more\n"),
+        );
+        append(
+            directory,
+            "a.log",
+            &format!("{AT}2Z  INFO two\n{AT}3Z  INFO thr\u{1b}ee\n{AT}5Z  IN"),
+        );
+        append(directory, "c.checkpoint", "no log");
+        let mut logs = Logs::of(directory, None);
+        let lines = [
+            "b INFO one",
+            "a INFO two",
+            "a INFO three",
+            "b WARN four",
+            "b and more",
+        ];
+        assert_eq!(round(&mut logs), lines);
+        append(directory, "a.log", "FO five\n");
+        append(directory, "new.log", &format!("{AT}6Z  INFO six\n"));
+        assert_eq!(round(&mut logs), ["a INFO five", "new INFO six"]);
+        assert_eq!(round(&mut logs), Vec::<String>::new());
+        let mut one = Logs::of(directory, Some("new"));
+        assert_eq!(round(&mut one), ["new INFO six"]);
+        assert_eq!(Logs::processes(directory).unwrap(), ["a", "b", "new"]);
+    }
+
+    #[test]
+    fn a_line_without_end_is_cut() {
+        let directory = tempfile::tempdir().unwrap();
+        append(
+            directory.path(),
+            "a.log",
+            &"x".repeat(3 * LONGEST_LINE as usize / 2),
+        );
+        let mut logs = Logs::of(directory.path(), None);
+        let lines = round(&mut logs);
+        assert_eq!(lines.len(), 1);
+        assert_eq!(lines[0].len() as u64, LONGEST_LINE + 2);
+    }
+}

@@ -1,0 +1,21 @@
+//! `firsthand resume`.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use common::{domain::RobotName, samples::RequestKind};
+
+use crate::console::{failure::Failure, operator};
+
+/// Let a stopped robot go on.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    operator::ask(&arguments.robot, RequestKind::Resume, "")?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,274 @@
+//! How a run ended, as numbers: for people, for scripts, for the picture.
+
+use std::{collections::BTreeMap, fmt};
+
+use common::{
+    ground_truth::GroundTruthTick, latency::Histogram, mission::Mission, samples::PoseSample,
+};
+use serde::Serialize;
+
+use supervisor::{Finished, outcome::Outcome, totals::LookTotals};
+
+/// Quantiles of a duration, microseconds; none of nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct Quantiles {
+    p50: Option<f64>,
+    p99: Option<f64>,
+    max: Option<f64>,
+}
+
+impl From<&Histogram> for Quantiles {
+    fn from(histogram: &Histogram) -> Self {
+        Self {
+            p50: histogram.quantile_us(0.5),
+            p99: histogram.quantile_us(0.99),
+            max: histogram.quantile_us(1.0),
+        }
+    }
+}
+
+/// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the ground truth of a
+/// real robot.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Summary {
+    pub(crate) outcome: Outcome,
+    pub(crate) reason: String,
+    /// The row of the failsafe table that ended the mission, by its name (`firsthand table failsafe`).
+    pub(crate) cause: Option<&'static str>,
+    /// From the first motion order to the end by the robot's clock, which counts the time when nobody heard it.
+    pub(crate) mission_time_s: f64,
+    pub(crate) path_length_m: f64,
+    pub(crate) straight_m: f64,
+    pub(crate) min_clearance_m: Option<f64>,
+    pub(crate) collisions: Option<u64>,
+    pub(crate) pose_error_m: Option<f64>,
+    /// Root mean square of that, by the covariance of the last pose.
+    pub(crate) pose_error_expected_m: Option<f64>,
+    /// From where the robot ended to the target, by the ground truth.
+    pub(crate) true_distance_m: Option<f64>,
+    /// When the robot had moved 0.1 m, by the ground truth.
+    pub(crate) departed_s: Option<f64>,
+    /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
+    /// together, in an outage or when a stage is down.
+    pub(crate) stopping_time_s: Option<f64>,
+    pub(crate) safety_events: u64,
+    pub(crate) full_solves: u64,
+    pub(crate) local_updates: u64,
+    /// Times the robot stopped to look.
+    pub(crate) looks: u64,
+    /// Mission time that it looked.
+    pub(crate) look_s: f64,
+    /// Share of the ticks in which the front sonar gave no distance, by the ground truth: a supervisor on a busy machine
+    /// may miss samples.
+    pub(crate) sonar_unavailable_share: Option<f64>,
+    /// The greatest commanded speed of either wheel less the least one, rad/s, in the last supervisor's part.
+    pub(crate) wheel_range_rad_s: Option<f64>,
+    pub(crate) ticks: u64,
+    pub(crate) restarts: BTreeMap<&'static str, u32>,
+    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last one's
+    /// part; the path is the believed one, which is complete.
+    pub(crate) resumes: u32,
+    /// Generations of the planner started because the robot stalled.
+    pub(crate) replans: u32,
+    /// Times its sensed belief was forgotten.
+    pub(crate) resets: u64,
+    /// From the datagram in to the datagram out.
+    pub(crate) tick_latency_us: Quantiles,
+    pub(crate) full_solve_us: Quantiles,
+    pub(crate) local_update_us: Quantiles,
+}
+
+/// A robot that has moved so far has departed, metres.
+const DEPARTED_M: f64 = 0.1;
+
+impl Summary {
+    /// Of a finished run. What came after that was decided does not count.
+    pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
+        let Finished {
+            ending,
+            record,
+            resumes,
+            ..
+        } = finished;
+        let last_tick = finished.last_tick.or(record.newest_tick());
+        let pose = last_tick.and_then(|tick| record.pose_at(tick));
+        let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
+        let truth = &finished.truth[..];
+        let (full_solves, local_updates) = record.solves(guidance);
+        let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
+        let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
+        let collisions = truth.last().map(|tick| tick.contacts);
+        let looks = last_tick.map_or(LookTotals::default(), |tick| record.looks.at(tick));
+        Self {
+            outcome: ending.outcome,
+            reason: ending.reason.clone(),
+            cause: ending.cause,
+            mission_time_s: finished.duration_s,
+            path_length_m: match ended {
+                Some(_) if *resumes == 0 => path_length(truth),
+                _ => pose.map_or(0.0, |pose| pose.travelled_m),
+            },
+            straight_m: mission.target.length(),
+            min_clearance_m: clearance
+                .filter(|&clearance| clearance < GroundTruthTick::NOTHING_NEAR),
+            collisions,
+            pose_error_m: pose.and_then(|pose| {
+                let its = truth.iter().rev().find(|tick| tick.is_of(pose));
+                Some(its.or(truth.last())?.pose_error_m(pose))
+            }),
+            pose_error_expected_m: pose.map(PoseSample::position_rms_m),
+            true_distance_m: truth
+                .last()
+                .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
+            departed_s: truth
+                .iter()
+                .find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M)
+                .map(|tick| tick.time_s),
+            stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
+            safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
+            full_solves,
+            local_updates,
+            looks: looks.looks,
+            look_s: looks.ticks as f64 / mission.robot.rate_hz,
+            sonar_unavailable_share: sonar_unavailable_share(truth),
+            // Of a car one of the two is a steering angle.
+            wheel_range_rad_s: last_tick
+                .filter(|_| mission.body().steering.is_none())
+                .and_then(|tick| record.wheels.at(tick).range_rad_s()),
+            ticks: last_tick.map_or(0, |tick| tick + 1),
+            restarts: finished.restarts.clone(),
+            resumes: *resumes,
+            replans: finished.replans,
+            resets: finished.resets,
+            tick_latency_us: (&record.latency()).into(),
+            full_solve_us: (&record.full_solves).into(),
+            local_update_us: (&record.local_updates).into(),
+        }
+    }
+
+    /// Lines below the picture.
+    pub(crate) fn captions(&self) -> Vec<String> {
+        let metres = |value: Option<f64>| {
+            value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))
+        };
+        let stalls = (self.replans > 0 || self.resets > 0).then(|| {
+            format!(
+                "The robot stalled: replans {}, beliefs forgotten {}",
+                self.replans, self.resets
+            )
+        });
+        let numbers = [
+            format!(
+                "Least true clearance {} · pose error at the end {} (expected {}) · {} full solves, {} local updates",
+                metres(self.min_clearance_m),
+                metres(self.pose_error_m),
+                metres(self.pose_error_expected_m),
+                self.full_solves,
+                self.local_updates,
+            ),
+            format!(
+                "tick latency {} · {} ticks · {}{}",
+                self.tick_latency_us,
+                self.ticks,
+                self.restarted(),
+                self.stopping_time_s
+                    .map_or(String::new(), |seconds| format!(
+                        " · at rest at most {seconds:.2} s after a last command"
+                    )),
+            ),
+        ];
+        stalls.into_iter().chain(numbers).collect()
+    }
+
+    fn restarted(&self) -> String {
+        let some: Vec<_> = self
+            .restarts
+            .iter()
+            .filter(|(_, times)| **times > 0)
+            .map(|(stage, times)| format!("{stage} restarted {times}×"))
+            .collect();
+        let resumed = (self.resumes > 0).then(|| format!("resumed {}×", self.resumes));
+        let all: Vec<_> = resumed.into_iter().chain(some).collect();
+        if all.is_empty() {
+            "no restarts".to_owned()
+        } else {
+            all.join(", ")
+        }
+    }
+}
+
+impl fmt::Display for Quantiles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.p50, self.p99, self.max) {
+            (Some(p50), Some(p99), Some(max)) => {
+                write!(
+                    f,
+                    "{p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)"
+                )
+            }
+            _ => f.write_str("unknown"),
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {}", self.outcome.as_str(), self.reason)?;
+        write!(
+            f,
+            "{:.1} s, {:.2} m driven, ",
+            self.mission_time_s, self.path_length_m
+        )?;
+        // A target where the robot stands has no straight way.
+        if self.straight_m > 0.0 {
+            let ratio = self.path_length_m / self.straight_m;
+            write!(f, "{ratio:.2} x the straight {:.2} m, ", self.straight_m)?;
+        }
+        writeln!(f, "{} safety events", self.safety_events)?;
+        for caption in self.captions() {
+            writeln!(f, "{caption}")?;
+        }
+        Ok(())
+    }
+}
+
+fn path_length(truth: &[GroundTruthTick]) -> f64 {
+    truth
+        .windows(2)
+        .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))
+        .sum()
+}
+
+/// Share of the ticks whose front sonar byte is no distance: 255, nothing in range, or 0, not valid.
+fn sonar_unavailable_share(truth: &[GroundTruthTick]) -> Option<f64> {
+    let unavailable = truth.iter().filter(|tick| matches!(tick.sonar_cm, 0 | 255));
+    (!truth.is_empty()).then(|| unavailable.count() as f64 / truth.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sonar_is_unavailable_where_its_byte_is_no_distance() {
+        let tick = |sonar_cm| GroundTruthTick {
+            tick: 0,
+            time_s: 0.0,
+            x: 0.0,
+            y: 0.0,
+            heading: 0.0,
+            v: 0.0,
+            omega: 0.0,
+            clearance_m: 1.0,
+            contacts: 0,
+            left_counts: 0,
+            right_counts: 0,
+            sonar_cm,
+            stopping_time_s: 0.0,
+            radio: None,
+        };
+        assert_eq!(sonar_unavailable_share(&[]), None);
+        let truth = [255, 0, 255, 254, 4].map(tick);
+        assert_eq!(sonar_unavailable_share(&truth), Some(0.6));
+    }
+}

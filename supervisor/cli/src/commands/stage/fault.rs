@@ -1,0 +1,127 @@
+//! `firsthand stage fault STAGE FAULT`: break something in a running stage on purpose.
+
+use std::{fmt::Write as _, time::Instant};
+
+use clap::Args;
+use common::{
+    bus::Bus,
+    clock::MissionTime,
+    domain::{Domain, RobotName},
+    faults,
+    roster::Roster,
+    samples::{FaultAnswer, FaultSample, name, name_str},
+    topics,
+    waiter::Waiter,
+};
+
+use crate::console::{
+    failure::{Failure, Refused},
+    operator::{PATIENCE, find, known, new_id},
+};
+
+/// Break something in a running stage on purpose, to see what the others do.
+#[derive(Debug, Args)]
+#[command(after_help = table())]
+pub(super) struct Arguments {
+    /// The stage (`firsthand stage list`).
+    stage: String,
+    /// What to break in it; see below.
+    fault: String,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// Do it although the robot is a real one, which may then drive anywhere: clear its surroundings first.
+    #[arg(long)]
+    break_a_real_robot: bool,
+}
+
+/// A real robot is not broken unless its operator insists.
+fn real_robot(robot: &RobotName) -> Refused {
+    let message = format!(
+        "robot {robot} is a real one, and a fault may drive it into things; to do it all the same, clear its surroundings \
+         and add --break-a-real-robot"
+    );
+    Refused::new("real-robot", message)
+}
+
+pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let stage = known(&arguments.stage)?;
+    let Some(fault) = faults::find(stage, &arguments.fault) else {
+        let known: Vec<_> = faults::of(stage).map(|fault| fault.name).collect();
+        let (fault, known) = (&arguments.fault, known.join(", "));
+        let message = format!("{stage} has no fault called {fault:?}; it has {known}");
+        return Err(Refused::new("unknown-fault", message).into());
+    };
+    let robot = &arguments.robot;
+    let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
+    let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| {
+        Some(header.simulated == 1)
+    })?;
+    if !simulated && !arguments.break_a_real_robot {
+        return Err(real_robot(robot).into());
+    }
+    let request = FaultSample {
+        id: new_id(),
+        stage: name(stage),
+        kind: fault.kind.into(),
+        although_real: arguments.break_a_real_robot.into(),
+        ..FaultSample::default()
+    };
+    let refused = match request_fault(&bus, stage, request)? {
+        Some(FaultAnswer::Taken) => return Ok(()),
+        Some(FaultAnswer::Refused) => real_robot(robot),
+        Some(FaultAnswer::Impossible) => {
+            let message = format!(
+                "{stage} has nothing to break yet; retry when the robot drives (`firsthand status`)"
+            );
+            Refused::new("not-yet", message)
+        }
+        Some(FaultAnswer::None) | None => {
+            let message = format!("{stage} does not answer; is it running? (`firsthand status`)");
+            Refused::new("no-answer", message)
+        }
+    };
+    Err(refused.into())
+}
+
+/// Publish the request. The next heartbeats of the stage have its answer; none if it does not answer.
+fn request_fault(
+    bus: &Bus,
+    stage: &str,
+    request: FaultSample,
+) -> Result<Option<FaultAnswer>, Failure> {
+    let mut health = bus.reader(&topics::HEALTH)?;
+    let mut waiter = Waiter::default();
+    waiter.on(bus.wakeup(&topics::HEALTH)?);
+    // The writer must outlive the answer: a request that was not read yet would end with its writer.
+    let mut requests = bus.writer(&topics::FAULTS, 1)?;
+    requests.publish(0, MissionTime::default(), request)?;
+    let began = Instant::now();
+    loop {
+        while let Some(beat) = health.take()? {
+            if name_str(&beat.stage) == stage && beat.last_fault == request.id {
+                return Ok(Some(FaultAnswer::from_byte(beat.fault_answer)));
+            }
+        }
+        let left = PATIENCE.saturating_sub(began.elapsed());
+        if left.is_zero() {
+            return Ok(None);
+        }
+        waiter.wait(left)?;
+    }
+}
+
+/// The table of faults for `--help`.
+fn table() -> String {
+    let mut text = String::from("Faults:\n");
+    for fault in &faults::TABLE {
+        let stage = fault.stage.unwrap_or("any");
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "  {stage:<8} {:<14} {}; until: {}",
+            fault.name, fault.meaning, fault.ends
+        );
+    }
+    text
+}

@@ -1,0 +1,125 @@
+//! `firsthand status --all`: the robots of this machine.
+
+use std::{path::PathBuf, time::Duration};
+
+use common::{
+    bus::{Bus, BusError},
+    domain::Domain,
+    roster::Roster,
+    samples::{HoldReason, Order},
+};
+use serde::Serialize;
+
+use crate::console::{
+    failure::Failure,
+    output::{json_lines, print_text, write_stderr},
+    robots::{self, Robot},
+    table::{
+        Align::{Left, Right},
+        Table,
+    },
+    words,
+};
+
+/// The roster is published five times a second.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A row of the list.
+#[derive(Serialize)]
+struct Listed {
+    robot: String,
+    supervisor_pid: Option<u32>,
+    state: &'static str,
+    mission_time_s: Option<f64>,
+    simulated: Option<bool>,
+    run: Option<PathBuf>,
+}
+
+/// Print the robots that run on this machine for this user.
+pub(super) fn print(json: bool) -> Result<(), Failure> {
+    let listed: Vec<_> = robots::own().into_iter().map(listed).collect();
+    if json {
+        print_text(&json_lines(&listed)?)?;
+        return Ok(());
+    }
+    if listed.is_empty() {
+        write_stderr(
+            "firsthand: no robot runs here for this user; start one with `firsthand run`\n",
+        );
+    } else {
+        print_text(&table(&listed))?;
+    }
+    let others: Vec<_> = robots::other_users().iter().map(u32::to_string).collect();
+    if !others.is_empty() {
+        let others = others.join(", ");
+        write_stderr(&format!(
+            "firsthand: users {others} have, or had, robots here: `sudo -u '#USER' firsthand status --all`\n"
+        ));
+    }
+    Ok(())
+}
+
+fn listed(robot: Robot) -> Listed {
+    let roster = robot.supervisor.map(|_| roster(&robot));
+    let (state, mission_time_s, simulated) = match roster {
+        None => ("its supervisor was killed", None, None),
+        Some(Ok(Some(roster))) => roster,
+        // The supervisor is frozen, or its bus is not complete yet.
+        Some(_) => ("no answer", None, None),
+    };
+    Listed {
+        robot: robot.name.to_string(),
+        supervisor_pid: robot.supervisor,
+        state,
+        mission_time_s,
+        simulated,
+        run: robot.run,
+    }
+}
+
+/// The order of the supervisor, the mission time, and whether the robot is a simulated one.
+type RosterFacts = (&'static str, Option<f64>, Option<bool>);
+
+fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
+    let bus = Bus::join(&Domain::of(robot.name.clone()), "list")?;
+    Roster::open(&bus)?.find(PATIENCE, |header, _| {
+        let order = words::order(
+            Order::from_byte(header.order),
+            HoldReason::from_byte(header.reason),
+        );
+        let time_s = header.stamp.time().seconds();
+        Some((order, Some(time_s), Some(header.simulated == 1)))
+    })
+}
+
+fn table(listed: &[Listed]) -> String {
+    let mut table = Table::new([
+        ("robot", Left),
+        ("supervisor", Right),
+        ("state", Left),
+        ("time", Right),
+        ("kind", Left),
+        ("run", Left),
+    ]);
+    let unknown = || "-".to_owned();
+    for robot in listed {
+        let time = robot.mission_time_s;
+        let kind = match robot.simulated {
+            Some(true) => "simulated",
+            Some(false) => "real",
+            None => "-",
+        };
+        let run = robot.run.as_ref();
+        table.row([
+            robot.robot.clone(),
+            robot
+                .supervisor_pid
+                .map_or_else(unknown, |pid| pid.to_string()),
+            robot.state.to_owned(),
+            time.map_or_else(unknown, |time_s| format!("{time_s:.1} s")),
+            kind.to_owned(),
+            run.map_or_else(unknown, |run| run.display().to_string()),
+        ]);
+    }
+    table.to_string()
+}

@@ -1,0 +1,85 @@
+//! `firsthand topic echo`: the samples of a topic, as they come.
+
+use clap::Args;
+use common::{
+    bus::ReadableTopic,
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    topics::{self, AnyTopic},
+};
+
+use super::sample_text;
+use crate::console::{
+    failure::{Failure, Refused},
+    stream::{LOOK_EVERY, Stream},
+    waiting::Waiting,
+};
+
+/// Print the samples of a topic as they come, from run to run of the robot, until Ctrl-C.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The topic (`firsthand topic list`).
+    topic: String,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// One JSON object a line, with all elements of arrays; a number that is not finite is null.
+    #[arg(long)]
+    json: bool,
+    /// As text, show all elements of arrays, and not the first 16 only.
+    #[arg(long)]
+    whole: bool,
+    /// End after N samples.
+    #[arg(short, long, value_name = "N")]
+    number: Option<u64>,
+}
+
+pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let topic = readable(&arguments.topic)?;
+    let mut stream = Stream::open()?;
+    let domain = Domain::of(arguments.robot.clone());
+    // Some topics wake no reader. Their samples are read when the link ends the tick.
+    let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus))
+        .also_on([&topics::LINK as &'static dyn AnyTopic]);
+    let mut waiting = Waiting::default();
+    let mut left = arguments.number.unwrap_or(u64::MAX);
+    while left > 0 && !stream.has_ended() {
+        match follower.wait(LOOK_EVERY)? {
+            Event::Connected => waiting.on_connected(),
+            Event::Disconnected => waiting.on_disconnected(&arguments.robot),
+            Event::Nothing => waiting.on_nothing(&arguments.robot),
+            Event::Samples(samples) => {
+                while left > 0
+                    && !stream.has_ended()
+                    && let Some(sample) = samples.take()?
+                {
+                    let text = if arguments.json {
+                        sample_text::json(&*sample)? + "\n"
+                    } else {
+                        sample_text::text(&*sample, arguments.whole) + "---\n"
+                    };
+                    // The writer may need the sample's place while a slow reader takes the text.
+                    drop(sample);
+                    stream.write(&text)?;
+                    left -= 1;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The topic of that name.
+pub(super) fn readable(name: &str) -> Result<&'static dyn ReadableTopic, Failure> {
+    let mut all = topics::READABLE.iter();
+    all.find(|topic| topic.spec().name == name)
+        .copied()
+        .ok_or_else(|| {
+            let names: Vec<_> = topics::TABLE
+                .iter()
+                .map(|topic| topic.spec().name)
+                .collect();
+            let message = format!("there is no topic {name:?}; there are {}", names.join(", "));
+            Refused::new("unknown-topic", message).into()
+        })
+}

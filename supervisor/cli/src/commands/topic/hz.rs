@@ -1,0 +1,124 @@
+//! `firsthand topic hz`: how often topics are published, against the table.
+
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use common::{
+    bus::{AnyReader, Bus, BusError, ReadableTopic},
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    topics::{self, AnyTopic},
+};
+
+use super::echo::readable;
+use crate::console::{
+    failure::Failure,
+    rates::{self, TopicRates},
+    stream::{LOOK_EVERY, Stream},
+    waiting::Waiting,
+};
+
+/// Print each second how often topics are published: rates, longest gaps and ages, against the table of topics.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Only this topic (`firsthand topic list`).
+    topic: Option<String>,
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// One JSON object a line.
+    #[arg(long)]
+    json: bool,
+    /// End after N seconds with the robot.
+    #[arg(short, long, value_name = "N")]
+    number: Option<u64>,
+}
+
+/// Each report covers this long.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
+
+/// The readers of a bus, and the rates of what they read.
+struct Readers(Vec<(Box<dyn AnyReader>, TopicRates)>);
+
+impl Readers {
+    fn open(bus: &Bus, topics: &[&'static dyn ReadableTopic]) -> Result<Self, BusError> {
+        let now = Instant::now();
+        let opened = topics.iter().map(|topic| {
+            let rates = TopicRates::new(topic.spec(), now);
+            Ok((topic.any_reader(bus)?, rates))
+        });
+        Ok(Self(opened.collect::<Result<_, BusError>>()?))
+    }
+
+    fn take(&mut self) -> Result<(), BusError> {
+        for (reader, rates) in &mut self.0 {
+            while let Some(sample) = reader.take()? {
+                rates.add(sample.author(), *sample.stamp(), Instant::now());
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, json: bool) -> serde_json::Result<String> {
+        let now = Instant::now();
+        let mut text = String::new();
+        if !json {
+            text = rates::heading() + "\n";
+        }
+        for (_, rates) in &mut self.0 {
+            let report = rates.report(now);
+            text += &if json {
+                serde_json::to_string(&report)?
+            } else {
+                report.line()
+            };
+            text += "\n";
+        }
+        if !json {
+            text += "\n";
+        }
+        Ok(text)
+    }
+}
+
+pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    let topics = match &arguments.topic {
+        Some(name) => vec![readable(name)?],
+        None => topics::READABLE.to_vec(),
+    };
+    let mut stream = Stream::open()?;
+    let domain = Domain::of(arguments.robot.clone());
+    let open = |bus: &Bus| Readers::open(bus, &topics);
+    let others = topics
+        .iter()
+        .skip(1)
+        .map(|&topic| topic as &'static dyn AnyTopic);
+    // Some topics wake no reader. Their samples are read when the link ends the tick.
+    let others = others.chain([&topics::LINK as &'static dyn AnyTopic]);
+    let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);
+    let mut waiting = Waiting::default();
+    let mut left = arguments.number.unwrap_or(u64::MAX);
+    let mut due = None;
+    while left > 0 && !stream.has_ended() {
+        match follower.wait(LOOK_EVERY)? {
+            Event::Connected => {
+                waiting.on_connected();
+                due = Some(Instant::now() + REPORT_EVERY);
+            }
+            Event::Disconnected => {
+                waiting.on_disconnected(&arguments.robot);
+                due = None;
+            }
+            Event::Nothing => waiting.on_nothing(&arguments.robot),
+            Event::Samples(readers) => readers.take()?,
+        }
+        if due.is_some_and(|due| Instant::now() >= due)
+            && let Some(readers) = follower.topics()
+        {
+            stream.write(&readers.report(arguments.json)?)?;
+            due = Some(Instant::now() + REPORT_EVERY);
+            left -= 1;
+        }
+    }
+    Ok(())
+}

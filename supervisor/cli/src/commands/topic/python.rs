@@ -1,0 +1,150 @@
+//! `firsthand topic list --python`: what a consumer in Python needs.
+
+use std::{collections::BTreeSet, fmt::Write as _};
+
+use common::{
+    bus::{Kind, Structure},
+    topics,
+};
+
+/// A module of Python: the structs of all topics, their layout checked when it is loaded, and a follower.
+pub(super) fn module() -> String {
+    let mut module = include_str!("topics.py").to_owned();
+    let (mut known, mut table) = (BTreeSet::new(), String::new());
+    for topic in topics::TABLE {
+        let (payload, element) = topic.layout();
+        for kind in [Some(&payload), element.as_ref()].into_iter().flatten() {
+            declare(kind, &mut known, &mut module);
+        }
+        let element = element.map_or("None".to_owned(), |element| python(&element));
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            table,
+            "    \"{}\": ({}, {element}),",
+            topic.spec().name,
+            python(&payload)
+        );
+    }
+    let _ = write!(
+        module,
+        "# What each sample is: a struct; or a header, and what a slice is made of.\nTOPICS = {{\n{table}}}\n"
+    );
+    module
+}
+
+/// The class of a struct after those of its fields, each once.
+fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String) {
+    let structure = match kind {
+        Kind::Number(_) => return,
+        Kind::Array(element, _) => return declare(element, known, module),
+        Kind::Struct(structure) => structure,
+    };
+    if !known.insert(structure.name) {
+        return;
+    }
+    for field in &structure.fields {
+        declare(&field.kind, known, module);
+    }
+    let class = class(structure);
+    let _ = writeln!(module, "class {class}(ctypes.Structure):\n    _fields_ = [");
+    for field in &structure.fields {
+        let _ = writeln!(
+            module,
+            "        (\"{}\", {}),",
+            field.name,
+            python(&field.kind)
+        );
+    }
+    let _ = writeln!(
+        module,
+        "    ]\n\n    @staticmethod\n    def type_name():\n        return \"{}\"\n\n",
+        structure.name
+    );
+    let _ = writeln!(
+        module,
+        "assert ctypes.sizeof({class}) == {}",
+        structure.size
+    );
+    for field in &structure.fields {
+        let (name, offset) = (field.name, field.offset);
+        let _ = writeln!(module, "assert {class}.{name}.offset == {offset}");
+    }
+    module.push_str("\n\n");
+}
+
+/// A struct's name without that of the project.
+fn class(structure: &Structure) -> &'static str {
+    let name = structure.name;
+    name.rsplit_once('.').map_or(name, |(_, name)| name)
+}
+
+fn python(kind: &Kind) -> String {
+    match kind {
+        Kind::Number("f32") => "ctypes.c_float".to_owned(),
+        Kind::Number("f64") => "ctypes.c_double".to_owned(),
+        Kind::Number(integer) => {
+            let (sign, bits) = integer.split_at(1);
+            let unsigned = if sign == "u" { "u" } else { "" };
+            format!("ctypes.c_{unsigned}int{bits}")
+        }
+        Kind::Array(element, length) => format!("{} * {length}", python(element)),
+        Kind::Struct(structure) => class(structure).to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Size and alignment of what C makes of it.
+    fn in_c(kind: &Kind) -> (usize, usize) {
+        match kind {
+            Kind::Number(number) => {
+                let bits: usize = number[1..].parse().unwrap();
+                (bits / 8, bits / 8)
+            }
+            Kind::Array(element, length) => {
+                let (size, align) = in_c(element);
+                (size * length, align)
+            }
+            Kind::Struct(structure) => {
+                let (mut end, mut most) = (0_usize, 1);
+                for field in &structure.fields {
+                    let (size, align) = in_c(&field.kind);
+                    let offset = end.next_multiple_of(align);
+                    assert_eq!(field.offset, offset, "{}.{}", structure.name, field.name);
+                    (end, most) = (offset + size, most.max(align));
+                }
+                let size = end.next_multiple_of(most);
+                assert_eq!(structure.size, size, "{}", structure.name);
+                (size, most)
+            }
+        }
+    }
+
+    #[test]
+    fn every_payload_has_the_size_and_the_offsets_that_its_declared_fields_have_in_c() {
+        for topic in topics::TABLE {
+            let (payload, element) = topic.layout();
+            in_c(&payload);
+            element.as_ref().map(in_c);
+        }
+    }
+
+    #[test]
+    fn the_python_module_declares_every_topic_and_python_takes_its_layouts_for_the_same() {
+        let module = module();
+        for topic in topics::TABLE {
+            let row = format!("\"{}\": (", topic.spec().name);
+            assert!(module.contains(&row), "{row}");
+        }
+        let ran = std::process::Command::new("python3")
+            .args(["-c", &module])
+            .output();
+        // Elsewhere the layouts are checked when the module is loaded.
+        if let Ok(output) = ran {
+            let error = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{error}");
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! A sample of any topic as text, one field a line, or as JSON, one object a line. Names and order of the fields are those
+//! of the layouts; nothing here knows a topic.
+
+use std::fmt::Write as _;
+
+use common::bus::{AnySample, Value};
+use serde::{
+    Serialize, Serializer,
+    ser::{SerializeMap as _, SerializeSeq as _},
+};
+
+/// The name of a slice's elements, beside the fields of their header.
+const ELEMENTS: &str = "elements";
+/// So many elements of an array are shown as text unless all are asked for.
+const SHOWN: usize = 16;
+
+/// `sample` as text: one field a line, below a struct's name those of the struct. Arrays of more than 16 elements are cut,
+/// unless `whole`.
+pub(super) fn text(sample: &dyn AnySample, whole: bool) -> String {
+    let most = if whole { usize::MAX } else { SHOWN };
+    let mut text = String::new();
+    for (name, value) in &fields(sample) {
+        write_field(&mut text, 0, name, value, most);
+    }
+    text
+}
+
+/// `sample` as a JSON object, whole. A number that is not finite is null.
+pub(super) fn json(sample: &dyn AnySample) -> serde_json::Result<String> {
+    serde_json::to_string(&Json(&Value::Struct(fields(sample))))
+}
+
+/// The fields of the struct or header, and the elements of a slice.
+fn fields(sample: &dyn AnySample) -> Vec<(&'static str, Value)> {
+    let mut fields = match sample.value() {
+        Value::Struct(fields) => fields,
+        other => vec![("value", other)],
+    };
+    let elements = sample.elements().map(Value::Array);
+    fields.extend(elements.map(|elements| (ELEMENTS, elements)));
+    fields
+}
+
+// Writing to a String cannot fail.
+fn write_field(to: &mut String, indent: usize, name: &str, value: &Value, most: usize) {
+    let _ = match value {
+        Value::Struct(fields) => {
+            let _ = writeln!(to, "{:indent$}{name}:", "");
+            for (name, value) in fields {
+                write_field(to, indent + 2, name, value, most);
+            }
+            return;
+        }
+        Value::Array(elements) if matches!(elements.first(), Some(Value::Struct(_))) => {
+            let _ = writeln!(to, "{:indent$}{name}:", "");
+            for element in elements.iter().take(most) {
+                let _ = writeln!(to, "{:indent$}- {}", "", on_one_line(element, most));
+            }
+            match elements.len().saturating_sub(most) {
+                0 => return,
+                more => writeln!(to, "{:indent$}# {more} more", ""),
+            }
+        }
+        other => writeln!(to, "{:indent$}{name}: {}", "", on_one_line(other, most)),
+    };
+}
+
+fn on_one_line(value: &Value, most: usize) -> String {
+    match value {
+        Value::Unsigned(number) => number.to_string(),
+        Value::Signed(number) => number.to_string(),
+        Value::Single(number) => format!("{number:?}"),
+        Value::Double(number) => format!("{number:?}"),
+        Value::Text(text) => format!("{text:?}"),
+        Value::Array(elements) => {
+            let shown = elements.iter().take(most);
+            let shown: Vec<_> = shown.map(|element| on_one_line(element, most)).collect();
+            let more = match elements.len().saturating_sub(most) {
+                0 => String::new(),
+                more => format!("  # {more} more"),
+            };
+            format!("[{}]{more}", shown.join(", "))
+        }
+        Value::Struct(fields) => {
+            let fields = fields.iter();
+            let fields =
+                fields.map(|(name, value)| format!("{name}: {}", on_one_line(value, most)));
+            format!("{{{}}}", fields.collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
+/// A value in the data model of JSON.
+struct Json<'a>(&'a Value);
+
+impl Serialize for Json<'_> {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Value::Unsigned(number) => to.serialize_u64(*number),
+            Value::Signed(number) => to.serialize_i64(*number),
+            Value::Single(number) => to.serialize_f32(*number),
+            Value::Double(number) => to.serialize_f64(*number),
+            Value::Text(text) => to.serialize_str(text),
+            Value::Array(elements) => {
+                let mut array = to.serialize_seq(Some(elements.len()))?;
+                for element in elements {
+                    array.serialize_element(&Json(element))?;
+                }
+                array.end()
+            }
+            Value::Struct(fields) => {
+                let mut object = to.serialize_map(Some(fields.len()))?;
+                for (name, value) in fields {
+                    object.serialize_entry(name, &Json(value))?;
+                }
+                object.end()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::{
+        bus::Author,
+        samples::{GuidanceSample, HealthSample, InfraredSample, name},
+    };
+
+    use super::*;
+
+    const AUTHOR: Author = Author {
+        process: 7,
+        generation: 1,
+    };
+
+    #[test]
+    fn text_has_one_field_a_line_in_the_order_of_the_layout() {
+        let infrared = InfraredSample {
+            range_m: [0.5; 7],
+            ..InfraredSample::default()
+        };
+        let shown = text(&(AUTHOR, infrared), false);
+        let lines: Vec<_> = shown.lines().collect();
+        assert_eq!(lines[0], "stamp:");
+        assert_eq!(lines[1], "  tick: 0");
+        assert_eq!(lines[5], "range_m: [0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]");
+        assert_eq!(lines.len(), 7);
+    }
+
+    #[test]
+    fn names_are_text_and_numbers_that_are_not_finite_are_null() {
+        let health = HealthSample {
+            stage: name("mapper"),
+            ..HealthSample::default()
+        };
+        assert!(text(&(AUTHOR, health), false).contains("\nstage: \"mapper\"\n"));
+        let guidance = GuidanceSample {
+            speed_limit_m_s: f64::INFINITY,
+            ..GuidanceSample::default()
+        };
+        let line = json(&(AUTHOR, guidance)).unwrap();
+        let read: serde_json::Value = serde_json::from_str(&line).unwrap();
+        assert!(
+            read["speed_limit_m_s"].is_null() && read["stamp"]["tick"] == 0,
+            "{line}"
+        );
+    }
+
+    #[test]
+    fn long_arrays_are_cut_in_text_unless_all_is_asked_for() {
+        let array = Value::Array(vec![Value::Unsigned(1); 20]);
+        let line = |most| on_one_line(&array, most);
+        assert!(line(SHOWN).ends_with("1]  # 4 more"), "{}", line(SHOWN));
+        assert_eq!(line(usize::MAX).matches('1').count(), 20);
+        let structs = Value::Array(vec![Value::Struct(vec![("x", Value::Signed(-2))]); 18]);
+        let mut text = String::new();
+        write_field(&mut text, 0, "beams", &structs, SHOWN);
+        assert!(
+            text.starts_with("beams:\n- {x: -2}\n") && text.ends_with("# 2 more\n"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,140 @@
+# The topics of firsthand, for consumers in Python (pip install iceoryx2==0.10.0): structs, and a class that follows a robot.
+# Printed by `firsthand topic list --python` of the firsthand that runs; print it again when that is replaced.
+
+import ctypes
+import fcntl
+import os
+import time
+
+
+class Follower:
+    """Follows a robot from run to run.
+
+    for news, samples in Follower("x80", ["pose", "grid"]): what came: "here", "gone", "nothing" (for a second),
+    or the name of a topic with one sample of it: its struct, or its header and an array. A sample is valid until the
+    next one is asked for.
+    """
+
+    def __init__(self, robot="x80", topics=("pose",), name="python"):
+        import iceoryx2
+
+        self.iox2 = iceoryx2
+        iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
+        self.topics = {topic: TOPICS[topic] for topic in topics}
+        self.name = name
+        self.directory = f"/tmp/firsthand-{os.geteuid()}/{robot}"
+
+    def __iter__(self):
+        while True:
+            making = self._wait()
+            readers = self._join(making)
+            if readers is None:
+                time.sleep(0.1)
+                continue
+            yield "here", None
+            node, listener, subscribers = readers
+            quiet = 0
+            while self._making() == making:
+                came = self._wait_for(listener)
+                yield from self._take(subscribers)
+                quiet = 0 if came else quiet + 1
+                if quiet == 5:
+                    quiet = 0
+                    if not self._supervised():
+                        break
+                    yield "nothing", None
+            # The last ones of a run that has ended.
+            yield from self._take(subscribers)
+            del subscribers, listener, node, readers
+            yield "gone", None
+
+    def _wait_for(self, listener):
+        """Wait for samples, 0.2 s at most."""
+        try:
+            came = listener.timed_wait(self.iox2.Duration.from_millis(200))
+            while came and listener.try_wait():
+                pass
+            return came
+        except self.iox2.ListenerWaitError as error:
+            # A process that is stopped and goes on, and one with a handler for a signal, is woken by that.
+            if "InterruptSignal" not in str(error):
+                raise
+            return None
+
+    def _take(self, subscribers):
+        for topic, (subscriber, sliced) in subscribers.items():
+            while True:
+                try:
+                    sample = subscriber.receive()
+                except Exception as error:
+                    # Of a writer that has just ended.
+                    if "Borrow" in str(error):
+                        raise
+                    break
+                if sample is None:
+                    break
+                if sliced:
+                    slice = sample.payload()
+                    element = self.topics[topic][1]
+                    count = slice.len() // ctypes.sizeof(element)
+                    elements = (element * count).from_address(slice.as_ptr())
+                    yield topic, (sample.user_header().contents, elements)
+                else:
+                    yield topic, sample.payload().contents
+                del sample
+
+    def _making(self):
+        try:
+            return os.readlink(f"{self.directory}/iceoryx2.toml")
+        except FileNotFoundError:
+            return None
+
+    def _supervised(self):
+        """Whether somebody holds the supervisor's lock: one that was killed leaves its bus."""
+        try:
+            with open(f"{self.directory}/lock") as lock:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return False
+        except FileNotFoundError:
+            return False
+        except BlockingIOError:
+            return True
+
+    def _wait(self):
+        while True:
+            making = self._making()
+            if making and self._supervised():
+                return making
+            time.sleep(0.1)
+
+    def _join(self, making):
+        """Readers on the bus of `making`; None where it has just gone."""
+        iox2 = self.iox2
+        try:
+            # Until the readers are made the bus is not removed: nobody makes its files again. The lock ends with the file.
+            joining = open(f"{self.directory}/joining.lock")
+            fcntl.flock(joining, fcntl.LOCK_SH)
+            if self._making() != making:
+                return None
+            config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{making}"))
+            builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
+            node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+            subscribers = {}
+            for topic, (payload, element) in self.topics.items():
+                service = node.service_builder(iox2.ServiceName.new(topic))
+                if element is None:
+                    service = service.publish_subscribe(payload)
+                else:
+                    service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
+                subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
+            # It ends a tick: until then the stages need the processor.
+            link = node.service_builder(iox2.ServiceName.new("link"))
+            listener = link.event().open().listener_builder().create()
+            joining.close()
+            return node, listener, subscribers
+        except Exception:
+            if self._making() == making and self._supervised():
+                raise
+            return None
+
+

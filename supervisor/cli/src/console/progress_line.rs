@@ -1,0 +1,82 @@
+//! Progress on standard error: one line rewritten on a terminal, a line now and then elsewhere.
+
+use std::{
+    io::{self, IsTerminal as _},
+    time::{Duration, Instant},
+};
+
+use super::output::write_stderr;
+
+/// The line that is shown now.
+pub(crate) struct ProgressLine {
+    rewrites: bool,
+    /// Time between lines that cannot be rewritten.
+    every: Duration,
+    shown: Option<Instant>,
+}
+
+impl ProgressLine {
+    /// None shown yet; where lines cannot be rewritten, one comes after each `every`.
+    pub(crate) fn new(every: Duration) -> Self {
+        Self {
+            rewrites: io::stderr().is_terminal(),
+            every,
+            shown: None,
+        }
+    }
+
+    /// Whether it is time for a line.
+    pub(crate) fn is_due(&self) -> bool {
+        self.shown
+            .is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
+    }
+
+    /// A line is due now. Returns whether it is the first.
+    pub(crate) fn begin(&mut self) -> bool {
+        self.shown.replace(Instant::now()).is_none()
+    }
+
+    /// Show `line`; where it would stay, only if it `may_stay`.
+    pub(crate) fn show(&self, line: &str, may_stay: bool) {
+        if self.rewrites {
+            let line = cut(line, columns());
+            write_stderr(&format!("\r\x1b[K{line}"));
+        } else if may_stay {
+            write_stderr(&format!("{line}\n"));
+        }
+    }
+
+    /// No line follows.
+    pub(crate) fn end(&self) {
+        if self.rewrites {
+            write_stderr("\n");
+        }
+    }
+}
+
+/// Columns of the terminal; 0 where it does not say.
+fn columns() -> usize {
+    let size = rustix::termios::tcgetwinsize(io::stderr());
+    size.map_or(0, |size| size.ws_col.into())
+}
+
+/// As much of `line` as `columns` show, of which the last stays free; all of it for 0. A line that is wrapped cannot be
+/// rewritten: each would stay.
+fn cut(line: &str, columns: usize) -> &str {
+    let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
+    let end = line.char_indices().nth(shown);
+    end.map_or(line, |(end, _)| &line[..end])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_cut_to_less_than_the_terminal_is_wide() {
+        assert_eq!(cut("12.3 s  0.50 m", 8), "12.3 s ");
+        assert_eq!(cut("12.3 s", 8), "12.3 s");
+        assert_eq!(cut("µµµµ", 3), "µµ");
+        assert_eq!(cut("12.3 s", 0), "12.3 s");
+    }
+}

@@ -1,0 +1,15 @@
+//! The subcommands that a robot does without, and what only they need.
+
+pub(crate) mod bench;
+pub(crate) mod completions;
+pub(crate) mod diff;
+pub(crate) mod error_code;
+pub(crate) mod evaluate;
+pub(crate) mod experiments;
+pub(crate) mod field;
+pub(crate) mod man;
+mod mission_progress;
+pub(crate) mod replay;
+pub(crate) mod report;
+pub(crate) mod run_picture;
+pub(crate) mod top;

@@ -1,0 +1,36 @@
+//! `firsthand bench`: random faults and measurements.
+
+mod chaos;
+mod consumer;
+mod tick;
+
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+
+use super::field;
+use crate::console::failure::Failure;
+
+/// Measure ticks and fields; send random signals to a robot's processes.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Tick(tick::Arguments),
+    Field(field::Arguments),
+    Chaos(Box<chaos::Arguments>),
+    Consumer(consumer::Arguments),
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    match &arguments.command {
+        Command::Tick(arguments) => tick::main(arguments),
+        Command::Field(arguments) => field::main(arguments),
+        Command::Chaos(arguments) => chaos::main(arguments),
+        Command::Consumer(arguments) => consumer::main(arguments),
+    }
+}

@@ -1,0 +1,84 @@
+//! `firsthand bench tick`: the time of a tick, and of the bus alone.
+
+use std::process::ExitCode;
+
+use bench::tick::{self, Options, Regime, consumers, hops, parse_hz};
+use clap::Args;
+use common::{clock::Pace, domain::RobotName};
+
+use crate::console::{failure::Failure, missions, output::print};
+
+/// Measure a tick, datagram in to datagram out, and five bare hops between processes.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The mission whose ticks are measured.
+    #[arg(default_value = "open-room")]
+    mission: String,
+    /// Its pace; the bare hops follow each other as its ticks do.
+    #[arg(long, default_value = "max")]
+    pace: Pace,
+    /// Ticks a second, in place of the pace: 7 is what a robot gets.
+    #[arg(long, value_name = "HZ", value_parser = parse_hz, conflicts_with = "pace")]
+    rate: Option<f64>,
+    /// How often both are measured, in turn: a shared machine has good and bad moments.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// Also what each stage does with its part of a tick: microseconds by stage and item.
+    #[arg(long)]
+    budget: bool,
+    /// KEY=VALUE over the mission file, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Record the missions meanwhile, as `run` does.
+    #[arg(long)]
+    record: bool,
+    /// Processes that read grid and field of the missions meanwhile, each both.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
+    consumers: u32,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+    /// Name of the robot, which also names its shared memory.
+    #[arg(long)]
+    robot: Option<RobotName>,
+    /// Be the forwarder that stands for this stage.
+    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
+    forwarder: Option<String>,
+    /// Be a consumer of this robot.
+    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
+    consumer: bool,
+    /// The parent process: this one stops when it ends.
+    #[arg(long, hide = true)]
+    supervisor: Option<u32>,
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let robot = match &arguments.robot {
+        Some(robot) => robot.clone(),
+        None => format!("latency{}", std::process::id()).parse()?,
+    };
+    if let (true, Some(supervisor)) = (arguments.consumer, arguments.supervisor) {
+        consumers::run(&robot, supervisor)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
+        hops::run_forwarder(&robot, place, supervisor)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let rate_hz = missions::load(&arguments.mission, &arguments.set)?
+        .robot
+        .rate_hz;
+    let report = tick::measure(&Options {
+        mission: &arguments.mission,
+        set: &arguments.set,
+        rate_hz,
+        robot: &robot,
+        regime: Regime::new(arguments.rate, arguments.pace, rate_hz),
+        rounds: arguments.rounds,
+        budget: arguments.budget,
+        record: arguments.record,
+        consumers: arguments.consumers,
+    })?;
+    print(&report, arguments.json)?;
+    Ok(ExitCode::SUCCESS)
+}

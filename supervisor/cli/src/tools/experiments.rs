@@ -1,0 +1,110 @@
+//! `firsthand experiments`: the paper's experiments, repeated with many seeds.
+
+use std::{fmt::Write as _, fs, num::NonZero, path::PathBuf, process::ExitCode};
+
+use clap::Args;
+use common::mission::Realism;
+use evaluation::{
+    directory::{self, PAGE_FILE},
+    experiments::{
+        experiment::{self, Experiment},
+        method::Method,
+        report::Report,
+    },
+    results::Results,
+    runner::{self, NoiseSeeds, Plan},
+    trial::Trial,
+};
+
+use super::mission_progress::{MissionProgress, jobs};
+use crate::console::{failure::Failure, output::print_text};
+
+/// Repeat the paper's experiments, by its method as printed and by the default one, and put what came of it beside what
+/// the paper reports.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Missions of each experiment and method, with noise seeds from 1 on.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: u64,
+    /// Some of the experiments, with commas: 1a, 1b, 2, 3, 4-180, 4-90, 4-0, 5-constant, 5-modulated.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    only: Vec<String>,
+    /// measured: wheels and sonar as measured, the radio out 20 % of the time; or laboratory.
+    #[arg(long, default_value = "measured", value_parser = realism)]
+    realism: Realism,
+    /// Missions at once; one for each processor if unsaid.
+    #[arg(long)]
+    jobs: Option<NonZero<usize>>,
+    /// Where rows, missions, pictures and the page go.
+    #[arg(long, value_name = "DIR", default_value = "experiments")]
+    out: PathBuf,
+    /// Go on with the experiments in the directory of --out, which must have been of the same command.
+    #[arg(long)]
+    resume: bool,
+    /// Give one line of JSON for each experiment on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The noise seed whose missions are pictured, and the first.
+const FIRST_SEED: u64 = 1;
+
+fn realism(text: &str) -> Result<Realism, String> {
+    match text {
+        "laboratory" => Ok(Realism::Laboratory),
+        "measured" => Ok(Realism::Measured),
+        _ => Err("give laboratory or measured".to_owned()),
+    }
+}
+
+pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let chosen = experiment::named(&arguments.only)?;
+    let described = described(arguments, &chosen);
+    let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
+    let mut results = Results::open(&directory)?;
+    for method in Method::ALL {
+        let its = chosen.iter().filter(|it| it.is_run_by(method));
+        let trials: Vec<Trial> = its.map(|it| it.trial()).collect::<Result<_, _>>()?;
+        let plan = Plan {
+            trials,
+            settings: vec![method.setting(arguments.realism)],
+            repeats: arguments.seeds,
+            noise: NoiseSeeds::Counted(FIRST_SEED),
+            pictured_seed: Some(FIRST_SEED),
+            jobs: jobs(arguments.jobs),
+            directory: directory.clone(),
+        };
+        let mut console = MissionProgress::new(&format!("{}: ", method.as_str()));
+        runner::run(&plan, &mut results, &mut |progress| console.show(progress))?;
+        console.end();
+    }
+    results.sort()?;
+    let report = Report::new(&chosen, results.rows.rows());
+    let page = directory.join(PAGE_FILE);
+    fs::write(&page, report.html(&described, FIRST_SEED))
+        .map_err(|error| format!("cannot write {}: {error}", page.display()))?;
+    let mut text = String::new();
+    if arguments.json {
+        for object in report.objects() {
+            writeln!(text, "{object}")?;
+        }
+    } else {
+        writeln!(text, "{report}rows and pictures: {}", page.display())?;
+    }
+    print_text(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The command that gives these rows.
+fn described(arguments: &Arguments, chosen: &[&Experiment]) -> String {
+    let names: Vec<_> = chosen.iter().map(|it| it.name).collect();
+    let realism = match arguments.realism {
+        Realism::Laboratory => "laboratory",
+        Realism::Measured => "measured",
+    };
+    format!(
+        "firsthand experiments --seeds {} --only {} --realism {realism}",
+        arguments.seeds,
+        names.join(",")
+    )
+}

@@ -1,0 +1,63 @@
+//! Many missions: how many at once, and how far they are, on standard error.
+
+use std::{
+    num::NonZero,
+    thread,
+    time::{Duration, Instant},
+};
+
+use evaluation::runner::Progress;
+
+use crate::console::progress_line::ProgressLine;
+
+/// A line that cannot be rewritten comes so seldom.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Missions at once: as asked for, or one for each processor.
+pub(super) fn jobs(asked_for: Option<NonZero<usize>>) -> usize {
+    asked_for.map_or_else(
+        || thread::available_parallelism().map_or(1, NonZero::get),
+        NonZero::get,
+    )
+}
+
+/// How far the missions are.
+pub(super) struct MissionProgress {
+    title: String,
+    began: Instant,
+    line: ProgressLine,
+}
+
+impl MissionProgress {
+    /// Lines begin with `title`.
+    pub(super) fn new(title: &str) -> Self {
+        Self {
+            title: title.to_owned(),
+            began: Instant::now(),
+            line: ProgressLine::new(LINE_EVERY),
+        }
+    }
+
+    /// After a mission.
+    pub(super) fn show(&mut self, progress: &Progress) {
+        if !self.line.is_due() {
+            return;
+        }
+        self.line.begin();
+        let Progress {
+            ended,
+            all,
+            ended_now,
+        } = *progress;
+        let each = self.began.elapsed().as_secs_f64() / ended_now.max(1) as f64;
+        let left = each * (all - ended) as f64;
+        let title = &self.title;
+        let line = format!("{title}{ended} of {all} missions, {left:.0} s left");
+        self.line.show(&line, true);
+    }
+
+    /// After the last.
+    pub(super) fn end(&self) {
+        self.line.end();
+    }
+}

@@ -1,0 +1,57 @@
+//! The picture a run ends with.
+
+use common::{
+    ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
+};
+use picture::{Facts, Scene};
+use supervisor::{Finished, outcome::Outcome};
+
+use crate::commands::run::summary::Summary;
+
+/// SVG of the run.
+pub(crate) fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
+    let record = &finished.record;
+    let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
+    let mut captions = summary.captions();
+    if summary.outcome != Outcome::Reached {
+        captions.insert(0, summary.reason.clone());
+    }
+    picture::svg(&Scene {
+        mission,
+        grid: record
+            .grid
+            .frame()
+            .map(|frame| (frame, record.grid.cells())),
+        field: record
+            .field
+            .frame()
+            .map(|frame| (frame, record.field.cells())),
+        believed: &believed,
+        covariance: record.poses.last().map(|pose| {
+            let [xx, xy, _, yy, ..] = pose.covariance;
+            [xx, xy, yy]
+        }),
+        truth: &true_poses(&finished.truth),
+        facts: Facts {
+            outcome: summary.outcome.as_str(),
+            reached: summary.outcome == Outcome::Reached,
+            mission_time_s: summary.mission_time_s,
+            path_length_m: summary.path_length_m,
+            straight_m: summary.straight_m,
+            safety_events: summary.safety_events,
+            seed: mission.robot.address.is_none().then_some(mission.seed),
+        },
+        captions: &captions,
+    })
+}
+
+/// Poses of the ground truth, for the picture.
+fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
+    truth
+        .iter()
+        .map(|tick| Pose2 {
+            position: glam::DVec2::new(tick.x, tick.y),
+            heading: tick.heading,
+        })
+        .collect()
+}

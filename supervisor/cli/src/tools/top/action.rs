@@ -1,0 +1,221 @@
+//! What the keys do.
+
+use std::{
+    sync::mpsc::{Receiver, TryRecvError, channel},
+    thread::{self, JoinHandle},
+};
+
+use common::{domain::RobotName, samples::RequestKind};
+use rustix::process::Signal;
+
+use crate::console::operator;
+
+/// What an operator does to a robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Action {
+    Kill,
+    Freeze,
+    Thaw,
+    Restart,
+    Stop,
+    Resume,
+}
+
+impl Action {
+    /// The name of the subcommand that does the same.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Kill => "kill",
+            Self::Freeze => "freeze",
+            Self::Thaw => "thaw",
+            Self::Restart => "restart",
+            Self::Stop => "stop",
+            Self::Resume => "resume",
+        }
+    }
+
+    /// Whether it concerns a stage rather than the robot.
+    const fn is_of_a_stage(self) -> bool {
+        !matches!(self, Self::Stop | Self::Resume)
+    }
+
+    /// Do it to `robot`, or to its `stage`.
+    fn perform(self, robot: &RobotName, stage: &str) -> Result<(), String> {
+        let done = match self {
+            Self::Kill => operator::send(robot, stage, Signal::KILL),
+            Self::Freeze => operator::send(robot, stage, Signal::STOP),
+            Self::Thaw => operator::send(robot, stage, Signal::CONT),
+            Self::Restart => operator::ask(robot, RequestKind::Restart, stage),
+            Self::Stop => operator::stand(robot),
+            Self::Resume => operator::ask(robot, RequestKind::Resume, ""),
+        };
+        done.map_err(|error| error.to_string())
+    }
+}
+
+/// What a key means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Key {
+    /// Choose the stage above.
+    Up,
+    /// Choose the stage below.
+    Down,
+    /// Do something.
+    Act(Action),
+    /// End.
+    Quit,
+}
+
+/// The keys, for the last line of the screen.
+pub(super) const KEYS: [(&str, &str); 8] = [
+    ("↑↓", "choose"),
+    ("k", "kill"),
+    ("f", "freeze"),
+    ("t", "thaw"),
+    ("r", "restart"),
+    ("s", "stop"),
+    ("c", "resume"),
+    ("q", "quit"),
+];
+
+/// Takes the keys out of `typed`, what a terminal in raw mode sent. The beginning of a key whose rest has not come stays.
+pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
+    let mut keys = Vec::new();
+    let mut rest = &typed[..];
+    loop {
+        rest = match rest {
+            // A key that sends a sequence: its last byte is a letter or `~`.
+            [ESCAPE, b'[' | b'O', sequence @ ..] => {
+                let Some(last) = sequence
+                    .iter()
+                    .position(|byte| (b'@'..=b'~').contains(byte))
+                else {
+                    break;
+                };
+                match sequence[last] {
+                    b'A' => keys.push(Key::Up),
+                    b'B' => keys.push(Key::Down),
+                    _ => {}
+                }
+                &sequence[last + 1..]
+            }
+            [] | [ESCAPE] => break,
+            [byte, others @ ..] => {
+                keys.extend(meaning(*byte));
+                others
+            }
+        };
+    }
+    let left = rest.len();
+    typed.drain(..typed.len() - left);
+    if left > LONGEST_SEQUENCE {
+        typed.clear();
+    }
+    keys
+}
+
+const ESCAPE: u8 = 0x1b;
+/// Ctrl-C, which a terminal in raw mode sends as a byte.
+const CONTROL_C: u8 = 0x03;
+/// No key sends so many bytes.
+const LONGEST_SEQUENCE: usize = 32;
+
+/// What a letter means; none for any other.
+const fn meaning(letter: u8) -> Option<Key> {
+    Some(match letter {
+        b'k' => Key::Act(Action::Kill),
+        b'f' => Key::Act(Action::Freeze),
+        b't' => Key::Act(Action::Thaw),
+        b'r' => Key::Act(Action::Restart),
+        b's' => Key::Act(Action::Stop),
+        b'c' => Key::Act(Action::Resume),
+        b'q' | CONTROL_C => Key::Quit,
+        _ => return None,
+    })
+}
+
+/// Performs one action at a time in a thread, because a stop takes until the robot rests.
+pub(super) struct Operator {
+    robot: RobotName,
+    under_way: Option<(JoinHandle<()>, Receiver<String>)>,
+}
+
+impl Operator {
+    pub(super) fn new(robot: &RobotName) -> Self {
+        Self {
+            robot: robot.clone(),
+            under_way: None,
+        }
+    }
+
+    /// Begin `action`. Returns what to show meanwhile.
+    pub(super) fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
+        if self.under_way.is_some() {
+            return "the last action goes on".to_owned();
+        }
+        let stage = match stage {
+            _ if !action.is_of_a_stage() => String::new(),
+            Some(stage) => stage.to_owned(),
+            None => return "no stage is known yet".to_owned(),
+        };
+        let asked = format!("{} {stage}", action.name()).trim_end().to_owned();
+        let (robot, name) = (self.robot.clone(), asked.clone());
+        let (tell, told) = channel();
+        let thread = thread::spawn(move || {
+            let message = match action.perform(&robot, &stage) {
+                Ok(()) => format!("{name}: done"),
+                Err(problem) => format!("{name}: {problem}"),
+            };
+            // The screen may have ended.
+            let _ = tell.send(message);
+        });
+        self.under_way = Some((thread, told));
+        format!("{asked} ...")
+    }
+
+    /// The result of the action, once.
+    pub(super) fn answer(&mut self) -> Option<String> {
+        let (_, told) = self.under_way.as_ref()?;
+        let message = match told.try_recv() {
+            Ok(message) => message,
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => "failed".to_owned(),
+        };
+        self.end();
+        Some(message)
+    }
+
+    fn end(&mut self) {
+        if let Some((thread, _)) = self.under_way.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// An action that goes on is awaited, so that it leaves the bus in order.
+impl Drop for Operator {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_understood_however_their_bytes_come() {
+        let mut typed = b"\x1b[B\x1bOA\x1b[3~xk\x1b".to_vec();
+        let keys = [Key::Down, Key::Up, Key::Act(Action::Kill)];
+        assert_eq!(take_keys(&mut typed), keys);
+        assert_eq!(typed, [ESCAPE], "the rest may come");
+        typed.extend(b"[1;5");
+        assert_eq!(take_keys(&mut typed), []);
+        typed.extend(b"B\x03");
+        assert_eq!(take_keys(&mut typed), [Key::Down, Key::Quit]);
+        typed.extend([ESCAPE, b'[']);
+        typed.extend([b'1'; 100]);
+        assert_eq!(take_keys(&mut typed), []);
+        assert!(typed.is_empty(), "what is no key is not kept");
+    }
+}

@@ -1,0 +1,102 @@
+//! Processor and memory of a process, as the kernel counts them.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    time::{Duration, Instant},
+};
+
+use common::process_status;
+use rustix::param::clock_ticks_per_second;
+
+/// What a process uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Usage {
+    /// Share of one processor since the last look, 1 for all of it; none at the first.
+    pub(super) cpu: Option<f64>,
+    /// Resident memory, shared memory among it, bytes; none of a process that has ended.
+    pub(super) memory_bytes: Option<u64>,
+}
+
+/// The processes that are looked at.
+#[derive(Debug, Default)]
+pub(super) struct Processes {
+    /// When each was looked at, its processor time until then, and what it used by then.
+    seen: BTreeMap<u32, (Instant, Duration, Usage)>,
+}
+
+/// Processor time is counted in hundredths of a second: a share of a shorter while is none.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+impl Processes {
+    /// What each of `processes` uses at `now`, in their order. Shares are over a second at least.
+    pub(super) fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
+        self.seen.retain(|process, _| processes.contains(process));
+        processes
+            .iter()
+            .map(|&process| self.one(process, now))
+            .collect()
+    }
+
+    fn one(&mut self, process: u32, now: Instant) -> Usage {
+        let before = self.seen.get(&process).copied();
+        if let Some((at, _, usage)) = before
+            && now.saturating_duration_since(at) < LOOK_EVERY
+        {
+            return usage;
+        }
+        let Some(used) = cpu_time(process) else {
+            return Usage::default();
+        };
+        let cpu = before.map(|(at, then, _)| {
+            let over = now.saturating_duration_since(at).as_secs_f64();
+            used.saturating_sub(then).as_secs_f64() / over
+        });
+        let usage = Usage {
+            cpu,
+            memory_bytes: memory_bytes(process),
+        };
+        self.seen.insert(process, (now, used, usage));
+        usage
+    }
+}
+
+/// Processor time of all its threads, in the kernel and outside.
+fn cpu_time(process: u32) -> Option<Duration> {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // Its name, in parentheses, may hold anything; from the state on come numbers.
+    let (_, numbers) = stat.rsplit_once(") ")?;
+    let mut times = numbers.split_ascii_whitespace().skip(11);
+    let mut time = || times.next()?.parse::<u64>().ok();
+    let ticks = time()?.saturating_add(time()?);
+    Some(Duration::from_secs_f64(
+        ticks as f64 / clock_ticks_per_second() as f64,
+    ))
+}
+
+fn memory_bytes(process: u32) -> Option<u64> {
+    let resident = process_status::field(&process.to_string(), "VmRSS")?;
+    let kilobytes: u64 = resident.strip_suffix(" kB")?.trim().parse().ok()?;
+    Some(kilobytes.saturating_mul(1024))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_computes_uses_a_processor_and_one_that_has_ended_nothing() {
+        let own = std::process::id();
+        let mut processes = Processes::default();
+        let began = Instant::now();
+        let first = processes.look(&[own, 0], began);
+        assert_eq!(first[0].cpu, None, "nothing to compare with");
+        assert!(first[0].memory_bytes > Some(1 << 20));
+        assert_eq!(first[1], Usage::default());
+        let used = cpu_time(own).unwrap();
+        while cpu_time(own).unwrap() < used + Duration::from_millis(200) {}
+        let second = processes.look(&[own], began + LOOK_EVERY);
+        assert!(second[0].cpu >= Some(0.19), "{second:?}");
+        assert_eq!(processes.look(&[own], began + LOOK_EVERY), second);
+    }
+}

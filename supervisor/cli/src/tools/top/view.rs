@@ -1,0 +1,147 @@
+//! What the screen shows.
+
+use std::collections::VecDeque;
+
+use common::{
+    domain::RobotName,
+    grid::Replica,
+    samples::{
+        CommandSample, FieldCell, GuidanceSample, LinkSample, PoseSample, PowerSample, RosterEntry,
+        RosterHeader, name_str,
+    },
+};
+use glam::DVec2;
+
+use super::usage::Usage;
+
+/// Points of the way that are kept; of a longer one every second is dropped, again and again.
+const MOST_POINTS: usize = 4000;
+/// A point is kept when the robot has moved so far since the last one, metres.
+const POINT_EVERY_M: f64 = 0.05;
+/// Events that are kept.
+const MOST_EVENTS: usize = 50;
+
+/// What the screen shows.
+#[derive(Debug)]
+pub(super) struct View {
+    /// The robot.
+    pub(super) robot: RobotName,
+    /// Whether it is there.
+    pub(super) connected: bool,
+    /// The supervisor; none before its first roster.
+    pub(super) supervisor: Option<RosterHeader>,
+    /// What its process uses.
+    pub(super) supervisor_usage: Usage,
+    /// The stages.
+    pub(super) stages: Vec<Stage>,
+    /// The stage that keys are about.
+    pub(super) chosen: usize,
+    /// The newest of each.
+    pub(super) pose: Option<PoseSample>,
+    /// The newest of each.
+    pub(super) guidance: Option<GuidanceSample>,
+    /// The newest of each.
+    pub(super) command: Option<CommandSample>,
+    /// The newest of each.
+    pub(super) link: Option<LinkSample>,
+    /// The newest of each.
+    pub(super) power: Option<PowerSample>,
+    /// The believed map.
+    pub(super) grid: Replica<u8>,
+    /// The harmonic field's direction.
+    pub(super) field: Replica<FieldCell>,
+    /// The target, metres in the mission frame.
+    pub(super) target: Option<DVec2>,
+    /// Where the robot was by its belief, metres in the mission frame.
+    pub(super) way: Vec<DVec2>,
+    /// Deaths and stalls, the newest first.
+    pub(super) events: VecDeque<String>,
+    /// What became of the last key.
+    pub(super) message: String,
+}
+
+/// A row of the table.
+#[derive(Clone, Debug)]
+pub(super) struct Stage {
+    /// As the supervisor sees it.
+    pub(super) entry: RosterEntry,
+    /// Samples a second on the first topic that it writes; none before they were counted.
+    pub(super) rate_hz: Option<f64>,
+    /// What its process uses.
+    pub(super) usage: Usage,
+}
+
+impl View {
+    /// Nothing is known of `robot` yet.
+    pub(super) fn of(robot: RobotName) -> Self {
+        Self {
+            robot,
+            connected: false,
+            supervisor: None,
+            supervisor_usage: Usage::default(),
+            stages: Vec::new(),
+            chosen: 0,
+            pose: None,
+            guidance: None,
+            command: None,
+            link: None,
+            power: None,
+            grid: Replica::default(),
+            field: Replica::default(),
+            target: None,
+            way: Vec::new(),
+            events: VecDeque::new(),
+            message: String::new(),
+        }
+    }
+
+    /// A run of the robot is there: nothing of the last one holds.
+    pub(super) fn on_connected(&mut self) {
+        let chosen = self.chosen;
+        *self = Self::of(self.robot.clone());
+        (self.connected, self.chosen) = (true, chosen);
+    }
+
+    /// The name of the chosen stage; none before the first roster.
+    pub(super) fn chosen_stage(&self) -> Option<&str> {
+        let stage = self.stages.get(self.chosen);
+        stage.map(|stage| name_str(&stage.entry.stage))
+    }
+
+    /// A pose came.
+    pub(super) fn on_pose(&mut self, pose: PoseSample) {
+        let position = pose.pose().position;
+        let last = self.way.last();
+        if last.is_none_or(|last| last.distance(position) >= POINT_EVERY_M) {
+            if self.way.len() == MOST_POINTS {
+                let mut nth = 0;
+                self.way.retain(|_| {
+                    nth += 1;
+                    nth % 2 == 1
+                });
+            }
+            self.way.push(position);
+        }
+        self.pose = Some(pose);
+    }
+
+    /// A roster came.
+    pub(super) fn on_roster(&mut self, header: RosterHeader, entries: &[RosterEntry]) {
+        self.supervisor = Some(header);
+        self.stages.resize_with(entries.len(), || Stage {
+            entry: RosterEntry::default(),
+            rate_hz: None,
+            usage: Usage::default(),
+        });
+        for (stage, entry) in self.stages.iter_mut().zip(entries) {
+            stage.entry = *entry;
+        }
+        self.chosen = self.chosen.min(entries.len().saturating_sub(1));
+    }
+
+    /// Something happened.
+    pub(super) fn on_event(&mut self, event: String) {
+        self.events.push_front(event);
+        self.events.truncate(MOST_EVENTS);
+    }
+}
