@@ -16,7 +16,7 @@ pub enum CellState {
     /// The perimeter of operation; never cleared.
     Perimeter = 3,
     /// Possibly safe, and the sonar looked there: only the evidential method tells it from [`Free`](Self::Free).
-    Swept = 4,
+    Scanned = 4,
     /// Hazard because the body would touch something sensed nearby; the sonar looked there and saw nothing.
     Margin = 5,
 }
@@ -25,13 +25,13 @@ impl CellState {
     /// Whether the harmonic field is 0 here.
     #[must_use]
     pub const fn is_hazard(self) -> bool {
-        !matches!(self, Self::Free | Self::Swept)
+        !matches!(self, Self::Free | Self::Scanned)
     }
 
     /// Whether the sonar looked here.
     #[must_use]
     pub const fn is_scanned(self) -> bool {
-        matches!(self, Self::Swept | Self::Margin)
+        matches!(self, Self::Scanned | Self::Margin)
     }
 
     /// The state a byte of the `grid` topic stands for; anything unheard of is a hazard.
@@ -41,7 +41,7 @@ impl CellState {
             0 => Self::Free,
             1 => Self::Sensed,
             2 => Self::Known,
-            4 => Self::Swept,
+            4 => Self::Scanned,
             5 => Self::Margin,
             _ => Self::Perimeter,
         }

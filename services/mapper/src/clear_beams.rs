@@ -1,9 +1,9 @@
 //! The newest readings as evidence of free ground.
 //!
-//! A smooth face answers only a beam along its normal. So a beam that nothing answered says nothing of faces at a slant,
-//! and the evidence grid, which knows no directions, cannot hold what it does say: no face square to this beam is
-//! nearer. The readings themselves can, and the planner asks them about every face that the robot could touch. The rays
-//! of infrared rangers are kept beside them: those end at a face of any angle.
+//! A smooth surface answers only a beam along its normal. A beam without an echo therefore excludes only surfaces square
+//! to it, and the evidence grid, which stores no directions, cannot hold that. The newest readings are kept for it: the
+//! planner asks them about every surface that the body could touch. The rays of infrared rangers are kept beside them,
+//! because a ray ends at a surface of any angle.
 
 use common::samples::{CLEAR_BEAMS, CLEAR_RAYS, ClearBeam, GridHeader};
 use glam::DVec2;
@@ -14,14 +14,14 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// Readings, oldest first: of the sonar at most [`CLEAR_BEAMS`], of infrared rangers [`CLEAR_RAYS`].
+/// Readings, oldest first: at most [`CLEAR_BEAMS`] of the sonar and [`CLEAR_RAYS`] of infrared rangers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ClearBeams {
     beams: Vec<Dated>,
     rays: Vec<Dated>,
 }
 
-/// A reading, and what the wheels had rolled then, metres.
+/// A reading with the distance that the wheels had rolled when it was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Dated {
     beam: ClearBeam,
@@ -29,10 +29,10 @@ struct Dated {
 }
 
 impl ClearBeams {
-    /// Bytes of as many as there can be, saved.
+    /// Size of the largest saved state, bytes.
     pub(crate) const SAVED_BYTES: usize = (CLEAR_BEAMS + CLEAR_RAYS) * size_of::<Dated>();
 
-    /// Take a reading after the wheels have rolled `rolled_m` metres; those that are too old go.
+    /// Take a reading after the wheels have rolled `rolled_m` metres, and drop the readings that are too old.
     pub(crate) fn take(&mut self, sonar: &SonarModel, reading: &Reading, rolled_m: f64) {
         let clear_m = reading
             .echo
@@ -47,7 +47,7 @@ impl ClearBeams {
         );
     }
 
-    /// Take a reading of an infrared ranger; otherwise as [`ClearBeams::take`].
+    /// Take a reading of an infrared ranger, as [`ClearBeams::take`] does of the sonar.
     pub(crate) fn take_ray(&mut self, sonar: &SonarModel, ray: &Ray, rolled_m: f64) {
         let beam = clear_beam(ray.origin, ray.axis, ray.seen.clear_m);
         let oldest_m = rolled_m - sonar.clear_for_m;
@@ -59,13 +59,12 @@ impl ClearBeams {
         );
     }
 
-    /// Forget all.
     pub(crate) fn clear(&mut self) {
         self.beams.clear();
         self.rays.clear();
     }
 
-    /// Put them into the header of a `grid` sample.
+    /// Put the readings into the header of a `grid` sample.
     pub(crate) fn fill(&self, header: &mut GridHeader) {
         header.clear_beam_count = self.beams.len() as u64;
         for (to, dated) in header.clear_beams.iter_mut().zip(&self.beams) {
@@ -87,7 +86,7 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
     }
 }
 
-/// Append `newest`, of readings no older than `oldest_m` and no more than `most`.
+/// Append `newest`, and drop readings older than `oldest_m` and beyond the newest `most`.
 fn keep(readings: &mut Vec<Dated>, most: usize, oldest_m: f64, newest: Dated) {
     readings.retain(|dated| dated.rolled_m > oldest_m);
     if readings.len() >= most {

@@ -1,17 +1,16 @@
-//! The occupancy evidence grid: what was heard for and against every cell, the evidential method's memory under the map.
+//! The occupancy evidence grid of the evidential method: evidence for and against an obstacle in every cell.
 //!
-//! Its cells are a lattice of their own, as fine as the sonar resolves and no finer, whatever the grid of the map:
-//! what the robot believes of the place must not depend on how finely the field is solved. Every cell
-//! holds the weight of the evidence that something stands in it, the beam that heard it, and whether the
-//! sonar ever looked there.
+//! Its lattice is as fine as the sonar resolves, whatever the grid of the map: the belief must not depend on how finely the
+//! field is solved. Every cell holds the weight of the evidence for an obstacle, the direction of the beam that heard it,
+//! and whether the sonar ever scanned the cell.
 //!
-//! One echo says that something stands somewhere on an arc, and that nothing stands before it. It is
-//! mapped as that: weight for every cell of the arc, more in its middle; weight off every cell before it
-//! along the axis. Where the arc meets a cell that is well known to be occupied, that explains the echo
-//! and the rest of the arc learns nothing, or every wall would grow at each end.
+//! An echo says that an obstacle stands somewhere on an arc, and that the ground before the arc is free. Every cell of the
+//! arc therefore gains weight, most in the middle, and every cell before it along the axis loses weight. Where the arc
+//! meets a cell that is well known to be occupied, that cell explains the echo and the rest of the arc learns nothing;
+//! otherwise every wall would grow at each end.
 //!
-//! The ray of an infrared ranger is as thin as a cell, sweeps little more, and ends at a face of any angle: what it passed is free,
-//! where it ends something stands, and no silence of the sonar is evidence against that.
+//! The ray of an infrared ranger is as thin as a cell and ends at a surface of any angle. The cells that it passed are free,
+//! the cell where it ends is occupied, and the absence of an echo is no evidence against that.
 
 use std::f64::consts::TAU;
 
@@ -23,34 +22,34 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    infrared_model::{SWEPT_ASIDE_M, Seen},
+    infrared_model::{SCANNED_ASIDE_M, Seen},
     reading::Ray,
     sonar_model::SonarModel,
 };
 
-/// A cell that was swept just now: it falls by one for every [`step_m`] that the wheels roll.
+/// The value of a cell that was scanned just now. It falls by one for every [`step_m`] that the wheels roll.
 const SCANNED: u8 = u8::MAX;
 
-/// Something stands in the cell.
+/// Flag of a cell: an obstacle stands in it.
 const OCCUPIED: u8 = 1;
-/// An infrared ranger saw it there.
+/// Flag of a cell: an infrared ranger saw the obstacle.
 const SEEN: u8 = 2;
 
-/// How far the wheels roll until scanned ground is one step less sure, metres.
+/// Distance that the wheels roll until scanned ground is one step less certain, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
     sonar.scanned_for_m / f64::from(SCANNED - sonar.pointed_enough)
 }
 
-/// One reading, where it was taken.
+/// One reading of the sonar in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beam {
-    /// The sensor, metres.
+    /// Position of the sensor, metres.
     pub(crate) origin: DVec2,
-    /// Which way it looked: a unit vector.
+    /// Direction of the beam, a unit vector.
     pub(crate) axis: DVec2,
     /// The echo's range, metres; none where nothing answered within reach.
     pub(crate) echo: Option<f64>,
-    /// How far it is evidence at all, metres.
+    /// Range up to which the reading counts as evidence, metres.
     pub(crate) reach: f64,
 }
 
@@ -59,7 +58,7 @@ pub(crate) struct Beam {
 pub(crate) struct Flip {
     /// The cell of the lattice.
     pub(crate) cell: Cell,
-    /// What it is now.
+    /// Whether it is occupied now.
     pub(crate) occupied: bool,
 }
 
@@ -69,19 +68,20 @@ pub(crate) struct EvidenceGrid {
     /// Weights of the [`SonarModel`], offset by 128.
     #[serde(with = "serde_bytes")]
     weight: Vec<u8>,
-    /// The beam that was heard last: 256ths of a turn.
+    /// Direction of the beam whose echo was heard last, 256ths of a turn.
     #[serde(with = "serde_bytes")]
     side: Vec<u8>,
-    /// From [`SCANNED`] down to [`SonarModel::pointed_enough`]: swept; below, how often the sonar was pointed here in vain.
+    /// From [`SCANNED`] down to [`SonarModel::pointed_enough`] the cell is scanned; below, the value counts how often the
+    /// sonar was pointed here without a result.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
-    /// [`OCCUPIED`], [`SEEN`].
+    /// The flags [`OCCUPIED`] and [`SEEN`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
 }
 
-/// The lattice laid over a mission's perimeter, and `beyond_m` metres further: what stands just outside is touched
-/// inside by a body that is as wide.
+/// The lattice over a mission's perimeter and `beyond_m` metres further: an obstacle just outside can be touched by a
+/// body whose centre is inside.
 pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
     let cells = (width / sonar.resolution_m)
@@ -97,7 +97,7 @@ pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> G
 }
 
 impl EvidenceGrid {
-    /// Nothing heard yet.
+    /// A grid without evidence.
     pub(crate) fn none(lattice: &GridFrame) -> Self {
         let cells = lattice.area();
         Self {
@@ -108,25 +108,24 @@ impl EvidenceGrid {
         }
     }
 
-    /// Whether it is of this lattice.
+    /// Whether the grid has the size of this lattice.
     pub(crate) fn fits(&self, lattice: &GridFrame) -> bool {
         [&self.weight, &self.side, &self.looks, &self.occupied]
             .iter()
             .all(|layer| layer.len() == lattice.area())
     }
 
-    /// Whether the sonar looked at a cell, or learned all it can of it.
+    /// Whether the sonar scanned a cell, or can learn nothing more of it.
     pub(crate) fn is_scanned(&self, sonar: &SonarModel, index: usize) -> bool {
         self.looks[index] >= sonar.pointed_enough
     }
 
-    /// Whether something stands in a cell.
     pub(crate) fn is_occupied(&self, index: usize) -> bool {
         self.occupied[index] & OCCUPIED != 0
     }
 
-    /// The wheels have rolled on: what was swept is a little less sure, by `steps`. The window in which
-    /// cells are not swept any more.
+    /// Lower the certainty of scanned cells by `steps`, because the wheels have rolled on. Returns the window of the cells
+    /// that are no longer scanned.
     pub(crate) fn grow_stale(
         &mut self,
         sonar: &SonarModel,
@@ -135,7 +134,7 @@ impl EvidenceGrid {
     ) -> Window {
         let mut window = Window::default();
         let enough = sonar.pointed_enough;
-        // Each pass over a row is without branches: the compiler makes vector instructions of it.
+        // The passes over a row have no branches, so that the compiler vectorises them.
         let is_over = |looks: u8| looks >= enough && looks.saturating_sub(steps) < enough;
         let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
         for (row, looks) in (0..).zip(rows) {
@@ -156,8 +155,8 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading of a robot at `robot` with a body of `radius` metres. Appends what flipped to
-    /// `flips`; returns the window in which anything changed.
+    /// Take one reading of a robot at `robot` with a body of `radius` metres. Appends the cells that flipped to `flips` and
+    /// returns the window of all cells that changed.
     pub(crate) fn take(
         &mut self,
         sonar: &SonarModel,
@@ -181,13 +180,13 @@ impl EvidenceGrid {
             .max(sonar.pointed_m)
             .max(echo.unwrap_or(0.0) + band);
         let came_from = side_of(beam.axis);
-        // Beyond `near` half a cell's diagonal is narrower than the widest cone.
+        // Beyond `near`, half a cell's diagonal is narrower than the widest cone.
         let near = half_diagonal / sonar.arc.sin();
         let outside = sonar.arc.tan() * (1.0 + 1e-9);
 
         let mut arc = Vec::new();
         let mut explained = false;
-        // What is asked below lies within `near`, or in the triangle of the widest cone.
+        // All cells that matter below lie within `near`, or in the triangle of the widest cone.
         let (end, aside) = (far * beam.axis, far * outside * beam.axis.perp());
         let corners = [
             DVec2::splat(near),
@@ -201,12 +200,12 @@ impl EvidenceGrid {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
             let (across, along) = (beam.axis.perp_dot(offset), beam.axis.dot(offset));
-            // Many of these cells still lie outside anything asked below, which is known without an angle.
+            // Many of the remaining cells are excluded here without computing an angle.
             if range > far || range > near && across.abs() > along * outside {
                 continue;
             }
             let off = across.atan2(along).abs();
-            // Half a cell's diagonal seen from the sensor: at its feet the cone is narrower than a cell.
+            // The angle of half a cell's diagonal from the sensor: near the sensor the cone is narrower than a cell.
             let slack = (half_diagonal / range.max(half_diagonal)).asin().min(1.0);
             let index = lattice.index(cell);
             if range <= known_to && off <= sonar.scanned.max(slack) {
@@ -252,13 +251,13 @@ impl EvidenceGrid {
                 continue;
             }
             let more = sonar.hit + (sonar.hit_at_edge - sonar.hit) * off.min(1.0);
-            // What was believed free for long must not hide something for long.
+            // A cell that was believed free for long must not need as long to become occupied.
             let weight = self.weight_of(index).max(-sonar.pass) + more as i8;
             self.side[index] = came_from;
             self.set(sonar, lattice, cell, weight, flips);
             window = window.including(cell);
         }
-        // Nothing stands where the robot does, and what touches it no sonar can look at.
+        // No obstacle stands where the robot is, and no sonar can scan the ground that touches the robot.
         let touches = radius + lattice.resolution_m;
         for cell in around(lattice, robot, touches) {
             let index = lattice.index(cell);
@@ -278,7 +277,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading of an infrared ranger; otherwise as [`EvidenceGrid::take`].
+    /// Take one reading of an infrared ranger, as [`EvidenceGrid::take`] does of the sonar.
     pub(crate) fn take_ray(
         &mut self,
         sonar: &SonarModel,
@@ -297,7 +296,7 @@ impl EvidenceGrid {
             let offset = centre - ray.origin;
             let (across, along) = (ray.axis.perp_dot(offset), ray.axis.dot(offset));
             let on_ray = across.abs() <= half_cell;
-            if across.abs() > half_cell.max(SWEPT_ASIDE_M) || along < -half_cell {
+            if across.abs() > half_cell.max(SCANNED_ASIDE_M) || along < -half_cell {
                 continue;
             }
             let index = lattice.index(cell);
@@ -325,7 +324,7 @@ impl EvidenceGrid {
         window
     }
 
-    /// Forget everything but what was heard within `keep` metres of `robot`.
+    /// Reset all evidence except echoes from within `keep` metres of `robot`.
     pub(crate) fn reset(
         &mut self,
         sonar: &SonarModel,
@@ -372,12 +371,12 @@ impl EvidenceGrid {
     }
 }
 
-/// The cells of a square of `reach` metres around `centre`, as far as they lie inside the map.
+/// The cells inside the map of a square of `reach` metres around `centre`.
 fn around(frame: &GridFrame, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
     between(frame, centre - reach, centre + reach)
 }
 
-/// The cells of a rectangle and those beside it, as far as they lie inside the map.
+/// The cells inside the map of a rectangle and of the rim around it.
 fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<Item = Cell> + use<> {
     let last = f64::from(frame.cells) - 1.0;
     let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
@@ -388,12 +387,12 @@ fn between(frame: &GridFrame, least: DVec2, greatest: DVec2) -> impl Iterator<It
         .flat_map(move |row| columns.clone().map(move |col| Cell { col, row }))
 }
 
-/// 256ths of a turn.
+/// Direction of `axis`, 256ths of a turn.
 fn side_of(axis: DVec2) -> u8 {
     (axis.to_angle() / TAU * 256.0).rem_euclid(256.0) as u8
 }
 
-/// The angle between two sides.
+/// Angle between two directions of [`side_of`], radians.
 fn apart(a: u8, b: u8) -> f64 {
     let steps = a.wrapping_sub(b);
     f64::from(steps.min(steps.wrapping_neg())) * TAU / 256.0

@@ -16,29 +16,28 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// The evidence, and what follows from it for the body.
+/// The evidence, and the cells that it forbids to the body's centre.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
     beams: ClearBeams,
-    /// Recomputed from the evidence, so not saved.
+    /// Not saved: it is recomputed from the evidence.
     #[serde(skip)]
     inflation: Inflation,
 }
 
 impl EvidenceMap {
-    /// The newest readings as evidence of free ground.
     pub(crate) const fn beams(&self) -> &ClearBeams {
         &self.beams
     }
 }
 
-/// What a reading brought.
+/// The effect of a reading.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observed {
     /// The cells of the grid that may look different now.
     pub(crate) window: Window,
-    /// Whether something was heard where nothing was believed to stand.
+    /// Whether a cell that was believed free became occupied.
     pub(crate) safety_event: bool,
 }
 
@@ -52,7 +51,6 @@ pub(crate) struct Evidential {
 }
 
 impl Evidential {
-    /// For a mission's robot and grid.
     pub(crate) fn new(mission: &Mission) -> Self {
         let sonar = SonarModel::default();
         let grid = mission.grid_frame();
@@ -71,12 +69,12 @@ impl Evidential {
         }
     }
 
-    /// How far a surface blocks the cells around it, metres.
+    /// Distance up to which a surface blocks the cells around it, metres.
     pub(crate) const fn reach(&self) -> f64 {
         self.geometry.reach
     }
 
-    /// The map a mission starts with: no evidence.
+    /// A map without evidence, with which a mission starts.
     pub(crate) fn empty(&self) -> EvidenceMap {
         EvidenceMap {
             evidence: EvidenceGrid::none(&self.geometry.lattice),
@@ -85,12 +83,12 @@ impl Evidential {
         }
     }
 
-    /// Bytes of a saved map.
+    /// Size of a saved map, bytes.
     pub(crate) const fn saved_bytes(&self) -> usize {
         4 * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 64
     }
 
-    /// Complete a map that was saved; one of another mission is refused.
+    /// Complete a saved map. A map of another mission is refused.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.geometry.lattice;
         if !map.evidence.fits(&lattice) {
@@ -110,8 +108,8 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take what was heard, if the sonar gave a reading at all, and what the infrared rangers saw, by a robot at `robot`
-    /// whose wheels have rolled `rolled_m` metres.
+    /// Take the reading of the sonar, if there is one, and the rays of the infrared rangers, of a robot at `robot` whose
+    /// wheels have rolled `rolled_m` metres.
     pub(crate) fn take(
         &self,
         map: &mut EvidenceMap,
@@ -124,7 +122,7 @@ impl Evidential {
         let lattice = &self.geometry.lattice;
         let body = (robot, self.radius);
         let mut touched = Window::default();
-        // What is seen first: it explains echoes.
+        // Rays come first, because what they show explains echoes.
         for ray in rays {
             map.beams.take_ray(&self.sonar, ray, rolled_m);
             let seen = map
@@ -155,8 +153,8 @@ impl Evidential {
         }
     }
 
-    /// The wheels have rolled from `before` to `now`, metres each since the start: the window of the grid that may look
-    /// different now.
+    /// Let scanned ground grow stale as the wheels roll from `before` to `now`, metres since the start. Returns the window of
+    /// the grid that may have changed.
     pub(crate) fn roll(&self, map: &mut EvidenceMap, before: f64, now: f64) -> Window {
         let step_m = step_m(&self.sonar);
         let steps = (now / step_m).floor() - (before / step_m).floor();
@@ -167,7 +165,7 @@ impl Evidential {
         self.on_grid(map.evidence.grow_stale(&self.sonar, lattice, steps as u8))
     }
 
-    /// Forget all but what is near the robot; at every second reset that as well, for it may be what is wrong.
+    /// Reset all evidence that is not near the robot. Every second reset drops that too, since it may be what is wrong.
     pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
         let keep = if epoch % 2 == 1 {
             self.sonar.near_m
@@ -184,7 +182,7 @@ impl Evidential {
         }
     }
 
-    /// What is believed of a cell of the grid that is not fixed.
+    /// The believed state of a cell of the grid that is neither known nor perimeter.
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
@@ -193,12 +191,12 @@ impl Evidential {
         match (hazard, under.is_some_and(is_scanned)) {
             (true, true) => CellState::Margin,
             (true, false) => CellState::Sensed,
-            (false, true) => CellState::Swept,
+            (false, true) => CellState::Scanned,
             (false, false) => CellState::Free,
         }
     }
 
-    /// The window of the grid that shows a window of the lattice.
+    /// The window of the grid that covers `window` of the lattice.
     fn on_grid(&self, window: Window) -> Window {
         if window.area() == 0 {
             return window;

@@ -1,26 +1,26 @@
-//! What a belief that was broken on purpose holds for hazard.
+//! Hazard that an injected fault puts into the belief.
 
 use common::samples::FaultKind;
 use glam::DVec2;
 
-/// How far around the robot hazard is believed by the fault that puts it inside, metres.
+/// Radius of the hazard around the robot, metres.
 const AROUND_M: f64 = 0.5;
-/// From the target to the wall that cuts it off, metres.
+/// Distance from the target to the wall that encloses it, metres.
 const WALL_M: f64 = 0.5;
-/// The wall's thickness in cells: no step to a neighbour crosses it.
+/// Thickness of the wall, cells: no step to a neighbouring cell crosses it.
 const WALL_CELLS: f64 = 1.5;
 
-/// Ground that is believed hazardous without a reason.
+/// An area that a fault makes hazard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Area {
-    /// All of it within [`AROUND_M`] of this point.
+    /// The disc of [`AROUND_M`] around this point.
     Disc(DVec2),
-    /// A wall at [`WALL_M`] from this point.
+    /// The closed wall at [`WALL_M`] from this point.
     Wall(DVec2),
 }
 
 impl Area {
-    /// Whether a cell of that side, with its middle at `at`, is of it; metres.
+    /// Whether the area covers a cell of width `side` with its centre at `at`, metres.
     pub(crate) fn covers(self, at: DVec2, side: f64) -> bool {
         match self {
             Self::Disc(middle) => at.distance(middle) <= AROUND_M,
@@ -31,7 +31,7 @@ impl Area {
     }
 }
 
-/// What `fault` makes hazard, of a robot at `robot` on its way to `target`; none if it makes none.
+/// The area that `fault` makes hazard for a robot at `robot` on its way to `target`.
 pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Area> {
     match fault {
         FaultKind::HazardAroundRobot => Some(Area::Disc(robot)),
@@ -40,7 +40,7 @@ pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Ar
     }
 }
 
-/// What is left of `fault` in a belief that forgot what was sensed.
+/// The part of `fault` that is left after a reset of the sensed belief.
 pub(crate) fn after_reset(fault: FaultKind) -> FaultKind {
     match fault {
         FaultKind::CutOff => fault,

@@ -1,41 +1,39 @@
-//! Where the body's centre must not be: everything within a reach of what is occupied.
+//! Cells that the body's centre must not enter: those within reach of an occupied cell.
 
 use common::grid::{Cell, GridFrame, Window};
 use glam::DVec2;
 
 use crate::evidence_grid::Flip;
 
-/// What reaches how far over what.
+/// The two grids of an inflation, and its reach.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Geometry {
-    /// The cells that are occupied or not: those of the evidence grid.
+    /// The cells of the evidence grid, which are occupied or free.
     pub(crate) lattice: GridFrame,
-    /// The cells they block: those of the map.
+    /// The cells of the map, which they block.
     pub(crate) grid: GridFrame,
-    /// How far an occupied cell blocks, centre to centre, metres.
+    /// Distance up to which an occupied cell blocks, centre to centre, metres.
     pub(crate) reach: f64,
 }
 
-/// How many occupied cells of the lattice each cell of the grid is in reach of, row-major.
+/// The number of occupied lattice cells within reach of each cell of the grid, row-major.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inflation {
     count: Vec<u16>,
 }
 
 impl Inflation {
-    /// Of nothing.
     pub(crate) fn new(geometry: &Geometry) -> Self {
         Self {
             count: vec![0; geometry.grid.area()],
         }
     }
 
-    /// Whether an occupied cell is in reach.
     pub(crate) fn is_hazard(&self, index: usize) -> bool {
         self.count[index] > 0
     }
 
-    /// Follow one flip; the window of the grid it reaches.
+    /// Follow one flip. Returns the window of the grid within its reach.
     pub(crate) fn follow(&mut self, geometry: &Geometry, flip: Flip) -> Window {
         let Geometry {
             lattice,

@@ -1,42 +1,42 @@
-//! The infrared model: what the voltage of an infrared ranger means for the cells along its ray.
+//! The infrared model: the meaning of a ranger's voltage for the cells along its ray.
 //!
-//! A ranger triangulates: it sees a small spot straight ahead of itself, 10 to 80 cm away, whatever the angle of the
-//! face. Its voltage grows with 1 / range, so that noise of the AD converter becomes noise of the range which
-//! grows with its square. Nearer than 10 cm the voltage falls again: such a reading says that something is near,
-//! and not how near. Glass and what throws no infrared back are not seen; the sonar hears those.
+//! A ranger triangulates: it sees a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage
+//! grows with 1 / range, so the noise of the AD converter becomes a noise of the range that grows with its square. Nearer
+//! than 10 cm the voltage falls again: such a reading says that an obstacle is near, but not how near. Glass and surfaces
+//! that do not reflect infrared are not seen; the sonar hears those.
 
 use std::ops::RangeInclusive;
 
 use common::wire::{infrared_ad, infrared_m};
 
-/// Counts that a ranger gives which is powered and connected, 0.2 V to 3.0 V: no less where it sees nothing, no more at
-/// the peak of its curve. Others are of one that is dead or saturated.
+/// Counts of a ranger that is powered and connected, 0.2 V to 3.0 V: the least where it sees nothing, the most at the peak
+/// of its curve. Other counts come from a ranger that is dead or saturated.
 const LIVE_AD: RangeInclusive<u16> = 268..=4_060;
-/// Nearer than this a reading may be of something nearer still, metres.
+/// A reading nearer than this may come from an obstacle that is nearer still, metres.
 const UNAMBIGUOUS_M: f64 = 0.10;
-/// Farther than this a reading is no hit, metres: it could be of a ranger that sees nothing.
+/// A reading farther than this is not a hit, metres: a ranger that sees nothing can give it.
 const HIT_WITHIN_M: f64 = 0.70;
 /// Standard deviation of a reading, AD counts. Nominal: three times that of the AD converter alone.
 const NOISE_AD: f64 = 15.0;
-/// A ray is free up to so many standard deviations before the reading, ...
+/// A ray is free up to this many standard deviations before the reading.
 const SURE_DEVIATIONS: f64 = 2.0;
-/// ... less this, metres: the formula's error on any one ranger.
+/// Error of the formula on a single ranger, metres; the free length of a ray is shorter by this.
 const FORMULA_M: f64 = 0.02;
 
-/// Half the width of the ground that a ray sweeps, metres: the spot of a ranger is some centimetres wide, and what stands
-/// beside it is met by the next ray of a robot that moves. Nominal.
-pub(crate) const SWEPT_ASIDE_M: f64 = 0.04;
+/// Half the width of the ground that a ray scans, metres: the spot of a ranger is some centimetres wide, and the next ray
+/// of a moving robot meets an obstacle beside it. Nominal.
+pub(crate) const SCANNED_ASIDE_M: f64 = 0.04;
 
-/// What a reading says.
+/// The meaning of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Nothing stands on the ray nearer than this, metres from the ranger; at most 0.72.
+    /// Free length of the ray, metres from the ranger; at most 0.72.
     pub(crate) clear_m: f64,
-    /// Something stands here, metres from the ranger.
+    /// Range of an obstacle, metres from the ranger.
     pub(crate) hit_m: Option<f64>,
 }
 
-/// What a ranger of `ad` counts sees; none of one that is not known to be live.
+/// The meaning of `ad` counts; none where the ranger may be dead or saturated.
 pub(crate) fn seen(ad: u16) -> Option<Seen> {
     if !LIVE_AD.contains(&ad) {
         return None;
@@ -52,7 +52,7 @@ pub(crate) fn seen(ad: u16) -> Option<Seen> {
 
 /// Standard deviation of a range, metres.
 fn deviation_m(range_m: f64) -> f64 {
-    // Counts are a / range + b: a from the formula at two ranges.
+    // Counts are a / range + b; `a` follows from the formula at two ranges.
     let (near, far) = (f64::from(infrared_ad(0.2)), f64::from(infrared_ad(0.4)));
     let counts_metres = (near - far) / (1.0 / 0.2 - 1.0 / 0.4);
     NOISE_AD * range_m * range_m / counts_metres

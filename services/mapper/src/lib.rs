@@ -3,14 +3,14 @@
 //! | module | holds |
 //! |---|---|
 //! | [`step`] | the mapper itself, pure: poses with ranges in, the window of the grid that changed out |
-//! | `sonar_model` | THE numbers of what an echo, and its absence, mean for the cells around |
-//! | `infrared_model` | THE numbers of what an infrared ranger's voltage means for the cells along its ray |
+//! | `sonar_model` | every number of the sonar's inverse model |
+//! | `infrared_model` | every number of the infrared rangers' model |
 //! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
 //! | `reading` | readings of the sonar and of an infrared ranger, where they were taken |
 //! | `clear_beams` | the newest readings as evidence of free ground, for the planner |
 //! | `inflation` | occupied cells grown by the robot's body |
 //! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
-//! | `fault` | hazard believed on purpose |
+//! | `fault` | hazard of injected faults |
 //! | [`shell`] | wires the step to the topics `pose`, `range`, `directive` and `grid`, saves its state |
 
 mod clear_beams;

@@ -1,34 +1,33 @@
-//! Readings, where they were taken.
+//! Readings of the rangers in the mission's frame.
 
 use common::{infrared, kinematics::Pose2, samples::RangeSample};
 use glam::DVec2;
 
 use crate::infrared_model::{self, Seen};
 
-/// A reading of the sonar, where it was taken.
+/// A reading of the sonar in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
-    /// The sensor, metres.
+    /// Position of the sensor, metres.
     pub(crate) origin: DVec2,
-    /// Which way it looked: a unit vector.
+    /// Direction of the beam, a unit vector.
     pub(crate) axis: DVec2,
-    /// The echo's range, metres; none where nothing answered.
+    /// Range of the echo, metres; none where nothing answered.
     pub(crate) echo: Option<f64>,
 }
 
-/// A reading of an infrared ranger, where it was taken.
+/// A reading of an infrared ranger in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
-    /// The ranger, metres.
+    /// Position of the ranger, metres.
     pub(crate) origin: DVec2,
-    /// Which way it looks: a unit vector.
+    /// Direction of the ray, a unit vector.
     pub(crate) axis: DVec2,
-    /// What it sees.
     pub(crate) seen: Seen,
 }
 
 impl Ray {
-    /// Those of the rangers that are live, on a robot at `pose` with a body of `radius` metres.
+    /// The readings of all live rangers of a robot at `pose` with a body of `radius` metres.
     pub(crate) fn all(pose: Pose2, radius: f64, range: &RangeSample) -> Vec<Self> {
         let rangers = infrared::rangers(pose, radius).into_iter();
         let ray = |(ranger, ad): (Pose2, u16)| {

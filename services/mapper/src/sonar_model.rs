@@ -1,16 +1,17 @@
-//! The sonar model: what an echo, and its absence, mean for the cells around.
+//! The sonar model: the meaning of an echo, and of its absence, for the cells around.
 //!
 //! The X80's front sonar is one ultrasonic ranger: one byte of centimetres a frame, "nothing" included, from a cone of
-//! about 15 degrees to either side. Every number that the evidential method makes of that stands here.
+//! about 15 degrees to either side. Every number of the evidential method's sensor model stands here.
 //!
 //! Angles are radians off the sonar's axis, to one side. Weights are integers in quarters of the echo that is heard in
-//! the middle of its arc; positive is evidence for something that stands there, negative for free ground.
+//! the middle of its arc; positive weights are evidence for an obstacle, negative ones for free ground.
 
 use std::f64::consts::TAU;
 
 const DEGREE: f64 = TAU / 360.0;
 
-/// The inverse sensor model of the evidence grid, and how evidence is bounded and forgotten. [`SonarModel::default`] is the X80's.
+/// The inverse sensor model of the evidence grid, with the bounds and the ageing of evidence. [`SonarModel::default`] is the
+/// X80's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SonarModel {
     /// Side of a cell of the evidence grid, metres. A third of the cone's width where a hit starts to matter: as fine as
@@ -19,68 +20,68 @@ pub(crate) struct SonarModel {
 
     /// Half the angle over which an echo is spread, and the widest angle of the model. The cone's 15 degrees, rounded up.
     pub(crate) arc: f64,
-    /// How far from its range an echo may be, metres: noise, the byte's centimetre, half a cell.
+    /// Error of an echo's range, metres: noise, the byte's centimetre, half a cell.
     pub(crate) band_m: f64,
     /// Weight of an echo in the middle of its arc.
     pub(crate) hit: f64,
-    /// Weight of an echo at the end of its arc, where the sound is weakest; in between it falls linearly. None: what stands
-    /// there is heard better by a beam that points there, and gaps stay open.
+    /// Weight of an echo at the end of its arc, where the sound is weakest; in between the weight falls linearly. It is 0,
+    /// because a beam that points there hears an obstacle better, and gaps stay open.
     pub(crate) hit_at_edge: f64,
 
-    /// What stands nearer than this before an echo may be its cause, metres: no beam passed there.
+    /// An obstacle this far before an echo may be its cause, metres: the beam is not evidence that the ground there is free.
     pub(crate) before_m: f64,
-    /// What lies within this behind an echo was looked at as well as can be, metres.
+    /// Ground up to this far behind an echo counts as scanned, metres.
     pub(crate) behind_m: f64,
     /// Weight taken off a cell that a beam passed.
     pub(crate) pass: i8,
-    /// The same at the beam's edge, where it may have missed.
+    /// Weight taken off a cell at the beam's edge, where the beam may have missed.
     pub(crate) pass_at_edge: i8,
     /// Half the angle in which a beam is evidence against an echo heard before; farther out it may have missed.
     pub(crate) against: f64,
-    /// Half the angle in which it does so at all.
+    /// Half the widest angle in which a beam is evidence against an echo at all.
     pub(crate) against_at_edge: f64,
     /// Widest angle between two beams of which one is evidence against an echo of the other. A smooth wall that is hit at a
     /// slant gives no echo, which is no evidence against what was heard square to it.
     pub(crate) same_side: f64,
 
-    /// Weights are bounded below and above: a world that changes is believed after a few readings.
+    /// Least weight of a cell. Weights are bounded, so that a few readings suffice where the world has changed.
     pub(crate) least: i8,
-    /// See `least`.
+    /// Greatest weight of a cell.
     pub(crate) most: i8,
-    /// A free cell becomes occupied at this weight, ...
+    /// A free cell becomes occupied at this weight.
     pub(crate) occupied: i8,
-    /// ... and free again at this one.
+    /// An occupied cell becomes free at this weight.
     pub(crate) released: i8,
     /// A cell of this weight is the cause of an echo whose arc it lies on: the rest of the arc learns nothing.
     pub(crate) explains: i8,
 
-    /// Half the angle in which a beam without echo sweeps ground. Less than the cone has: a surface that only just
-    /// reaches into the cone throws the sound away.
+    /// Half the angle in which a beam without echo scans ground. It is less than the cone's, because a surface that only just
+    /// reaches into the cone deflects the sound.
     pub(crate) scanned: f64,
-    /// So far ground is swept, metres, though echoes are mapped less far: an echo there is too wide to be mapped, yet no
-    /// echo says that the ground is free.
+    /// Range up to which ground is scanned, metres. Echoes are mapped less far, because an echo from there is too wide; the
+    /// absence of an echo still says that the ground is free.
     pub(crate) scanned_m: f64,
-    /// Half the angle in which the sonar counts as pointed at a cell that it cannot see, ...
+    /// Half the angle in which the sonar counts as pointed at a cell that it cannot see.
     pub(crate) pointed: f64,
-    /// ... how far ahead of the sensor, metres, ...
+    /// Range up to which the sonar counts as pointed at such a cell, metres.
     pub(crate) pointed_m: f64,
-    /// ... and how many readings until there is nothing more to learn from here: the cell counts as swept.
+    /// Number of such readings after which the cell counts as scanned, because there is nothing more to learn.
     pub(crate) pointed_enough: u8,
-    /// Swept ground stays so while the wheels roll this far, turns on the spot included, metres: wheels slip, and by then
-    /// the pose is off by about the clearance that hazards are given.
+    /// Scanned ground stays scanned while the wheels roll this far, turns on the spot included, metres. By then the error of
+    /// the pose is about the clearance that hazards are given.
     pub(crate) scanned_for_m: f64,
 
-    /// No echo from within this says that no face square to the beam is there, metres. Half a metre less than the sonar's
-    /// reach, where answers grow weak.
+    /// Range within which the absence of an echo excludes a surface square to the beam, metres. It is half a metre less than
+    /// the sonar's reach, where answers grow weak.
     pub(crate) clear_m: f64,
-    /// What echoes may be nearer than its range by so much, metres: noise, the byte's centimetre.
+    /// An obstacle may be nearer than its echo's range by this much, metres: noise, the byte's centimetre.
     pub(crate) ahead_of_echo_m: f64,
     /// A reading is evidence of free ground until the wheels have rolled this far, turns on the spot included, metres.
     pub(crate) clear_for_m: f64,
 
-    /// Of the robot's footprint so much at the rim is not sure to be free, metres: the pose drifts.
+    /// Width of the footprint's rim that is not certainly free, metres, because the pose drifts.
     pub(crate) rim_m: f64,
-    /// What stands nearer than this to the robot survives the first reset of the sensed belief, metres: it may touch it.
+    /// An obstacle nearer than this to the robot survives the first reset of the sensed belief, metres: the robot may touch it.
     pub(crate) near_m: f64,
 }
 

@@ -1,8 +1,7 @@
 //! The belief: which cells are hazard.
 //!
-//! The paper's map only grows, (10); what it must never swallow is the target's cell, the cells under
-//! the robot, and nothing ever changes the perimeter, (18). The evidential method's map follows the evidence,
-//! both ways ([`Sensed::Evidence`]).
+//! The paper's map only grows, (10). The target's cell and the cells under the robot never become hazard, and the
+//! perimeter never changes, (18). The evidential method's map follows the evidence both ways ([`Sensed::Evidence`]).
 
 use common::{
     clock::MissionTime,
@@ -21,49 +20,48 @@ use crate::{
     reading::{Ray, Reading},
 };
 
-/// "4 cm or nearer" is mapped at 4 cm.
+/// The range at which the reading "4 cm or nearer" is mapped, metres.
 const CONTACT_M: f64 = 0.04;
 
-/// What the mapper takes. The belief is the fold of its inputs, so they are what its journal holds, too.
+/// An input of the step. The belief follows from its inputs alone, so the journal holds the inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
-    /// The pose of a tick, and what the rangers gave in it.
+    /// The pose of a tick with the readings of the rangers.
     Tick {
-        /// Where the robot was.
         pose: PoseSample,
-        /// The readings; none if they did not come.
+        /// None if no range sample of this tick came.
         range: Option<RangeSample>,
     },
     /// The supervisor's reset of the sensed belief.
     Reset {
-        /// The epoch that begins; one that has begun already is ignored.
+        /// The epoch that begins. An epoch that has begun already is ignored.
         epoch: u64,
     },
-    /// Break the belief like this, on purpose, from the next tick on.
+    /// A fault that an operator injects into the belief; it acts from the next tick on.
     Fault(FaultKind),
 }
 
-/// What an input did to the map: what is to be published.
+/// The part of the map that an input changed and that is published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing, and nobody waits for an answer.
+    /// Nothing changed, and no stage waits for an answer.
     None,
-    /// This window may have changed; an empty one answers the tick.
+    /// This window may have changed; an empty window answers the tick.
     Window(Window),
-    /// All of it.
+    /// The whole map changed.
     Whole,
 }
 
-/// What was sensed, by the method that the mission chose.
+/// The sensed belief, by the method of the mission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Sensed {
-    /// The paper's: hits are in the cells themselves, and stay.
+    /// Method `paper`: hits are marked in the cells themselves and stay.
     Hits,
-    /// The evidential method's: evidence, from which the cells follow.
+    /// Method `evidential`: the cells follow from evidence.
     Evidence(EvidenceMap),
 }
 
-/// What must survive the process.
+/// The state that survives the process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
     /// One [`CellState`] byte a cell, row-major.
@@ -77,21 +75,19 @@ pub struct Belief {
     epoch: u64,
     /// The last tick mapped.
     tick: Option<u64>,
-    /// Where the robot was then, metres.
+    /// Position of the robot at that tick, metres.
     robot: DVec2,
-    /// Where it faced, radians.
+    /// Heading of the robot at that tick, radians.
     heading: f64,
-    /// What its wheels had rolled on average, turns on the spot included, metres.
+    /// Distance that the wheels had rolled on average at that tick, turns on the spot included, metres.
     rolled: f64,
-    /// What the sonar gave.
     sensed: Sensed,
-    /// What it was broken by on purpose.
+    /// The injected fault.
     fault: FaultKind,
 }
 
 impl Belief {
-    /// The cells, row-major.
-    #[must_use]
+    /// One [`CellState`] byte a cell, row-major.
     pub fn cells(&self) -> &[u8] {
         &self.cells
     }
@@ -132,13 +128,13 @@ impl Step for Mapper {
     type Output = Change;
     type State = Belief;
 
-    /// (18) and what the mission knows beforehand.
+    /// A map with the perimeter, (18), and the shapes that the mission knows beforehand.
     fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
         let margin = mission.margin_cells();
         let evidential = Evidential::new(mission);
         let (sensed, reach) = match mission.method {
-            // A known surface blocks what a hit on it would: its cell and the margin around.
+            // A known surface blocks the same cells as a hit on it: its own cell and the margin around.
             Method::Paper => (Sensed::Hits, (f64::from(margin) + 0.5) * frame.resolution_m),
             Method::Evidential => (Sensed::Evidence(evidential.empty()), evidential.reach()),
         };
@@ -202,13 +198,11 @@ impl Step for Mapper {
 }
 
 impl Mapper {
-    /// How the map lies.
-    #[must_use]
     pub const fn frame(&self) -> GridFrame {
         self.frame
     }
 
-    /// Bytes that an encoded belief has at most.
+    /// Upper bound of an encoded belief, bytes.
     #[must_use]
     pub const fn saved_bytes(&self) -> usize {
         let evidence = match self.belief.sensed {
@@ -233,7 +227,7 @@ impl Mapper {
         header
     }
 
-    /// Everything within `reach` metres of what the mission knows is hazard, and so is the perimeter.
+    /// Mark the perimeter, and every cell within `reach` metres of a shape that the mission knows.
     fn mark_known(&mut self, mission: &Mission, reach: f64) {
         let frame = self.frame;
         let last = f64::from(frame.cells) - 1.0;
@@ -282,7 +276,7 @@ impl Mapper {
         changed
     }
 
-    /// The paper's method: a reading that says where something is puts hazard there.
+    /// Method `paper`: mark hazard where a reading shows an obstacle.
     fn mark_hit(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
         let Some(distance) = range.and_then(safety_distance) else {
             return Window::default();
@@ -296,7 +290,7 @@ impl Mapper {
         changed
     }
 
-    /// The evidential method: what the reading says for and against hazard, and where it looked.
+    /// Method `evidential`: take the reading as evidence for and against hazard, and note which ground was scanned.
     fn weigh(&mut self, pose: &PoseSample, range: Option<&RangeSample>, rolled: f64) -> Window {
         let Sensed::Evidence(map) = &mut self.belief.sensed else {
             return Window::default();
@@ -324,7 +318,7 @@ impl Mapper {
         changed
     }
 
-    /// Bring the cells of `window` up to date with the evidence; the window that changed.
+    /// Bring the cells of `window` up to date with the evidence. Returns the window that changed.
     fn redraw(&mut self, window: Window) -> Window {
         let mut changed = Window::default();
         let Sensed::Evidence(map) = &self.belief.sensed else {
@@ -347,7 +341,7 @@ impl Mapper {
         changed
     }
 
-    /// (19): the hit's cell and the margin around it. A hit outside the map marks as much of its margin as is inside.
+    /// Mark the hit's cell and the margin around it, (19). A hit outside the map marks the part of its margin that lies inside.
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
         let mut changed = Window::default();
         let margin = f64::from(self.margin);
@@ -379,8 +373,8 @@ impl Mapper {
         changed
     }
 
-    /// Forget what was sensed, if `epoch` is newer than the belief's: back to the perimeter and what
-    /// was known beforehand; the evidential method keeps what was heard near the robot. Says whether it did.
+    /// Reset the sensed belief to the perimeter and the known shapes, if `epoch` is newer than the belief's. The evidential
+    /// method keeps echoes from near the robot. Returns whether the belief was reset.
     fn reset_belief(&mut self, epoch: u64) -> bool {
         if epoch <= self.belief.epoch {
             return false;
@@ -405,7 +399,7 @@ impl Mapper {
         true
     }
 
-    /// What the fault in it puts on the map; the window that changed.
+    /// Mark the hazard of an injected fault. Returns the window that changed.
     fn falsify(&mut self) -> Window {
         let mut changed = Window::default();
         let Some(area) = fault::hazard(self.belief.fault, self.belief.robot, self.target_m) else {

@@ -183,7 +183,7 @@ fn evidential(swept: impl Fn(DVec2) -> bool) -> Planner {
             row: index as u32 / frame.cells,
         };
         if *state == CellState::Free as u8 && swept(frame.centre_of(cell)) {
-            *state = CellState::Swept as u8;
+            *state = CellState::Scanned as u8;
         }
     }
     let mut planner = Planner::new(&mission);

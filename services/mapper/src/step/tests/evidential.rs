@@ -45,7 +45,7 @@ fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept(
     // The hit is at 0.9; the body and its clearance reach 0.22 m and half a cell around.
     assert!(state(&mapper, 0.9, 0.0).is_hazard());
     assert_eq!(state(&mapper, 0.7, 0.0), CellState::Margin);
-    assert_eq!(state(&mapper, 0.5, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, 0.5, 0.0), CellState::Scanned);
     assert_eq!(state(&mapper, 0.5, 0.5), CellState::Free);
     assert_eq!(mapper.state().safety_events(), 1);
 }
@@ -93,7 +93,7 @@ fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
     let mut mapper = mapper(INFRARED);
     see(&mut mapper, 0, rear(0.6));
     // What it sees is at -0.79; the body and its clearance reach 0.22 m and half a cell around.
-    assert_eq!(state(&mapper, -0.4, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, -0.4, 0.0), CellState::Scanned);
     assert!(state(&mapper, -0.8, 0.0).is_hazard());
     assert!(!state(&mapper, -0.5, 0.0).is_hazard());
     assert_eq!(state(&mapper, -1.2, 0.0), CellState::Free);
@@ -105,7 +105,7 @@ fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
 fn an_infrared_ranger_that_sees_nothing_frees_ground_only_if_it_is_live() {
     let mut live = mapper(INFRARED);
     see(&mut live, 0, rear(0.81));
-    assert_eq!(state(&live, -0.8, 0.0), CellState::Swept);
+    assert_eq!(state(&live, -0.8, 0.0), CellState::Scanned);
     assert_eq!(live.state().safety_events(), 0);
     let mut dead = mapper(INFRARED);
     see(&mut dead, 0, [0; 7]);
@@ -121,7 +121,7 @@ fn an_infrared_ranger_that_sees_nothing_frees_ground_only_if_it_is_live() {
 fn an_infrared_reading_nearer_than_10_cm_frees_nothing() {
     let mut near = mapper(INFRARED);
     see(&mut near, 0, rear(0.81));
-    assert_eq!(state(&near, -0.5, 0.0), CellState::Swept);
+    assert_eq!(state(&near, -0.5, 0.0), CellState::Scanned);
     let mut nearer = mapper(INFRARED);
     see(&mut nearer, 0, rear(0.09));
     assert!(state(&nearer, -0.3, 0.0).is_hazard());
@@ -158,7 +158,7 @@ fn a_false_echo_is_gone_after_a_look_without_an_echo_at_it() {
         let heading = 0.1 * (tick as f64 - 5.0);
         hear(&mut mapper, tick, 0.0, heading, None);
     }
-    assert_eq!(state(&mapper, 0.6, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, 0.6, 0.0), CellState::Scanned);
 }
 
 #[test]
@@ -197,19 +197,19 @@ fn an_echo_beyond_reach_is_not_mapped() {
     let mut mapper = mapper("");
     hear(&mut mapper, 0, 0.0, 0.0, Some(1.4));
     assert_eq!(mapper.state().safety_events(), 0);
-    assert_eq!(state(&mapper, 1.0, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, 1.0, 0.0), CellState::Scanned);
 }
 
 #[test]
 fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
     hear(&mut mapper, 0, 0.0, 0.0, None);
-    assert_eq!(state(&mapper, 0.9, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, 0.9, 0.0), CellState::Scanned);
     // Six turns on the spot: 4.9 m of each wheel; the beam looks the other way at the end.
     let heading = 13.0 * std::f64::consts::PI;
     hear(&mut mapper, 1, 0.0, heading, None);
     assert_eq!(state(&mapper, 0.9, 0.0), CellState::Free);
-    assert_eq!(state(&mapper, -0.9, 0.0), CellState::Swept);
+    assert_eq!(state(&mapper, -0.9, 0.0), CellState::Scanned);
 }
 
 #[test]

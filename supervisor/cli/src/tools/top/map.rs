@@ -33,7 +33,7 @@ pub(super) const ROBOT_STYLE: Style = Style::new().fg(Color::White).add_modifier
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Square {
     Free,
-    Swept,
+    Scanned,
     Margin,
     Perimeter,
     Known,
@@ -44,7 +44,7 @@ impl Square {
     const fn of(cell: u8) -> Self {
         match CellState::from_byte(cell) {
             CellState::Free => Self::Free,
-            CellState::Swept => Self::Swept,
+            CellState::Scanned => Self::Scanned,
             CellState::Margin => Self::Margin,
             CellState::Perimeter => Self::Perimeter,
             CellState::Known => Self::Known,
@@ -55,7 +55,7 @@ impl Square {
     /// Its colour, if it is a hazard.
     const fn hazard(self) -> Option<Color> {
         match self {
-            Self::Free | Self::Swept => None,
+            Self::Free | Self::Scanned => None,
             Self::Margin => Some(Color::Indexed(94)),
             Self::Perimeter => Some(Color::DarkGray),
             Self::Known => Some(Color::Blue),
@@ -167,7 +167,7 @@ fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) 
     };
     let (above, below) = (square(2 * line), square(2 * line + 1));
     let ground = |square| match square {
-        Square::Swept => SCANNED,
+        Square::Scanned => SCANNED,
         _ => Color::Reset,
     };
     match (above.hazard(), below.hazard()) {
