@@ -26,8 +26,18 @@ macro_rules! stamped {
     )*};
 }
 
-/// What a byte on the bus stands for.
+/// What a byte on the bus stands for; each value may have a text.
 macro_rules! wire_enum {
+    ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident, text = $text:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal $words:literal),* $(,)? }) => {
+        wire_enum! { $(#[$meta])* $name, unknown = $unknown { $($(#[$doc])* $variant = $byte),* } }
+        impl $name {
+            /// In a few words.
+            #[must_use]
+            pub const fn $text(self) -> &'static str {
+                match self { $(Self::$variant => $words),* }
+            }
+        }
+    };
     ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal),* $(,)? }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -65,59 +65,59 @@ pub struct WheelSample {
 wire_enum! {
     /// What the link's failsafe does with the robot, the least severe first.
     #[derive(PartialOrd, Ord)]
-    Action, unknown = Stop {
+    Action, unknown = Stop, text = effect {
         /// Commands pass as they are.
-        Go = 0,
+        Go = 0 "goes",
         /// Commands pass at a fraction of their speed, along the same curve.
-        Slow = 1,
+        Slow = 1 "goes at half speed",
         /// The robot stands; it drives again when the cause has ended.
-        Stop = 2,
+        Stop = 2 "stands",
         /// The robot stands until the process ends: the mission is over.
-        End = 3,
+        End = 3 "stands, and the mission ends",
     }
 }
 
 wire_enum! {
-    /// Why the link's failsafe does it; `firsthand failsafe` explains each.
-    Cause, unknown = NotOrdered {
+    /// The cause for which the link's failsafe acts; `firsthand failsafe` explains each.
+    Cause, unknown = NotOrdered, text = name {
         /// Nothing is wrong.
-        None = 0,
+        None = 0 "nothing is wrong",
         /// The supervisor has not ordered to drive.
-        NotOrdered = 1,
+        NotOrdered = 1 "no order to drive",
         /// The supervisor ends the mission.
-        MissionOver = 2,
+        MissionOver = 2 "mission over",
         /// A battery that the robot drives on is empty.
-        BatteryEmpty = 3,
+        BatteryEmpty = 3 "battery empty",
         /// An operator has asked for a stop.
-        OperatorStop = 4,
+        OperatorStop = 4 "stopped by an operator",
         /// A stage is held.
-        StageHeld = 5,
+        StageHeld = 5 "stage held",
         /// The supervisor publishes nothing any more.
-        SupervisorSilent = 6,
+        SupervisorSilent = 6 "supervisor silent",
         /// The robot does not answer; stops are sent in case it receives them.
-        RobotLost = 7,
+        RobotLost = 7 "robot lost",
         /// No command yet, or the newest is too old: a stage is down or slow.
-        CommandStale = 8,
+        CommandStale = 8 "command stale",
         /// The command was computed from too old a pose.
-        PoseStale = 9,
+        PoseStale = 9 "pose stale",
         /// The command follows too old a guidance.
-        GuidanceStale = 10,
+        GuidanceStale = 10 "guidance stale",
         /// A battery that the robot drives on is low.
-        BatteryLow = 11,
+        BatteryLow = 11 "battery low",
         /// What was commanded and what the encoders say disagree.
-        OdometryImplausible = 12,
+        OdometryImplausible = 12 "odometry implausible",
         /// They have disagreed for so long that the mission ends.
-        OdometryGivenUp = 13,
+        OdometryGivenUp = 13 "odometry implausible for long",
         /// The robot was told to stand, and its encoders say that it moves.
-        RobotDoesNotStop = 14,
+        RobotDoesNotStop = 14 "robot does not obey",
         /// The robot answers and sends no motor frames.
-        FramesSilent = 15,
+        FramesSilent = 15 "motor frames missing",
         /// Motor frames come less often than commands last.
-        FramesSlow = 16,
+        FramesSlow = 16 "motor frames too slow",
         /// The front sonar of a mission that senses gives no readings.
-        RangeSilent = 17,
+        RangeSilent = 17 "front sonar silent",
         /// What the robot sends is old.
-        RobotLate = 18,
+        RobotLate = 18 "robot late",
     }
 }
 

@@ -11,7 +11,7 @@ use common::{
     },
 };
 
-use crate::stop_monitor::StopMethod;
+use crate::failsafe::stop_monitor::StopMethod;
 
 /// Steering rate for each angle that is left, over the ticks of a second: below 1, so that the delay of a speed loop does
 /// not make the steering swing.

@@ -18,10 +18,12 @@ use common::{
 };
 
 use crate::{
-    failsafe::{self, Charge, Decision},
+    failsafe::{
+        Decision,
+        battery::{BatteryChange, Charge},
+    },
     replay::{Carried, Entry, Taken, WIRE_PIECE},
     step::{Effect, Event, Input, Link, State},
-    telemetry::BatteryChange,
     transport::{Transport, TransportError},
     writers::Writers,
 };
@@ -236,13 +238,13 @@ fn log_battery(change: &BatteryChange) {
             volts,
             "battery low: charge it, or set robot.low_battery_v"
         ),
-        Charge::Well => tracing::info!(pack, volts, "battery well again"),
+        Charge::Enough => tracing::info!(pack, volts, "the battery gives enough again"),
     }
 }
 
 fn log_decision(before: Decision, now: Decision) {
-    let robot = failsafe::effect(now.action);
-    let cause = failsafe::name(now.cause);
+    let robot = now.action.effect();
+    let cause = now.cause.name();
     // The end of a mission is no fault.
     if now.action > before.action && now.cause != Cause::MissionOver {
         tracing::warn!(robot, cause, "failsafe");

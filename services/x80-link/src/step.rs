@@ -25,9 +25,12 @@ use common::{
 
 use crate::{
     drive::Drive,
-    failsafe::{Decision, SLOW_SHARE},
-    presence::{Absence, Presence},
-    robot_health::RobotHealth,
+    failsafe::{
+        Decision, Failsafe, Monitors, SLOW_SHARE,
+        monitor::{Moment, Observation},
+        presence::Absence,
+        restart::RestartWatch,
+    },
     telemetry::Telemetry,
 };
 
@@ -68,14 +71,6 @@ struct Repeat {
     due: MissionTime,
 }
 
-/// The supervisor's newest directive.
-#[derive(Clone, Copy, Debug)]
-struct NewestDirective {
-    order: Order,
-    reason: HoldReason,
-    heard_ns: u64,
-}
-
 /// The link to one robot.
 #[derive(Debug)]
 pub struct Link {
@@ -86,10 +81,9 @@ pub struct Link {
     sonar_index: usize,
     half_period_ns: u64,
     decoder: Decoder,
-    directive: Option<NewestDirective>,
-    presence: Presence,
+    failsafe: Failsafe,
+    restart: RestartWatch,
     pinged_ns: Option<u64>,
-    health: RobotHealth,
     telemetry: Telemetry,
     /// The front sonar's byte and the infrared rangers' counts, for the next tick.
     sonar: Option<u8>,
@@ -124,11 +118,10 @@ impl Step for Link {
             sonar_index: usize::from(mission.sonar.index),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             decoder: Decoder::default(),
-            directive: None,
-            presence: Presence::new(mission),
+            failsafe: Failsafe::new(mission),
+            restart: RestartWatch::new(mission),
             pinged_ns: None,
-            health: RobotHealth::new(mission),
-            telemetry: Telemetry::new(mission.robot.low_battery_v),
+            telemetry: Telemetry::default(),
             sonar: None,
             infrared: None,
             wheels: WheelSample::default(),
@@ -154,8 +147,7 @@ impl Step for Link {
 
     fn restore(&mut self, state: State) -> Result<(), ForeignState> {
         self.state = state;
-        self.presence.set_pace(state.pace);
-        self.health.set_pace(state.pace);
+        self.observe(Observation::Pace(state.pace), 0);
         Ok(())
     }
 
@@ -182,7 +174,7 @@ impl Step for Link {
             .iter()
             .any(|effect| matches!(effect, Effect::Send(_)))
         {
-            self.health.sent(now_ns);
+            self.observe(Observation::Sent, now_ns);
         }
         effects
     }
@@ -191,8 +183,8 @@ impl Step for Link {
 impl Link {
     /// Whether the robot answers.
     #[must_use]
-    pub const fn connected(&self) -> bool {
-        self.presence.connected()
+    pub fn connected(&self) -> bool {
+        self.monitors().presence.connected()
     }
 
     /// What the failsafe does, and why.
@@ -216,7 +208,7 @@ impl Link {
     /// Times the robot was seen to have restarted its counts.
     #[must_use]
     pub const fn restarts(&self) -> u32 {
-        self.health.restarts()
+        self.restart.restarts()
     }
 
     /// Whether the encoders say that no wheel turns. in lockstep a robot that is held is given no time.
@@ -225,26 +217,26 @@ impl Link {
         if self.in_ticks() {
             self.decision.stops()
         } else {
-            self.presence.connected() && self.health.is_at_rest()
+            self.connected() && self.monitors().stop.is_at_rest()
         }
     }
 
     /// What was seen of `cause`, and what to do about it.
     #[must_use]
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
-        self.health.explain(cause, now_ns, self.presence.silence())
+        self.failsafe.explain(cause, self.moment(now_ns))
     }
 
     /// How long the robot has been away, at `now_ns` of the monotonic clock.
     #[must_use]
     pub fn absence(&self, now_ns: u64) -> Absence {
-        self.presence.absence(now_ns)
+        self.monitors().presence.absence(now_ns)
     }
 
     /// Times the robot was lost.
     #[must_use]
-    pub const fn losses(&self) -> u64 {
-        self.presence.losses()
+    pub fn losses(&self) -> u64 {
+        self.monitors().presence.losses()
     }
 
     /// What is sent when the stage stops: the robot stands.
@@ -253,17 +245,28 @@ impl Link {
         (0..STOPS).map(|_| self.drive.stop()).collect()
     }
 
-    fn ordered_to_drive(&self) -> bool {
-        self.directive
-            .is_some_and(|directive| directive.order == Order::Drive)
+    const fn monitors(&self) -> &Monitors {
+        &self.failsafe.monitors
     }
 
-    /// Whether ticks go on although the robot is to stand: it may be carried meanwhile. A clock of ticks stands with it.
+    const fn moment(&self, machine_ns: u64) -> Moment {
+        Moment {
+            time: self.now,
+            machine_ns,
+        }
+    }
+
+    fn observe(&mut self, what: Observation<'_>, now_ns: u64) {
+        self.failsafe.observe(&what, self.moment(now_ns));
+    }
+
+    fn ordered_to_drive(&self) -> bool {
+        self.monitors().orders.drive()
+    }
+
+    /// Whether ticks go on although the robot is to stand: it may be carried meanwhile. In lockstep mission time stands.
     fn held_by_operator(&self) -> bool {
-        !self.in_ticks()
-            && self
-                .directive
-                .is_some_and(|directive| directive.reason == HoldReason::Operator)
+        !self.in_ticks() && self.monitors().orders.by_operator()
     }
 
     fn in_ticks(&self) -> bool {
@@ -293,7 +296,7 @@ impl Link {
             self.state.next_tick += 1;
         }
         let wheels = WheelSample {
-            restarts: self.health.restarts(),
+            restarts: self.restart.restarts(),
             ..self.drive.wheels(sensors)
         };
         self.wheels = wheels;
@@ -338,6 +341,7 @@ impl Link {
             return;
         }
         self.newest_command = Some(*command);
+        self.observe(Observation::Command(command), now_ns);
         let decision = self.decide(now_ns);
         if decision.stops() {
             return;
@@ -350,7 +354,7 @@ impl Link {
             CommandState::Driving => self.drive.counts(command, share, &self.wheels),
             CommandState::Halt | CommandState::Arrived => [0, 0],
         };
-        self.tell(counts, self.drive.limit(), effects);
+        self.tell(counts, self.drive.limit(), now_ns, effects);
         let stamp = command.stamp.time();
         self.repeat = Some(Repeat {
             counts,
@@ -377,15 +381,10 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         let drives = order == Order::Drive && !self.ordered_to_drive();
-        let operator = |newest: NewestDirective| newest.reason == HoldReason::Operator;
-        if drives && self.directive.is_some_and(operator) {
-            self.health.reset();
+        if drives && self.monitors().orders.by_operator() {
+            self.observe(Observation::Resumed, now_ns);
         }
-        self.directive = Some(NewestDirective {
-            order,
-            reason,
-            heard_ns: now_ns,
-        });
+        self.observe(Observation::Directive(order, reason), now_ns);
         if drives && self.in_ticks() {
             // A robot that waits for commands tells its state again when pinged: tick 0.
             self.ping(now_ns, effects);
@@ -435,7 +434,7 @@ impl Link {
         if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
             return;
         }
-        self.tell(repeat.counts, left, effects);
+        self.tell(repeat.counts, left, now_ns, effects);
         self.tally.repeated_commands += 1;
     }
 }

@@ -117,9 +117,10 @@ fn arrived(snapshot: &Snapshot<'_>) -> Option<Ending> {
 fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
     let link = snapshot.link.filter(|link| link.action() == Action::End)?;
     let rule = failsafe::rule(link.cause())?;
-    let reason = format!("{}: {}", rule.name, rule.when);
+    let name = rule.cause.name();
+    let reason = format!("{name}: {}", rule.when);
     Some(Ending {
-        cause: Some(rule.name),
+        cause: Some(name),
         ..Ending::failed(Outcome::Aborted, reason)
     })
 }

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use common::samples::{Action, Cause};
-use x80_link::failsafe;
 
 use crate::observer::Record;
 
@@ -43,8 +42,8 @@ impl fmt::Display for Progress<'_> {
         match link.action() {
             Action::Go => Ok(()),
             action => {
-                let cause = failsafe::name(link.cause()).to_uppercase();
-                write!(f, ", {cause}: the robot {}", failsafe::effect(action))
+                let cause = link.cause().name().to_uppercase();
+                write!(f, ", {cause}: the robot {}", action.effect())
             }
         }
     }

@@ -167,7 +167,7 @@ impl Events {
             let text = match (link.action(), link.cause()) {
                 (Action::Go, _) => "commands pass".to_owned(),
                 (action, Cause::None) => words(action),
-                (action, cause) => format!("{}: {}", words(action), words(cause)),
+                (action, cause) => format!("{}: {}", words(action), cause.name()),
             };
             self.add(&link.stamp, FAILSAFE, Symbol::Event, text);
         }

@@ -10,7 +10,7 @@ use common::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{failsafe::Decision, stop_monitor::StopMethod, telemetry::BatteryChange};
+use crate::failsafe::{Decision, battery::BatteryChange, stop_monitor::StopMethod};
 
 /// How mission time passes, and where the ticks of this link begin. The run says the one, and the supervisor the other:
 /// it hears the ticks, so the link writes no checkpoint.

@@ -1,13 +1,18 @@
 //! What the robot sends, and whether it is there.
 
-use common::wire::{Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal};
+use common::wire::{
+    COUNT_CYCLE, Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal,
+};
 
 use super::{Effect, Link, PING_EVERY, passed};
-use crate::{drive::encoded, restart::Counts};
+use crate::{
+    drive::encoded,
+    failsafe::monitor::{Counts, Observation},
+};
 
 impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.presence.wire(open);
+        self.failsafe.monitors.presence.wire(open);
         // Half a frame of one connection does not go on in the next.
         self.decoder.reset();
         if !open {
@@ -27,7 +32,9 @@ impl Link {
                 Ok(Report::Custom(sensors)) => custom = Some(sensors),
                 Ok(Report::Motor(sensors)) => motor = Some(sensors),
                 Ok(Report::System(SystemSignal::Ping)) => ping = true,
-                Ok(Report::System(SystemSignal::Ack)) => self.health.acknowledged(now_ns),
+                Ok(Report::System(SystemSignal::Ack)) => {
+                    self.observe(Observation::Acknowledged, now_ns);
+                }
                 // A frame nobody here needs only says that the robot is there.
                 Err(_) => {}
             }
@@ -40,19 +47,20 @@ impl Link {
         if counts == Some(Counts::Elsewhere) {
             effects.push(Effect::CountsElsewhere);
         }
-        if counts == Some(Counts::Restarted) {
+        if matches!(counts, Some(Counts::Restarted { .. })) {
             effects.push(Effect::Restarted);
-            if self.presence.connected() {
-                // It is as it was when it booted.
+            if self.connected() {
+                // It has the settings that it boots with.
                 effects.push(Effect::Send(self.drive.greeting()));
             }
         }
-        if let (Some(_), Some(byte)) = (standard, self.sonar) {
-            self.health.range(byte, now_ns);
+        if let Some(standard) = &standard {
+            self.observe(Observation::Standard(standard), now_ns);
         }
         self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
-        if heard && self.presence.heard(now_ns) {
-            self.health.found(now_ns, self.presence.losses() > 0);
+        if heard && self.failsafe.monitors.presence.heard(now_ns) {
+            let again = self.losses() > 0;
+            self.observe(Observation::Found { again }, now_ns);
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
             // It may be driving still by a command of an earlier link.
@@ -71,7 +79,7 @@ impl Link {
         }
         // Nothing is computed from counts that cannot be true.
         if let Some(sensors) = motor
-            && counts != Some(Counts::Disbelieved)
+            && counts != Some(Counts::Implausible)
         {
             self.begin_tick(&sensors, now_ns, effects);
         }
@@ -85,8 +93,11 @@ impl Link {
         }
         let wheels = self.drive.wheels(sensors);
         let counts = [wheels.left_counts, wheels.right_counts];
-        let was_away = !self.presence.connected();
-        self.health.motor(counts, was_away, self.now, now_ns)
+        let counts = counts.map(|count| count % COUNT_CYCLE);
+        let was_away = !self.connected();
+        let are = self.restart.step(counts, was_away, self.now);
+        self.observe(Observation::Motor(counts, are), now_ns);
+        are
     }
 
     /// What the frames carry besides the tick.
@@ -101,10 +112,11 @@ impl Link {
             self.telemetry.take_motor(motor);
         }
         if let Some(standard) = standard {
-            let (power, surroundings, changes) = self.telemetry.take_standard(standard, self.now);
+            let battery = &mut self.failsafe.monitors.battery;
+            let (power, surroundings) = self.telemetry.take_standard(standard, battery.low());
             effects.push(Effect::Power(power));
             effects.push(Effect::Surroundings(surroundings));
-            effects.extend(changes.into_iter().map(Effect::Battery));
+            effects.extend(battery.take_changes().into_iter().map(Effect::Battery));
         }
         if let Some(infrared) = custom.and_then(|custom| self.telemetry.take_custom(custom)) {
             self.infrared = Some(infrared.raw_ad);
@@ -114,7 +126,7 @@ impl Link {
 
     pub(super) fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.pinged_ns = Some(now_ns);
-        self.presence.pinged(now_ns);
+        self.failsafe.monitors.presence.pinged(now_ns);
         if self.ordered_to_drive() {
             self.due += 1;
         }
@@ -122,21 +134,22 @@ impl Link {
     }
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let silent = self.presence.is_silent(now_ns);
+        let silent = self.monitors().presence.is_silent(now_ns);
         // A robot that waits for a command is not lost; at most a datagram is, if it owes us a tick.
         let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
         }
         if !self.in_ticks()
-            && self.presence.connected()
-            && self.health.wants_streams(now_ns, self.presence.silence())
+            && self.connected()
+            && !self.monitors().latency.is_testing()
+            && self.failsafe.monitors.streams.wants_request(now_ns)
         {
             effects.push(Effect::Send(self.drive.streams()));
             effects.push(Effect::AskedForStreams);
         }
-        let owing = self.in_ticks() && owes && silent && self.presence.connected();
-        if self.presence.wants_ping(now_ns) {
+        let owing = self.in_ticks() && owes && silent && self.connected();
+        if self.failsafe.monitors.presence.wants_ping(now_ns) {
             self.ping(now_ns, effects);
         } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
             // What was due is lost.
@@ -146,10 +159,11 @@ impl Link {
     }
 
     pub(super) fn lose(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        if !self.presence.lose(now_ns) {
+        if !self.failsafe.monitors.presence.lose(now_ns) {
             return;
         }
-        self.health.lost();
+        self.restart.lost();
+        self.observe(Observation::Lost, now_ns);
         effects.push(Effect::Connected(false));
     }
 }

@@ -19,7 +19,6 @@ use common::{
     topics,
 };
 use serde::Serialize;
-use x80_link::failsafe;
 
 use crate::console::{
     failure::Failure,
@@ -188,8 +187,8 @@ fn link_status(link: &LinkSample) -> LinkStatus {
     LinkStatus {
         connected,
         stopped: link.stopped(),
-        robot: failsafe::effect(link.action()),
-        cause: (link.action() != Action::Go).then(|| failsafe::name(link.cause())),
+        robot: link.action().effect(),
+        cause: (link.action() != Action::Go).then(|| link.cause().name()),
         at_rest: link.at_rest == 1,
         lost_s: while_lost(link.lost_ns),
         attempts: link.attempts,

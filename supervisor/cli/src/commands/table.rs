@@ -115,10 +115,10 @@ fn failsafe() -> String {
         let _ = writeln!(
             table,
             "| {} | {} | {} | {} |",
-            rule.name,
+            rule.cause.name(),
             rule.when,
-            failsafe::effect(rule.action),
-            rule.until
+            rule.action.effect(),
+            rule.clears
         );
     }
     table

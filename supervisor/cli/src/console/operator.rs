@@ -20,7 +20,6 @@ use common::{
 };
 use rustix::process::Signal;
 use supervisor::stages::{self, Stage};
-use x80_link::failsafe;
 
 use super::failure::{Failure, Refused};
 
@@ -56,7 +55,7 @@ fn await_rest(robot: &RobotName) -> Result<(), Failure> {
         Some(link) if link.connected == 0 => {
             "it does not answer; it is ordered to stand when it does".to_owned()
         }
-        Some(link) => format!("{}: it moves", failsafe::name(link.cause())),
+        Some(link) => format!("{}: it moves", link.cause().name()),
     };
     let message = format!(
         "robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`",

@@ -22,7 +22,6 @@ use supervisor::{
     process::{Process, firsthand},
     simulator::Simulator,
 };
-use x80_link::failsafe;
 
 use crate::chaos::{
     error::{ChaosError, system},
@@ -222,7 +221,7 @@ impl Observed {
         let summary: serde_json::Value = serde_json::from_slice(summary).unwrap_or_default();
         let word = |key: &str| summary[key].as_str().unwrap_or_default().to_owned();
         let stopped = self.link.filter(LinkSample::stopped);
-        let cause = stopped.map_or("", |link| failsafe::name(link.cause()));
+        let cause = stopped.map_or("", |link| link.cause().name());
         let (mut outcome, reason) = if self.ended_by_itself {
             (word("outcome"), word("reason"))
         } else {

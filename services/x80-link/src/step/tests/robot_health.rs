@@ -58,7 +58,7 @@ fn a_robot_whose_counts_stay_while_it_is_told_to_drive_stands_in_time_and_its_mi
 }
 
 #[test]
-fn an_operators_stop_and_resume_let_a_doubted_robot_go_on_and_its_wait_is_no_end() {
+fn an_operators_stop_and_resume_let_a_suspected_robot_go_on_and_its_wait_is_no_end() {
     let mut link = driving(on_the_wall());
     drive(&mut link, 0..10, |_| datagram(255, 0, 0));
     assert_eq!(link.decision().cause, Cause::OdometryImplausible);
@@ -87,7 +87,7 @@ fn counts_that_cannot_be_true_give_no_tick() {
 }
 
 #[test]
-fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_means_in_turn() {
+fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     let mut link = driving(on_the_wall());
     let (mut tried, mut seen) = (Vec::new(), None);
     for number in 0..30 {

@@ -11,7 +11,6 @@ use ratatui::{
     text::{Line, Span},
     widgets::{Paragraph, Row, Table, TableState, Wrap},
 };
-use x80_link::failsafe;
 
 use super::{
     action::KEYS,
@@ -322,11 +321,11 @@ fn robot_words(link: &LinkSample) -> (String, Style) {
         let lost = age(Some(link.lost_ns as f64 * 1e-9));
         return (format!("LOST for {lost}"), BAD);
     }
-    let does = failsafe::effect(link.action());
+    let does = link.action().effect();
     match link.action() {
         Action::Go => (does.to_owned(), Style::new()),
         _ => {
-            let cause = failsafe::name(link.cause());
+            let cause = link.cause().name();
             (format!("{does}: {cause}"), Style::new().fg(Color::Yellow))
         }
     }

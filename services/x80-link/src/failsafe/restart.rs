@@ -1,8 +1,8 @@
 //! Whether the counts of a frame can follow those before.
 //!
-//! A robot that was switched off and on, or got another battery, begins its counts anew. What it counted before is gone, and
-//! the step in the counts is no motion. Other counts that lie farther off than wheels turn are disbelieved, and those
-//! after them are held against the last that was believed: one old frame between good ones costs nothing.
+//! A robot that was switched off and on, or got another battery, restarts its counts, and the step in the counts is no
+//! motion. Other counts that lie farther off than wheels turn are implausible, and later ones are compared with the last
+//! plausible ones: one old frame between good ones costs nothing.
 
 use common::{
     clock::MissionTime,
@@ -10,33 +10,22 @@ use common::{
     wire::{counts_between, counts_restarted},
 };
 
-/// Counts are disbelieved when they are this many times as far as the wheels get at their top speed.
+use super::monitor::Counts;
+
+/// Counts are implausible from so many times the distance that wheels reach at their top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// Counts that follow each other in so many frames are where the robot counts now.
+/// Implausible counts that follow each other in so many frames are taken for the robot's own.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
-/// What the counts of a frame are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Counts {
-    /// Those of wheels that turned since the frame before.
-    Follow,
-    /// The first after the robot restarted: what lies between is no motion.
-    Restarted,
-    /// Nothing that wheels can have done, but those after them follow: what lies between is no motion.
-    Elsewhere,
-    /// Nothing that wheels can have done.
-    Disbelieved,
-}
-
-/// The counts that were believed last, and whether the robot was away since.
+/// The last plausible counts, and whether the robot was lost since.
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
-    /// The newest that are disbelieved, and how many of them follow each other.
+    /// The newest implausible counts, and how many of them follow each other.
     suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
     restarts: u32,
-    /// The most a wheel turns in a second.
+    /// Counts of a wheel in a second at its top speed.
     top_counts: f64,
     /// Frames come this much too late or too early, seconds.
     jitter_s: f64,
@@ -62,9 +51,10 @@ impl RestartWatch {
         self.away = true;
     }
 
-    /// What the counts of channels 0 and 1 are. After an absence it is enough for a restart that both stand where a robot
-    /// begins; otherwise they must also have come there faster than wheels turn.
-    pub fn step(&mut self, counts: [u16; 2], now: MissionTime) -> Counts {
+    /// Classify the counts of channels 0 and 1 of a robot that `was_away` until this frame, or was not. After an absence
+    /// it is enough for a restart that both stand where a robot begins; otherwise they must also have come there faster
+    /// than wheels turn.
+    pub fn step(&mut self, counts: [u16; 2], was_away: bool, now: MissionTime) -> Counts {
         let away = std::mem::take(&mut self.away);
         let Some((before, then)) = self.last else {
             self.last = Some((counts, now));
@@ -73,7 +63,7 @@ impl RestartWatch {
         let share = self.share_of_reach(before, then, counts, now);
         if counts_restarted(before, counts) && (away || share > 1.0) {
             self.begin_at(counts, now);
-            return Counts::Restarted;
+            return Counts::Restarted { was_away };
         }
         if share <= IMPLAUSIBLE {
             (self.last, self.suspected) = (Some((counts, now)), None);
@@ -88,7 +78,7 @@ impl RestartWatch {
             return Counts::Elsewhere;
         }
         self.suspected = Some((counts, now, following));
-        Counts::Disbelieved
+        Counts::Implausible
     }
 
     fn begin_at(&mut self, counts: [u16; 2], now: MissionTime) {
@@ -110,7 +100,7 @@ impl RestartWatch {
         f64::from(farthest.unwrap_or_default()) / reach
     }
 
-    /// How often that happened.
+    /// Times the counts restarted or went on elsewhere.
     #[must_use]
     pub const fn restarts(&self) -> u32 {
         self.restarts
@@ -135,14 +125,17 @@ mod tests {
     fn counts_that_begin_anew_after_an_absence_are_a_restart() {
         let mut watch = watch();
         assert_eq!(
-            watch.step([32_168, 600], at(0.0)),
+            watch.step([32_168, 600], false, at(0.0)),
             Counts::Follow,
             "the first frame"
         );
         watch.lost();
-        assert_eq!(watch.step([0, 1], at(3.0)), Counts::Restarted);
         assert_eq!(
-            watch.step([32_700, 68], at(3.1)),
+            watch.step([0, 1], false, at(3.0)),
+            Counts::Restarted { was_away: false }
+        );
+        assert_eq!(
+            watch.step([32_700, 68], false, at(3.1)),
             Counts::Follow,
             "it drives on"
         );
@@ -152,60 +145,72 @@ mod tests {
     #[test]
     fn a_robot_that_comes_back_with_its_counts_is_no_restart() {
         let mut watch = watch();
-        watch.step([32_168, 600], at(0.0));
+        watch.step([32_168, 600], false, at(0.0));
         watch.lost();
-        assert_eq!(watch.step([32_000, 768], at(3.0)), Counts::Follow);
+        assert_eq!(watch.step([32_000, 768], false, at(3.0)), Counts::Follow);
         watch.lost();
         // It stood at its start all the time.
-        watch.step([3, 32_765], at(6.0));
+        watch.step([3, 32_765], false, at(6.0));
         watch.lost();
-        assert_eq!(watch.step([0, 0], at(9.0)), Counts::Follow);
+        assert_eq!(watch.step([0, 0], false, at(9.0)), Counts::Follow);
     }
 
     #[test]
     fn a_robot_that_turns_back_through_its_start_is_no_restart() {
         let mut watch = watch();
-        watch.step([300, 300], at(0.0));
-        assert_eq!(watch.step([2, 1], at(0.143)), Counts::Follow);
-        watch.step([800, 900], at(0.5));
+        watch.step([300, 300], false, at(0.0));
+        assert_eq!(watch.step([2, 1], false, at(0.143)), Counts::Follow);
+        watch.step([800, 900], false, at(0.5));
         assert_eq!(
-            watch.step([0, 0], at(0.643)),
-            Counts::Restarted,
+            watch.step([0, 0], false, at(0.643)),
+            Counts::Restarted { was_away: false },
             "nothing turns so fast"
         );
     }
 
     #[test]
-    fn an_old_frame_between_good_ones_is_disbelieved_and_is_not_what_the_next_are_held_against() {
+    fn an_old_frame_between_good_ones_is_implausible_and_the_next_are_not_compared_with_it() {
         let mut watch = watch();
         for tick in 0..7 {
             let now = at(0.143 * f64::from(tick));
-            watch.step([1000 + 112 * tick as u16, 5000], now);
+            watch.step([1000 + 112 * tick as u16, 5000], false, now);
         }
-        assert_eq!(watch.step([31_000, 2000], at(0.95)), Counts::Disbelieved);
-        assert_eq!(watch.step([1784, 5000], at(1.0)), Counts::Follow);
+        assert_eq!(
+            watch.step([31_000, 2000], false, at(0.95)),
+            Counts::Implausible
+        );
+        assert_eq!(watch.step([1784, 5000], false, at(1.0)), Counts::Follow);
         assert_eq!(watch.restarts(), 0);
     }
 
     #[test]
-    fn counts_that_go_on_elsewhere_are_believed_from_the_third_on() {
+    fn counts_that_go_on_elsewhere_are_plausible_from_the_third_on() {
         let mut watch = watch();
-        watch.step([1000, 1000], at(0.0));
-        assert_eq!(watch.step([9000, 17_000], at(0.143)), Counts::Disbelieved);
-        assert_eq!(watch.step([9100, 17_100], at(0.286)), Counts::Disbelieved);
-        assert_eq!(watch.step([9200, 17_200], at(0.429)), Counts::Elsewhere);
-        assert_eq!(watch.step([9300, 17_300], at(0.571)), Counts::Follow);
+        watch.step([1000, 1000], false, at(0.0));
+        assert_eq!(
+            watch.step([9000, 17_000], false, at(0.143)),
+            Counts::Implausible
+        );
+        assert_eq!(
+            watch.step([9100, 17_100], false, at(0.286)),
+            Counts::Implausible
+        );
+        assert_eq!(
+            watch.step([9200, 17_200], false, at(0.429)),
+            Counts::Elsewhere
+        );
+        assert_eq!(watch.step([9300, 17_300], false, at(0.571)), Counts::Follow);
         assert_eq!(watch.restarts(), 1, "what lies between is no motion");
     }
 
     #[test]
-    fn counts_that_jump_about_are_disbelieved_one_by_one() {
+    fn counts_that_jump_about_are_implausible_one_by_one() {
         let mut watch = watch();
-        watch.step([0, 0], at(0.0));
+        watch.step([0, 0], false, at(0.0));
         for tick in 1..5_u16 {
             let jump = tick.wrapping_mul(9973) % 32_768;
-            let are = watch.step([jump, 32_767 - jump], at(0.143 * f64::from(tick)));
-            assert_eq!(are, Counts::Disbelieved, "{tick}");
+            let are = watch.step([jump, 32_767 - jump], false, at(0.143 * f64::from(tick)));
+            assert_eq!(are, Counts::Implausible, "{tick}");
         }
     }
 }

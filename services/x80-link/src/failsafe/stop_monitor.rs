@@ -2,22 +2,24 @@
 
 use std::time::Duration;
 
-use common::{clock::MissionTime, mission::Mission, wire::counts_between};
+use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::counts_between};
+
+use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
 /// A robot that was told to stand is at rest after this: the delay and the lag of its speed loop, and a stop or two that
 /// were lost.
 const COMES_TO_REST: Duration = Duration::from_millis(600);
-/// So much of motion after that is disobedience: longer than it takes from a stop sent again until it shows.
+/// A robot that moves for so long after that does not stop: longer than a stop that is sent again takes to show.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
 /// A wheel moves from this speed on, m/s at the rim.
 const MOVES_M_S: f64 = 0.03;
-/// A wheel is at rest below this speed, m/s, or this many counts between two frames: encoders tremble.
+/// A wheel is at rest below this speed, m/s, or below so many counts between two frames: encoders tremble.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
-/// It is at rest when it has been for so long.
+/// The robot is at rest when its wheels have been for so long.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// A robot that did not obey does again when it has been at rest for so long.
-const OBEYS_AFTER: Duration = Duration::from_millis(500);
+/// A robot that does not stop is told so by the next method after so long.
+const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
 /// A way to make the robot stand. Each is tried in turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,9 +36,7 @@ pub enum StopMethod {
 }
 
 impl StopMethod {
-    /// The one to try after it.
-    #[must_use]
-    pub const fn next(self) -> Self {
+    const fn next(self) -> Self {
         match self {
             Self::Velocity => Self::Disable,
             Self::Disable => Self::Pwm,
@@ -57,7 +57,7 @@ impl StopMethod {
     }
 }
 
-/// The stop_monitor of one robot.
+/// How one robot obeys when it is told to stand.
 #[derive(Clone, Debug)]
 pub struct StopMonitor {
     counts_per_m: f64,
@@ -66,31 +66,15 @@ pub struct StopMonitor {
     frame: Option<([u16; 2], MissionTime)>,
     moving: Duration,
     resting: Duration,
-    does_not_stop: bool,
     method: StopMethod,
+    tried: Option<MissionTime>,
 }
 
 impl StopMonitor {
-    /// Of the robot of `mission`, of which nothing is known.
-    #[must_use]
-    pub fn new(mission: &Mission) -> Self {
-        Self {
-            counts_per_m: 1.0 / mission.body().metres_per_count(),
-            longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
-            told_to_stand: None,
-            frame: None,
-            moving: Duration::ZERO,
-            resting: Duration::ZERO,
-            does_not_stop: false,
-            method: StopMethod::Velocity,
-        }
-    }
-
-    /// The wheels were told these counts/s.
-    pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
+    fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         if counts == [0, 0] {
             if self.told_to_stand.is_none() {
-                // Rest before a command that was just sent shows in the wheels is none.
+                // A wheel that rests because the last command does not show yet is not at rest.
                 self.resting = Duration::ZERO;
                 self.told_to_stand = Some(now);
             }
@@ -101,8 +85,7 @@ impl StopMonitor {
         }
     }
 
-    /// The counts of a frame.
-    pub fn heard(&mut self, counts: [u16; 2], now: MissionTime) {
+    fn heard(&mut self, counts: [u16; 2], now: MissionTime) {
         let Some((before, then)) = self.frame.replace((counts, now)) else {
             return;
         };
@@ -129,29 +112,11 @@ impl StopMonitor {
         } else if self.told_to_stand.is_some_and(due) {
             self.moving += gap;
         }
-        self.does_not_stop = if self.does_not_stop {
-            self.resting < OBEYS_AFTER
-        } else {
-            self.moving >= DOES_NOT_STOP_AFTER
-        };
     }
 
-    /// It is unknown how the wheels turn.
-    pub const fn not_heard(&mut self) {
+    const fn not_heard(&mut self) {
         self.moving = Duration::ZERO;
         self.resting = Duration::ZERO;
-    }
-
-    /// The counts began anew.
-    pub const fn reset_counts(&mut self) {
-        self.frame = None;
-        self.not_heard();
-    }
-
-    /// Whether it moves although it was told to stand.
-    #[must_use]
-    pub const fn does_not_stop(&self) -> bool {
-        self.does_not_stop
     }
 
     /// Whether its encoders say that no wheel turns.
@@ -166,9 +131,60 @@ impl StopMonitor {
         self.method
     }
 
-    /// That did not help.
-    pub const fn try_next(&mut self) {
+    /// Take the next method when it is time for it; `does_not_stop` says whether the cause applies.
+    pub fn next_method(&mut self, does_not_stop: bool, now: MissionTime) -> Option<StopMethod> {
+        if !does_not_stop {
+            self.tried = None;
+            return None;
+        }
+        let recently = |tried| now.since(tried) < NEXT_METHOD_AFTER;
+        if self.tried.is_some_and(recently) {
+            return None;
+        }
+        self.tried = Some(now);
         self.method = self.method.next();
+        Some(self.method)
+    }
+}
+
+impl Monitor for StopMonitor {
+    fn new(mission: &Mission) -> Self {
+        Self {
+            counts_per_m: 1.0 / mission.body().metres_per_count(),
+            longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
+            told_to_stand: None,
+            frame: None,
+            moving: Duration::ZERO,
+            resting: Duration::ZERO,
+            method: StopMethod::Velocity,
+            tried: None,
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        match *what {
+            Observation::Commanded(counts) => self.commanded(counts, now.time),
+            Observation::Motor(counts, Counts::Follow) => self.heard(counts, now.time),
+            Observation::Motor(_, Counts::Restarted { .. } | Counts::Elsewhere) => {
+                self.frame = None;
+                self.not_heard();
+            }
+            Observation::Motor(_, Counts::Implausible) | Observation::Lost => self.not_heard(),
+            _ => {}
+        }
+    }
+
+    fn condition(&self, _: Cause, _: Moment) -> Condition {
+        if self.moving >= DOES_NOT_STOP_AFTER {
+            Condition::Holds
+        } else {
+            Condition::OverFor(self.resting)
+        }
+    }
+
+    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
+        let text = "it was told to stand and its encoders say that it moves; every method is tried in turn: velocity 0, disable, pulse width 0, suspend";
+        Some(text.to_owned())
     }
 }
 

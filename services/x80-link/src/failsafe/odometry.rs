@@ -1,52 +1,58 @@
 //! Whether the wheels turn as they were told, by their own encoders.
 //!
-//! What is compared: each wheel, and the difference of both, which a robot whose wheels are swapped turns the wrong way.
-//! An interval between two frames tells something of a wheel when it has been told the same direction for [`SETTLE`]
-//! before, at [`LEAST_M_S`] or more: 0.07 s of delay and 0.08 s of lag have passed then, and a dead band of 20 counts/s
-//! (9 mm/s) is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for;
-//! real ones give 0.75 to 0.8. Intervals that speak against a wheel add up, those that speak for it count down twice as
-//! fast, up to a limit. A wheel that turns the other way speaks against itself twice as much, and from [`TURNS_AFTER`]
-//! on: a controller whose robot turns away from where it should changes direction every other tick. At [`SUSPECTED_AFTER`]
-//! the robot must stand: at 7 Hz that is 0.86 s after a motion began, and it is at rest 0.2 s later. A wheel that is told to
-//! turn, this way or that, and does not count at all is doubted after [`STILL_AFTER`]: a controller whose pose turns the wrong
-//! way changes direction too often for the rest. Intervals longer than two periods tell nothing, since commands may have been
-//! lost as well.
+//! Each wheel is compared, and the difference of both, since a robot whose wheels are swapped turns the wrong way. An
+//! interval between two frames is evidence about a wheel once the wheel has been told the same direction for [`SETTLE`],
+//! at [`LEAST_M_S`] or more: 0.07 s of delay and 0.08 s of lag have passed then, and a dead band of 20 counts/s (9 mm/s)
+//! is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for; real
+//! wheels roll 0.75 to 0.8. Evidence against a wheel adds up, evidence for it counts down twice as fast, up to a limit. A
+//! wheel that turns the other way counts twice, and from [`TURNS_AFTER`] on, because a controller whose robot turns away
+//! from where it should changes direction every other tick. At [`SUSPECTED_AFTER`] the robot must stand: at 7 Hz that is
+//! 0.86 s after a motion began, and it is at rest 0.2 s later. A wheel that is told to turn and does not count at all is
+//! suspected after [`STILL_AFTER`], because a controller whose pose turns the wrong way changes direction too often for
+//! the other evidence. Intervals longer than two periods are no evidence, since commands may have been lost as well.
 //!
-//! Counts that jump farther than wheels turn are disbelieved one by one ([`crate::restart`]); [`MOST_JUMPS`] of them
-//! within [`JUMPS_WITHIN`] are doubted, too.
+//! Counts that jump farther than wheels turn are dropped one by one ([`super::restart`]); [`MOST_JUMPS`] of them within
+//! [`JUMPS_WITHIN`] are suspected, too.
 
 use std::{collections::VecDeque, time::Duration};
 
-use common::{clock::MissionTime, mission::Mission, wire::counts_between};
+use common::{
+    clock::MissionTime,
+    mission::Mission,
+    samples::{Cause, Order},
+    wire::counts_between,
+};
 
-/// A command says nothing of the counts before it has held so long.
+use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
+
+/// The counts are evidence once a command has held for so long.
 const SETTLE: Duration = Duration::from_millis(250);
-/// A wheel of such a robot has changed direction after this, though not come to its speed: 0.6 of it at 7 Hz.
+/// A real wheel has changed direction after so long, though not reached its speed: 0.6 of it at 7 Hz.
 const TURNS_AFTER: Duration = Duration::from_millis(100);
-/// The slowest motion that is judged, m/s at the rim.
+/// The slowest commanded motion that is judged, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
-/// The least difference of the wheels that is judged, m/s, and as a share of their mean speed: motors of two wheels
-/// differ by some hundredths.
+/// The least commanded difference of the wheels that is judged, m/s, and as a share of their mean speed: motors of two
+/// wheels differ by some hundredths.
 const LEAST_TURN_M_S: f64 = 0.1;
 const LEAST_TURN_SHARE: f64 = 0.25;
-/// The least share of what it was told that a wheel turns.
+/// A wheel turns at least this share of what it was told.
 const LEAST_SHARE: f64 = 0.25;
-/// So much evidence is enough: longer than a radio's commands are lost while its frames are heard.
+/// So much evidence is enough: a radio loses commands for a shorter time while its frames are heard.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// A wheel that counts nothing for so long while it is told to turn: commands may be lost before.
+/// A wheel that is told to turn may count nothing for so long: commands may be lost.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// So many counts that cannot be are too many.
+/// So many jumps are too many.
 pub(crate) const MOST_JUMPS: usize = 3;
-/// Within this time.
+/// Jumps are counted within this time.
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 /// Jumps are over after so long without any.
-const CALM: Duration = Duration::from_secs(2);
-/// So often jumps may be over by themselves: a robot whose counts jump when it moves stands still each time.
+pub(crate) const CALM: Duration = Duration::from_secs(2);
+/// Jumps may be over by themselves so often: the counts of a robot may jump only while it moves.
 const MOST_MENDED: u32 = 2;
-/// A mission whose robot is doubted for so long ends.
+/// A mission whose robot has been suspected for so long ends.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
-/// What is doubted.
+/// What is suspected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspicion {
     /// The left wheel, or that of a car, does not turn as told.
@@ -78,24 +84,12 @@ impl Suspicion {
     }
 }
 
-/// What is known of the odometry.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Plausibility {
-    /// Nothing speaks against it.
-    #[default]
-    Plausible,
-    /// It cannot be true.
-    Suspected,
-    /// It has not been true for [`GIVEN_UP_AFTER`].
-    GivenUp,
-}
-
-/// What speaks against one wheel, or against the difference of both.
+/// The evidence against one wheel, or against the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     /// What the two newest commands ask for, counts/s.
     asked: [f64; 2],
-    /// Since when in the same direction.
+    /// When the direction that is asked for last changed.
     since: MissionTime,
     against_s: f64,
     /// How long it has counted nothing although it was told to turn.
@@ -111,7 +105,7 @@ impl Evidence {
         self.asked = [before, counts_s];
     }
 
-    /// The wheel rolled `counts` in `gap_s` until `now`; commands below `least` counts/s tell nothing.
+    /// The wheel rolled `counts` in `gap_s` until `now`; commands below `least` counts/s are no evidence.
     fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, now: MissionTime) {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());
@@ -136,12 +130,12 @@ impl Evidence {
     }
 }
 
-/// The odometry of one robot, judged.
+/// The evidence about the odometry of one robot.
 #[derive(Clone, Debug)]
 pub struct Odometry {
     counts_per_m: f64,
     steers: bool,
-    /// Of two periods of the robot.
+    /// Two periods of the robot.
     longest_gap: Duration,
     /// How long a command holds.
     limit: Duration,
@@ -153,31 +147,11 @@ pub struct Odometry {
     jumps: VecDeque<MissionTime>,
     mended: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
+    ordered_to_drive: bool,
 }
 
 impl Odometry {
-    /// Of the robot of `mission`, of which nothing is known.
-    #[must_use]
-    pub fn new(mission: &Mission) -> Self {
-        let body = mission.body();
-        Self {
-            counts_per_m: 1.0 / body.metres_per_count(),
-            steers: body.steering.is_some(),
-            longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
-            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
-            commanded: None,
-            frame: None,
-            left: Evidence::default(),
-            right: Evidence::default(),
-            turn: Evidence::default(),
-            jumps: VecDeque::new(),
-            mended: 0,
-            suspicion: None,
-        }
-    }
-
-    /// The wheels were told these counts/s, forward positive.
-    pub fn commanded(&mut self, [left, right]: [i16; 2], now: MissionTime) {
+    fn commanded(&mut self, [left, right]: [i16; 2], now: MissionTime) {
         let lapsed = |then| now.since(then) > self.limit;
         if self.commanded.is_none_or(lapsed) {
             self.begin_anew(now);
@@ -195,8 +169,7 @@ impl Odometry {
         self.turn.ask(if tells { turn } else { 0.0 }, now);
     }
 
-    /// Counts that may be true.
-    pub fn believed(&mut self, counts: [u16; 2], now: MissionTime) {
+    fn plausible(&mut self, counts: [u16; 2], now: MissionTime) {
         let newest_jump = self.jumps.back().copied();
         let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
         if calm
@@ -239,8 +212,7 @@ impl Odometry {
         }
     }
 
-    /// Counts that cannot be true.
-    pub fn implausible(&mut self, now: MissionTime) {
+    fn implausible(&mut self, now: MissionTime) {
         self.jumps.push_back(now);
         if self.jumps.len() > MOST_JUMPS {
             self.jumps.pop_front();
@@ -251,15 +223,10 @@ impl Odometry {
         }
     }
 
-    /// The counts of the next frame do not follow those before.
-    pub const fn reset_counts(&mut self) {
-        self.frame = None;
-    }
-
-    /// The robot was switched off and on, or an operator has looked at it: nothing is known of it.
-    pub fn reset(&mut self) {
+    /// Forget everything.
+    fn reset(&mut self) {
         self.commanded = None;
-        self.reset_counts();
+        self.frame = None;
         self.left = Evidence::default();
         self.right = Evidence::default();
         self.turn = Evidence::default();
@@ -268,27 +235,66 @@ impl Odometry {
         self.suspicion = None;
     }
 
-    /// What is doubted.
-    #[must_use]
-    pub fn suspicion(&self) -> Option<Suspicion> {
-        self.suspicion.map(|(suspicion, _)| suspicion)
-    }
-
-    /// What is known of it at `now`.
-    #[must_use]
-    pub fn belief(&self, now: MissionTime) -> Plausibility {
-        match self.suspicion {
-            None => Plausibility::Plausible,
-            Some((_, since)) if now.since(since) >= GIVEN_UP_AFTER => Plausibility::GivenUp,
-            Some(_) => Plausibility::Suspected,
-        }
-    }
-
     fn begin_anew(&mut self, now: MissionTime) {
         for evidence in [&mut self.left, &mut self.right, &mut self.turn] {
             evidence.since = now;
             evidence.still_s = 0.0;
         }
+    }
+}
+
+impl Monitor for Odometry {
+    fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        Self {
+            counts_per_m: 1.0 / body.metres_per_count(),
+            steers: body.steering.is_some(),
+            longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
+            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
+            commanded: None,
+            frame: None,
+            left: Evidence::default(),
+            right: Evidence::default(),
+            turn: Evidence::default(),
+            jumps: VecDeque::new(),
+            mended: 0,
+            suspicion: None,
+            ordered_to_drive: false,
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        match *what {
+            Observation::Directive(order, _) => self.ordered_to_drive = order == Order::Drive,
+            Observation::Resumed => self.reset(),
+            Observation::Commanded(counts) => self.commanded(counts, now.time),
+            Observation::Motor(counts, Counts::Follow) => self.plausible(counts, now.time),
+            Observation::Motor(_, Counts::Restarted { was_away: true }) => self.reset(),
+            Observation::Motor(_, Counts::Implausible) => self.implausible(now.time),
+            Observation::Motor(_, Counts::Restarted { .. } | Counts::Elsewhere) => {
+                self.implausible(now.time);
+                self.frame = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn condition(&self, cause: Cause, now: Moment) -> Condition {
+        match (cause, self.suspicion, self.jumps.back()) {
+            // Nobody waits for a robot that is not to drive.
+            (Cause::OdometryGivenUp, Some((_, since)), _) => {
+                (self.ordered_to_drive && now.time.since(since) >= GIVEN_UP_AFTER).into()
+            }
+            (Cause::OdometryGivenUp, None, _) => false.into(),
+            (_, Some(_), _) => Condition::Holds,
+            (_, None, Some(&jump)) => Condition::OverFor(now.time.since(jump)),
+            (_, None, None) => false.into(),
+        }
+    }
+
+    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
+        let (suspicion, _) = self.suspicion?;
+        Some(suspicion.words().to_owned())
     }
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use common::samples::HoldReason;
 use std::path::Path;
 
 /// From frame to frame, seconds: 7 Hz.
@@ -9,6 +10,10 @@ const TURN: i16 = 1200;
 fn odometry() -> Odometry {
     // 1 m/s is 2247 counts a second.
     Odometry::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
+}
+
+fn suspicion(odometry: &Odometry) -> Option<Suspicion> {
+    odometry.suspicion.map(|(suspicion, _)| suspicion)
 }
 
 /// Wheels as measured on a real robot: 0.07 s of delay, 0.08 s of lag, 0.78 of the speed, a dead band of 20 counts/s.
@@ -52,7 +57,7 @@ impl Wheels {
 const COUNTS: u16 = common::wire::COUNT_CYCLE;
 
 /// Ticks of a robot that is told `tells(tick)`, is out of reach where `out` says so, and whose frames say `says` of what
-/// its wheels count. When it is doubted, seconds after the first command, and why.
+/// its wheels count. Returns when it is suspected, seconds after the first command, and of what.
 fn drive(
     ticks: u32,
     tells: impl Fn(u32) -> [i16; 2],
@@ -68,8 +73,8 @@ fn drive(
             continue;
         }
         let now = MissionTime::from_seconds(time);
-        odometry.believed(says(tick, wheels.counts()), now);
-        if let Some(suspicion) = odometry.suspicion() {
+        odometry.plausible(says(tick, wheels.counts()), now);
+        if let Some(suspicion) = suspicion(&odometry) {
             return Some((time, suspicion));
         }
         odometry.commanded(tells(tick), now);
@@ -96,7 +101,7 @@ fn in_time(suspected: Option<(f64, Suspicion)>, why: Suspicion) {
 }
 
 #[test]
-fn an_honest_robot_is_believed_whatever_it_is_told() {
+fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
     let straight = |_| [TURN, TURN];
     let turning = |_| [-TURN / 2, TURN / 2];
     let slow = |_| [70, 70];
@@ -127,7 +132,7 @@ fn an_honest_robot_is_believed_whatever_it_is_told() {
 }
 
 #[test]
-fn an_honest_robot_is_believed_with_its_radio_out_a_fifth_or_half_of_the_time() {
+fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_time() {
     // Bursts of 1 to 8 frames.
     for share in [5, 2] {
         for seed in 1..60_u32 {
@@ -155,7 +160,7 @@ fn an_honest_robot_is_believed_with_its_radio_out_a_fifth_or_half_of_the_time() 
 }
 
 #[test]
-fn wheels_held_for_half_a_second_are_believed() {
+fn wheels_held_for_half_a_second_are_not_suspected() {
     // Frames of a robot that something holds repeat; then it goes on from there.
     let mut held = 0;
     let says = |tick: u32, counts: [u16; 2]| {
@@ -202,7 +207,7 @@ fn a_dead_encoder_is_suspected_though_the_direction_changes_with_every_tick_and_
 }
 
 #[test]
-fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
+fn wheels_that_are_reversed_or_swapped_are_suspected_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
     in_time(
         drive(40, |_| [TURN, TURN], never, reversed),
@@ -228,7 +233,7 @@ fn wheels_that_are_reversed_or_swapped_are_doubted_in_time() {
 }
 
 #[test]
-fn frames_that_are_two_seconds_late_are_doubted_in_time() {
+fn frames_that_are_two_seconds_late_are_suspected_in_time() {
     let mut said = VecDeque::from([[0; 2]; 14]);
     let late = move |_, counts| {
         said.push_back(counts);
@@ -238,52 +243,63 @@ fn frames_that_are_two_seconds_late_are_doubted_in_time() {
 }
 
 #[test]
-fn a_robot_that_is_suspected_is_given_up_after_10_s_or_believed_again_when_an_operator_has_looked()
+fn a_robot_that_is_suspected_is_given_up_after_10_s_or_plausible_again_when_an_operator_has_looked()
 {
     let at = MissionTime::from_seconds;
     let mut odometry = odometry();
     for tick in 0..8 {
         let now = at(f64::from(tick) * PERIOD);
-        odometry.believed([5, 5], now);
+        odometry.plausible([5, 5], now);
         odometry.commanded([TURN, TURN], now);
     }
-    assert_eq!(odometry.belief(at(1.0)), Plausibility::Suspected);
+    let given_up = |odometry: &Odometry, seconds| {
+        let now = Moment {
+            time: at(seconds),
+            machine_ns: 0,
+        };
+        odometry.condition(Cause::OdometryGivenUp, now) == Condition::Holds
+    };
+    assert!(suspicion(&odometry).is_some());
     for tick in 8..80 {
-        odometry.believed([5, 5], at(f64::from(tick) * PERIOD));
+        odometry.plausible([5, 5], at(f64::from(tick) * PERIOD));
     }
-    assert_eq!(odometry.belief(at(10.8)), Plausibility::Suspected);
-    assert_eq!(odometry.belief(at(11.0)), Plausibility::GivenUp);
-    odometry.reset();
-    assert_eq!(odometry.belief(at(11.0)), Plausibility::Plausible);
+    assert!(!given_up(&odometry, 10.8));
+    assert!(!given_up(&odometry, 11.0), "nobody waits for it");
+    let drive = Observation::Directive(Order::Drive, HoldReason::None);
+    odometry.observe(&drive, Moment::default());
+    assert!(!given_up(&odometry, 10.8));
+    assert!(given_up(&odometry, 11.0));
+    odometry.observe(&Observation::Resumed, Moment::default());
+    assert!(suspicion(&odometry).is_none() && !given_up(&odometry, 11.0));
 }
 
 #[test]
-fn three_jumps_within_two_seconds_are_doubted_until_two_seconds_without_twice_at_most() {
+fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_at_most() {
     let at = MissionTime::from_seconds;
     let mut odometry = odometry();
     for round in 0..3 {
         let start = 10.0 * f64::from(round);
         for jump in 0..3 {
-            assert_eq!(odometry.suspicion(), None);
+            assert_eq!(suspicion(&odometry), None);
             odometry.implausible(at(start + 0.143 * f64::from(jump)));
         }
-        assert_eq!(odometry.suspicion(), Some(Suspicion::Jumps));
-        odometry.believed([5, 5], at(start + 2.2));
-        assert_eq!(odometry.suspicion(), Some(Suspicion::Jumps));
-        odometry.believed([5, 5], at(start + 2.3));
+        assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps));
+        odometry.plausible([5, 5], at(start + 2.2));
+        assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps));
+        odometry.plausible([5, 5], at(start + 2.3));
     }
     assert_eq!(
-        odometry.suspicion(),
+        suspicion(&odometry),
         Some(Suspicion::Jumps),
         "the third time"
     );
 }
 
 #[test]
-fn an_old_frame_now_and_then_is_no_doubt() {
+fn an_old_frame_now_and_then_is_not_suspected() {
     let mut odometry = odometry();
     for frame in 0..20 {
         odometry.implausible(MissionTime::from_seconds(2.0 * f64::from(frame)));
-        assert_eq!(odometry.suspicion(), None);
+        assert_eq!(suspicion(&odometry), None);
     }
 }

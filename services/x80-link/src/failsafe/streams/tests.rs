@@ -1,14 +1,25 @@
 use super::*;
+use common::wire::StandardSensors;
 use std::path::Path;
 
-const SILENCE: Duration = Duration::from_millis(750);
 const MS: u64 = 1_000_000;
 
 fn streams(text: &str) -> Streams {
     let text = format!("target = [3, 0]\n{text}");
     let mut streams = Streams::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
-    streams.found(0);
+    streams.observe(&Observation::Found { again: false }, Moment::default());
     streams
+}
+
+/// A standard frame with a reading of the front sonar.
+fn range(streams: &mut Streams, machine_ns: u64) {
+    let mut standard = StandardSensors::default();
+    standard.ultrasonic[1] = 255;
+    let now = Moment {
+        time: MissionTime(machine_ns),
+        machine_ns,
+    };
+    streams.observe(&Observation::Standard(&standard), now);
 }
 
 /// Motor frames after these intervals, milliseconds. The time of the last.
@@ -26,23 +37,15 @@ fn frames(streams: &mut Streams, intervals: impl IntoIterator<Item = u64>) -> u6
 fn a_robot_that_answers_without_motor_frames_is_asked_for_them_with_growing_pauses() {
     let mut streams = streams("");
     let last = frames(&mut streams, [143; 5]);
-    assert_eq!(
-        streams.motor_frames(last + 749 * MS, SILENCE),
-        Motor::Regular
-    );
-    assert_eq!(
-        streams.motor_frames(last + 750 * MS, SILENCE),
-        Motor::Silent
-    );
+    assert_eq!(streams.motor_frames(last + 749 * MS), Motor::Regular);
+    assert_eq!(streams.motor_frames(last + 750 * MS), Motor::Silent);
     let asks = |from: u64, to: u64, streams: &mut Streams| {
         let times = (from..to).step_by(10);
-        times
-            .filter(|at| streams.wants_request(at * MS, SILENCE))
-            .count()
+        times.filter(|at| streams.wants_request(at * MS)).count()
     };
     assert_eq!(asks(1500, 60_000, &mut streams), 9);
     streams.motor(MissionTime(0), 60_000 * MS);
-    streams.range(60_000 * MS);
+    range(&mut streams, 60_000 * MS);
     assert_eq!(asks(60_000, 60_700, &mut streams), 0);
 }
 
@@ -50,23 +53,23 @@ fn a_robot_that_answers_without_motor_frames_is_asked_for_them_with_growing_paus
 fn three_frames_a_second_are_told_with_their_rate_and_a_fading_radio_is_not() {
     let mut slow = streams("");
     let last = frames(&mut slow, [333; 9]);
-    let Motor::Slow(hz) = slow.motor_frames(last, SILENCE) else {
+    let Motor::Slow(hz) = slow.motor_frames(last) else {
         panic!();
     };
     assert!((hz - 3.0).abs() < 0.01, "{hz}");
     let mut fading = streams("");
     let last = frames(&mut fading, [143, 700, 500, 143, 600, 400, 143, 500, 600]);
-    assert_eq!(fading.motor_frames(last, SILENCE), Motor::Regular);
+    assert_eq!(fading.motor_frames(last), Motor::Regular);
 }
 
 #[test]
 fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
     for (text, missed) in [("", true), ("sensing = false", false)] {
         let mut streams = streams(text);
-        streams.range(100 * MS);
-        assert!(!streams.range_is_silent(849 * MS, SILENCE));
-        assert_eq!(streams.range_is_silent(850 * MS, SILENCE), missed);
-        streams.range(900 * MS);
-        assert!(!streams.range_is_silent(1000 * MS, SILENCE), "back");
+        range(&mut streams, 100 * MS);
+        assert!(!streams.range_is_silent(849 * MS));
+        assert_eq!(streams.range_is_silent(850 * MS), missed);
+        range(&mut streams, 900 * MS);
+        assert!(!streams.range_is_silent(1000 * MS), "back");
     }
 }

@@ -1,0 +1,191 @@
+//! Whether the batteries give enough.
+
+use std::time::Duration;
+
+use common::{
+    clock::MissionTime,
+    mission::{BatteryLimits, Mission},
+    samples::Cause,
+    wire::{LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors, volts},
+};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+
+/// A battery that was low gives enough again this far above its limit, volts: a pack whose motors have just
+/// stopped recovers by less.
+pub(crate) const RECOVERED_V: f64 = 0.3;
+/// The share of the limit below which a battery is empty: 1.0 V a cell where it is low at 1.1 V. A cell that
+/// gives less is damaged, and the voltage falls faster than a robot can be fetched.
+pub(crate) const EMPTY_SHARE: f64 = 1.0 / 1.1;
+/// A battery is empty after so long below that, mission time: motors that start draw the voltage down for some tenths of
+/// a second.
+pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
+/// A supply below this is no empty battery but none, volts: the robot could not speak on it.
+const FITTED_V: f64 = 1.0;
+
+/// What a battery still holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Charge {
+    /// Enough, or there is no such battery.
+    #[default]
+    Enough,
+    /// Little.
+    Low,
+    /// Nothing to drive on.
+    Empty,
+}
+
+/// A battery of the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pack {
+    /// The boards'.
+    Board,
+    /// The motors'.
+    Motor,
+    /// The servos'.
+    Servo,
+}
+
+impl Pack {
+    const ALL: [Self; 3] = [Self::Board, Self::Motor, Self::Servo];
+
+    /// For logs.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Board => "board",
+            Self::Motor => "motor",
+            Self::Servo => "servo",
+        }
+    }
+}
+
+/// A battery became low or empty, or is no longer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BatteryChange {
+    /// Which.
+    pub pack: Pack,
+    /// What it gives, volts.
+    pub volts: f64,
+    /// How it is now.
+    pub charge: Charge,
+}
+
+/// One battery over time.
+#[derive(Clone, Copy, Debug, Default)]
+struct Gauge {
+    charge: Charge,
+    /// Since when it has given less than an empty one does.
+    sunk_since: Option<MissionTime>,
+}
+
+impl Gauge {
+    fn read(&mut self, volts: f64, limit: f64, now: MissionTime) -> Charge {
+        let fitted = volts >= FITTED_V;
+        let sunk = fitted && volts < limit * EMPTY_SHARE;
+        let since = self.sunk_since.unwrap_or(now);
+        self.sunk_since = sunk.then_some(since);
+        let ends = if self.charge == Charge::Enough {
+            limit
+        } else {
+            limit + RECOVERED_V
+        };
+        self.charge = if self.charge == Charge::Empty || sunk && now.since(since) >= EMPTY_AFTER {
+            // Its voltage comes back when the robot stands, but nothing to drive on does.
+            Charge::Empty
+        } else if fitted && volts < ends {
+            Charge::Low
+        } else {
+            Charge::Enough
+        };
+        self.charge
+    }
+}
+
+/// The batteries of one robot.
+#[derive(Clone, Debug)]
+pub struct Batteries {
+    limits: BatteryLimits,
+    /// As [`Pack::ALL`].
+    gauges: [Gauge; 3],
+    changes: Vec<BatteryChange>,
+}
+
+impl Batteries {
+    /// Whether the boards', the motors' and the servos' battery is low or empty.
+    #[must_use]
+    pub fn low(&self) -> [bool; 3] {
+        self.gauges.map(|gauge| gauge.charge > Charge::Enough)
+    }
+
+    /// What changed since the last call.
+    pub fn take_changes(&mut self) -> Vec<BatteryChange> {
+        std::mem::take(&mut self.changes)
+    }
+
+    /// The worst of the batteries that the robot drives on: it drives without its servos.
+    fn charge(&self) -> Charge {
+        let [board, motor, _] = self.gauges;
+        board.charge.max(motor.charge)
+    }
+
+    fn read(&mut self, standard: &StandardSensors, now: MissionTime) {
+        let readings = [
+            (
+                volts(standard.board_battery, LOGIC_SCALE_V),
+                self.limits.board,
+            ),
+            (
+                volts(standard.motor_battery, MOTOR_SCALE_V),
+                self.limits.motor,
+            ),
+            (
+                volts(standard.servo_battery, LOGIC_SCALE_V),
+                self.limits.servo,
+            ),
+        ];
+        for ((gauge, pack), (volts, limit)) in self.gauges.iter_mut().zip(Pack::ALL).zip(readings) {
+            let before = gauge.charge;
+            let charge = gauge.read(volts, limit, now);
+            if charge != before {
+                self.changes.push(BatteryChange {
+                    pack,
+                    volts,
+                    charge,
+                });
+            }
+        }
+    }
+}
+
+impl Monitor for Batteries {
+    fn new(mission: &Mission) -> Self {
+        Self {
+            limits: mission.robot.low_battery_v,
+            gauges: [Gauge::default(); 3],
+            changes: Vec::new(),
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        if let Observation::Standard(standard) = what {
+            self.read(standard, now.time);
+        }
+    }
+
+    fn condition(&self, cause: Cause, _: Moment) -> Condition {
+        let charge = if cause == Cause::BatteryEmpty {
+            Charge::Empty
+        } else {
+            Charge::Low
+        };
+        (self.charge() == charge).into()
+    }
+
+    fn judges_frames(&self) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests;

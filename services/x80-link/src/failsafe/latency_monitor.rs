@@ -1,0 +1,190 @@
+//! Whether what the robot sends is old: buffers on the way may hold seconds of it, and its frames carry no time.
+//!
+//! A robot acknowledges every command. After it was lost, and while it is late, the link sends nothing for a window; an
+//! acknowledgement that comes when nothing was sent for as long as a command lasts has taken longer than that. One that
+//! came in time cannot be told from a late one of an earlier command, so only late ones count. A robot that acknowledges
+//! nothing is taken for timely.
+
+use std::time::Duration;
+
+use common::{clock::Pace, mission::Mission, samples::Cause};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+
+/// Processes are late by so much now and then, however fast mission time runs.
+const LEAST_LIMIT: Duration = Duration::from_millis(100);
+/// The window is so much longer than the limit, mission time: commands are sent every 0.2 s to a robot that stands.
+const WINDOW: Duration = Duration::from_millis(400);
+/// A late robot is tested again after so long, mission time.
+const AGAIN: Duration = Duration::from_secs(2);
+
+/// Whether the robot is late, as far as known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum State {
+    /// Nothing indicates that it is late.
+    #[default]
+    Timely,
+    /// Nothing is sent since this time of the machine's clock, to find out.
+    Testing(u64),
+    /// It is late, as found at this time.
+    Late(u64),
+}
+
+/// The latency of one robot; times are of the machine's clock, nanoseconds.
+#[derive(Clone, Debug)]
+pub struct LatencyMonitor {
+    command_limit: Duration,
+    limit_ns: u64,
+    window_ns: u64,
+    again_ns: u64,
+    sent_ns: u64,
+    came_late: bool,
+    state: State,
+}
+
+impl LatencyMonitor {
+    fn set_pace(&mut self, pace: Pace) {
+        let rate = match pace {
+            Pace::Rate(rate) if rate > 0.0 => rate,
+            _ => 1.0,
+        };
+        let machine = |mission: Duration| mission.div_f64(rate);
+        let limit = machine(self.command_limit).max(LEAST_LIMIT);
+        self.limit_ns = limit.as_nanos() as u64;
+        self.window_ns = (limit + machine(WINDOW)).as_nanos() as u64;
+        self.again_ns = machine(AGAIN).as_nanos() as u64;
+    }
+
+    fn pass(&mut self, now_ns: u64) {
+        match self.state {
+            State::Testing(since) if now_ns.saturating_sub(since) >= self.window_ns => {
+                self.state = if self.came_late {
+                    State::Late(now_ns)
+                } else {
+                    State::Timely
+                };
+            }
+            State::Late(since) if now_ns.saturating_sub(since) >= self.again_ns => {
+                self.test(now_ns);
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether nothing is to be sent, so that late acknowledgements show.
+    #[must_use]
+    pub const fn is_testing(&self) -> bool {
+        matches!(self.state, State::Testing(_))
+    }
+
+    const fn test(&mut self, now_ns: u64) {
+        self.came_late = false;
+        self.state = State::Testing(now_ns);
+    }
+}
+
+impl Monitor for LatencyMonitor {
+    fn new(mission: &Mission) -> Self {
+        let command_limit = Duration::from_secs_f64(mission.robot.command_limit_s);
+        let mut new = Self {
+            command_limit,
+            limit_ns: 0,
+            window_ns: 0,
+            again_ns: 0,
+            sent_ns: 0,
+            came_late: false,
+            state: State::Timely,
+        };
+        new.set_pace(Pace::Rate(1.0));
+        new
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        match *what {
+            Observation::Pace(pace) => self.set_pace(pace),
+            Observation::Time => self.pass(now.machine_ns),
+            Observation::Sent => self.sent_ns = now.machine_ns,
+            Observation::Acknowledged => {
+                let age_ns = now.machine_ns.saturating_sub(self.sent_ns);
+                self.came_late |= age_ns > self.limit_ns;
+            }
+            Observation::Found { again: true } => self.test(now.machine_ns),
+            Observation::Lost => self.state = State::Timely,
+            _ => {}
+        }
+    }
+
+    /// A robot that is being tested may be late.
+    fn condition(&self, _: Cause, _: Moment) -> Condition {
+        (self.state != State::Timely).into()
+    }
+
+    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
+        let text = "what it sends may be old: look at the network and the radio between, which hold it back";
+        Some(text.to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn observe(monitor: &mut LatencyMonitor, what: Observation<'_>, at_ms: u64) {
+        let now = Moment {
+            machine_ns: at_ms * MS,
+            ..Moment::default()
+        };
+        monitor.observe(&what, now);
+    }
+
+    fn may_be_late(monitor: &LatencyMonitor) -> bool {
+        monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
+    }
+
+    /// A robot that acknowledges what it gets every 70 ms after `delay_ms`, found at 10 s and then left alone for `quiet_ms`.
+    fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
+        let text = "target = [3, 0]";
+        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+        let mut monitor = LatencyMonitor::new(&mission);
+        observe(&mut monitor, Observation::Sent, 10_000);
+        observe(&mut monitor, Observation::Found { again: true }, 10_000);
+        let last_acknowledged = delay_ms.min(quiet_ms);
+        for now in (0..=quiet_ms).step_by(70) {
+            if now <= last_acknowledged {
+                observe(&mut monitor, Observation::Acknowledged, 10_000 + now);
+            }
+            observe(&mut monitor, Observation::Time, 10_000 + now);
+        }
+        monitor
+    }
+
+    #[test]
+    fn a_robot_whose_acknowledgements_come_in_time_may_go_after_the_window() {
+        assert!(may_be_late(&found(20, 300)), "not known yet");
+        assert!(!may_be_late(&found(20, 700)));
+        assert!(!may_be_late(&found(200, 700)));
+    }
+
+    #[test]
+    fn a_robot_that_acknowledges_what_was_sent_long_ago_is_late() {
+        assert!(may_be_late(&found(2000, 700)));
+    }
+
+    #[test]
+    fn a_late_robot_is_tested_again_and_taken_for_timely_when_nothing_late_comes() {
+        let mut monitor = found(2000, 700);
+        assert!(!monitor.is_testing());
+        observe(&mut monitor, Observation::Time, 13_000);
+        assert!(monitor.is_testing());
+        observe(&mut monitor, Observation::Acknowledged, 13_400);
+        observe(&mut monitor, Observation::Time, 13_700);
+        assert!(may_be_late(&monitor));
+        observe(&mut monitor, Observation::Time, 16_000);
+        observe(&mut monitor, Observation::Time, 16_700);
+        assert!(!may_be_late(&monitor));
+    }
+}

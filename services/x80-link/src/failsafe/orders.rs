@@ -1,0 +1,88 @@
+//! Whether the supervisor wants the robot to drive.
+
+use std::time::Duration;
+
+use common::{
+    mission::Mission,
+    samples::{Cause, HoldReason, Order},
+};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+
+/// A supervisor that has published nothing for so long is taken for dead: ten times the interval of its directives,
+/// so that a loaded machine does not stop the robot, and a second before systemd's watchdog would kill it.
+pub(crate) const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
+
+/// The supervisor's newest directive.
+#[derive(Clone, Copy, Debug)]
+struct Directive {
+    order: Order,
+    reason: HoldReason,
+    heard_ns: u64,
+}
+
+/// The supervisor's directives.
+#[derive(Clone, Debug)]
+pub struct Orders {
+    newest: Option<Directive>,
+}
+
+impl Orders {
+    /// Whether the supervisor orders to drive.
+    #[must_use]
+    pub fn drive(&self) -> bool {
+        self.is(Order::Drive)
+    }
+
+    /// Whether the reason of the newest directive is an operator's stop.
+    #[must_use]
+    pub fn by_operator(&self) -> bool {
+        self.newest
+            .is_some_and(|directive| directive.reason == HoldReason::Operator)
+    }
+
+    fn is(&self, order: Order) -> bool {
+        self.newest
+            .is_some_and(|directive| directive.order == order)
+    }
+
+    fn held(&self) -> Option<HoldReason> {
+        let directive = self.newest?;
+        (directive.order == Order::Hold).then_some(directive.reason)
+    }
+}
+
+impl Monitor for Orders {
+    fn new(_: &Mission) -> Self {
+        Self { newest: None }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        if let Observation::Directive(order, reason) = *what {
+            self.newest = Some(Directive {
+                order,
+                reason,
+                heard_ns: now.machine_ns,
+            });
+        }
+    }
+
+    fn condition(&self, cause: Cause, now: Moment) -> Condition {
+        let age = |directive: Directive| now.machine_ns.saturating_sub(directive.heard_ns);
+        let holds = match (cause, self.held()) {
+            (Cause::MissionOver, _) => self.is(Order::Stop),
+            (Cause::OperatorStop, held) => held == Some(HoldReason::Operator),
+            (Cause::StageHeld, held) => held == Some(HoldReason::StageHeld),
+            (Cause::SupervisorSilent, _) => self
+                .newest
+                .is_some_and(|newest| u128::from(age(newest)) > SUPERVISOR_SILENT.as_nanos()),
+            (_, Some(HoldReason::Operator | HoldReason::StageHeld)) => false,
+            (_, held) => held.is_some() || self.newest.is_none(),
+        };
+        holds.into()
+    }
+
+    fn judges_frames(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,176 @@
+//! Whether the robot answers, and when it is pinged while it does not.
+
+use std::time::Duration;
+
+use common::{clock::Pace, mission::Mission, samples::Cause};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+use crate::backoff::Backoff;
+
+/// A robot that has sent nothing for so many command limits is lost: that is longer than a radio's short fade, and the
+/// robot stands by then anyway.
+pub(crate) const SILENT_LIMITS: u32 = 3;
+/// Processes are late by so much now and then, however fast mission time runs.
+const LEAST_SILENCE: Duration = Duration::from_millis(100);
+/// The pause between the first two pings of a robot that does not answer.
+const FIRST_PAUSE: Duration = Duration::from_millis(200);
+/// The longest pause between pings: a robot that sends something is heard at once, and one that waits for a ping can
+/// wait so long.
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+
+/// How long the robot has not answered, and the pings since, by the machine's clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Absence {
+    /// Since it was lost, or looked for first, nanoseconds; 0 while it answers.
+    pub lost_ns: u64,
+    /// Pings since.
+    pub pings: u64,
+    /// Until the next ping, nanoseconds.
+    pub next_ping_ns: u64,
+}
+
+/// How long the robot may send nothing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Silence {
+    mission: Duration,
+    machine: Duration,
+}
+
+impl Silence {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
+        Self {
+            mission: limit,
+            machine: limit,
+        }
+    }
+
+    pub(crate) fn set_pace(&mut self, pace: Pace) {
+        self.machine = match pace {
+            Pace::Rate(rate) if rate > 0.0 => self.mission.div_f64(rate).max(LEAST_SILENCE),
+            _ => self.mission,
+        };
+    }
+
+    /// Whether it is over `now_ns` by the machine's clock when the last came at `heard_ns`.
+    pub(crate) fn is_over(&self, heard_ns: u64, now_ns: u64) -> bool {
+        now_ns.saturating_sub(heard_ns) >= self.machine.as_nanos() as u64
+    }
+}
+
+/// The robot's presence on the wire.
+#[derive(Clone, Debug)]
+pub struct Presence {
+    silence: Silence,
+    wire_open: bool,
+    connected: bool,
+    heard_ns: Option<u64>,
+    lost_since_ns: Option<u64>,
+    pings: Backoff,
+    losses: u64,
+}
+
+impl Presence {
+    /// Whether it answers.
+    #[must_use]
+    pub const fn connected(&self) -> bool {
+        self.connected
+    }
+
+    /// Times it was lost.
+    #[must_use]
+    pub const fn losses(&self) -> u64 {
+        self.losses
+    }
+
+    /// A frame of it came. Returns whether it was away until now.
+    pub fn heard(&mut self, now_ns: u64) -> bool {
+        self.heard_ns = Some(now_ns);
+        self.lost_since_ns = None;
+        self.pings.reset();
+        !std::mem::replace(&mut self.connected, true)
+    }
+
+    /// Whether it has sent nothing for longer than a robot that is there does.
+    #[must_use]
+    pub fn is_silent(&self, now_ns: u64) -> bool {
+        self.heard_ns
+            .is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
+    }
+
+    /// Take it for lost. Returns whether that is new.
+    pub fn lose(&mut self, now_ns: u64) -> bool {
+        let new = std::mem::replace(&mut self.connected, false);
+        if new {
+            self.lost_since_ns = Some(now_ns);
+            self.losses += 1;
+        }
+        new
+    }
+
+    /// The wire is open now, or is not. The robot is then pinged at once.
+    pub const fn wire(&mut self, open: bool) {
+        self.wire_open = open;
+        self.pings.reset();
+    }
+
+    /// Whether to ping a robot that does not answer, now.
+    pub fn wants_ping(&mut self, now_ns: u64) -> bool {
+        if self.connected {
+            return false;
+        }
+        self.lost_since_ns.get_or_insert(now_ns);
+        self.wire_open && self.pings.is_due(now_ns)
+    }
+
+    /// It was pinged.
+    pub fn pinged(&mut self, now_ns: u64) {
+        if !self.connected {
+            self.pings.attempted(now_ns);
+        }
+    }
+
+    /// How long it has been away.
+    #[must_use]
+    pub fn absence(&self, now_ns: u64) -> Absence {
+        if self.connected {
+            return Absence::default();
+        }
+        Absence {
+            lost_ns: self
+                .lost_since_ns
+                .map_or(0, |since| now_ns.saturating_sub(since)),
+            pings: self.pings.attempts(),
+            next_ping_ns: self.pings.wait_ns(now_ns),
+        }
+    }
+}
+
+impl Monitor for Presence {
+    /// It takes the wire for open.
+    fn new(mission: &Mission) -> Self {
+        Self {
+            silence: Silence::new(mission),
+            wire_open: true,
+            connected: false,
+            heard_ns: None,
+            lost_since_ns: None,
+            pings: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
+            losses: 0,
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, _: Moment) {
+        if let Observation::Pace(pace) = *what {
+            self.silence.set_pace(pace);
+        }
+    }
+
+    fn condition(&self, _: Cause, _: Moment) -> Condition {
+        (!self.connected).into()
+    }
+
+    fn judges_frames(&self) -> bool {
+        false
+    }
+}

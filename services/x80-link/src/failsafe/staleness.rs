@@ -1,0 +1,76 @@
+//! Whether the newest command, and what it was computed from, is too old.
+
+use std::time::Duration;
+
+use common::{
+    clock::{MissionTime, Pace},
+    mission::Mission,
+    samples::Cause,
+};
+
+use super::monitor::{Condition, Moment, Monitor, Observation};
+
+/// Mission times of the newest command.
+#[derive(Clone, Copy, Debug)]
+struct Times {
+    /// When the tick began that it answers.
+    command: MissionTime,
+    /// The oldest pose that it was computed from.
+    pose: MissionTime,
+    guidance: MissionTime,
+}
+
+/// The age of the newest command.
+#[derive(Clone, Debug)]
+pub struct Staleness {
+    limit: Duration,
+    lockstep: bool,
+    newest: Option<Times>,
+}
+
+impl Monitor for Staleness {
+    fn new(mission: &Mission) -> Self {
+        Self {
+            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
+            lockstep: true,
+            newest: None,
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, _: Moment) {
+        match *what {
+            Observation::Pace(pace) => self.lockstep = pace == Pace::Max,
+            Observation::Command(command) => {
+                self.newest = Some(Times {
+                    command: command.stamp.time(),
+                    pose: MissionTime(command.pose_ns),
+                    guidance: MissionTime(command.guidance_ns),
+                });
+            }
+            _ => {}
+        }
+    }
+
+    fn condition(&self, cause: Cause, now: Moment) -> Condition {
+        let Some(newest) = self.newest else {
+            return (cause == Cause::CommandStale).into();
+        };
+        // In lockstep no time passes until the command has come.
+        let now = if self.lockstep {
+            newest.command
+        } else {
+            now.time
+        };
+        let then = match cause {
+            Cause::PoseStale => newest.pose,
+            Cause::GuidanceStale => newest.guidance,
+            _ => newest.command,
+        };
+        // A stamp from the future would never grow old.
+        (then > now || now.since(then) > self.limit).into()
+    }
+
+    fn judges_frames(&self) -> bool {
+        false
+    }
+}

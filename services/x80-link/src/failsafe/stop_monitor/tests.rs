@@ -1,0 +1,105 @@
+use super::*;
+use crate::failsafe::{monitor::Clears, rule};
+use std::path::Path;
+
+/// From frame to frame, seconds: 7 Hz.
+const PERIOD: f64 = 1.0 / 7.0;
+
+fn stop_monitor() -> StopMonitor {
+    StopMonitor::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
+}
+
+/// The monitor and the row of the failsafe.
+struct Watch {
+    monitor: StopMonitor,
+    clears: Clears,
+    does_not_stop: bool,
+}
+
+/// A robot told to stand at 1 s whose wheels go on at `speed(seconds since)` counts/s. Seconds since then, when it was
+/// found not to stop.
+fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
+    let mut watch = Watch {
+        monitor: stop_monitor(),
+        clears: rule(Cause::RobotDoesNotStop).unwrap().clears,
+        does_not_stop: false,
+    };
+    let (mut rolled, mut first) = (0.0, None);
+    watch.monitor.commanded([900, 900], MissionTime::default());
+    for tick in 0..42 {
+        let time = f64::from(tick) * PERIOD;
+        rolled += PERIOD
+            * if time <= 1.0 {
+                700.0
+            } else {
+                speed(time - 1.0)
+            };
+        let now = MissionTime::from_seconds(time);
+        watch.monitor.heard([rolled as u16; 2], now);
+        if time >= 1.0 {
+            watch.monitor.commanded([0, 0], now);
+        }
+        let condition = watch
+            .monitor
+            .condition(Cause::RobotDoesNotStop, Moment::default());
+        watch.does_not_stop = watch.clears.applies(watch.does_not_stop, condition);
+        if watch.does_not_stop {
+            first.get_or_insert(time - 1.0);
+        }
+    }
+    (watch, first)
+}
+
+#[test]
+fn a_robot_that_comes_to_rest_half_a_second_after_it_was_told_to_obeys() {
+    let (watch, did_not_stop) = told_to_stand(|since| if since < 0.5 { 560.0 } else { 0.0 });
+    assert_eq!(did_not_stop, None);
+    assert!(watch.monitor.is_at_rest());
+}
+
+#[test]
+fn a_robot_that_rolls_on_disobeys_within_one_and_a_half_seconds_and_is_not_at_rest() {
+    let (watch, did_not_stop) = told_to_stand(|_| 560.0);
+    assert!(did_not_stop.unwrap() < 1.5, "{did_not_stop:?}");
+    assert!(!watch.monitor.is_at_rest());
+}
+
+#[test]
+fn a_robot_that_did_not_obey_does_when_it_has_been_seen_at_rest() {
+    let (watch, did_not_stop) = told_to_stand(|since| if since < 3.0 { 560.0 } else { 0.0 });
+    assert!(did_not_stop.is_some() && !watch.does_not_stop);
+    assert!(watch.monitor.is_at_rest());
+}
+
+#[test]
+fn encoders_that_tremble_are_at_rest() {
+    let mut stop_monitor = stop_monitor();
+    for tick in 0..4 {
+        let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
+        stop_monitor.heard([10 + 3 * (tick % 2) as u16, 7], now);
+    }
+    assert!(stop_monitor.is_at_rest());
+}
+
+#[test]
+fn every_method_is_tried_in_turn_while_the_robot_does_not_stop() {
+    let mut stop_monitor = stop_monitor();
+    let mut tried = |from_ms: u64, to_ms: u64, does_not_stop| {
+        let times = (from_ms..to_ms).step_by(20);
+        let tried = times.filter_map(|ms| {
+            let now = MissionTime(ms * 1_000_000);
+            let method = stop_monitor.next_method(does_not_stop, now);
+            method.map(|method| (ms, method))
+        });
+        tried.collect::<Vec<_>>()
+    };
+    let methods = [
+        (0, StopMethod::Disable),
+        (300, StopMethod::Pwm),
+        (600, StopMethod::Suspend),
+        (900, StopMethod::Velocity),
+    ];
+    assert_eq!(tried(0, 1000, true), methods);
+    assert_eq!(tried(1000, 1100, false), []);
+    assert_eq!(tried(1100, 1120, true), [(1100, StopMethod::Disable)]);
+}

@@ -1,0 +1,164 @@
+//! Whether the robot's streams come, and often enough. Silence is timed by the machine's clock, as in [`super::presence`],
+//! and intervals by mission time.
+
+use std::{collections::VecDeque, time::Duration};
+
+use common::{clock::MissionTime, mission::Mission, samples::Cause};
+
+use super::{
+    monitor::{Condition, Moment, Monitor, Observation},
+    presence::Silence,
+};
+use crate::backoff::Backoff;
+
+/// The robot is slow when of so many intervals all but the two shortest are too long. Those of a radio that is out half
+/// of the time are not.
+const INTERVALS: usize = 9;
+const SHORT_ONES: usize = 2;
+/// The pause between the first two requests for streams that do not come.
+const FIRST_PAUSE: Duration = Duration::from_secs(1);
+/// The longest pause between requests.
+const LONGEST_PAUSE: Duration = Duration::from_secs(8);
+
+/// How the motor frames come.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Motor {
+    /// Often enough.
+    #[default]
+    Regular,
+    /// None comes although the robot answers.
+    Silent,
+    /// So many a second, which is too few: a command ends before the next frame.
+    Slow(f64),
+}
+
+/// The streams of one robot.
+#[derive(Clone, Debug)]
+pub struct Streams {
+    limit: Duration,
+    silence: Silence,
+    sensing: bool,
+    sonar_index: u8,
+    found_ns: u64,
+    motor_ns: u64,
+    range_ns: u64,
+    newest: Option<MissionTime>,
+    intervals: VecDeque<Duration>,
+    requests: Backoff,
+}
+
+impl Streams {
+    fn motor(&mut self, now: MissionTime, now_ns: u64) {
+        self.motor_ns = now_ns;
+        if let Some(before) = self.newest.replace(now) {
+            self.intervals.push_back(now.since(before));
+        }
+        if self.intervals.len() > INTERVALS {
+            self.intervals.pop_front();
+        }
+    }
+
+    /// How the motor frames of a robot that answers come.
+    #[must_use]
+    pub fn motor_frames(&self, now_ns: u64) -> Motor {
+        let since = self.motor_ns.max(self.found_ns);
+        if self.silence.is_over(since, now_ns) {
+            return Motor::Silent;
+        }
+        let mut sorted: Vec<_> = self.intervals.iter().copied().collect();
+        sorted.sort_unstable();
+        match sorted.get(SHORT_ONES) {
+            Some(&interval) if sorted.len() == INTERVALS && interval > self.limit => {
+                Motor::Slow(1.0 / interval.as_secs_f64())
+            }
+            _ => Motor::Regular,
+        }
+    }
+
+    fn range_is_silent(&self, now_ns: u64) -> bool {
+        // A robot that was found a moment ago must send a reading first: older ones say nothing of what stands ahead.
+        self.sensing && self.silence.is_over(self.range_ns, now_ns)
+    }
+
+    /// Whether to ask for the streams again, now. The pauses between requests grow.
+    pub fn wants_request(&mut self, now_ns: u64) -> bool {
+        if self.motor_frames(now_ns) == Motor::Regular && !self.range_is_silent(now_ns) {
+            // A robot that streams only while it is asked is asked no faster.
+            return false;
+        }
+        let due = self.requests.is_due(now_ns);
+        if due {
+            self.requests.attempted(now_ns);
+        }
+        due
+    }
+}
+
+impl Monitor for Streams {
+    fn new(mission: &Mission) -> Self {
+        Self {
+            limit: Duration::from_secs_f64(mission.robot.command_limit_s),
+            silence: Silence::new(mission),
+            sensing: mission.sensing,
+            sonar_index: mission.sonar.index,
+            found_ns: 0,
+            motor_ns: 0,
+            range_ns: 0,
+            newest: None,
+            intervals: VecDeque::new(),
+            requests: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
+        }
+    }
+
+    fn observe(&mut self, what: &Observation<'_>, now: Moment) {
+        match *what {
+            Observation::Pace(pace) => self.silence.set_pace(pace),
+            Observation::Motor(..) => self.motor(now.time, now.machine_ns),
+            Observation::Standard(standard) => {
+                let byte = standard.ultrasonic.get(usize::from(self.sonar_index));
+                // 0 is no reading; 255 is one: nothing is in range.
+                if byte.is_some_and(|&byte| byte != 0) {
+                    self.range_ns = now.machine_ns;
+                }
+            }
+            Observation::Found { .. } => {
+                self.found_ns = now.machine_ns;
+                self.newest = None;
+                self.intervals.clear();
+                self.requests.reset();
+                self.requests.attempted(now.machine_ns);
+            }
+            _ => {}
+        }
+    }
+
+    fn condition(&self, cause: Cause, now: Moment) -> Condition {
+        let holds = match cause {
+            Cause::RangeSilent => self.range_is_silent(now.machine_ns),
+            Cause::FramesSilent => self.motor_frames(now.machine_ns) == Motor::Silent,
+            _ => matches!(self.motor_frames(now.machine_ns), Motor::Slow(_)),
+        };
+        holds.into()
+    }
+
+    fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
+        match (cause, self.motor_frames(now.machine_ns)) {
+            (Cause::RangeSilent, _) => Some(format!(
+                "the front sonar, index {} of the standard frame (sonar.index), is missing or 0",
+                self.sonar_index
+            )),
+            (Cause::FramesSilent, _) => {
+                Some("the robot answers and sends no motor frames; they are asked for".to_owned())
+            }
+            (_, Motor::Slow(hz)) => Some(format!(
+                "the robot sends {hz:.1} motor frames a second, one in {:.2} s, and a command lasts {:.2} s: let it send faster, or raise robot.command_limit_s",
+                1.0 / hz,
+                self.limit.as_secs_f64()
+            )),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
