@@ -1,4 +1,4 @@
-//! Pauses between attempts that double up to a longest one. The clock comes in as an argument.
+//! Pauses between attempts, which double up to a longest one.
 
 use std::time::Duration;
 
@@ -15,7 +15,6 @@ pub struct Backoff {
 impl Backoff {
     /// The first attempt is due at once, the second a `first` pause later, and no pause is longer than
     /// `longest`.
-    #[must_use]
     pub const fn new(first: Duration, longest: Duration) -> Self {
         Self {
             first,
@@ -27,7 +26,6 @@ impl Backoff {
     }
 
     /// Whether to try now, at `now_ns` of the monotonic clock.
-    #[must_use]
     pub fn is_due(&self, now_ns: u64) -> bool {
         self.next_ns.is_none_or(|next| now_ns >= next)
     }
@@ -39,19 +37,17 @@ impl Backoff {
         self.pause = (self.pause * 2).min(self.longest);
     }
 
-    /// It succeeded: the next loss begins anew.
+    /// It succeeded: the pauses start from the shortest again.
     pub const fn reset(&mut self) {
         *self = Self::new(self.first, self.longest);
     }
 
     /// Attempts since the last success.
-    #[must_use]
     pub const fn attempts(&self) -> u64 {
         self.attempts
     }
 
     /// Nanoseconds until the next attempt; 0 when it is due.
-    #[must_use]
     pub fn wait_ns(&self, now_ns: u64) -> u64 {
         self.next_ns.map_or(0, |next| next.saturating_sub(now_ns))
     }

@@ -13,7 +13,7 @@ use common::{
 
 use crate::failsafe::stop_monitor::StopMethod;
 
-/// Steering rate for each angle that is left, over the ticks of a second: below 1, so that the delay of a speed loop does
+/// The steering turns by this share of the remaining angle in a tick: below 1, so that the delay of a speed loop does
 /// not make the steering swing.
 const STEERING_GAIN: f64 = 0.6;
 
@@ -29,8 +29,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Of the robot of `mission`.
-    #[must_use]
+    /// The drive of `mission`'s robot.
     pub fn new(mission: &Mission) -> Self {
         Self {
             robot: mission.robot.clone(),
@@ -39,14 +38,12 @@ impl Drive {
         }
     }
 
-    /// How long a command holds.
-    #[must_use]
+    /// The time limit of a command.
     pub const fn limit(&self) -> Duration {
         self.limit
     }
 
-    /// Encoders as feedback, velocity mode, motors enabled, sensors streaming.
-    #[must_use]
+    /// Commands for encoders as feedback, velocity mode, enabled motors and running streams.
     pub fn greeting(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut say = |command: Command| command.encode(Addressing::default(), &mut bytes);
@@ -66,8 +63,7 @@ impl Drive {
         bytes
     }
 
-    /// Sensors streaming.
-    #[must_use]
+    /// Commands for running streams.
     pub fn streams(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         for stream in [Stream::Motor, Stream::Custom, Stream::Standard] {
@@ -77,8 +73,7 @@ impl Drive {
         bytes
     }
 
-    /// What a motor frame says of the wheels, growing forward.
-    #[must_use]
+    /// The counts of a motor frame, growing forward.
     pub fn wheels(&self, sensors: &MotorSensors) -> WheelSample {
         let left = self.wheel(sensors, self.robot.left);
         let right = self.wheel(sensors, self.robot.right);
@@ -104,10 +99,9 @@ impl Drive {
         }
     }
 
-    /// What `command` asks of the two channels, counts/s, at `share` of its speed, where the encoders stand at `wheels`. A
+    /// The speeds of the two channels for `command`, counts/s, at `share` of its speed, where the encoders stand at `wheels`. A
     /// car's steering is a channel with a speed loop like that of a wheel: it is driven towards its angle, so a timed
     /// command ends its motion, too.
-    #[must_use]
     pub fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let driven = self.counts_per_second(share * command.left_rad_s);
         let Some(steering) = self.body.steering else {
@@ -122,15 +116,14 @@ impl Drive {
         [driven, on_the_wire(rate)]
     }
 
-    /// rad/s to counts/s, limited to what the wheel can do; what is no number stands.
+    /// Convert rad/s to counts/s, limited to the wheel's top speed; NaN gives 0.
     fn counts_per_second(&self, speed: f64) -> i16 {
         let per_radian = self.body.counts_per_turn / std::f64::consts::TAU;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         on_the_wire((speed * per_radian).clamp(-top, top))
     }
 
-    /// A timed velocity command: a robot that obeys the time stops by itself when we fall silent.
-    #[must_use]
+    /// A timed velocity command: a robot that obeys the time stops by itself when the link is gone.
     pub fn velocity(&self, [left, right]: [i16; 2], limit: Duration) -> Vec<u8> {
         let mut channels = [None; 2];
         for (channel, counts) in [(self.robot.left, left), (self.robot.right, right)] {
@@ -141,14 +134,12 @@ impl Drive {
         encoded(Command::velocity(channels, limit_ms))
     }
 
-    /// The wheels to rest, for as long as a command holds.
-    #[must_use]
+    /// A command that holds the wheels at rest.
     pub fn stop(&self) -> Vec<u8> {
         self.velocity([0, 0], self.limit)
     }
 
-    /// The wheels to rest by these means.
-    #[must_use]
+    /// The commands that stop the wheels by `method`.
     pub fn stop_by(&self, method: StopMethod) -> Vec<u8> {
         let wheels = [self.robot.left.channel, self.robot.right.channel];
         let disable = |channel: Option<u8>| encoded(Command::Enable { on: false, channel });
@@ -171,14 +162,13 @@ impl Drive {
     }
 }
 
-/// Counts/s as a command carries them; what is no number is 0.
+/// Round counts/s to a command's integers; NaN gives 0.
 fn on_the_wire(counts: f64) -> i16 {
     // -32768 and -32767 mean "leave alone".
     counts.round().clamp(-32_766.0, 32_766.0) as i16
 }
 
 /// The frame of a command.
-#[must_use]
 pub fn encoded(command: Command) -> Vec<u8> {
     let mut bytes = Vec::new();
     command.encode(Addressing::default(), &mut bytes);
@@ -191,7 +181,7 @@ mod tests {
 
     use super::*;
 
-    /// What a car's channels are asked for when its steering stands at `counts`: at 7 Hz, 3600 counts a turn.
+    /// Speeds for a car whose steering stands at `counts`, at 7 Hz with 3600 counts a turn.
     fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
         let text = "target = [3, 0]\nrobot.model = 'car'";
         let drive = Drive::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
@@ -209,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_cars_steering_is_driven_towards_its_angle() {
-        // 5 degrees are 50 counts; 0.6 of what is left in a tick.
+        // 5 degrees are 50 counts; a tick turns 0.6 of the remaining angle.
         let five = 5_f64.to_radians();
         assert_eq!(counts(0.0, five, 1.0, 0), [0, 210]);
         assert_eq!(counts(0.0, five, 1.0, 50), [0, 0]);

@@ -61,15 +61,15 @@ monitors! {
 /// A row of the table.
 #[derive(Debug)]
 pub struct Rule {
-    /// What is wrong.
+    /// The cause.
     pub cause: Cause,
     /// When it applies, in words.
     pub when: &'static str,
-    /// What is done.
+    /// The action.
     pub action: Action,
     /// When it no longer applies.
     pub clears: Clears,
-    /// Who watches for it.
+    /// The monitor that watches for it.
     monitor: fn(&Monitors) -> &dyn Monitor,
 }
 
@@ -205,12 +205,12 @@ pub const TABLE: &[Rule] = &[
     },
 ];
 
-/// What to do, and why.
+/// An action and its cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// What.
+    /// The action.
     pub action: Action,
-    /// Why.
+    /// Its cause.
     pub cause: Cause,
 }
 
@@ -222,7 +222,6 @@ impl Decision {
     };
 
     /// Whether no command may pass.
-    #[must_use]
     pub fn stops(self) -> bool {
         self.action >= Action::Stop
     }
@@ -240,7 +239,6 @@ impl Decision {
 }
 
 /// The row of a cause; none for [`Cause::None`].
-#[must_use]
 pub fn rule(cause: Cause) -> Option<&'static Rule> {
     TABLE.iter().find(|rule| rule.cause == cause)
 }
@@ -270,7 +268,7 @@ impl Failsafe {
         }
     }
 
-    /// What to do now. In lockstep, and while the robot does not answer, its frames are not judged.
+    /// Decide what to do now. In lockstep, and while the robot does not answer, its frames are not judged.
     pub(crate) fn decide(&mut self, lockstep: bool, now: Moment) -> Decision {
         let judges_frames = !lockstep && self.monitors.presence.connected();
         let monitors = &self.monitors;
@@ -293,7 +291,7 @@ impl Failsafe {
         rules.any(|(rule, applied)| rule.cause == cause && applied)
     }
 
-    /// What was seen of `cause`, and what an operator can do about it.
+    /// An explanation of `cause` with what was seen, and a remedy.
     pub(crate) fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         (rule(cause)?.monitor)(&self.monitors).explain(cause, now)
     }

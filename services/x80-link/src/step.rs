@@ -1,8 +1,8 @@
-//! The link, pure: what came and what time it is go in, samples and bytes for the robot come out.
+//! The pure step of the link: events and their times in, samples and bytes for the robot out.
 //!
 //! A tick starts with a motor frame and takes the newest sonar frame with it; it ends with the command
-//! computed from it. in lockstep (a simulated robot at `--pace max`) the robot waits for that
-//! command, so a tick that gets none, because a stage ended, is given again. On a wall clock the robot
+//! computed from it. In lockstep (a simulated robot at `--pace max`) the robot waits for that
+//! command, so a tick that gets none, because a stage ended, is repeated. On a wall clock the robot
 //! moves on, so an unanswered tick is abandoned for the next.
 
 mod event;
@@ -36,19 +36,19 @@ use crate::{
 
 pub use event::{Effect, Event, Input, State, Tally};
 
-/// Between pings of a robot that owes a tick.
+/// The pause between pings of a robot that owes a tick.
 const PING_EVERY: Duration = Duration::from_millis(200);
-/// An open tick without a command is given again after this: ten times the longest tick measured.
+/// An open tick without a command is repeated after this: ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
-/// in lockstep the supervisor's word that the next one may begin is waited for so long: longer than a stalled robot's
-/// planner may take to start anew. A supervisor that is silent stops the robot before.
+/// In lockstep a tick waits at most so long for the supervisor's limit to reach it: longer than the planner of a stalled
+/// robot may take to restart. A supervisor that is silent stops the robot before.
 const LIMIT_WAITED: Duration = Duration::from_secs(5);
-/// The wire knows whole milliseconds, and to most robots none means no limit.
+/// The wire carries whole milliseconds, and to most robots 0 means no limit.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
-/// A stop is sent so often: one datagram may be lost.
+/// A new stop is sent so many times: one datagram may be lost.
 const STOPS: u32 = 3;
-/// While the robot stands by our decision the stop is sent again: all of them may be lost in a fade, and a
-/// robot may ignore the time limit of the command before.
+/// While the link stops the robot, the stop is sent again after so long: all of them may be lost in a fade, and a robot
+/// may ignore the time limit of the command before.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 /// A tick that waits for its command.
@@ -57,7 +57,7 @@ struct OpenTick {
     range: RangeSample,
     wheels: WheelSample,
     began_ns: u64,
-    /// None while it waits for the supervisor's word that it may begin.
+    /// `None` while it waits for the supervisor's limit.
     given_ns: Option<u64>,
 }
 
@@ -67,7 +67,7 @@ struct Repeat {
     counts: [i16; 2],
     /// The tick it was computed from.
     stamp: MissionTime,
-    /// Halfway to the next.
+    /// Half a period after it.
     due: MissionTime,
 }
 
@@ -75,7 +75,7 @@ struct Repeat {
 #[derive(Debug)]
 pub struct Link {
     state: State,
-    /// Mission time of the input that is taken.
+    /// Mission time of the present input.
     now: MissionTime,
     drive: Drive,
     sonar_index: usize,
@@ -93,13 +93,13 @@ pub struct Link {
     /// Mission time of the newest tick.
     time: MissionTime,
     open: Option<OpenTick>,
-    /// in lockstep: the last tick that may begin; none if nobody limits them.
+    /// In lockstep, the last tick that may begin; `None` if there is no limit.
     last_tick: Option<u64>,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
     stop_sent_ns: Option<u64>,
-    /// in lockstep: motor frames that are due, one for each command and each ping since the order.
+    /// In lockstep, motor frames that are due, one for each command and each ping since the order.
     due: u32,
     tally: Tally,
 }
@@ -109,7 +109,7 @@ impl Step for Link {
     type Output = Vec<Effect>;
     type State = State;
 
-    /// The link of a robot that waits for commands, before tick 0.
+    /// A link in lockstep before tick 0.
     fn new(mission: &Mission) -> Self {
         Self {
             state: State::default(),
@@ -130,7 +130,7 @@ impl Step for Link {
             last_tick: None,
             newest_command: None,
             repeat: None,
-            // Nothing has moved yet: what holds it needs no stop of its own.
+            // Nothing has moved yet: no stop needs to be sent.
             decision: Decision {
                 action: Action::Stop,
                 cause: Cause::NotOrdered,
@@ -182,37 +182,31 @@ impl Step for Link {
 
 impl Link {
     /// Whether the robot answers.
-    #[must_use]
     pub fn connected(&self) -> bool {
         self.monitors().presence.connected()
     }
 
     /// What the failsafe does, and why.
-    #[must_use]
     pub const fn decision(&self) -> Decision {
         self.decision
     }
 
     /// Counts of the wire.
-    #[must_use]
     pub fn wire_tally(&self) -> DecoderTally {
         self.decoder.tally()
     }
 
     /// Counts of the link.
-    #[must_use]
     pub const fn tally(&self) -> Tally {
         self.tally
     }
 
     /// Times the robot was seen to have restarted its counts.
-    #[must_use]
     pub const fn restarts(&self) -> u32 {
         self.restart.restarts()
     }
 
-    /// Whether the encoders say that no wheel turns. in lockstep a robot that is held is given no time.
-    #[must_use]
+    /// Whether the encoders say that no wheel turns. In lockstep a robot that is held is given no time.
     pub fn is_at_rest(&self) -> bool {
         if self.in_ticks() {
             self.decision.stops()
@@ -221,26 +215,22 @@ impl Link {
         }
     }
 
-    /// What was seen of `cause`, and what to do about it.
-    #[must_use]
+    /// An explanation of `cause` with what was seen, and a remedy.
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
         self.failsafe.explain(cause, self.moment(now_ns))
     }
 
-    /// How long the robot has been away, at `now_ns` of the monotonic clock.
-    #[must_use]
+    /// The robot's absence at `now_ns` of the monotonic clock.
     pub fn absence(&self, now_ns: u64) -> Absence {
         self.monitors().presence.absence(now_ns)
     }
 
     /// Times the robot was lost.
-    #[must_use]
     pub fn losses(&self) -> u64 {
         self.monitors().presence.losses()
     }
 
-    /// What is sent when the stage stops: the robot stands.
-    #[must_use]
+    /// The stops that are sent when the stage ends.
     pub fn final_stops(&self) -> Vec<Vec<u8>> {
         (0..STOPS).map(|_| self.drive.stop()).collect()
     }
@@ -273,7 +263,7 @@ impl Link {
         self.state.pace == Pace::Max
     }
 
-    /// Whether the newest command was the mission's last: in lockstep there is nothing to go on for.
+    /// Whether the newest command was the mission's last. In lockstep no tick follows it.
     fn arrived(&self) -> bool {
         self.newest_command
             .is_some_and(|command| CommandState::from_byte(command.state) == CommandState::Arrived)
@@ -284,7 +274,7 @@ impl Link {
             return;
         }
         if self.in_ticks() {
-            // Of several answers that are due only the last shows where the robot is.
+            // When several answers are due, only the last shows the robot's present state.
             self.due = self.due.saturating_sub(1);
             if self.open.is_some() || self.due > 0 || self.arrived() {
                 return;
@@ -337,7 +327,7 @@ impl Link {
         }
         let answers = self.open.is_some() && command.stamp.tick == self.open_number();
         if self.in_ticks() && !answers {
-            // A second answer to a tick that was given twice.
+            // It is a second answer to a tick that was repeated.
             return;
         }
         self.newest_command = Some(*command);
@@ -386,12 +376,12 @@ impl Link {
         }
         self.observe(Observation::Directive(order, reason), now_ns);
         if drives && self.in_ticks() {
-            // A robot that waits for commands tells its state again when pinged: tick 0.
+            // A robot that waits for commands sends its state again when pinged: tick 0.
             self.ping(now_ns, effects);
         }
     }
 
-    /// Give the open tick to the pipeline when it may begin; in lockstep, again when it has no answer for long.
+    /// Give the open tick to the pipeline when it may begin; in lockstep, repeat it when it has no answer for long.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let Some(mut open) = self.open else {
             return;
@@ -418,7 +408,7 @@ impl Link {
     }
 
     /// Send the newest command once more, halfway to the next tick and with what remains of its time: the
-    /// robot still stands when that has passed since the tick. in lockstep each command draws a
+    /// robot still stands when that has passed since the tick. In lockstep each command draws a
     /// frame, and none is lost unnoticed.
     fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if self.in_ticks() {
@@ -444,7 +434,7 @@ fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
 }
 
-/// A sonar byte as the pipeline takes it.
+/// The sample of a sonar byte.
 fn reading(byte: Option<u8>) -> RangeSample {
     let (status, range_m) = match byte.map(Echo::from_byte) {
         None => (RangeStatus::Absent, None),

@@ -1,4 +1,4 @@
-//! What the robot's frames carry besides wheels and front sonar, in the units of the topics.
+//! Batteries, infrared and the other sensors of the robot's frames, in the units of the topics.
 
 use common::{
     samples::{InfraredSample, PowerSample, SurroundingsSample},
@@ -8,7 +8,7 @@ use common::{
     },
 };
 
-/// Frames in, samples out; it remembers what a sample needs of another frame.
+/// The parts of earlier frames that the next sample needs.
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
     currents: [u16; 6],
@@ -17,12 +17,12 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// A motor frame: its currents go with the next [`PowerSample`].
+    /// Take a motor frame: its currents go into the next [`PowerSample`].
     pub const fn take_motor(&mut self, motor: &MotorSensors) {
         self.currents = motor.currents;
     }
 
-    /// A standard frame; `low` says which of the boards', the motors' and the servos' battery is.
+    /// Take a standard frame; `low` says which of the boards', the motors' and the servos' battery is low.
     pub fn take_standard(
         &mut self,
         standard: &StandardSensors,
@@ -52,8 +52,7 @@ impl Telemetry {
         (power, surroundings)
     }
 
-    /// A custom frame; none before the first ranger was heard in a standard one.
-    #[must_use]
+    /// Take a custom frame. There is no sample before a standard frame has brought the first ranger.
     pub fn take_custom(&self, custom: &CustomSensors) -> Option<InfraredSample> {
         let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
         let first = self.first_infrared?;

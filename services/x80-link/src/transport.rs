@@ -1,13 +1,13 @@
-//! How bytes reach the robot: datagrams, a connection or a serial line. Nothing here ever blocks, and
-//! what cannot be sent now is lost, as on a radio.
+//! The transport of bytes to the robot: datagrams, a connection or a serial line. Nothing here blocks, and
+//! bytes that cannot be sent now are lost, as on a radio.
 //!
 //! | module | holds |
 //! |---|---|
 //! | `udp` | datagrams from the robot's address, and from nowhere else |
-//! | `stream` | what a connection and a serial line have in common: opened for ever anew, never half a frame |
+//! | `stream` | the common part of a connection and a serial line: reopened after each loss, never half a frame |
 //! | `tcp` | a connection |
 //! | `serial` | a serial line |
-//! | `counts` | what each of them counts |
+//! | `counts` | the counts of each |
 
 mod counts;
 mod serial;
@@ -26,15 +26,15 @@ use thiserror::Error;
 pub use self::counts::{Attempts, Tally};
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
-/// The wire cannot be opened or stays unusable: this process is short of something, the robot has no part in it.
+/// The wire cannot be opened or stays unusable, for a reason that lies with this machine and not with the robot.
 #[derive(Debug, Error)]
 #[error(
     "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
 )]
 pub struct TransportError {
-    /// Where the robot is.
+    /// The robot's address.
     pub address: Address,
-    /// The system's word.
+    /// The system's error.
     pub source: io::Error,
 }
 
@@ -56,10 +56,7 @@ enum Wire {
 }
 
 impl Transport {
-    /// A wire to the robot at `address`. One that must be opened first is opened by [`Transport::tend`].
-    ///
-    /// # Errors
-    /// When the system has no descriptor or port left.
+    /// A wire to the robot at `address`. [`Transport::maintain`] opens one that must be opened first.
     pub fn open(address: &Address) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
@@ -78,12 +75,8 @@ impl Transport {
         })
     }
 
-    /// Open what is down when that is due, send what is left of a message; at `now_ns` of the monotonic
-    /// clock. Says whether the wire is open, when that was not reported yet. No opening hides a closing: both
-    /// are reported, in turn.
-    ///
-    /// # Errors
-    /// When the system refuses to watch a descriptor.
+    /// Open a wire that is down when that is due, and send the rest of a message, at `now_ns` of the monotonic clock.
+    /// Returns whether the wire is open if that was not reported yet. No opening hides a closing: both are reported.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
@@ -102,8 +95,7 @@ impl Transport {
         Ok(open)
     }
 
-    /// Whether the robot could hear.
-    #[must_use]
+    /// Whether the wire is open.
     pub const fn is_open(&self) -> bool {
         match &self.wire {
             Wire::Udp(_) => true,
@@ -113,9 +105,6 @@ impl Transport {
     }
 
     /// The next bytes of the robot; none when all were taken.
-    ///
-    /// # Errors
-    /// When a socket broke that cannot be opened anew.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
         let received = match &mut self.wire {
             Wire::Udp(udp) => udp.receive(&mut self.buffer),
@@ -128,10 +117,7 @@ impl Transport {
         }
     }
 
-    /// Send one message, of one frame or more.
-    ///
-    /// # Errors
-    /// When a socket broke that cannot be opened anew.
+    /// Send one message of one frame or more.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         let sent = match &mut self.wire {
             Wire::Udp(udp) => udp.send(bytes),
@@ -141,8 +127,7 @@ impl Transport {
         sent.map_err(|source| self.broken(source))
     }
 
-    /// What was counted.
-    #[must_use]
+    /// The counts so far.
     pub const fn tally(&self) -> Tally {
         match &self.wire {
             Wire::Udp(udp) => udp.tally(),
@@ -151,8 +136,7 @@ impl Transport {
         }
     }
 
-    /// Attempts to open it, of a wire that is not open; at `now_ns` of the monotonic clock.
-    #[must_use]
+    /// Attempts to open a wire that is not open, at `now_ns` of the monotonic clock.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         match &self.wire {
             Wire::Udp(_) => None,
@@ -169,7 +153,7 @@ impl Transport {
     }
 }
 
-/// Readable when there is something to do; the same descriptor for as long as the transport exists.
+/// The descriptor is readable when there is something to do, and does not change.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
         match &self.wire {

@@ -1,4 +1,4 @@
-//! Whose commands and orders the link obeys: those of the processes that the supervisor started, and of no others.
+//! The link obeys commands and orders only of processes that the supervisor started.
 
 use common::{
     bus::{Author, Bus, BusError, Ignored, Reader, SliceReader},
@@ -6,7 +6,7 @@ use common::{
     topics::{self, AnyTopic as _},
 };
 
-/// Follows the roster, and tells of processes that write and should not.
+/// The writers that the roster names, and the others that were ignored.
 #[derive(Debug)]
 pub(crate) struct Writers {
     roster: SliceReader<RosterHeader, RosterEntry>,
@@ -26,7 +26,7 @@ impl Writers {
         })
     }
 
-    /// Let `command` give what the controller that the roster names writes.
+    /// Make `command` read from the controller that the roster names.
     pub(crate) fn follow(&mut self, command: &mut Reader<CommandSample>) -> Result<(), BusError> {
         while let Some(entries) = self.roster.take()? {
             let writer = topics::COMMAND.spec().writer;
@@ -42,7 +42,7 @@ impl Writers {
         Ok(())
     }
 
-    /// What was ignored on all topics, a warning for each process that is new among them.
+    /// Sum up the ignored samples of all topics, and warn of each process that is new among their writers.
     pub(crate) fn tell(&mut self, ignored: [Ignored; 3]) -> Ignored {
         let samples = ignored.iter().map(|topic| topic.samples).sum();
         let changed = samples != self.ignored.samples;

@@ -18,7 +18,7 @@ pub struct Wheels<T> {
 }
 
 impl<T> Wheels<T> {
-    /// `change` of both.
+    /// Apply `change` to both.
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Wheels<U> {
         Wheels {
             left: change(self.left),
@@ -29,7 +29,7 @@ impl<T> Wheels<T> {
 
 /// A body that touches nothing any more has moved at least this far off, metres.
 const RELEASE_M: f64 = 0.005;
-/// Attempts to push the body out of everything it penetrates; corners take two.
+/// The body is pushed out of what it penetrates so many times at most; corners take two.
 const PUSHES: usize = 4;
 
 /// The disc, its pose and what it has touched.
@@ -47,7 +47,6 @@ pub struct Body {
 
 impl Body {
     /// The body of `mission`'s robot at its start in `world`, its track `track_scale` times the nominal one.
-    #[must_use]
     pub fn new(mission: &Mission, world: &World, track_scale: f64) -> Self {
         let body = mission.body();
         let track = body.track_m * track_scale;
@@ -65,41 +64,36 @@ impl Body {
         }
     }
 
-    /// Put it where it was when it had touched something `contacts` times.
+    /// Restore its pose and how often it had touched something.
     pub fn put(&mut self, pose: Pose2, contacts: u64, world: &World) {
         self.pose = pose;
         self.contacts = contacts;
         self.clearance = world.clearance(pose.position) - self.radius;
-        // Where it leans on something it has come there before.
+        // A contact that lasts is not counted again.
         self.touching = self.clearance <= RELEASE_M;
     }
 
     /// Where it is.
-    #[must_use]
     pub fn pose(&self) -> Pose2 {
         self.pose
     }
 
     /// Its radius, metres.
-    #[must_use]
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
     /// Its true track, metres: W is the nominal one.
-    #[must_use]
     pub fn track(&self) -> f64 {
         self.track
     }
 
-    /// How often it has touched something: once for each time it came and stayed.
-    #[must_use]
+    /// Times it has touched something; a contact counts once, however long it lasts.
     pub fn contacts(&self) -> u64 {
         self.contacts
     }
 
-    /// From its surface to the nearest thing, metres, where it came to stand last.
-    #[must_use]
+    /// Distance from its surface to the nearest thing, metres, at its last place.
     pub fn clearance(&self) -> f64 {
         self.clearance
     }
@@ -151,7 +145,7 @@ impl Body {
             let Some(outward) = surface.outward(position) else {
                 break;
             };
-            // A hair more than needed, or rounding would find it penetrating for ever.
+            // Without the margin, rounding would find it penetrating for ever.
             self.pose.position += outward * (1e-9 - gap);
         }
         self.clearance = world.clearance(self.pose.position) - self.radius;

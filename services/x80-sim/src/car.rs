@@ -17,17 +17,17 @@ use crate::{
 /// How a car hangs on its motors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Car {
-    /// With the true diameter and the true wheelbase.
+    /// Its true diameter and wheelbase.
     drive: Ackermann,
     steering: Steering,
     driven: OnChannel,
     steered: OnChannel,
-    /// Of the true wheel.
+    /// Metres per count of the true wheel.
     wheel_radius_m: f64,
     counts_per_radian: f64,
 }
 
-/// The motor that does something, and which way.
+/// The channel of a motor, and its sign.
 #[derive(Clone, Copy, Debug)]
 struct OnChannel {
     channel: usize,
@@ -45,7 +45,7 @@ impl From<Channel> for OnChannel {
 }
 
 impl Car {
-    /// That of `mission`'s robot, with the driven wheel and the wheelbase as far off as `errors` says of a left wheel and of
+    /// The car of `mission`, with the driven wheel and the wheelbase as far off as `errors` says of a left wheel and of
     /// a track; none if the robot is no car.
     pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
         let body = mission.body();
@@ -72,18 +72,18 @@ impl Car {
         self.steered.channel == channel
     }
 
-    /// The most that motor can do, counts per second.
+    /// Top speed of that motor, counts per second.
     pub(crate) fn top_steering_counts(&self) -> f64 {
         self.steering.counts(self.steering.rate_rad_s)
     }
 
-    /// Where the steering stands, radians.
+    /// Angle of the steering, radians.
     fn angle(&self, motors: &[Motor; 6]) -> f64 {
         let OnChannel { channel, sign } = self.steered;
         self.steering.angle(sign * motors[channel].turned())
     }
 
-    /// How it moves by what its motors do.
+    /// Its motion by the speeds of its motors.
     pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
         let OnChannel { channel, sign } = self.driven;
         self.drive.twist(SteeredWheel {

@@ -24,19 +24,19 @@ pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> f64 {
     }
 }
 
-/// How the wheels hang on the motors.
+/// The wheels of the robot and their motors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drivetrain {
     channel: Wheels<usize>,
     sign: Wheels<f64>,
-    /// Of a wheel of nominal diameter.
+    /// Metres per count of a wheel of nominal diameter.
     metres_per_count: f64,
     /// True diameters over the nominal one.
     diameter: Wheels<f64>,
 }
 
 impl Drivetrain {
-    /// That of `mission`'s robot, its wheels `diameter` times the nominal one.
+    /// The drivetrain of `mission`'s robot, its wheels `diameter` times the nominal one.
     pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
         let wheels = Wheels {
             left: mission.robot.left,
@@ -51,7 +51,7 @@ impl Drivetrain {
         }
     }
 
-    /// What the speed loops ask of the wheels from mission time `now` for `dt` seconds, metres of nominal wheels.
+    /// The distances that the speed loops ask for from mission time `now` for `dt` seconds, metres of nominal wheels.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],

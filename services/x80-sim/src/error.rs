@@ -1,11 +1,11 @@
-//! Why a simulated robot could not start or go on.
+//! Errors of a simulated robot.
 
 use std::{io, net::SocketAddr, path::PathBuf};
 
 use common::checkpoint::CheckpointError;
 use thiserror::Error;
 
-/// Why a simulated robot could not start or go on.
+/// An error for which a simulated robot does not start or go on.
 #[derive(Debug, Error)]
 pub enum SimError {
     /// The address cannot be listened on.
@@ -15,18 +15,18 @@ pub enum SimError {
     Bind {
         /// The address.
         address: SocketAddr,
-        /// The system's word.
+        /// The system's error.
         source: io::Error,
     },
-    /// No pseudo-terminal is to be had.
+    /// There is no pseudo-terminal.
     #[error("the simulated robot gets no pseudo-terminal: {0}; mount /dev/pts, or use UDP or TCP")]
     Line(#[source] io::Error),
     /// The transport failed later.
     #[error("the simulated robot can no longer listen on {address}: {source}; start it again")]
     Lost {
-        /// Where it listened.
+        /// The address it listened on.
         address: String,
-        /// The system's word.
+        /// The system's error.
         source: io::Error,
     },
     /// Its state cannot be saved.
@@ -37,10 +37,10 @@ pub enum SimError {
     Lock {
         /// The file.
         file: PathBuf,
-        /// The system's word.
+        /// The system's error.
         source: io::Error,
     },
-    /// The system would not let it wait.
+    /// Waiting for the socket failed.
     #[error("the simulated robot cannot wait for its socket: {0}; start it again")]
     Wait(#[source] io::Error),
 }

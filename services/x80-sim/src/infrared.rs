@@ -9,10 +9,10 @@ use common::{
 
 use crate::{noise::Noise, world::World};
 
-/// Beyond its reach a ranger reads as if something stood here, metres.
+/// Beyond its reach a ranger reads as if something stood at this distance, metres.
 const NOTHING_M: f64 = 0.81;
 
-/// What the rangers read on a robot of `radius` at `pose`, AD counts.
+/// Readings of the rangers on a robot of `radius` at `pose`, AD counts.
 pub fn read(
     world: &World,
     pose: Pose2,
@@ -23,7 +23,7 @@ pub fn read(
     rangers(pose, radius).map(|ranger| {
         let height_m = world.heights().infrared_m;
         let range = if world.is_between(pose.position, ranger.position, height_m) {
-            // Pressed against what the body touches: it sees that, not what is behind.
+            // A ranger pressed against what the body touches sees that, not what is behind.
             0.0
         } else {
             let hit = world.first_hit(ranger.position, ranger.axis(), height_m);

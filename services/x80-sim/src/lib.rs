@@ -1,6 +1,6 @@
-//! A simulated X80: the other end of the wire. Nothing of it reaches the stages but bytes.
+//! A simulated X80: the other end of the wire. The stages get only bytes from it.
 //!
-//! Layout, from the ground up:
+//! Layout, a module needs only those above it:
 //!
 //! | module | holds |
 //! |---|---|

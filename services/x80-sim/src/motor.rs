@@ -12,13 +12,13 @@ use crate::noise::Noise;
 
 /// Pulse width at which a wheel stands.
 const PWM_STOP: f64 = 16_383.5;
-/// Pulse widths so near to that turn no wheel: a client that drives by them adds as much.
+/// Pulse widths within this of it turn no wheel: a client that drives by them adds as much.
 const PWM_DEAD_BAND: f64 = 8000.0;
 /// Speed per count of position error, 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
-/// A wheel this near to the position it was ordered to is there, counts.
+/// A wheel has reached its position within this, counts.
 const POSITION_REACHED: f64 = 0.5;
-/// Below this friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
+/// Below this speed friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
 /// starting is friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
 /// Changes of the target under way through the delay. At 5 ms a step this is more than the longest
@@ -37,7 +37,7 @@ pub struct PidGains {
 }
 
 impl PidGains {
-    /// What a board boots with.
+    /// The gains that a board boots with.
     const BOOT: Self = Self {
         kp: 50,
         kd: 5,
@@ -51,11 +51,11 @@ impl PidGains {
     }
 }
 
-/// What a channel has been ordered and how far its wheel has turned.
+/// A channel: its order and the counts of its wheel.
 #[derive(Clone, Debug)]
 pub struct Motor {
     physics: WheelPhysics,
-    /// The most the wheel can do, counts per second.
+    /// Top speed of the wheel, counts per second.
     top_speed: f64,
     enabled: bool,
     mode: Mode,
@@ -63,7 +63,7 @@ pub struct Motor {
     position_pid: PidGains,
     velocity_pid: PidGains,
     order: Option<Order>,
-    /// When the target became what, before the delay.
+    /// Changes of the target and their times, before the delay.
     pending: VecDeque<(f64, f64)>,
     /// The target that the loop follows.
     target: f64,
@@ -82,7 +82,6 @@ struct Order {
 
 impl Motor {
     /// A channel as it boots: suspended, PWM mode, one potentiometer as feedback.
-    #[must_use]
     pub fn new(physics: WheelPhysics, top_speed: f64) -> Self {
         Self {
             physics,
@@ -101,43 +100,37 @@ impl Motor {
     }
 
     /// Whether it may run.
-    #[must_use]
     pub fn enabled(&self) -> bool {
         self.enabled
     }
 
-    /// What its loop controls.
-    #[must_use]
+    /// The quantity that its loop controls.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// What its loop measures itself by.
-    #[must_use]
+    /// The sensor that its loop uses as feedback.
     pub fn feedback(&self) -> Feedback {
         self.feedback
     }
 
     /// Gains of the position loop and of the velocity loop. They are stored and reported; the simulated
     /// loop is the one that was measured, whatever its gains.
-    #[must_use]
     pub fn gains(&self) -> (PidGains, PidGains) {
         (self.position_pid, self.velocity_pid)
     }
 
     /// Counts per second.
-    #[must_use]
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
     /// Counts since boot.
-    #[must_use]
     pub fn turned(&self) -> f64 {
         self.turned
     }
 
-    /// The counts of an earlier process, standing.
+    /// Restore the counts of an earlier process; the wheel stands.
     pub(crate) fn restore(&mut self, turned: f64) {
         self.turned = turned;
     }
@@ -157,7 +150,7 @@ impl Motor {
         });
     }
 
-    /// Let it run, or suspend it. A suspended motor forgets its order.
+    /// Enable or suspend it. A suspended motor forgets its order.
     pub fn enable(&mut self, on: bool) {
         self.enabled = on;
         if !on {
@@ -186,8 +179,7 @@ impl Motor {
         }
     }
 
-    /// When the order ends, mission time: no step may reach across it.
-    #[must_use]
+    /// The mission time at which the order ends: no step may reach across it.
     pub fn ends_at(&self) -> Option<f64> {
         self.order.and_then(|order| order.until)
     }
@@ -196,7 +188,7 @@ impl Motor {
     /// wheel.
     pub fn step(&mut self, now: f64, dt: f64, noise: &mut Noise) -> f64 {
         if self.ends_at().is_some_and(|end| now >= end) {
-            // The time of a position is how long the way takes; the wheel goes on to its last count.
+            // The time limit of a position is the duration of the motion; the wheel goes on to its last count.
             self.order = self
                 .order
                 .filter(|order| order.quantity == Quantity::Position)
@@ -224,7 +216,7 @@ impl Motor {
         } else {
             0.0
         };
-        // The way of an exponential approach is its integral, not its end times dt.
+        // The distance of an exponential approach is its integral, not its end times dt.
         let behind = self.speed - self.target;
         let counts = self.target * dt + behind * self.physics.lag_s * (1.0 - decay);
         self.speed = self.target + behind * decay;
@@ -270,7 +262,7 @@ impl Motor {
                 let way = if way > cycle / 2.0 { way - cycle } else { way };
                 let left = order.until.map_or(0.0, |end| end - now);
                 let asked = way / left.max(1.0 / POSITION_GAIN);
-                // The loop pushes until the wheel is there: no dead band is left over.
+                // The loop pushes until the wheel is there: no dead band remains.
                 let least = self.physics.dead_band_counts;
                 let there = way.abs() < POSITION_REACHED;
                 if there {

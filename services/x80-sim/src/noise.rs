@@ -1,9 +1,9 @@
-//! Randomness: one stream for each thing that is random, so that turning one off leaves the others as
+//! Random numbers: one stream for each source of noise, so that turning one off leaves the others as
 //! they were.
 
 use rand_pcg::{Pcg64, rand_core::Rng};
 
-/// What a stream of random numbers is for.
+/// The source of noise that a stream is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Ultrasonic rangers.
@@ -28,7 +28,6 @@ pub struct Noise(Pcg64);
 
 impl Noise {
     /// The stream of `source` in the run with `seed`.
-    #[must_use]
     pub fn new(seed: u64, source: Source) -> Self {
         Self(Pcg64::new(u128::from(seed), source as u128))
     }
@@ -38,7 +37,7 @@ impl Noise {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Normal with mean 0 and standard deviation `sd`; nothing is drawn for none.
+    /// Normal with mean 0 and standard deviation `sd`; nothing is drawn for 0.
     pub fn normal(&mut self, sd: f64) -> f64 {
         if sd <= 0.0 {
             return 0.0;
@@ -49,7 +48,7 @@ impl Noise {
         sd * radius * angle.cos()
     }
 
-    /// Exponential with `mean`; nothing is drawn for none.
+    /// Exponential with `mean`; nothing is drawn for 0.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         if mean <= 0.0 {
             return 0.0;
@@ -57,7 +56,7 @@ impl Noise {
         -mean * (1.0 - self.uniform()).ln()
     }
 
-    /// True in `share` of the cases; nothing is drawn for none.
+    /// True in `share` of the cases; nothing is drawn for 0.
     pub fn chance(&mut self, share: f64) -> bool {
         share > 0.0 && self.uniform() < share
     }
@@ -74,7 +73,7 @@ mod tests {
         assert_eq!(drawn, FIRST_OF_SEED_1);
     }
 
-    // Drawn once and written down: another release of the generator must give the same.
+    // These were drawn once: another release of the generator must give the same numbers.
     const FIRST_OF_SEED_1: [f64; 3] = [0.8297300050883016, 0.7306982094730567, 0.8844419132630329];
 
     #[test]

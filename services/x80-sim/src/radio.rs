@@ -1,6 +1,6 @@
-//! The radio between host and robot: good or out in turns, late, and careless with datagrams.
+//! The radio between host and robot: outages, delays, losses, and datagrams that are reordered, joined or cut.
 //!
-//! Whatever it does is drawn from one seeded stream, so a run can be had again; what it did is written
+//! All of it is drawn from one seeded stream, so a run can be repeated; what it did is written
 //! to the ground truth.
 
 use std::collections::VecDeque;
@@ -9,7 +9,7 @@ use common::{ground_truth::GroundTruthRadio, mission};
 
 use crate::noise::{Noise, Source};
 
-/// Datagrams under way at most; further ones are lost.
+/// At most so many datagrams are under way; further ones are lost.
 const MOST_IN_FLIGHT: usize = 1024;
 /// A datagram that waits for the next one to go behind it, or with it, waits no longer than this, seconds.
 const LONGEST_HOLD_S: f64 = 0.5;
@@ -58,7 +58,7 @@ impl Fading {
             self.out = !self.out;
             self.since = self.until;
             self.until += if self.out {
-                // A floor, or a mean of nothing would never let time pass.
+                // Without a floor, time would never pass where the mean is 0.
                 noise
                     .exponential(self.mean_out)
                     .clamp(1e-3, self.longest.max(1e-3))
@@ -85,7 +85,7 @@ struct Flight<W> {
     held: Option<Hold>,
 }
 
-/// What a datagram waits for.
+/// The event that a datagram waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
     /// To arrive behind the next.
@@ -94,13 +94,13 @@ enum Hold {
     Joined,
 }
 
-/// The radio. `W` says which way a datagram goes, and from or to whom.
+/// The radio. `W` is the direction of a datagram and its peer.
 #[derive(Clone, Debug)]
 pub struct Radio<W> {
     settings: mission::Radio,
     noise: Noise,
     fading: Fading,
-    /// In order of arrival.
+    /// Datagrams in order of arrival.
     in_flight: VecDeque<Flight<W>>,
     sent: u64,
     lost: u64,
@@ -109,7 +109,6 @@ pub struct Radio<W> {
 
 impl<W: Copy + PartialEq> Radio<W> {
     /// The radio of the run with `seed`.
-    #[must_use]
     pub fn new(settings: mission::Radio, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Source::Radio);
         Self {
@@ -124,7 +123,6 @@ impl<W: Copy + PartialEq> Radio<W> {
     }
 
     /// Whether it does nothing at all to datagrams.
-    #[must_use]
     pub fn is_perfect(&self) -> bool {
         let radio = &self.settings;
         [
@@ -150,7 +148,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         lost
     }
 
-    /// Whether the frames of a tick, sent at mission time `now`, are lost: then nobody hears of the tick.
+    /// Whether the frames of a tick, sent at mission time `now`, are lost: then no host learns of the tick.
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
         self.missed_ticks += u64::from(lost);
@@ -185,7 +183,7 @@ impl<W: Copy + PartialEq> Radio<W> {
     }
 
     fn dispatch(&mut self, now: f64, way: W, bytes: Vec<u8>) {
-        // Datagrams keep their order but where they are put out of it.
+        // Datagrams stay in order except where the radio reorders them.
         let same_way = self.in_flight.iter().filter(|flight| flight.way == way);
         let before = same_way
             .filter(|flight| flight.held.is_none())
@@ -242,7 +240,6 @@ impl<W: Copy + PartialEq> Radio<W> {
     }
 
     /// When the next datagram arrives, mission time.
-    #[must_use]
     pub fn next_due(&self) -> Option<f64> {
         self.in_flight.front().map(|flight| flight.due)
     }
@@ -253,7 +250,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         Some((flight.way, flight.bytes))
     }
 
-    /// What it has done until mission time `now`.
+    /// Counts of what it has done until mission time `now`.
     pub fn ground_truth(&mut self, now: f64) -> GroundTruthRadio {
         GroundTruthRadio {
             out: self.fading.is_out(now, &mut self.noise),

@@ -26,10 +26,10 @@ use crate::{
 /// The longest step of the body, seconds.
 const STEP_S: f64 = 0.005;
 
-/// A robot whose commands hold for ever does not drive on for longer when its process ends, seconds.
+/// When its process ends, a robot whose commands hold for ever drives on for at most so long, seconds.
 const COMES_TO_REST_S: f64 = 3.0;
 
-/// What a frame from the host was to the robot.
+/// The meaning of a frame from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
     /// Not addressed to a robot.
@@ -40,7 +40,7 @@ pub enum Heard {
     Ping,
     /// A motion command.
     Motion,
-    /// Anything else, known or not.
+    /// Another frame, known or not.
     Other,
 }
 
@@ -52,7 +52,7 @@ pub struct Robot {
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     drivetrain: Drivetrain,
-    /// None of a robot with two driven wheels.
+    /// `None` for a robot with two driven wheels.
     car: Option<Car>,
     longest_step: f64,
 
@@ -79,7 +79,6 @@ pub struct Robot {
 
 impl Robot {
     /// The robot of `mission`, booted and standing at the start; tick 0 is measured.
-    #[must_use]
     pub fn new(mission: &Mission) -> Self {
         Self::with_noise(mission, mission.seed)
     }
@@ -129,9 +128,8 @@ impl Robot {
     }
 
     /// The robot of `mission` where an earlier process left it, booted anew but for its counts.
-    #[must_use]
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
-        // The same readings again would be no readings.
+        // Otherwise the noise of the first readings would be repeated.
         let seed = mission.seed.wrapping_add(saved.tick + 1);
         let mut robot = Self::with_noise(mission, seed);
         robot.tick = saved.tick;
@@ -150,8 +148,7 @@ impl Robot {
         robot
     }
 
-    /// What a next process needs to go on from here.
-    #[must_use]
+    /// The state that the next process restores.
     pub fn saved_state(&self) -> SavedState {
         SavedState {
             tick: self.tick,
@@ -164,14 +161,14 @@ impl Robot {
         }
     }
 
-    /// Let it come to rest as it does when no further command comes; a robot that would never is halted.
+    /// Let it come to rest as without further commands; a robot that would never rest is halted.
     pub fn come_to_rest(&mut self) {
         let latest = self.time + COMES_TO_REST_S;
         while self.time < latest && self.is_moving() {
             self.advance_to((self.time + STEP_S).min(latest));
         }
         self.motors.iter_mut().for_each(Motor::halt);
-        // No tick is made up for on the way: nobody listens.
+        // No frames are sent on the way: no host listens.
         self.tick = self.tick.max((self.time * self.rate_hz) as u64);
     }
 
@@ -181,31 +178,26 @@ impl Robot {
     }
 
     /// Mission time, seconds.
-    #[must_use]
     pub fn time_s(&self) -> f64 {
         self.time
     }
 
     /// From tick to tick, seconds.
-    #[must_use]
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
 
     /// Mission time of the next tick, seconds.
-    #[must_use]
     pub fn next_tick_s(&self) -> f64 {
         (self.tick + 1) as f64 / self.rate_hz
     }
 
     /// One of the six channels of the motor board.
-    #[must_use]
     pub fn motor(&self, channel: u8) -> Option<&Motor> {
         self.motors.get(usize::from(channel))
     }
 
-    /// What `frame` is to a robot, before any takes it.
-    #[must_use]
+    /// The meaning of `frame`, before it is executed.
     pub fn kind(frame: &Frame<'_>) -> Heard {
         if Addressing::of_robot(frame.rid).is_none() {
             return Heard::Foreign;
@@ -226,7 +218,7 @@ impl Robot {
         self.addressing = addressing;
         self.heard_at = self.time;
         let heard = Self::kind(frame);
-        // Even what is not understood is acknowledged, for it has come; acknowledgements never are.
+        // Even a frame that is not understood is acknowledged; acknowledgements never are.
         if heard != Heard::Ack {
             Report::System(SystemSignal::Ack).encode(addressing, replies);
         }
@@ -271,14 +263,14 @@ impl Robot {
         }
     }
 
-    /// When the ultrasonic rangers listen for the next tick, if that is before the tick and has not been yet.
+    /// The time at which the ultrasonic rangers listen for the next tick, if that is before the tick and still to come.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
         (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
     }
 
     /// Let mission time pass until `end`, seconds, in short steps, none of which reaches across the end
-    /// of a timed command or the moment of a range. A time gone by is none.
+    /// of a timed command or the moment of a range. An end in the past does nothing.
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
             if self.listens_at().is_some_and(|moment| moment <= self.time) {
@@ -297,7 +289,7 @@ impl Robot {
                 self.step(span / steps);
                 self.time = from + span * step as f64 / steps;
             }
-            // Exactly, so that what ends now has ended.
+            // Time is set exactly, so that a command that ends now has ended.
             self.time = until;
         }
     }
@@ -356,7 +348,7 @@ impl Robot {
         }
     }
 
-    /// How it moves by what its motors do.
+    /// Its motion by the speeds of its motors.
     fn twist(&self) -> Twist {
         if let Some(car) = &self.car {
             return car.twist(&self.motors);
@@ -375,7 +367,7 @@ impl Robot {
         self.measure();
     }
 
-    /// Take the readings of this tick. Nothing random is drawn for sensors but here.
+    /// Take the readings of this tick. Noise of sensors is drawn only here.
     fn measure(&mut self) {
         let noise = self.physics.wheels.count_noise;
         for (channel, encoder) in self.motor.encoders.iter_mut().enumerate() {
@@ -389,14 +381,14 @@ impl Robot {
                 .measure(&self.world, &self.body, self.time, &self.physics);
     }
 
-    /// Append the frames of this tick to `out`: of every stream that runs, the motor frame last. They
+    /// Append the frames of this tick to `out`, one of every stream that runs, the motor frame last. They
     /// count against what a host has asked for.
     pub fn stream(&mut self, out: &mut Vec<u8>) {
         let due = self.streams.take();
         self.write(due, out);
     }
 
-    /// Append the frames of this tick once more; that counts against nothing.
+    /// Append the frames of this tick once more, without counting them.
     pub fn repeat(&self, out: &mut Vec<u8>) {
         self.write(self.streams.running(), out);
     }
@@ -413,7 +405,7 @@ impl Robot {
         }
     }
 
-    /// What is true at this tick. The least clearance begins anew.
+    /// The ground truth at this tick. The least clearance is reset.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();

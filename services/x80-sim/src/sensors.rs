@@ -1,4 +1,4 @@
-//! What the robot's sensors read at a tick.
+//! Readings of the robot's sensors at a tick.
 
 use common::{
     mission::{Mission, Physics, SonarPhysics},
@@ -19,7 +19,7 @@ use crate::{
 /// Bearing of the two rangers beside the front one, degrees; and their distance from the centre, metres.
 const SIDE_BEARING_DEG: f64 = 45.0;
 const SIDE_FORWARD_M: f64 = 0.194;
-/// A sensor that sees nothing out of the ordinary, AD counts.
+/// Reading of a sensor that sees nothing out of the ordinary, AD counts.
 pub const MIDDLE: u16 = 2048;
 /// Supply of the AD converters, AD counts: drivers convert with it.
 const REFERENCE: u16 = 2048;
@@ -34,14 +34,13 @@ pub struct Ranging {
     silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
-    /// What the ultrasonic rangers have heard for the next tick.
+    /// Readings of the ultrasonic rangers for the next tick.
     heard: Option<[u8; 6]>,
 }
 
 impl Ranging {
     /// The rangers of `mission`'s robot: the front one, one at either side of it, and what the mission
     /// adds. Their noise follows from `seed`.
-    #[must_use]
     pub fn new(mission: &Mission, seed: u64) -> Self {
         let front = usize::from(mission.sonar.index) % 6;
         let mut mounts = [None; 6];
@@ -76,29 +75,26 @@ impl Ranging {
     }
 
     /// The front ranger's byte.
-    #[must_use]
     pub fn front(&self, sensors: &StandardSensors) -> u8 {
         sensors.ultrasonic[self.front]
     }
 
     /// Which ultrasonic rangers are silent.
-    #[must_use]
     pub fn silent(&self) -> [bool; 6] {
         self.silence.silent()
     }
 
-    /// Go on with those silent.
+    /// Restore which ultrasonic rangers are silent.
     pub(crate) fn restore(&mut self, silent: [bool; 6]) {
         self.silence.restore(silent);
     }
 
     /// Whether the ultrasonic rangers have listened for the next tick.
-    #[must_use]
     pub fn has_listened(&self) -> bool {
         self.heard.is_some()
     }
 
-    /// Let the ultrasonic rangers listen for the next tick: once.
+    /// Let the ultrasonic rangers listen for the next tick, unless they have.
     pub fn listen(&mut self, world: &World, body: &Body, physics: &SonarPhysics) {
         if self.heard.is_none() {
             self.heard = Some(self.heard_now(world, body, physics));
@@ -169,8 +165,7 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
     (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
 }
 
-/// What the encoder of `motor` reports, `error` counts off.
-#[must_use]
+/// The reported encoder of `motor`, `error` counts off.
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     let position = (motor.turned() + error).round();
     Encoder {
@@ -180,8 +175,7 @@ pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     }
 }
 
-/// What the motors draw, AD counts.
-#[must_use]
+/// Currents of the motors, AD counts.
 pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
     std::array::from_fn(|channel| {
         let motor = &motors[channel];

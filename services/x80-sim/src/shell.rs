@@ -1,4 +1,4 @@
-//! The process around the robot: a socket, a pace and the ground truth. All else is [`crate::robot`].
+//! The process around the robot: a socket, a pace and the ground truth. The rest is in [`crate::robot`].
 
 mod session;
 
@@ -26,10 +26,10 @@ use crate::{
     transport::{Transport, Way},
 };
 
-/// Datagrams taken in one go before time and the stop are looked at again.
+/// So many datagrams are taken before time and the stop are looked at again.
 const MOST_AT_ONCE: usize = 64;
 
-/// What a simulated robot is started with.
+/// The options of a simulated robot.
 pub struct SimOptions {
     /// The mission, seed and all.
     pub mission: Mission,
@@ -42,13 +42,13 @@ pub struct SimOptions {
     /// At [`Pace::Rate`] it follows the machine's clock and frames are sent unasked. While the process
     /// is not scheduled for more than a period, mission time waits for it.
     pub pace: Pace,
-    /// Where to listen; port 0 takes a free one. A pseudo-terminal gets its path from the system.
+    /// The address to listen on; port 0 takes a free one. A pseudo-terminal gets its path from the system.
     pub listen: SocketAddr,
-    /// How to listen.
+    /// The transport to listen by.
     pub transport: Transport,
     /// The file in which the robot's state is saved, and from which it goes on; none saves nothing.
     pub keep: Option<PathBuf>,
-    /// Where the ground truth is written: a [`common::ground_truth::GroundTruthHeader`], then a
+    /// The file of the ground truth: a [`common::ground_truth::GroundTruthHeader`], then a
     /// [`common::ground_truth::GroundTruthTick`] each tick, one JSON object a line, each
     /// in one write. The robot waits for a reader that is slow; when it is gone, the robot goes on
     /// without.
@@ -56,9 +56,6 @@ pub struct SimOptions {
 }
 
 /// Run a simulated robot until `stop` becomes readable (or its other end is closed).
-///
-/// # Errors
-/// When it cannot listen, or its socket fails.
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
     let SimOptions {
         mission,
@@ -82,7 +79,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
             let robot = match saved {
                 None => Robot::new(&mission),
                 Some(saved) => {
-                    tracing::info!(?saved, "it stands where it stood");
+                    tracing::info!(?saved, "the robot starts where the last process left it");
                     Robot::restored(&mission, &saved)
                 }
             };
@@ -115,7 +112,7 @@ fn lock(file: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Wait for bytes, the stop or the timeout; which of the first two it was.
+/// Wait for bytes, the stop or the timeout. Returns which of the first two came.
 fn wait(
     session: &Session,
     stop: &impl AsFd,
@@ -127,7 +124,7 @@ fn wait(
     Ok([came[1] || came[2], came[0]])
 }
 
-/// Mission time by the machine's clock; none at the pace of the commands.
+/// Mission time by the machine's clock; it is `None` in lockstep.
 #[derive(Clone, Copy, Debug)]
 struct SimClock {
     /// Machine time at mission time 0, and mission seconds a machine second.
@@ -136,7 +133,7 @@ struct SimClock {
 }
 
 impl SimClock {
-    /// At mission time `begin_s` now.
+    /// A clock that shows mission time `begin_s` now.
     fn new(pace: Pace, period_s: f64, begin_s: f64) -> Self {
         let runs = match pace {
             Pace::Max => None,
@@ -154,7 +151,7 @@ impl SimClock {
         Some(machine_ns.saturating_sub(epoch) as f64 * 1e-9 * rate)
     }
 
-    /// How long to wait for mission time `due`; for ever at the pace of the commands.
+    /// The time to wait for mission time `due`; for ever in lockstep.
     fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Duration> {
         let (_, rate) = self.runs?;
         let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);

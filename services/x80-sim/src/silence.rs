@@ -1,4 +1,4 @@
-//! Runs of silence: a ranger that hears nothing for a while, whatever stands there.
+//! A ranger sometimes hears nothing for several readings, whatever stands there.
 
 use common::mission::SonarPhysics;
 
@@ -17,7 +17,7 @@ pub(crate) struct Silence {
 }
 
 impl Silence {
-    /// Readings of `physics` that are `period_s` apart. Nothing is drawn where the share is 0.
+    /// The chain for readings by `physics` that are `period_s` apart. Nothing is drawn where the share is 0.
     pub(crate) fn new(physics: &SonarPhysics, period_s: f64, seed: u64) -> Self {
         let share = physics.silence_share;
         let end = (period_s / physics.silence_mean_s).min(1.0);
@@ -46,7 +46,7 @@ impl Silence {
         self.silent
     }
 
-    /// Go on from there.
+    /// Restore which rangers are silent.
     pub(crate) fn restore(&mut self, silent: [bool; 6]) {
         self.silent = silent;
     }

@@ -3,7 +3,7 @@
 //! In the laboratory every surface answers wherever the cone meets it. With smooth walls the echo comes
 //! back only from where the wall is square to the sound: a wall answers at the foot of the
 //! perpendicular while that is not too far off the axis, a drum over a wider angle, an edge sometimes.
-//! What does not answer still hides what is behind it.
+//! A surface that does not answer still hides what is behind it.
 //!
 //! An echo is heard where its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r: the
 //! mirror image of the transmitter in a plane is 2 r away, and air at 40 kHz takes alpha = 1.3 dB/m (ISO 9613-1, 20 degrees
@@ -12,8 +12,8 @@
 //! 1: a post of 1.25 cm has k a = 9. A soft surface gives back its share `echo`. The threshold is the amplitude of a post
 //! 3 cm in diameter at `post_reach_m`. A wall is so heard far beyond [`REACH_M`].
 //!
-//! What ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level, from a
-//! distance on. A smooth one answers with no more than its edge.
+//! A solid that ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level, from a
+//! distance on. A smooth solid then answers with no more than its edge.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -31,20 +31,20 @@ pub const REACH_M: f64 = 2.55;
 const HIDES_M: f64 = 0.01;
 /// A reflected beam starts so far off its mirror, or it would meet it again, metres.
 const NUDGE_M: f64 = 1e-6;
-/// What air takes from sound at 40 kHz, dB per metre.
+/// Attenuation of sound at 40 kHz in air, dB per metre.
 const ABSORPTION_DB_PER_M: f64 = 1.3;
 /// Radius of the post whose reach is known, metres.
 const POST_RADIUS_M: f64 = 0.015;
 
-/// Where an echo may come from.
+/// A place that an echo may come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// The same from above.
+    /// Metres, seen from above.
     level_range: f64,
     /// Unit vector from the ranger, from above.
     along: DVec2,
-    /// An answer near a limit, or of an edge: often lost.
+    /// It is near a limit, or an edge: its echo is often lost.
     weak: bool,
     /// Share of pings it answers.
     share: f64,
@@ -88,8 +88,8 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
 
-/// What a ranger at `pose` on a robot whose centre is at `centre` hears: metres, infinite for nothing. Noise of the range is not
-/// in it yet.
+/// The range that a ranger at `pose` hears on a robot whose centre is at `centre`: metres, infinite for nothing, without
+/// noise.
 pub fn listen(
     world: &World,
     centre: DVec2,
@@ -99,7 +99,7 @@ pub fn listen(
 ) -> f64 {
     let height = world.heights().sonar_m;
     if world.is_between(centre, pose.position, height) {
-        // Pressed against what the body touches: it hears that, not what is behind.
+        // A ranger pressed against what the body touches hears that, not what is behind.
         return 0.0;
     }
     let receiver = Receiver::new(pose, height, physics);
@@ -185,7 +185,7 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// How far an answer from so far off the axis is heard, metres: full in the cone, then less and less.
+    /// The distance at which an answer from so far off the axis is heard, metres: full in the cone, then less and less.
     fn reach(&self, off: f64) -> f64 {
         let cone = self.cone.half;
         if off <= cone + 1e-12 {

@@ -2,7 +2,7 @@
 
 use common::wire::{Request, Stream};
 
-/// How long a stream runs on.
+/// The duration of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Run {
     ForEver,
@@ -37,11 +37,11 @@ pub(crate) struct Streams {
 /// Which frames are to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Due {
-    /// 123.
+    /// Frame 123.
     pub(crate) motor: bool,
-    /// 124.
+    /// Frame 124.
     pub(crate) custom: bool,
-    /// 125.
+    /// Frame 125.
     pub(crate) standard: bool,
 }
 
@@ -90,7 +90,6 @@ impl Streams {
     }
 
     /// The streams that run.
-    #[must_use]
     pub(crate) const fn running(&self) -> Due {
         Due {
             motor: self.motor.runs(),

@@ -1,4 +1,4 @@
-//! How bytes reach the robot: datagrams, a connection or a serial line.
+//! The transport of bytes to the robot: datagrams, a connection or a serial line.
 
 mod pty;
 mod source;
@@ -10,7 +10,7 @@ use std::{io, net::SocketAddr, os::fd::BorrowedFd};
 pub(crate) use self::source::Source;
 use crate::error::SimError;
 
-/// How bytes reach the robot.
+/// The transport of bytes to the robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Transport {
     /// Datagrams.
@@ -22,7 +22,7 @@ pub enum Transport {
     Pty,
 }
 
-/// An open way to the robot. What cannot be sent on it is lost, as on a radio.
+/// An open transport. Bytes that cannot be sent on it are lost, as on a radio.
 #[derive(Debug)]
 pub(crate) enum Way {
     Udp(udp::Udp),
@@ -31,7 +31,7 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    /// Open the way that `transport` says, at `address` where it has one.
+    /// Open `transport`, at `address` where it has one.
     pub(crate) fn open(transport: Transport, address: SocketAddr) -> Result<Self, SimError> {
         let bound = |source| SimError::Bind { address, source };
         match transport {
@@ -41,7 +41,7 @@ impl Way {
         }
     }
 
-    /// Who is there without having sent anything: a host that is connected, or whoever has the line.
+    /// The peer that is there without having sent anything: a connected host, or the other end of the line.
     pub(crate) fn connected(&mut self) -> Result<Option<Source>, SimError> {
         let connected = match self {
             Self::Udp(_) => Ok(None),
@@ -54,7 +54,7 @@ impl Way {
         })
     }
 
-    /// Where it listens: `address:port`, or the path of the line.
+    /// The address it listens on: `address:port`, or the path of the line.
     pub(crate) fn address(&self) -> String {
         match self {
             Self::Udp(udp) => udp.address().to_string(),
@@ -63,7 +63,7 @@ impl Way {
         }
     }
 
-    /// What becomes readable when something has come; the second only where there are two.
+    /// File descriptors that become readable when bytes have come; the second only where there are two.
     pub(crate) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         match self {
             Self::Udp(udp) => (udp.readable(), None),

@@ -1,4 +1,4 @@
-//! How far the wheels of this robot are from what its mission says of them: systematic errors.
+//! Systematic errors of the wheels: how far they differ from what the mission says.
 //!
 //! They are a property of the robot, not of the moment: drawn once from the seed of the mission, with a stream of their
 //! own, and the same in each process of a run.
@@ -20,8 +20,7 @@ pub struct WheelErrors {
 }
 
 impl WheelErrors {
-    /// Those of `mission`'s robot.
-    #[must_use]
+    /// The errors of `mission`'s robot.
     pub fn of(mission: &Mission) -> Self {
         let WheelPhysics {
             diameter_ratio,

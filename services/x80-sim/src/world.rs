@@ -1,4 +1,4 @@
-//! What stands around the robot: the mission's world, and things that appear, vanish or move.
+//! The world around the robot: what the mission has, and things that appear, vanish or move.
 
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
@@ -9,7 +9,7 @@ use glam::DVec2;
 /// A sensor that is no farther from a surface touches it, metres.
 const TOUCHES_M: f64 = 1e-3;
 
-/// One surface, as it is seen from above.
+/// One surface, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
     /// A disc.
@@ -30,7 +30,6 @@ pub enum Surface {
 
 impl Surface {
     /// Distance from `point` to this surface, metres; negative inside a drum.
-    #[must_use]
     pub fn distance(&self, point: DVec2) -> f64 {
         match *self {
             Self::Drum { at, radius } => at.distance(point) - radius,
@@ -38,8 +37,7 @@ impl Surface {
         }
     }
 
-    /// The direction from this surface straight out to `point`; none where it has none.
-    #[must_use]
+    /// The direction from this surface straight out to `point`; a point on it has none.
     pub fn outward(&self, point: DVec2) -> Option<DVec2> {
         let from = match *self {
             Self::Drum { at, .. } => at,
@@ -49,7 +47,6 @@ impl Surface {
     }
 
     /// Distance along the ray from `origin` in the unit direction `along` to this surface, metres.
-    #[must_use]
     pub fn hit(&self, origin: DVec2, along: DVec2) -> Option<f64> {
         match *self {
             Self::Drum { at, radius } => {
@@ -90,12 +87,12 @@ impl Surface {
     }
 }
 
-/// A surface with its heights and its echo: all the robot can touch, hear or see.
+/// A surface with its heights and its echo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
-    /// From above.
+    /// Its outline from above.
     pub surface: Surface,
-    /// From the side.
+    /// Its heights.
     pub profile: Profile,
 }
 
@@ -134,16 +131,15 @@ pub struct World {
 #[derive(Clone, Debug)]
 struct Visitor {
     thing: Thing,
-    /// As the mission writes it.
+    /// Its row in the mission.
     solids: Vec<Solid>,
-    /// Where it is now.
+    /// Its present place.
     offset: DVec2,
     present: bool,
 }
 
 impl World {
     /// The world of `mission` at time 0, with the robot at the start.
-    #[must_use]
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
             solids: solids_of(&thing.shape),
@@ -171,8 +167,7 @@ impl World {
         }
     }
 
-    /// At which heights the body and its sensors are.
-    #[must_use]
+    /// Heights of the body and its sensors.
     pub fn heights(&self) -> &Heights {
         &self.heights
     }
@@ -199,7 +194,6 @@ impl World {
     }
 
     /// Distance from `point` to the nearest surface that the body can touch, metres; infinite where nothing stands.
-    #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.touchable()
             .map(|surface| surface.distance(point))
@@ -208,7 +202,6 @@ impl World {
 
     /// Distance along the level ray at `height_m` from `origin` in the unit direction `along` to the first surface,
     /// metres, and that surface.
-    #[must_use]
     pub fn first_hit(&self, origin: DVec2, along: DVec2, height_m: f64) -> Option<(f64, Surface)> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
@@ -220,7 +213,6 @@ impl World {
 impl World {
     /// Whether a surface at `height_m` stands between two points, or within [`TOUCHES_M`] of the second: what a body
     /// touches may do so between a sensor at its edge and its centre.
-    #[must_use]
     pub fn is_between(&self, from: DVec2, to: DVec2, height_m: f64) -> bool {
         let Some(along) = (to - from).try_normalize() else {
             return false;
@@ -250,7 +242,7 @@ trait Itinerary {
 }
 
 impl Itinerary for Thing {
-    /// Where the thing is at `time`, from where its shape says.
+    /// Displacement of the thing at `time` from the place of its shape.
     fn offset_at(&self, time: f64) -> DVec2 {
         let next = self.moves.partition_point(|station| station.at_s <= time);
         let before = next.checked_sub(1).and_then(|last| self.moves.get(last));

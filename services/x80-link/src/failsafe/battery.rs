@@ -23,7 +23,7 @@ pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
 /// A supply below this is no empty battery but none, volts: the robot could not speak on it.
 const FITTED_V: f64 = 1.0;
 
-/// What a battery still holds.
+/// The charge of a battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Charge {
     /// Enough, or there is no such battery.
@@ -50,7 +50,6 @@ impl Pack {
     const ALL: [Self; 3] = [Self::Board, Self::Motor, Self::Servo];
 
     /// For logs.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Board => "board",
@@ -63,11 +62,11 @@ impl Pack {
 /// A battery became low or empty, or is no longer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryChange {
-    /// Which.
+    /// The battery.
     pub pack: Pack,
-    /// What it gives, volts.
+    /// Its voltage, volts.
     pub volts: f64,
-    /// How it is now.
+    /// Its charge now.
     pub charge: Charge,
 }
 
@@ -75,7 +74,7 @@ pub struct BatteryChange {
 #[derive(Clone, Copy, Debug, Default)]
 struct Gauge {
     charge: Charge,
-    /// Since when it has given less than an empty one does.
+    /// The time since which it has given less than an empty one does.
     sunk_since: Option<MissionTime>,
 }
 
@@ -106,19 +105,18 @@ impl Gauge {
 #[derive(Clone, Debug)]
 pub struct Batteries {
     limits: BatteryLimits,
-    /// As [`Pack::ALL`].
+    /// In the order of [`Pack::ALL`].
     gauges: [Gauge; 3],
     changes: Vec<BatteryChange>,
 }
 
 impl Batteries {
     /// Whether the boards', the motors' and the servos' battery is low or empty.
-    #[must_use]
     pub fn low(&self) -> [bool; 3] {
         self.gauges.map(|gauge| gauge.charge > Charge::Enough)
     }
 
-    /// What changed since the last call.
+    /// The changes since the last call.
     pub fn take_changes(&mut self) -> Vec<BatteryChange> {
         std::mem::take(&mut self.changes)
     }

@@ -72,7 +72,6 @@ impl LatencyMonitor {
     }
 
     /// Whether nothing is to be sent, so that late acknowledgements show.
-    #[must_use]
     pub const fn is_testing(&self) -> bool {
         matches!(self.state, State::Testing(_))
     }

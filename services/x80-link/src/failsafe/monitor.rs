@@ -1,4 +1,4 @@
-//! What the link tells each monitor, and what a monitor says of a cause.
+//! Monitors: the observations they take, and when a cause applies and clears.
 
 use std::{fmt, time::Duration};
 
@@ -18,7 +18,7 @@ pub struct Moment {
     pub machine_ns: u64,
 }
 
-/// What happened on the link.
+/// Something that happened on the link.
 #[derive(Clone, Copy, Debug)]
 pub enum Observation<'a> {
     /// Mission time passes at this pace from now on.
@@ -103,7 +103,6 @@ pub enum Clears {
 
 impl Clears {
     /// Whether a cause applies now that did or did not apply before.
-    #[must_use]
     pub fn applies(self, before: bool, condition: Condition) -> bool {
         let Condition::OverFor(over) = condition else {
             return true;
@@ -145,7 +144,7 @@ pub trait Monitor {
     /// Whether the condition of `cause`, one of its own, holds.
     fn condition(&self, cause: Cause, now: Moment) -> Condition;
 
-    /// What was seen, and what an operator can do about it.
+    /// An explanation with what was seen, and a remedy.
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         let _ = (cause, now);
         None

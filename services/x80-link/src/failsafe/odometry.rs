@@ -52,7 +52,7 @@ const MOST_MENDED: u32 = 2;
 /// A mission whose robot has been suspected for so long ends.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
-/// What is suspected.
+/// A suspicion about the odometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspicion {
     /// The left wheel, or that of a car, does not turn as told.
@@ -67,7 +67,6 @@ pub enum Suspicion {
 
 impl Suspicion {
     /// For logs.
-    #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
@@ -87,7 +86,7 @@ impl Suspicion {
 /// The evidence against one wheel, or against the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
-    /// What the two newest commands ask for, counts/s.
+    /// Speeds that the two newest commands ask for, counts/s.
     asked: [f64; 2],
     /// When the direction that is asked for last changed.
     since: MissionTime,
@@ -137,7 +136,7 @@ pub struct Odometry {
     steers: bool,
     /// Two periods of the robot.
     longest_gap: Duration,
-    /// How long a command holds.
+    /// The time limit of a command.
     limit: Duration,
     commanded: Option<MissionTime>,
     frame: Option<([u16; 2], MissionTime)>,
@@ -186,7 +185,7 @@ impl Odometry {
         let gap = now.since(then);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
-            // What was commanded meanwhile may have been lost, or no longer holds.
+            // The commands since then may have been lost, or no longer hold.
             self.begin_anew(now);
             return;
         }

@@ -29,13 +29,11 @@ pub struct Orders {
 
 impl Orders {
     /// Whether the supervisor orders to drive.
-    #[must_use]
     pub fn drive(&self) -> bool {
         self.is(Order::Drive)
     }
 
     /// Whether the reason of the newest directive is an operator's stop.
-    #[must_use]
     pub fn by_operator(&self) -> bool {
         self.newest
             .is_some_and(|directive| directive.reason == HoldReason::Operator)

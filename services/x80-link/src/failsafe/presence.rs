@@ -21,11 +21,11 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// How long the robot has not answered, and the pings since, by the machine's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Absence {
-    /// Since it was lost, or looked for first, nanoseconds; 0 while it answers.
+    /// Nanoseconds since it was lost, or first looked for; 0 while it answers.
     pub lost_ns: u64,
     /// Pings since.
     pub pings: u64,
-    /// Until the next ping, nanoseconds.
+    /// Nanoseconds until the next ping.
     pub next_ping_ns: u64,
 }
 
@@ -72,13 +72,11 @@ pub struct Presence {
 
 impl Presence {
     /// Whether it answers.
-    #[must_use]
     pub const fn connected(&self) -> bool {
         self.connected
     }
 
     /// Times it was lost.
-    #[must_use]
     pub const fn losses(&self) -> u64 {
         self.losses
     }
@@ -92,7 +90,6 @@ impl Presence {
     }
 
     /// Whether it has sent nothing for longer than a robot that is there does.
-    #[must_use]
     pub fn is_silent(&self, now_ns: u64) -> bool {
         self.heard_ns
             .is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
@@ -131,7 +128,6 @@ impl Presence {
     }
 
     /// How long it has been away.
-    #[must_use]
     pub fn absence(&self, now_ns: u64) -> Absence {
         if self.connected {
             return Absence::default();

@@ -33,7 +33,6 @@ pub struct RestartWatch {
 
 impl RestartWatch {
     /// For the robot of `mission`.
-    #[must_use]
     pub fn new(mission: &Mission) -> Self {
         let body = mission.body();
         Self {
@@ -101,7 +100,6 @@ impl RestartWatch {
     }
 
     /// Times the counts restarted or went on elsewhere.
-    #[must_use]
     pub const fn restarts(&self) -> u32 {
         self.restarts
     }

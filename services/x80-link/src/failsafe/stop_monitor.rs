@@ -46,7 +46,6 @@ impl StopMethod {
     }
 
     /// For logs.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Velocity => "velocity 0",
@@ -120,13 +119,11 @@ impl StopMonitor {
     }
 
     /// Whether its encoders say that no wheel turns.
-    #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.resting >= AT_REST_AFTER
     }
 
     /// How it is told to stand.
-    #[must_use]
     pub const fn method(&self) -> StopMethod {
         self.method
     }

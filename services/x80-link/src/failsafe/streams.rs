@@ -59,7 +59,6 @@ impl Streams {
     }
 
     /// How the motor frames of a robot that answers come.
-    #[must_use]
     pub fn motor_frames(&self, now_ns: u64) -> Motor {
         let since = self.motor_ns.max(self.found_ns);
         if self.silence.is_over(since, now_ns) {

@@ -1,4 +1,4 @@
-//! What goes into the link and what comes out.
+//! The events that the link takes, and the effects that it asks for.
 
 use common::{
     clock::{MissionTime, Pace},
@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::failsafe::{Decision, battery::BatteryChange, stop_monitor::StopMethod};
 
-/// How mission time passes, and where the ticks of this link begin. The run says the one, and the supervisor the other:
-/// it hears the ticks, so the link writes no checkpoint.
+/// The pace of mission time, given by the run, and the first tick, given by the supervisor, which follows the ticks; so
+/// the link writes no checkpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// [`Pace::Max`] is lockstep: the robot waits for each command. Any other is a wall clock, times a rate.
@@ -31,34 +31,33 @@ impl Default for State {
     }
 }
 
-/// What happened, and when by the machine's clock, which the deadlines of the wire go by.
+/// An event and its time by the machine's clock, which the deadlines of the wire use.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
-    /// What.
+    /// The event.
     pub event: Event<'a>,
     /// Reading of the monotonic clock, nanoseconds.
     pub machine_ns: u64,
 }
 
-/// What happened.
+/// An event that the link takes.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
     /// Bytes of the robot.
     Datagram(&'a [u8]),
-    /// Whether the wire is open now. One of datagrams always is, and it is taken for open until this says
-    /// otherwise.
+    /// Whether the wire is open now. It is taken for open at first; a wire of datagrams always is.
     Wire(bool),
     /// A command of the controller.
     Command(&'a CommandSample),
-    /// The supervisor's directive: what it orders, and why that is not drive.
+    /// The supervisor's directive: an order, and the reason for not driving.
     Order(Order, HoldReason),
-    /// The last tick that may begin, by the supervisor's word; in lockstep.
+    /// The supervisor's limit in lockstep: the last tick that may begin.
     TickLimit(u64),
     /// Nothing; time passed.
     Quiet,
 }
 
-/// What to do about it.
+/// An effect that the link asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// Send these bytes to the robot.
@@ -74,38 +73,38 @@ pub enum Effect {
         /// The encoders.
         wheels: WheelSample,
     },
-    /// The command of the tick that began at this reading of the monotonic clock is on its way.
+    /// The command of a tick is on its way.
     Answered {
-        /// Nanoseconds.
+        /// Reading of the monotonic clock at which the tick began, nanoseconds.
         began_ns: u64,
     },
-    /// A tick begins without the supervisor's word, which was waited for too long.
+    /// A tick begins beyond the supervisor's limit, which was waited for too long.
     Unlimited {
         /// Its number.
         tick: u64,
     },
-    /// The failsafe decides otherwise than before; what follows from that comes as effects of its own.
+    /// The failsafe decides otherwise than before. The stops that follow are effects of their own.
     Decided {
-        /// What it decided before.
+        /// The decision before.
         before: Decision,
-        /// What it decides now.
+        /// The decision now.
         now: Decision,
     },
     /// The robot answers again, or no longer.
     Connected(bool),
     /// The robot restarted its encoder counts.
     Restarted,
-    /// The counts jumped farther than wheels turn, and now follow each other where they are.
+    /// The counts jumped farther than wheels turn, and go on from there.
     CountsElsewhere,
-    /// The robot does not stand, and was told to by these means.
+    /// The robot does not stop, and was told to by this method.
     StopBy(StopMethod),
     /// The robot was asked for its streams again.
     AskedForStreams,
-    /// Publish what an infrared frame said.
+    /// Publish the infrared rangers.
     Infrared(InfraredSample),
-    /// Publish what the batteries and motors said.
+    /// Publish batteries and motor currents.
     Power(PowerSample),
-    /// Publish what the other sensors said.
+    /// Publish the other sensors.
     Surroundings(SurroundingsSample),
     /// A battery became low or empty, or is no longer.
     Battery(BatteryChange),
@@ -118,6 +117,6 @@ pub struct Tally {
     pub commands: u64,
     /// Velocity commands sent again.
     pub repeated_commands: u64,
-    /// Ticks given again.
+    /// Ticks repeated.
     pub repeated_ticks: u64,
 }

@@ -12,8 +12,8 @@ impl Link {
         self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
     }
 
-    /// Stop the robot when it must not move. in lockstep it waits for commands, and to let none pass
-    /// stops its time, too: a run that was held goes on as if it had not been.
+    /// Stop the robot when it must not move. In lockstep it waits for commands, and passing none stops its time, too: a run
+    /// that was held goes on as if it had not been.
     pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.observe(Observation::Time, now_ns);
         let now = self.decide(now_ns);
@@ -38,25 +38,25 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         if self.monitors().stop.method() != StopMethod::Velocity && counts != [0, 0] {
-            // It was made to stand by other means than those it drives by.
+            // It was stopped by another method than velocity, and must be set up again.
             effects.push(Effect::Send(self.drive.greeting()));
         }
         self.observe(Observation::Commanded(counts), now_ns);
         effects.push(Effect::Send(self.drive.velocity(counts, limit)));
     }
 
-    /// Several times when the stop is new, then again now and then.
+    /// Send the stop several times when it is new, and then at intervals.
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
             effects.extend(self.final_stops().into_iter().map(Effect::Send));
         } else if self.monitors().latency.is_testing() && self.stop_sent_ns.is_some() {
-            // Whatever is acknowledged now was sent long ago.
+            // The latency monitor waits for late acknowledgements: nothing may be sent.
             return;
         } else if let Some(method) = self.next_stop_method() {
             effects.push(Effect::Send(self.drive.stop_by(method)));
             effects.push(Effect::StopBy(method));
         } else if self.decision.cause == Cause::RobotDoesNotStop {
-            // What was tried is given time.
+            // The last method is given time.
             return;
         } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
             effects.push(Effect::Send(

@@ -1,4 +1,4 @@
-//! What the robot sends, and whether it is there.
+//! The robot's frames, and the connection to it.
 
 use common::wire::{
     COUNT_CYCLE, Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal,
@@ -35,7 +35,7 @@ impl Link {
                 Ok(Report::System(SystemSignal::Ack)) => {
                     self.observe(Observation::Acknowledged, now_ns);
                 }
-                // A frame nobody here needs only says that the robot is there.
+                // Any other frame only shows that the robot is there.
                 Err(_) => {}
             }
             heard = true;
@@ -66,8 +66,8 @@ impl Link {
             // It may be driving still by a command of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
-                // Those frames belong to the greeting: how many there are depends on how long the robot
-                // took to start. Ticks begin with the frames that answer the order.
+                // These frames answer the greeting, and their number depends on how long the robot took to start.
+                // Ticks begin with the frames that answer the order.
                 if motor.is_some() {
                     self.due = self.due.saturating_sub(1);
                 }
@@ -77,7 +77,7 @@ impl Link {
                 return;
             }
         }
-        // Nothing is computed from counts that cannot be true.
+        // Implausible counts give no tick.
         if let Some(sensors) = motor
             && counts != Some(Counts::Implausible)
         {
@@ -85,8 +85,8 @@ impl Link {
         }
     }
 
-    /// What the counts are. in lockstep the robot is a simulated one that runs as long as its mission, and no
-    /// time passes by which to judge.
+    /// Classify the counts. In lockstep the robot is a simulated one that runs as long as its mission, and no time passes by
+    /// which to judge.
     pub(super) fn judge_counts(&mut self, sensors: &MotorSensors, now_ns: u64) -> Counts {
         if self.in_ticks() {
             return Counts::Follow;
@@ -100,7 +100,7 @@ impl Link {
         are
     }
 
-    /// What the frames carry besides the tick.
+    /// Take from the frames what does not belong to the tick.
     pub(super) fn take_telemetry(
         &mut self,
         motor: Option<&MotorSensors>,
@@ -135,7 +135,7 @@ impl Link {
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let silent = self.monitors().presence.is_silent(now_ns);
-        // A robot that waits for a command is not lost; at most a datagram is, if it owes us a tick.
+        // A robot that waits for a command is not lost. If it owes a tick, a datagram is.
         let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
@@ -152,7 +152,7 @@ impl Link {
         if self.failsafe.monitors.presence.wants_ping(now_ns) {
             self.ping(now_ns, effects);
         } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
-            // What was due is lost.
+            // The frames that were due are lost.
             self.due = 0;
             self.ping(now_ns, effects);
         }

@@ -1,6 +1,6 @@
-//! What a wire counts.
+//! Counts of a wire.
 
-/// What a wire counts.
+/// Counts of a wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Datagrams from another address than the robot's, dropped.
@@ -14,7 +14,7 @@ pub struct Tally {
 /// Attempts to open a wire that is down.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Attempts {
-    /// So many since the robot was last heard on it.
+    /// Attempts since the robot last sent something.
     pub made: u64,
     /// Nanoseconds until the next one; 0 when one is under way.
     pub next_ns: u64,

@@ -21,10 +21,10 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// The robot's speed, bits a second.
+/// Speed of the line, bits a second.
 const BAUD: u32 = 115_200;
 
-/// Which line to open.
+/// The path of the line.
 #[derive(Debug)]
 pub(super) struct Serial {
     path: PathBuf,
@@ -54,8 +54,8 @@ impl Dial for Serial {
         if !isatty(&line) {
             return Err(Errno::NOTTY.into());
         }
-        // For this process alone. TIOCEXCL would do the same, but it outlives a killed link for as long as
-        // anyone has the line open, and then keeps its successor out; this lock ends with its holder.
+        // The lock reserves the line for this process. TIOCEXCL would do so, too, but it outlives a killed link for as long as
+        // anyone has the line open, and shuts its successor out; this lock ends with its holder.
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
@@ -72,7 +72,7 @@ impl Dial for Serial {
         settings.special_codes[SpecialCodeIndex::VMIN] = 1;
         settings.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(&line, OptionalActions::Now, &settings)?;
-        // What was sent to whoever had the line before is old.
+        // Bytes for an earlier holder of the line are old.
         tcflush(&line, QueueSelector::IOFlush)?;
         Ok(line)
     }
@@ -82,7 +82,7 @@ impl Dial for Serial {
     }
 
     fn abandon(&self, line: &OwnedFd) {
-        // A line that is gone has nothing to forget.
+        // A line that is gone has nothing to discard.
         let _ = tcflush(line, QueueSelector::IOFlush);
     }
 }

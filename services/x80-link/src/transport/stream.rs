@@ -1,10 +1,10 @@
-//! A wire without datagrams: a connection or a serial line, opened for ever anew when it goes away.
+//! A wire without datagrams, that is a connection or a serial line; it is reopened whenever it closes.
 //!
-//! Frames go out whole or not at all: what the system takes only half of is finished before anything
-//! else is sent, for half a frame would garble the one behind it. What comes meanwhile is lost.
+//! Frames go out whole or not at all: the rest of a frame that the system took in part goes out before anything
+//! else is sent, for half a frame would garble the next one. Messages that come meanwhile are lost.
 //!
-//! Its descriptor changes with every opening, and a waiter wants one that stays: an epoll descriptor,
-//! readable when the one of the moment is ready.
+//! Its descriptor changes with every opening, and a waiter needs one that stays: an epoll descriptor,
+//! readable when the present one is ready.
 
 use std::{
     fmt, io,
@@ -21,25 +21,25 @@ use rustix::{
 use super::counts::{Attempts, Tally};
 use crate::backoff::Backoff;
 
-/// Between the first two attempts: a robot that restarts its network is back as soon as it can be.
+/// The pause between the first two attempts: a robot that restarts its network is back as soon as it can be.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// Between attempts at most: nobody waits longer than this for a robot that is back.
+/// The longest pause between attempts: nobody waits longer for a robot that is back.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// An opening that takes longer is given up: no answer comes from a robot that is off.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What a stream is opened over.
+/// A way to open a stream.
 pub(super) trait Dial: fmt::Display {
-    /// After how much silence an open stream is taken for closed; none where the system reports that.
+    /// An open stream is taken for closed after so much silence; none where the system reports a closing.
     const SILENCE: Option<Duration>;
 
-    /// Begin to open it, without waiting.
+    /// Start to open it, without waiting.
     fn dial(&self) -> io::Result<OwnedFd>;
 
     /// See whether `descriptor`, which is writable now, leads to the robot.
     fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
 
-    /// Forget what `descriptor` has not sent yet: closing it must not wait for that.
+    /// Discard what `descriptor` has not sent yet: closing it must not wait for that.
     fn abandon(&self, descriptor: &OwnedFd);
 }
 
@@ -60,7 +60,7 @@ pub(super) struct Stream<D> {
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
-    /// What was last logged to be wrong: the same again is no news.
+    /// The error that was logged last: it is not logged again.
     logged: Option<Errno>,
 }
 
@@ -101,7 +101,7 @@ impl<D: Dial> Stream<D> {
         })
     }
 
-    /// Begin, finish or give up an opening; send what is left of a message.
+    /// Start, finish or give up an opening; send the rest of a message.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         if matches!(self.state, State::Closed) {
             if !self.backoff.is_due(now_ns) {
@@ -147,7 +147,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// How many bytes of the robot are in `buffer` now; none when there are none.
+    /// Read bytes of the robot into `buffer`. Returns their number; none when there are none.
     pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
         let State::Open {
             descriptor,
@@ -160,7 +160,7 @@ impl<D: Dial> Stream<D> {
             Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
             Ok(length) => {
                 *heard_ns = now_ns;
-                // Only now: a peer that hangs up at once must not be called ten times a second.
+                // The pauses start from the shortest only now: a peer that closes at once must not be called ten times a second.
                 self.backoff.reset();
                 self.logged = None;
                 return Some(length);
@@ -197,7 +197,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Send the rest of what went out in part.
+    /// Send the rest of a message that went out in part.
     fn flush(&mut self) -> io::Result<()> {
         let State::Open { descriptor, .. } = &self.state else {
             return Ok(());
@@ -231,7 +231,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Wake the waiter for `events` of the open stream.
+    /// Make the waiter wake for `events` of the open stream.
     fn watch(&self, events: EventFlags) -> io::Result<()> {
         if let State::Open { descriptor, .. } = &self.state {
             epoll::modify(&self.epoll, descriptor, EventData::new_u64(0), events)?;
@@ -239,7 +239,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Down it is. The descriptor takes itself off the epoll when it is closed.
+    /// Close it. The epoll drops a descriptor that is closed.
     fn close(&mut self, error: &io::Error) {
         self.log(error);
         if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
@@ -251,7 +251,7 @@ impl<D: Dial> Stream<D> {
     }
 
     fn log(&mut self, error: &io::Error) {
-        // A stream that ends has no number of its own.
+        // The end of a stream has no error number.
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
         if self.logged.replace(errno) != Some(errno) {
             let remedy = remedy(errno);
@@ -260,7 +260,7 @@ impl<D: Dial> Stream<D> {
     }
 }
 
-/// What a user can do about it.
+/// The remedy for an error.
 const fn remedy(errno: Errno) -> &'static str {
     match errno {
         Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::IO => "is the adapter plugged in",

@@ -13,10 +13,10 @@ use rustix::{
 use super::stream::Dial;
 
 /// A connection is not notified when its other end was switched off. The slowest robot a mission allows
-/// speaks every 2 s, and pings are answered at once.
+/// sends every 2 s, and answers pings at once.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// How to connect.
+/// The address to connect to.
 #[derive(Debug)]
 pub(super) struct Tcp {
     robot: SocketAddr,
@@ -53,7 +53,7 @@ impl Dial for Tcp {
 
     fn finish(&self, socket: &OwnedFd) -> io::Result<()> {
         sockopt::socket_error(socket)??;
-        // On a port that nobody listens on, of this very machine, a socket can connect to itself.
+        // A socket can connect to itself on a port of this machine that nobody listens on.
         if getpeername(socket)? == Some(getsockname(socket)?) {
             return Err(Errno::CONNREFUSED.into());
         }

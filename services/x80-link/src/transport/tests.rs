@@ -28,7 +28,7 @@ fn ready(descriptor: impl AsFd) {
     assert!(came, "nothing came");
 }
 
-/// Tend at `now_ns` until the wire says that it is open, or is not.
+/// Maintain the wire at `now_ns` until it reports that it is open, or is not.
 fn tend_until(transport: &mut Transport, open: bool, now_ns: u64) {
     while transport.maintain(now_ns).unwrap() != Some(open) {
         ready(&*transport);

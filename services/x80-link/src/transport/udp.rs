@@ -10,7 +10,7 @@ use rustix::io::Errno;
 
 use super::counts::Tally;
 
-/// A socket that speaks to one robot.
+/// A socket for one robot.
 #[derive(Debug)]
 pub(super) struct Udp {
     socket: UdpSocket,
@@ -19,10 +19,10 @@ pub(super) struct Udp {
 }
 
 impl Udp {
-    /// To the robot at `robot`, from any free port.
+    /// A socket for the robot at `robot`, from any free port.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
         let any = match robot.ip() {
-            // On loopback bind to it: nothing from outside can even arrive.
+            // A socket that is bound to loopback gets nothing from outside.
             IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
             IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
             IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
@@ -37,7 +37,7 @@ impl Udp {
         })
     }
 
-    /// How many bytes the next datagram of the robot has, in `buffer`; none when all were taken. Others
+    /// Read the next datagram of the robot into `buffer`. Returns its length; none when all were taken. Datagrams of others
     /// are dropped and counted.
     pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
@@ -62,12 +62,12 @@ impl Udp {
         }
     }
 
-    /// Send one datagram. What the network does not take now is lost, as on any radio.
+    /// Send one datagram. It is lost if the network does not take it now, as on any radio.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.socket.send_to(bytes, self.robot) {
             Ok(_) => Ok(()),
             Err(error) if Errno::from_io_error(&error) == Some(Errno::BADF) => Err(error),
-            // A full queue, a firewall, a network that is down.
+            // A full queue, a firewall or a network that is down refuses it.
             Err(_) => {
                 self.tally.unsent += 1;
                 Ok(())
@@ -80,7 +80,7 @@ impl Udp {
     }
 }
 
-/// The robot is away, or a signal came: nothing is wrong with the socket.
+/// Whether the error means only that the robot is away or a signal came.
 fn is_passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -1,4 +1,4 @@
-//! Robot, radio, transport and ground truth together: what is done with bytes, and with a tick.
+//! Robot, radio, transport and ground truth together take bytes and make ticks.
 
 use std::{
     io::Write,
@@ -22,48 +22,48 @@ use crate::{
     transport::{Source, Way},
 };
 
-/// Ticks that lock-step makes unheard before it waits for a ping: the longest outage at the highest rate.
+/// Lockstep makes so many ticks without an answer before it waits for a ping: the longest outage at the highest rate.
 const MOST_UNHEARD: usize = 120_000;
 
-/// A host that said nothing for so long, by the machine's clock, has gone: another may take the robot.
+/// A host that has sent nothing for so long, by the machine's clock, has gone: another may take the robot.
 const HOST_SILENT: Duration = Duration::from_secs(2);
 
-/// Which way a datagram goes through the radio.
+/// Direction of a datagram through the radio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
     ToRobot(Source),
     ToHost(Source),
 }
 
-/// A robot that is spoken to.
+/// A robot and its host.
 pub(super) struct Session {
     robot: Robot,
     /// Whether time waits for commands.
     lock_step: bool,
     way: Way,
-    /// None where it is perfect.
+    /// `None` for a perfect radio.
     radio: Option<Radio<Leg>>,
-    /// Whoever of the host that is served sent the last valid frame: all streams go there.
+    /// The source of the last valid frame of the host that is served: all streams go there.
     peer: Option<Source>,
-    /// When that was.
+    /// The time of that frame.
     heard: Instant,
-    /// Frames of other hosts that were ignored since the last warning; the first is told.
+    /// Frames of other hosts that were ignored since the last warning.
     strangers: u64,
-    /// The peer's and one other's: half a frame of the one must not garble the other's.
+    /// Decoders of the peer and of one other: half a frame of the one must not garble the other's.
     decoders: Vec<SourceDecoder>,
     ground_truth: Option<Box<dyn Write + Send>>,
-    /// Where the robot's state is saved.
+    /// The file of the robot's state.
     checkpoint: Option<Checkpoint>,
 }
 
-/// What has come from one source.
+/// Bytes from one source.
 struct SourceDecoder {
     source: Source,
     decoder: Decoder,
 }
 
 impl Session {
-    /// A robot at its first tick, which is written to the ground truth.
+    /// A session at the robot's first tick, which is written to the ground truth.
     pub(super) fn new(
         mission: &Mission,
         robot: Robot,
@@ -92,7 +92,7 @@ impl Session {
         Ok(session)
     }
 
-    /// Save how the robot stands.
+    /// Save the robot's state.
     fn save(&mut self) -> Result<(), SimError> {
         if let Some(checkpoint) = &mut self.checkpoint {
             checkpoint.save(&self.robot.saved_state())?;
@@ -100,13 +100,13 @@ impl Session {
         Ok(())
     }
 
-    /// The process ends: the robot comes to rest, for nobody speaks to it any more.
+    /// Let the robot come to rest: the process ends, and with it all commands.
     pub(super) fn end(mut self) -> Result<(), SimError> {
         self.robot.come_to_rest();
         self.save()
     }
 
-    /// What becomes readable when bytes have come.
+    /// File descriptors that become readable when bytes have come.
     pub(super) fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
         self.way.readable()
     }
@@ -148,7 +148,7 @@ impl Session {
 
     /// Let everything happen that is due by mission time `now`, in its order.
     pub(super) fn pass(&mut self, now: f64) -> Result<(), SimError> {
-        // More than a period is not caught up: the shell lets the clock wait for it.
+        // A delay of more than a period is not made up for: the shell lets the clock wait.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
         loop {
             let due = self.next_due_s();
@@ -175,7 +175,7 @@ impl Session {
         Ok(())
     }
 
-    /// A tick in lock-step. When the radio loses its frames nobody sends the next command, so time moves
+    /// A tick in lockstep. When the radio loses its frames no host sends the next command, so time moves
     /// on by itself until frames come through.
     fn tick_until_heard(&mut self) -> Result<(), SimError> {
         for _ in 0..MOST_UNHEARD {
@@ -221,7 +221,7 @@ impl Session {
         while let Some(frame) = heard.decoder.next_frame() {
             self.on_frame(source, &frame)?;
         }
-        // Of others than the peer, only one is remembered.
+        // Only one source besides the peer is remembered.
         if self.peer != Some(source) {
             let peer = self.peer;
             self.decoders.retain(|other| Some(other.source) == peer);
@@ -313,7 +313,7 @@ impl Session {
         }
     }
 
-    /// Hand to the peer what has come through.
+    /// Send to the peer what the radio has let through.
     fn deliver(&mut self, bytes: &[u8]) {
         if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
             self.way.send(peer, bytes);
@@ -327,12 +327,12 @@ impl Session {
         self.write(&ground_truth);
     }
 
-    /// Write one line of ground truth; when nobody reads it any more, no further ones.
+    /// Write one line of ground truth. When its reader is gone, no further lines are written.
     fn write(&mut self, record: &impl Serialize) {
         let Some(ground_truth) = &mut self.ground_truth else {
             return;
         };
-        // One write a line: a pipe charges each write far more than its bytes.
+        // Each line is one write: a write to a pipe costs far more than its bytes.
         let written = serde_json::to_vec(record)
             .map_err(std::io::Error::from)
             .and_then(|mut line| {
@@ -341,7 +341,7 @@ impl Session {
             })
             .and_then(|()| ground_truth.flush());
         if let Err(error) = written {
-            tracing::warn!(%error, "nobody reads the ground truth any more; the robot goes on without");
+            tracing::warn!(%error, "the ground truth has no reader any more; the robot goes on without");
             self.ground_truth = None;
         }
     }

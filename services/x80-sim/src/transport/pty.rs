@@ -17,7 +17,7 @@ use super::source::Source;
 #[derive(Debug)]
 pub(crate) struct Pty {
     robot: OwnedFd,
-    /// Held open: while nobody holds it, reading the robot's end is an error.
+    /// The host's end is held open: while nobody holds it, reading the robot's end is an error.
     _host: OwnedFd,
     path: String,
 }
@@ -30,7 +30,7 @@ impl Pty {
         let path = ptsname(&robot, Vec::new())?;
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
         let host = open(path.as_c_str(), flags, Mode::empty())?;
-        // Bytes as they are: no echo, no line editing, no signals.
+        // Bytes pass as they are: no echo, no line editing, no signals.
         let mut settings = tcgetattr(&host)?;
         settings.make_raw();
         tcsetattr(&host, OptionalActions::Now, &settings)?;
@@ -58,7 +58,7 @@ impl Pty {
         }
     }
 
-    /// What a host does not read in time is lost; its decoder finds the next frame.
+    /// Bytes that a host does not read in time are lost; its decoder finds the next frame.
     pub(super) fn send(&self, bytes: &[u8]) -> io::Result<()> {
         write(&self.robot, bytes).map(drop).map_err(io::Error::from)
     }

@@ -1,4 +1,4 @@
-//! A connection: one host at a time, and the newest is the one.
+//! A connection: one host at a time, the newest.
 
 use std::{
     io::{self, ErrorKind, Read, Write},
@@ -13,7 +13,7 @@ pub(crate) struct Tcp {
     listener: TcpListener,
     address: SocketAddr,
     connection: Option<TcpStream>,
-    /// How many have been accepted: the number of the one that is open.
+    /// Connections accepted so far: the number of the one that is open.
     accepted: u64,
 }
 
@@ -84,7 +84,7 @@ impl Tcp {
         }
     }
 
-    /// A host that does not read is hung up on: half a frame would garble all that follow.
+    /// The connection to a host that does not read is closed: half a frame would garble all that follow.
     pub(super) fn send(&mut self, number: u64, bytes: &[u8]) -> io::Result<()> {
         let Some(connection) = self.connection.as_mut().filter(|_| number == self.accepted) else {
             return Err(ErrorKind::NotConnected.into());
