@@ -78,7 +78,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// The cause for which the link's failsafe acts; `firsthand failsafe` explains each.
+    /// The cause for which the link's failsafe acts; `firsthand table failsafe` explains each.
     Cause, unknown = NotOrdered, text = name {
         /// Nothing is wrong.
         None = 0 "nothing is wrong",
