@@ -13,7 +13,7 @@ fn a_robot_that_falls_silent_is_at_rest_in_time_and_the_ledger_says_so() {
     let entry = &ledger["entries"][0];
     assert_eq!(output.status.code(), Some(0), "{ledger}");
     assert_eq!(
-        (&entry["fault"], &entry["lied"]),
+        (&entry["fault"], &entry["fault_began"]),
         (&"silence".into(), &true.into())
     );
     assert_eq!(entry["reason"], "robot lost", "{ledger}");

@@ -1,4 +1,4 @@
-//! All that the supervisor reads from and writes to one bus. It goes and comes with the bus.
+//! The supervisor's readers and writers on one bus. They are replaced when the bus is recreated.
 
 use std::{
     io,
@@ -24,9 +24,7 @@ use crate::{
     stages,
 };
 
-/// The supervisor's endpoints on the bus.
 pub(crate) struct BusEndpoints {
-    /// What the stages publish.
     pub observer: Observer,
     /// Wakes for heartbeats, ends of ticks and requests.
     pub waiter: Waiter,
@@ -44,12 +42,11 @@ pub(crate) struct BusEndpoints {
 }
 
 impl BusEndpoints {
-    /// Open all on the bus of `lock`.
     pub(crate) fn open(lock: &DomainLock) -> Result<Self, SupervisorError> {
         Self::continued(lock, Record::default(), 0)
     }
 
-    /// Open all, to go on with what was read on an earlier bus.
+    /// Open all, and continue the record of an earlier bus.
     fn continued(
         lock: &DomainLock,
         record: Record,
@@ -78,16 +75,15 @@ impl BusEndpoints {
     /// Recreate the bus of `lock`, and open all on it.
     pub(crate) fn recreate(mut self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
         let mut record = std::mem::take(&mut self.observer.record);
-        // The wire to the robot is opened again by the next link.
+        // The next link opens the connection to the robot again.
         record.link = None;
         let last_request = self.last_request;
-        // The old endpoints go before the new bus is made: they would remove its files as their own.
+        // The old endpoints are closed before the new bus is made.
         drop(self);
         lock.recreate_bus()?;
         Self::continued(lock, record, last_request)
     }
 
-    /// The bus itself.
     pub(crate) fn bus(&self) -> &Bus {
         &self.bus
     }
@@ -101,7 +97,7 @@ impl BusEndpoints {
         Ok(request)
     }
 
-    /// Whether nothing was published to late joiners for so long.
+    /// Whether the state was last published a `period` ago or earlier.
     pub(crate) fn is_due(&self, period: Duration) -> bool {
         self.published.is_none_or(|last| last.elapsed() >= period)
     }
@@ -124,7 +120,7 @@ impl BusEndpoints {
         self.roster.publish(tick, time, header, entries.into_iter())
     }
 
-    /// Publish how far the link may go, as of `tick`.
+    /// Publish the limit of the link, as of `tick`.
     pub(crate) fn publish_tick_limit(
         &mut self,
         tick: u64,
@@ -134,13 +130,13 @@ impl BusEndpoints {
         self.tick_limit.publish(tick, time, limit)
     }
 
-    /// Publish a death. It only reports: a failure is a warning in the log.
+    /// Publish a death. It only reports, so a failure is a warning in the log.
     pub(crate) fn publish_death(&mut self, death: DeathSample) {
         let stamp = self.observer.record.pose.unwrap_or_default().stamp;
         warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));
     }
 
-    /// Publish a stall of the robot at `pose`, likewise.
+    /// Publish a stall of the robot at `pose`. A failure is a warning in the log.
     pub(crate) fn publish_stall(&mut self, pose: &PoseSample, stall: StallSample) {
         let stamp = pose.stamp;
         warn_if_failed(self.stalls.publish(stamp.tick, stamp.time(), stall));

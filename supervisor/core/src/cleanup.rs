@@ -1,4 +1,4 @@
-//! When the bus is cleaned of what ended processes held: places on topics, shared memory, files of nodes.
+//! When the resources of ended processes on the bus are freed: places on topics, shared memory, files of nodes.
 
 use std::time::{Duration, Instant};
 
@@ -6,22 +6,21 @@ use common::bus::Bus;
 
 use crate::{death::Death, stages};
 
-/// How often the bus is cleaned at least: of consumers that ended, which is not notified.
+/// Longest time between cleanups. The end of a consumer is not notified.
 const PERIOD: Duration = Duration::from_secs(1);
-/// After a stage's death: another often follows within this, its successor's or of another stage.
+/// Delay after a stage's death: another death often follows within it.
 const DELAY: Duration = Duration::from_millis(50);
 
-/// What is to be cleaned up, and when that was last done.
+/// The cleanup that is due, and the time of the last one.
 pub(crate) struct Cleanup {
     done: Instant,
     /// Deaths since then, and when the last one was.
     deaths: (usize, Instant),
-    /// Processes that ended and whose leftovers are not all removed.
+    /// Ended processes whose resources are not all freed.
     pending: Vec<u32>,
 }
 
 impl Cleanup {
-    /// Nothing is to be cleaned up.
     pub(crate) fn new() -> Self {
         let now = Instant::now();
         Self {
@@ -31,7 +30,7 @@ impl Cleanup {
         }
     }
 
-    /// These stages died, and their successors are started.
+    /// These stages died. Their successors are started already.
     pub(crate) fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
         if deaths.is_empty() {
             return;
@@ -39,13 +38,13 @@ impl Cleanup {
         self.pending.extend(deaths.iter().map(|death| death.pid));
         self.deaths = (self.deaths.0 + deaths.len(), Instant::now());
         if deaths.iter().any(Death::was_refused) {
-            // An ended process may still hold the place that it needs.
+            // An ended process may still hold the place that the successor needs.
             self.run(bus);
         }
     }
 
-    /// Clean up if it is time: after deaths, once no stage is starting, because a cleanup takes about as long as a start,
-    /// which would wait for it; but sooner when so many died that places on the bus may run out.
+    /// Clean up if it is due. After deaths that is once no stage is starting, because a cleanup takes about as long as a start,
+    /// which would wait for it; or earlier, when so many died that places on the bus may run out.
     pub(crate) fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
         let quiet = deaths > 0 && last.elapsed() >= DELAY && !any_starting;
@@ -55,7 +54,7 @@ impl Cleanup {
         }
     }
 
-    /// What cannot be freed makes the bus slower, not wrong.
+    /// Free the resources of ended processes. Resources that cannot be freed make the bus slower, not wrong.
     fn run(&mut self, bus: &Bus) {
         self.done = Instant::now();
         self.deaths.0 = 0;
@@ -64,7 +63,7 @@ impl Cleanup {
             Ok(false) => {}
             Err(error) => {
                 let processes = std::mem::take(&mut self.pending);
-                tracing::warn!(%error, ?processes, "cannot remove what ended processes left on the bus");
+                tracing::warn!(%error, ?processes, "cannot free the resources of ended processes on the bus");
             }
         }
     }

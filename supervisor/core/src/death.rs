@@ -16,23 +16,18 @@ use serde::Serialize;
 
 use crate::process::ExitCause;
 
-/// Bytes of its log that are recorded as a stage's last words: a few lines.
-const LAST_WORDS: u64 = 400;
+/// Bytes of its log that are recorded with a stage's death: a few lines.
+const LOG_TAIL_BYTES: u64 = 400;
 
-/// One death of a stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Death {
-    /// Which stage.
     pub stage: &'static str,
-    /// Its process.
     pub pid: u32,
-    /// Which generation of the stage.
     pub generation: u32,
-    /// What ended it.
     pub cause: ExitCause,
-    /// Whether it hung, or was never ready, and was ended by the supervisor for that.
+    /// Whether the supervisor ended it because it hung or was never ready.
     pub hung: bool,
-    /// Age of its last beat when that was noticed.
+    /// Age of its last beat when the supervisor noticed.
     pub noticed_after_s: Option<f64>,
     /// Age of its last beat; none if it never beat.
     pub beat_age_s: Option<f64>,
@@ -40,9 +35,7 @@ pub struct Death {
     pub uptime_s: f64,
     /// Deaths of this stage within the policy's window, this one among them.
     pub deaths_in_window: u32,
-    /// What follows.
     pub next: Next,
-    /// The end of what it wrote to its log.
     pub log_tail: String,
 }
 
@@ -50,16 +43,12 @@ pub struct Death {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Next {
-    /// A successor is started at once.
     StartNow,
-    /// A successor is started after a pause.
     StartLater {
-        /// How long.
         after_s: f64,
     },
     /// It died too often: only an operator starts it again.
     Hold,
-    /// No successor is wanted.
     Nothing,
 }
 
@@ -69,7 +58,6 @@ impl Death {
         self.cause == ExitCause::Exited(start::REFUSED.into())
     }
 
-    /// Log it.
     pub fn log(&self) {
         let Self {
             stage,
@@ -87,7 +75,6 @@ impl Death {
         tracing::warn!(stage, pid, generation, %cause, hung, ?beat_age_s, uptime_s, deaths_in_window, ?next, log_tail, "stage died");
     }
 
-    /// The sample for the bus.
     pub fn sample(&self) -> DeathSample {
         let (cause, code) = match self.cause {
             ExitCause::Exited(code) => (DeathCause::Exited, code),
@@ -131,16 +118,18 @@ pub(crate) fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;
         let end = file.metadata()?.len();
-        file.seek(SeekFrom::Start(end.saturating_sub(LAST_WORDS).max(since)))?;
+        file.seek(SeekFrom::Start(
+            end.saturating_sub(LOG_TAIL_BYTES).max(since),
+        ))?;
         let mut bytes = Vec::new();
-        file.take(LAST_WORDS).read_to_end(&mut bytes)?;
+        file.take(LOG_TAIL_BYTES).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
     let bytes = read().unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes);
     // The first line may be half of one.
     let whole = match text.split_once('\n') {
-        Some((_, rest)) if bytes.len() as u64 == LAST_WORDS => rest,
+        Some((_, rest)) if bytes.len() as u64 == LOG_TAIL_BYTES => rest,
         _ => &text,
     };
     whole.trim().to_owned()
@@ -151,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn last_words_are_whole_lines_of_this_generation_alone() {
+    fn a_log_tail_is_whole_lines_of_this_generation_alone() {
         let directory = tempfile::tempdir().unwrap();
         let log = directory.path().join("stage.log");
         let lines: String = (0..100).map(|line| format!("line {line}\n")).collect();
@@ -161,7 +150,7 @@ mod tests {
             words.starts_with("line ") && words.ends_with("line 99"),
             "{words}"
         );
-        assert!(words.len() as u64 <= LAST_WORDS);
+        assert!(words.len() as u64 <= LOG_TAIL_BYTES);
         assert_eq!(log_tail(&log, lines.len() as u64 - 8), "line 99");
         assert_eq!(log_tail(&directory.path().join("none"), 0), "");
     }

@@ -1,7 +1,7 @@
-//! Which of the things that end a mission came first, and what of the run counts. Pure.
+//! Which event ended a mission first, and which part of the run counts. Pure.
 //!
-//! The stages go on until the supervisor has seen one of them and stopped the robot. How far they get by then depends on
-//! the machine; what came first does not.
+//! The stages go on until the supervisor has seen an event and stopped the robot. How far they get by then depends on
+//! the machine; which event came first does not.
 
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
@@ -11,34 +11,30 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-/// The first tick of the simulated robot at which its body had touched something.
+/// The first tick of the simulated robot at which its body touched something.
 pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTick> {
     truth.get(truth.partition_point(|tick| tick.contacts == 0))
 }
 
-/// What decided how a run ended.
+/// The event that ended a run.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Decided {
-    /// How it ended.
     pub ending: Ending,
-    /// The last tick that was complete by then; none where no tick decided. Of the tick of a touch, a timeout or a stall
-    /// itself the stages may have been stopped halfway.
+    /// The last complete tick; none where no tick decided. The tick of a contact, a timeout or a stall may be incomplete,
+    /// because the stages are stopped during it.
     pub last_tick: Option<u64>,
-    /// So many ticks of the ground truth count: those up to the touch, or up to the last tick.
+    /// Number of ticks of the ground truth that count: up to the contact, or up to the last tick.
     pub truth_ticks: usize,
 }
 
-/// When a mission runs out of time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timeout {
-    /// When it is given up.
     pub deadline: Deadline,
-    /// By the simulated robot's own clock, which also counts the ticks that nobody heard: in lockstep.
+    /// Time is that of the simulated robot's own clock, which also counts ticks that nobody received: in lockstep.
     pub by_robot: bool,
 }
 
 impl Timeout {
-    /// The first tick that was too late.
     fn tick(self, poses: &[PoseSample], truth: &[GroundTruthTick]) -> Option<u64> {
         let seconds = self.deadline.at_s();
         if self.by_robot {
@@ -50,7 +46,7 @@ impl Timeout {
     }
 }
 
-/// Of a run that was seen to end with `ending`. `stall` is the tick and the ending of the stall at
+/// The first event of a run that the supervisor saw end with `ending`. `stall` is the tick and the ending of the stall at
 /// which no recovery step was left.
 pub(crate) fn first(
     ending: Ending,
@@ -75,13 +71,13 @@ pub(crate) fn first(
         .map(|command| (command.stamp.tick, reached(command.distance_m)));
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
-    // Of two at one tick the one named first.
+    // Of two events at one tick the first of the list counts.
     let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         return undecided(ending);
     };
     let last_tick = match ending.outcome {
-        // Its command is the last of the mission.
+        // The command of the arrival is the last of the mission.
         Outcome::Reached => tick,
         _ => tick.saturating_sub(1),
     };
@@ -102,8 +98,8 @@ pub(crate) fn first(
     }
 }
 
-/// Where in the ground truth the tick is that `pose` was computed from. A robot at rest measures the same for many ticks;
-/// of these it is the one whose number is nearest.
+/// The index in the ground truth of the tick that `pose` was computed from. A robot at rest measures the same for many
+/// ticks; then it is the tick with the nearest number.
 fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown
@@ -111,8 +107,7 @@ fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
         .map(|(index, _)| index)
 }
 
-/// The tick of the pose that was computed from what the robot measured at `truth`; if there is none, the number that it
-/// would have.
+/// The tick of the pose that was computed from the measurement at `truth`; if there is none, the number that it would have.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()

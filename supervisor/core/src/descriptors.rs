@@ -1,5 +1,5 @@
-//! How many descriptors this process may have, and those that its children must not inherit. The middleware opens its files without close-on-exec: each
-//! child would hold the shared memory and the sockets of its parent as long as it runs.
+//! The limit of this process's descriptors, and the descriptors that its children must not inherit. The middleware opens its
+//! files without close-on-exec: each child would hold the shared memory and the sockets of its parent as long as it runs.
 //!
 //! Why `unsafe` is allowed here: the kernel lists open descriptors as numbers, and a number becomes a descriptor only through
 //! an `unsafe` call. Each is borrowed for one call that sets a flag; it is neither read, written nor closed.
@@ -15,8 +15,8 @@ use rustix::{
 /// A supervisor has some 200 open.
 const NEEDED: u64 = 256;
 
-/// As many descriptors as the hard limit allows this process and its children. An error says the limit, if they are too
-/// few: the middleware would report no more than that something failed.
+/// Raise the limit of descriptors to the hard limit. The error is the limit, if it is too low: the middleware would report
+/// only that something failed.
 pub(crate) fn raise_limit() -> Result<(), u64> {
     let Some([_, hard]) = limits() else {
         return Ok(());
@@ -25,7 +25,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
         current: Some(hard),
         maximum: Some(hard),
     };
-    // One that cannot be raised, as under the service's unit, is judged as it is.
+    // Under the service's unit the limit cannot be raised; then the present one counts.
     let _ = setrlimit(Resource::Nofile, limit);
     match limits() {
         Some([soft, _]) if soft < NEEDED => Err(soft),
@@ -33,8 +33,8 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
     }
 }
 
-/// The soft and the hard limit; none where the kernel does not say, or there is none. As text: the call that asks may be
-/// forbidden to a service, together with the one that sets.
+/// The soft and the hard limit; none where the kernel does not say, or there is none. They are read from text, because the
+/// system call may be forbidden to a service.
 fn limits() -> Option<[u64; 2]> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits
@@ -47,7 +47,7 @@ fn limits() -> Option<[u64; 2]> {
 /// Standard input, output and error are the child's own.
 const STANDARD: i32 = 2;
 
-/// Have all but the standard descriptors closed in every program that this process executes from now on.
+/// Close all but the standard descriptors in every program that this process executes from now on.
 pub(crate) fn close_all_on_exec() -> io::Result<()> {
     for entry in fs::read_dir("/proc/self/fd")? {
         let name = entry?.file_name();
@@ -58,7 +58,7 @@ pub(crate) fn close_all_on_exec() -> io::Result<()> {
         // SAFETY: the number was listed a moment ago, so it is not -1; should another thread close it meanwhile, the
         // kernel refuses the call.
         let descriptor = unsafe { BorrowedFd::borrow_raw(number) };
-        // That of the listing itself is gone when this is over; a refusal is of one that was closed.
+        // The kernel refuses only a descriptor that was closed meanwhile.
         let _ = fcntl_setfd(descriptor, FdFlags::CLOEXEC);
     }
     Ok(())

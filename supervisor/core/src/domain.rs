@@ -21,34 +21,33 @@ use crate::{
     orphans,
 };
 
-/// Shared memory that the topics of small structs take, measured, and as much again; and what a recorder that is
-/// frozen keeps from being used again: a page or more for each piece of `inputs` of five stages, and grids.
+/// Shared memory for the topics of small structs: twice the measured size; and for samples that a frozen recorder
+/// holds: a page or more for each piece of `inputs` of five stages, and grids.
 const SMALL_TOPICS_BYTES: u64 = (16 << 20) + (32 << 20);
-/// Shared memory a cell of the map takes: a byte in `grid` and twelve in `field`, in each of the samples
-/// that are under way at once when readers keep up.
+/// Shared memory for a cell of the map: a byte in `grid` and twelve in `field`, in each of the eight samples
+/// that are under way at once.
 const CELL_BYTES: u64 = 8 * 13;
 
-/// A supervisor that was killed a moment ago holds its lock no longer than this, on a loaded machine too.
+/// A killed supervisor holds its lock no longer than this, even on a loaded machine.
 const LAST_HOLDER_ENDS: Duration = Duration::from_secs(1);
-/// How often the lock is tried: a file lock has no descriptor to wait on.
+/// Pause between attempts to lock. A file lock has no descriptor to wait on.
 const RETRY: Duration = Duration::from_millis(10);
 
-/// A domain held by this process. Dropping it leaves nothing behind.
+/// A domain locked by this process. Dropping it removes all files of the domain.
 pub struct DomainLock {
     domain: Domain,
     // Dropped before the files are removed.
     bus: Option<(Services, Rc<Bus>)>,
-    // Locked while the bus is made and removed: no stage can join meanwhile.
+    // Locked while the bus is made and removed, so that no stage joins meanwhile.
     stages_lock: Option<File>,
-    // The same of consumers, but for one that does not get on with joining.
+    // Likewise for consumers, except one that is stuck while joining.
     joining_lock: Option<File>,
     cells: usize,
     _lock: File,
 }
 
 impl DomainLock {
-    /// Lock `domain`, wipe what an earlier supervisor left, create the services for a map of so many
-    /// `cells`.
+    /// Lock `domain`, remove the files of an earlier supervisor, create the services for a map of so many `cells`.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         let lock = lock(&domain)?;
@@ -64,7 +63,7 @@ impl DomainLock {
         Ok(acquired)
     }
 
-    /// Make the bus, in place of an old one if there is one, whose endpoints must be closed.
+    /// Make the bus. It replaces an old one, whose endpoints must be closed before.
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
         check_shared_memory(
@@ -90,7 +89,6 @@ impl DomainLock {
         wipe(&self.domain)
     }
 
-    /// The bus.
     pub fn bus(&self) -> Option<Rc<Bus>> {
         self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
     }
@@ -98,7 +96,7 @@ impl DomainLock {
 
 impl Drop for DomainLock {
     fn drop(&mut self) {
-        // The lock goes last, with its directory: a process that waits for it finds nothing and makes its own.
+        // The lock is removed last, with its directory; a process that waits for it then makes its own.
         let _ = self.clear();
         let domain = &self.domain;
         for file in [
@@ -153,13 +151,13 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
             .open(&path);
         let file = match opened {
             Ok(file) => file,
-            // The last holder has just removed the directory.
+            // The previous holder has just removed the directory.
             Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
             Err(error) => return Err(failed("open", &path)(error)),
         };
         match file.try_lock() {
             Ok(()) => {}
-            // A supervisor that was killed holds it until the kernel has taken it apart.
+            // A killed supervisor holds the lock until the kernel has removed the process.
             Err(fs::TryLockError::WouldBlock) if began.elapsed() < LAST_HOLDER_ENDS => {
                 std::thread::park_timeout(RETRY);
                 continue;
@@ -173,7 +171,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
             }
             Err(fs::TryLockError::Error(error)) => return Err(failed("lock", &path)(error)),
         }
-        // Its last holder may have removed it after it was opened here and before it was locked.
+        // The previous holder may have removed the file between its opening and its locking here.
         let (ours, there) = (file.metadata(), fs::metadata(&path));
         if let (Ok(ours), Ok(there)) = (ours, there)
             && ours.ino() == there.ino()
@@ -185,8 +183,8 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
     }
 }
 
-/// Remove every trace of the middleware in this domain. Files of another user in shared memory are left: a bus that is
-/// made has names that nobody could know.
+/// Remove all files of the middleware in this domain. Files of another user in shared memory are left: a new bus has
+/// random names, so nobody can have taken them.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // Without a configuration no process can join.
     remove_file(&domain.middleware_config())?;
@@ -213,12 +211,12 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
             continue;
         }
         let path = entry.path();
-        // A consumer that leaves at the same time removes its own.
+        // A consumer that leaves at the same time removes its own files.
         let Ok(found) = entry.metadata() else {
             continue;
         };
         if found.uid() != user {
-            tracing::warn!(file = %path.display(), owner = found.uid(), "another user's file has a name of this robot's; it is not used");
+            tracing::warn!(file = %path.display(), owner = found.uid(), "a file of another user has a name of this robot; it is left alone");
         } else if found.is_dir() {
             remove_root(&path)?;
         } else {
@@ -228,7 +226,7 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// Remove the directory of a bus. Renamed first: a consumer that is joining would fill it while it is emptied.
+/// Remove the directory of a bus. It is renamed first, because a consumer that is joining would add files meanwhile.
 fn remove_root(root: &Path) -> Result<(), DomainError> {
     let aside = root.with_extension("old");
     remove_directory(&aside)?;
@@ -239,7 +237,7 @@ fn remove_root(root: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Remove a file, if it is there: a consumer that leaves the old bus at the same time removes its own.
+/// Remove a file, if it exists: a consumer that leaves the old bus at the same time removes its own.
 fn remove_file(path: &Path) -> Result<(), DomainError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
@@ -247,7 +245,7 @@ fn remove_file(path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Remove a directory with all that is in it, if it is there.
+/// Remove a directory and its content, if it exists.
 fn remove_directory(path: &Path) -> Result<(), DomainError> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
@@ -255,7 +253,7 @@ fn remove_directory(path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// A segment made in a full file system leads to SIGBUS when it is used: check before.
+/// Check for space first: the use of a segment in a full file system raises SIGBUS.
 fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
     let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
         problem: format!("cannot be examined: {error}"),

@@ -1,4 +1,4 @@
-//! An executable that somebody names: found, and checked before anything starts.
+//! Finds and checks a named executable before anything starts.
 
 use std::{
     env, io,
@@ -8,25 +8,18 @@ use std::{
 use rustix::fs::{Access, access};
 use thiserror::Error;
 
-/// Why what is named cannot be executed.
 #[derive(Debug, Error)]
 pub enum ExecutableError {
-    /// A name alone, in no folder.
     #[error("it is neither beside firsthand nor on PATH")]
     Nowhere,
-    /// No text.
     #[error("its path is not UTF-8")]
     NotUtf8,
-    /// The system refuses.
     #[error(transparent)]
     Refused(#[from] io::Error),
 }
 
-/// The absolute path of the executable that is `named`: a path from the current directory, or a name alone beside this
+/// The absolute path of the executable `named`: a path from the current directory, or a plain name beside this
 /// executable or on `PATH`.
-///
-/// # Errors
-/// When there is none, or it cannot be executed.
 pub fn find(named: &Path) -> Result<PathBuf, ExecutableError> {
     let is_name = named.components().count() == 1 && !named.is_absolute();
     let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
@@ -46,7 +39,7 @@ pub fn find(named: &Path) -> Result<PathBuf, ExecutableError> {
     }
 }
 
-/// Where a name alone is looked for, in order, as absolute paths.
+/// The folders in which a plain name is searched, in order, as absolute paths.
 fn folders() -> impl Iterator<Item = PathBuf> {
     let own = env::current_exe().ok();
     let beside = own.and_then(|own| Some(own.parent()?.to_path_buf()));
@@ -57,7 +50,6 @@ fn folders() -> impl Iterator<Item = PathBuf> {
     beside.into_iter().chain(path)
 }
 
-/// Whether this user may execute the file at `path`.
 fn check(path: &Path) -> io::Result<()> {
     if path.metadata()?.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());

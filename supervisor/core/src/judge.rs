@@ -15,42 +15,33 @@ use crate::{
     records,
 };
 
-/// A pipeline that makes no tick for so long although nothing holds it is stuck. Wall-clock: lockstep does not
-/// advance meanwhile, so the mission's own timeout would not end it.
+/// A pipeline without a tick for so long, although nothing holds it, is stuck. This is wall-clock time: in lockstep mission
+/// time does not advance meanwhile, so the mission's own timeout would not end it.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
-/// What the judgement depends on.
+/// The input of the judgement.
 #[derive(Clone, Debug)]
 pub(crate) struct Snapshot<'a> {
-    /// Distance from the target at which the controller said arrived, metres.
+    /// Distance from the target at which the controller reported its arrival, metres.
     pub arrived_m: Option<f64>,
-    /// The newest state of the link.
     pub link: Option<&'a LinkSample>,
-    /// The robot is a simulated one.
     pub simulated: bool,
-    /// The process of the simulated robot ended.
     pub simulator_ended: bool,
-    /// Where a simulated robot is that has touched something, metres.
+    /// Place at which a simulated robot touched something, metres.
     pub collision_m: Option<[f64; 2]>,
-    /// Mission time.
     pub time: MissionTime,
-    /// When the mission is given up.
     pub deadline: Deadline,
     /// Mission time advances with ticks, not with the wall clock.
     pub in_ticks: bool,
-    /// When the newest tick was first seen, or the order last changed.
+    /// When the newest tick was first seen, or the order last changed, whichever is later.
     pub progress: Instant,
     /// The robot was once ready to drive.
     pub was_ready: bool,
-    /// Why the robot is not to drive.
     pub reason: HoldReason,
-    /// Stages that died too often and are held.
     pub held: Vec<&'static str>,
     /// Stages that do not run although another should have started them.
     pub not_started: Vec<&'static str>,
-    /// Name of the robot.
     pub robot: &'a RobotName,
-    /// Where the robot should answer.
     pub address: &'a Address,
 }
 
@@ -64,24 +55,24 @@ pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
         .or_else(|| stuck(snapshot, now))
 }
 
-/// The robot arrived so far from the target, metres.
+/// The ending of a robot that arrived at this distance from the target, metres.
 pub(crate) fn reached(distance_m: f64) -> Ending {
     let reason = format!("{distance_m:.2} m from the target");
     Ending::asked_for(Outcome::Reached, reason)
 }
 
-/// The robot touched something when it was there, metres.
+/// The ending of a robot that touched something at this place, metres.
 pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
     let reason = format!("touched something near ({x:.2}, {y:.2})");
     Ending::failed(Outcome::Collision, reason)
 }
 
-/// When a mission is given up: the time that an operator's stop takes is not the robot's.
+/// The deadline of a mission. Time in which an operator stopped the robot does not count.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deadline {
     /// The mission's own limit, seconds.
     pub timeout_s: f64,
-    /// Mission time that an operator's stop took, seconds.
+    /// Mission time of operators' stops, seconds.
     pub stopped_s: f64,
 }
 
@@ -91,7 +82,6 @@ impl Deadline {
         self.timeout_s + self.stopped_s
     }
 
-    /// The mission's time was not enough.
     pub(crate) fn timed_out(self) -> Ending {
         let Self {
             timeout_s,
@@ -136,10 +126,10 @@ fn overran(snapshot: &Snapshot<'_>) -> Option<Ending> {
 
 fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
     let may_wait = match snapshot.reason {
-        // A real robot may be out of reach for as long as it likes.
+        // A real robot may be out of reach for any time.
         HoldReason::None => !snapshot.simulated,
         HoldReason::Operator => true,
-        // On the wall clock the mission's timeout ends it.
+        // In wall-clock time the mission's timeout ends it.
         HoldReason::StageHeld => !snapshot.in_ticks,
         HoldReason::Starting | HoldReason::Ending => false,
     };
@@ -167,10 +157,10 @@ fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
     Some(Ending::failed(Outcome::Aborted, reason))
 }
 
-/// Mission time since an operator's stop was last looked at, to be counted as stopped.
+/// Measures the mission time of an operator's stops.
 #[derive(Debug, Default)]
 pub(crate) struct StopClock {
-    /// When a stop was last seen to hold.
+    /// Time of the last call, if the robot was stopped then.
     stopped_at: Option<MissionTime>,
 }
 
@@ -190,7 +180,6 @@ pub(crate) struct TickProgress {
 }
 
 impl TickProgress {
-    /// No tick is known at `now`.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             tick: None,
@@ -198,7 +187,7 @@ impl TickProgress {
         }
     }
 
-    /// When the newest `tick`, as of `now`, was first seen.
+    /// Record the newest `tick` at `now`. Returns when it was first seen.
     pub(crate) fn update(&mut self, tick: Option<u64>, now: Instant) -> Instant {
         if tick != self.tick {
             (self.tick, self.since) = (tick, now);

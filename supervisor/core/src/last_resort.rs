@@ -1,9 +1,9 @@
 //! The end of a run whose supervisor hangs: the middleware may wait for ever in a file that somebody truncated, and a
-//! process that waits there hears no signal.
+//! process that waits there does not react to signals.
 //!
-//! A thread of its own hears them too. When one came and the loop does not get on for [`STUCK`], it ends the stages and
-//! the process. The robot stands by then: its link stops it when the supervisor is silent, and a command that none
-//! follows ends by itself.
+//! A separate thread catches them too. After a signal, if the loop does not turn for [`STUCK`], the thread ends the stages
+//! and the process. The robot stands by then: its link stops it when the supervisor is silent, and a command ends by
+//! itself if no other follows.
 
 use std::{
     fs,
@@ -22,17 +22,17 @@ use common::{
 };
 use rustix::process::{Pid, Signal, kill_process};
 
-/// A loop that gets on comes around five times a second; on a machine that is overloaded it may take longer.
+/// A healthy loop turns five times a second; on an overloaded machine it may take longer.
 const STUCK: Duration = Duration::from_secs(2);
-/// Between the request to the stages to stop and their end.
+/// Time between SIGTERM and SIGKILL to the stages.
 const GRACE: Duration = Duration::from_millis(300);
-/// The exit code of a run that ends like this: as of any run that failed.
+/// The exit code of a run that ends like this, the same as of any run that failed.
 const FAILED: u8 = 1;
 
 /// Between looks at the loop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// Counts the turns of the supervisor's loop, until it has ended.
+/// The number of turns of the supervisor's loop, and whether it has ended.
 #[derive(Clone, Default)]
 pub(crate) struct Turns {
     count: Arc<AtomicU64>,
@@ -40,17 +40,16 @@ pub(crate) struct Turns {
 }
 
 impl Turns {
-    /// The loop came around.
     pub(crate) fn count(&self) {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The stages have ended in order: what follows takes its time.
+    /// The stages have ended in order. The rest may take longer.
     pub(crate) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// Return when the loop has not come around for [`STUCK`]. Says false when it has ended.
+    /// Wait until the loop has not turned for [`STUCK`]. Returns false when it has ended.
     fn are_stuck(&self) -> bool {
         let (mut seen, mut since) = (0, Instant::now());
         while !self.ended.load(Ordering::Relaxed) {
@@ -67,7 +66,7 @@ impl Turns {
     }
 }
 
-/// Watch over `turns` from the first of `signals` on.
+/// Watch `turns` from the first of `signals` on.
 pub(crate) fn watch(mut signals: Signals, turns: Turns) {
     thread::spawn(move || {
         while !signals.came() {
@@ -88,7 +87,7 @@ pub(crate) fn watch(mut signals: Signals, turns: Turns) {
     });
 }
 
-/// Signal all children of this process. Their numbers are their own: nobody reaps them.
+/// Signal all children of this process. Nobody reaps them, so their ids are not reused.
 fn end_children(signal: Signal) {
     let Ok(threads) = fs::read_dir("/proc/self/task") else {
         return;
@@ -97,7 +96,7 @@ fn end_children(signal: Signal) {
         let children = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
         let pids = children.split_ascii_whitespace();
         for pid in pids.filter_map(|pid| Pid::from_raw(pid.parse().ok()?)) {
-            // One that has ended needs no signal.
+            // A child that has ended needs no signal.
             let _ = kill_process(pid, signal);
         }
     }

@@ -1,47 +1,41 @@
-//! in lockstep: how far the link may go ahead of the supervisor, and the tick from which a recovery step holds.
+//! In lockstep: how far the link may go ahead of the supervisor, and the tick from which a recovery step holds.
 //! Pure.
 //!
-//! The link begins no tick later than the newest [`TickLimitSample`] says, which is [`LEAD`] ticks after the last one that
-//! was looked at for a stall. So a stall of tick T leaves the pipeline at rest after tick T + [`LEAD`], on any machine. There
-//! the recovery step is carried out, and the limit rises once the planner and, after a reset, the controller have answered to it.
-//! At the pace of the wall nothing waits, and a recovery step is carried out at once.
+//! The newest [`TickLimitSample`] names the last tick that the link may begin: [`AHEAD`] ticks after the last tick that was
+//! checked for a stall. So a stall at tick T leaves the pipeline at rest after tick T + [`AHEAD`], on any machine. The recovery
+//! step is carried out there, and the limit rises once the planner and, after a reset, the controller have answered it.
+//! In wall-clock time nothing waits, and a recovery step is carried out at once.
 
 use std::time::{Duration, Instant};
 
 use common::samples::{RecoveryStep, StallSample, TickLimitSample};
 
-/// Ticks that the link may be ahead: so many that it seldom waits, and little time for a robot that has not moved for
-/// seconds.
-const LEAD: u64 = 4;
-/// A recovery step that was not answered by then is not waited for: less than the link waits for the limit, and as long as
-/// a planner may take to start.
+/// Ticks that the link may be ahead. With this many it seldom waits, and a robot that has not moved for seconds loses little time.
+const AHEAD: u64 = 4;
+/// How long a recovery step waits for its answer: less than the link waits for the limit, and as long as a planner may take to start.
 const ANSWERED: Duration = Duration::from_secs(3);
 
-/// What the stages have published so far.
+/// The newest output of the stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Published {
     /// The tick of the newest command.
     pub tick: Option<u64>,
-    /// Commands.
     pub commands: u64,
-    /// The planner's generation that beat last, and the tick of the newest grid that it has followed.
+    /// The generation of the planner's newest heartbeat, and the tick of the newest grid that it has used.
     pub planner: (u32, u64),
-    /// The epoch that the newest guidance knew.
+    /// The epoch of the newest guidance.
     pub epoch: u64,
-    /// The epoch of the newest grid.
     pub grid_epoch: u64,
-    /// Whether the grid changed when that epoch began: the planner does not answer to one that did not.
+    /// Whether the grid changed when that epoch began. The planner does not answer a grid that did not change.
     pub grid_changed: bool,
 }
 
-/// What to do about the recovery step under way.
+/// The next action on the recovery step under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// There is none: look at further ticks.
+    /// No recovery step is under way: check further ticks.
     Look,
-    /// Wait for the stages.
     Wait,
-    /// Carry it out now.
     Begin(RecoveryStep),
 }
 
@@ -53,7 +47,7 @@ struct Step {
     begun: Option<(Instant, Published)>,
 }
 
-/// How far the link may go.
+/// The limit of the link, and the recovery step that it waits for.
 #[derive(Debug)]
 pub(crate) struct Lockstep {
     limit: TickLimitSample,
@@ -61,32 +55,31 @@ pub(crate) struct Lockstep {
 }
 
 impl Lockstep {
-    /// No tick from `first_tick` on was looked at.
+    /// A run whose ticks from `first_tick` on are not checked yet.
     pub(crate) fn new(first_tick: u64) -> Self {
         let limit = TickLimitSample {
-            last_tick: first_tick + LEAD,
+            last_tick: first_tick + AHEAD,
             ..TickLimitSample::default()
         };
         Self { limit, step: None }
     }
 
-    /// What the link is told.
     pub(crate) const fn limit(&self) -> TickLimitSample {
         self.limit
     }
 
-    /// All ticks up to `tick` were looked at, and what they call for was done.
+    /// All ticks up to `tick` are checked, and no recovery step is open.
     pub(crate) fn looked_at(&mut self, tick: u64) {
-        self.limit.last_tick = self.limit.last_tick.max(tick + LEAD);
+        self.limit.last_tick = self.limit.last_tick.max(tick + AHEAD);
     }
 
-    /// The robot stalled at a tick; the ones after it are not looked at before the recovery step holds.
+    /// The robot stalled. Later ticks are not checked before the recovery step is in force.
     pub(crate) fn stalled(&mut self, stall: StallSample) {
         self.looked_at(stall.stamp.tick);
         self.step = Some(Step { stall, begun: None });
     }
 
-    /// Whether `epoch` of the newest stall is not to be published yet.
+    /// Whether `epoch`, the newest stall's, must not be published yet.
     pub(crate) fn withholds(&self, epoch: u64) -> bool {
         self.step.is_some_and(|step| {
             let forgets = step.stall.recovery() == RecoveryStep::Reset;
@@ -94,13 +87,13 @@ impl Lockstep {
         })
     }
 
-    /// What is to be done where `published` is what the stages have published by `now`.
+    /// The next action, given the output of the stages at `now`.
     pub(crate) fn next(&mut self, published: Published, now: Instant) -> Next {
         let Some(step) = &mut self.step else {
             return Next::Look;
         };
         let Some((since, before)) = step.begun else {
-            let last = step.stall.stamp.tick + LEAD;
+            let last = step.stall.stamp.tick + AHEAD;
             if published.tick.is_none_or(|tick| tick < last) {
                 return Next::Wait;
             }
@@ -118,13 +111,13 @@ impl Lockstep {
     }
 }
 
-/// Whether the stages have answered to the recovery step of `stall`.
+/// Whether the stages have answered the recovery step of `stall`.
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {
-        // It has no pose to answer to before the next tick: that it has a field is enough.
+        // Before the next tick there is no pose to guide: a new planner with a field has answered.
         RecoveryStep::Replan => {
-            now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + LEAD
+            now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + AHEAD
         }
         RecoveryStep::Reset => {
             let guided = commanded && now.epoch >= stall.epoch;

@@ -1,24 +1,22 @@
-//! Time that the supervisor was there to see. A deadline of a stage counts that alone: where the whole machine stood still,
-//! or this process was not scheduled, nobody can say that a stage was late.
+//! Time in which the supervisor ran. Deadlines of stages count only that: if the whole machine stood still, or this process
+//! was not scheduled, nobody can say that a stage was late.
 
 use std::time::{Duration, Instant};
 
 use crate::policy::Now;
 
-/// A wait, or the work between two waits, that takes so much longer than it should is noticed as lateness. On a machine
-/// that is not overloaded a wait ends within a hundredth of it.
+/// A wait, or the work between two waits, that takes so much longer than planned does not count. On a machine that is not
+/// overloaded a wait ends within a hundredth of it.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
 /// The clock of the stages' deadlines.
 #[derive(Debug)]
 pub(crate) struct ObservedTime {
     observed: Now,
-    /// Until when that was counted.
     until: Instant,
 }
 
 impl ObservedTime {
-    /// Zero at `now`.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             observed: Now::ZERO,
@@ -26,14 +24,12 @@ impl ObservedTime {
         }
     }
 
-    /// Its reading at `now`, while the supervisor works.
     pub(crate) fn at(&self, now: Instant) -> Now {
         self.observed + self.since(now).min(TOLERANCE)
     }
 
-    /// At `now` a wait ended that should have taken at most `planned`. Of one that took longer nobody can say when the
-    /// machine stood still, so hardly any of it counts; a little does, or a supervisor that is always late would never notice
-    /// anything.
+    /// At `now` a wait ended that should have taken at most `planned`. If it took longer, nobody can say when the machine stood
+    /// still, so only a little of it counts; some must count, or a supervisor that is always late would never notice anything.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
         let took = self.since(now);
         self.observed += if took <= planned + TOLERANCE {
@@ -69,9 +65,9 @@ mod tests {
     fn a_stall_of_everything_does_not_count_wherever_it_falls() {
         let began = Instant::now();
         let mut time = ObservedTime::new(began);
-        // In the work between two waits.
+        // A stall in the work between two waits.
         assert_eq!(time.at(began + 600 * MS), TOLERANCE);
-        // In a wait, again and again: the stages had no time to beat between.
+        // Stalls in several waits: the stages had no time to beat between them.
         for stall in 1..=5 {
             time.on_waited(200 * MS, began + stall * 600 * MS);
             assert_eq!(time.at(began + stall * 600 * MS), stall * TOLERANCE);

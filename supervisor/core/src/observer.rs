@@ -1,4 +1,4 @@
-//! What the supervisor reads from the bus: the record that a run is judged, summarised and drawn from.
+//! The supervisor's readers on the bus, and the record that a run is judged, summarised and drawn from.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -20,12 +20,11 @@ use crate::{
     totals::{LookTotals, Totals, WheelTotals},
 };
 
-/// Guidance samples recorded: the one of the arrival tick must still be there when the command is seen.
+/// Guidance samples recorded: that of the arrival tick must still be there when its command is read.
 const MOST_GUIDANCE: usize = 1024;
-/// Poses recorded: three hours at 7 Hz. Of a longer run every second pose is dropped, again and again.
+/// Poses recorded: three hours at 7 Hz. In a longer run every second pose is dropped whenever the record is full.
 const MOST_POSES: usize = 80_000;
 
-/// Readers of every topic the record is made of.
 pub struct Observer {
     health: Reader<HealthSample>,
     link: Reader<LinkSample>,
@@ -34,22 +33,19 @@ pub struct Observer {
     guidance: Reader<GuidanceSample>,
     field: SliceReader<FieldHeader, FieldCell>,
     command: Reader<CommandSample>,
-    /// What was read so far.
+    /// The data read so far.
     pub record: Record,
 }
 
-/// What was read so far.
+/// The data read so far.
 #[derive(Default)]
 pub struct Record {
-    /// Where the robot believed it was, tick by tick.
+    /// The pose of every tick.
     pub poses: Vec<PoseSample>,
-    /// The newest pose.
     pub pose: Option<PoseSample>,
     /// The newest guidance samples, oldest first.
     guidance: VecDeque<GuidanceSample>,
-    /// The newest command.
     pub command: Option<CommandSample>,
-    /// Commands so far.
     commands: u64,
     /// The generation and tick of the planner's newest heartbeat.
     planner: (u32, u64),
@@ -58,30 +54,23 @@ pub struct Record {
     grid_changed: bool,
     /// The first command that said arrived.
     pub arrival: Option<CommandSample>,
-    /// The newest state of the link.
     pub link: Option<LinkSample>,
     /// Latencies by generation of the link.
     latencies: BTreeMap<u32, LinkSample>,
-    /// The newest counts of each generation of the planner: full solves, local updates.
+    /// Newest counts of each generation of the planner: full solves, local updates.
     planners: BTreeMap<u32, (u64, u64)>,
-    /// How often and how long the robot stopped to look.
     pub looks: Totals<LookTotals>,
-    /// What the wheels were commanded.
     pub wheels: Totals<WheelTotals>,
-    /// How long full solves took.
     pub full_solves: Histogram,
-    /// How long local updates took.
     pub local_updates: Histogram,
-    /// The newest belief.
     pub grid: Replica<u8>,
-    /// The newest policy.
     pub field: Replica<FieldCell>,
 }
 
 impl Observer {
-    /// Read everything on `bus`, to complete `record`; `waiter` wakes for what nobody waits for but the supervisor: a
-    /// heartbeat beside the ticks, the state of the link, which ends a tick, and a field. What a tick goes through it reads
-    /// then, and takes no processor from the stages meanwhile.
+    /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, for the state of the link, which ends a
+    /// tick, and for fields. The other samples of a tick are read then, so that the supervisor takes no processor time from the
+    /// stages during the tick.
     pub fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);
@@ -98,7 +87,7 @@ impl Observer {
         })
     }
 
-    /// Read what the stages of `roster` write, and nothing of other processes.
+    /// Read only samples that the stages of `roster` write.
     fn follow(&mut self, roster: &[RosterEntry]) {
         for entry in roster.iter().filter(|entry| entry.pid != 0) {
             let author = Author {
@@ -128,7 +117,7 @@ impl Observer {
         }
     }
 
-    /// Read all that came. Says whether the roster changed by it.
+    /// Read all new samples. Returns whether the roster changed by them.
     pub fn take(&mut self, stages: &mut StageProcesses) -> Result<bool, BusError> {
         self.follow(&stages.roster());
         let mut roster_changed = false;
@@ -139,7 +128,7 @@ impl Observer {
             }
         }
         let record = &mut self.record;
-        // The command of a tick is read before the samples it was computed from, so that these are in the record when
+        // The command of a tick is read before the samples it was computed from, so that these are in the record whenever
         // the command is.
         while let Some(command) = self.command.take()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
@@ -179,7 +168,7 @@ impl Observer {
             }
             record.poses.push(pose);
         }
-        // What the link passes is what poses come from.
+        // Poses are computed from the link's samples, so these are read last.
         while let Some(link) = self.link.take()? {
             stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
             record.latencies.insert(link.stamp.generation, link);
@@ -194,7 +183,7 @@ impl Record {
         let counts = (guidance.full_solves, guidance.local_updates);
         let before = self.planners.insert(guidance.stamp.generation, counts);
         let (full, local) = before.unwrap_or_default();
-        // Several solves in one sample are counted as the last of them.
+        // If a sample covers several solves, only the last one's time is known.
         if counts.0 > full {
             self.full_solves.record(guidance.full_solve_ns);
         }
@@ -217,7 +206,7 @@ impl Record {
             .find(|guidance| guidance.stamp.tick <= tick)
     }
 
-    /// The pose and the guidance of every tick after `last` of which both are here, oldest first.
+    /// The pose and the guidance of every tick after `last` that has both, oldest first.
     pub(crate) fn ticks_since(
         &self,
         last: Option<u64>,
@@ -232,7 +221,6 @@ impl Record {
         ticks.filter_map(move |pose| Some((pose, guidance_of(pose.stamp.tick)?)))
     }
 
-    /// The newest guidance.
     pub fn newest_guidance(&self) -> Option<&GuidanceSample> {
         self.guidance.back()
     }
@@ -252,7 +240,6 @@ impl Record {
         ticks.into_iter().flatten().max()
     }
 
-    /// What the stages have published so far.
     pub(crate) fn published(&self) -> Published {
         let guidance = self.newest_guidance();
         Published {
@@ -265,7 +252,7 @@ impl Record {
         }
     }
 
-    /// Full solves and local updates of every generation of the planner until `last`, the last one's as of then.
+    /// Full solves and local updates of all generations of the planner, up to the sample `last`.
     pub fn solves(&self, last: Option<&GuidanceSample>) -> (u64, u64) {
         let mut sum = (0, 0);
         let newest = last.map_or(u32::MAX, |last| last.stamp.generation);

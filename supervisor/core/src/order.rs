@@ -2,30 +2,27 @@
 
 use common::samples::{HoldReason, Order};
 
-/// What the decision depends on.
+/// The input of the decision.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Snapshot {
     /// The robot was once ready to drive on this bus.
     pub was_ready: bool,
-    /// Every stage beats as ready.
     pub all_running: bool,
-    /// The link hears the robot.
+    /// The link receives data from the robot.
     pub robot_answers: bool,
-    /// `firsthand`'s own planner has published a field: the first tick should not wait for it.
+    /// The planner has published a field, so the first tick does not wait for one.
     pub field_known: bool,
-    /// An operator said stop, and has not said resume.
+    /// An operator's stop holds.
     pub operator_stop: bool,
-    /// A stage died too often and is held.
     pub stage_held: bool,
 }
 
-/// What the robot is ordered to do.
+/// The order to the robot and its reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decision {
-    /// The robot was once ready to drive: from then on a stage that is down does not change the order, because the
+    /// The robot was once ready to drive. From then on a stage that is down does not change the order, because the
     /// link stops the robot itself.
     pub ready: bool,
-    /// Why the robot is not to drive.
     pub reason: HoldReason,
 }
 
@@ -41,7 +38,6 @@ impl Decision {
         reason: HoldReason::Ending,
     };
 
-    /// The order that follows from the reason.
     pub(crate) const fn order(self) -> Order {
         match self.reason {
             HoldReason::None => Order::Drive,
@@ -51,7 +47,7 @@ impl Decision {
     }
 }
 
-/// Decide. The first reason that applies is given.
+/// The first reason that applies decides.
 pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
     let can_start = snapshot.all_running && snapshot.robot_answers && snapshot.field_known;
     let ready = snapshot.was_ready || can_start;

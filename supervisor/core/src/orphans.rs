@@ -1,8 +1,8 @@
-//! Stages that still run in a robot's domain when a supervisor has locked it: waited for, and killed if they stay.
+//! Stages that still run in a robot's domain when a new supervisor has locked it. It waits for them, and kills those that stay.
 //!
-//! Each stage holds a shared lock on one file of the domain as long as it runs, and stops when its supervisor ends. One
-//! that is frozen cannot. Only the process that holds the supervisor's lock can need the stages of the domain, so such
-//! an orphan is killed.
+//! Each stage holds a shared lock on one file of the domain as long as it runs, and stops when its supervisor ends. A frozen
+//! stage cannot. Only the process that holds the supervisor's lock can need the stages of the domain, so such an orphan is
+//! killed.
 
 use std::{
     fs::{self, File},
@@ -22,12 +22,12 @@ use crate::domain_error::{DomainError, failed};
 const STOP_GRACE: Duration = Duration::from_secs(2);
 /// A killed process ends within this, unless it hangs in the kernel.
 const KILLED: Duration = Duration::from_secs(1);
-/// A consumer has joined within this.
+/// Time for a consumer to join.
 const JOINED_WITHIN: Duration = Duration::from_millis(300);
-/// How often the lock is tried: a file lock has no descriptor to wait on.
+/// Pause between attempts to lock. A file lock has no descriptor to wait on.
 const RETRY: Duration = Duration::from_millis(10);
 
-/// Wait until no stage runs in the domain: what they use is wiped next. None can join while the result is held.
+/// Wait until no stage runs in the domain, because its files are removed next. No stage can join while the result is held.
 pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.stages_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;
@@ -37,8 +37,8 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     }
     let holders = holders(&lock).map_err(failed("look for who locks", &path))?;
     for &pid in &holders {
-        tracing::warn!(pid, "a stage outlives its supervisor: killed");
-        // One that has just ended by itself needs no signal.
+        tracing::warn!(pid, "a stage has outlived its supervisor and is killed");
+        // A stage that has just ended by itself needs no signal.
         let _ = signal(pid, &lock, Signal::KILL);
     }
     if locked_within(&lock, KILLED).map_err(system)? {
@@ -51,14 +51,14 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     })
 }
 
-/// Wait until no consumer is joining the bus of the domain, which takes milliseconds; for one that is frozen meanwhile, or
-/// joins for ever, not longer than [`JOINED_WITHIN`]. None can begin to join while the result is held.
+/// Wait until no consumer is joining the bus of the domain, which takes milliseconds; but not longer than [`JOINED_WITHIN`],
+/// because a consumer may be frozen meanwhile. No consumer can begin to join while the result is held.
 pub(crate) fn wait_for_consumers(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.joining_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;
     if !locked_within(&lock, JOINED_WITHIN).map_err(failed("lock", &path))? {
         tracing::warn!(
-            "a consumer has been joining for {JOINED_WITHIN:?}; the bus goes without it"
+            "a consumer has been joining for {JOINED_WITHIN:?}; the bus is recreated without it"
         );
     }
     Ok(lock)

@@ -3,30 +3,27 @@
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use serde::Serialize;
 
-/// A simulated robot that says it arrived, and by the ground truth stands farther from its target than this, is in the wrong
-/// place, metres: what counts as success on other benches. A mission whose tolerance is wider asks for no more than that.
+/// A simulated robot that reports its arrival and by the ground truth stands farther from its target than this is in the wrong
+/// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The robot is within the tolerance of the target: by its own word, and in simulation by the ground truth, too.
+    /// The robot is within the tolerance of the target: by its own pose, and in simulation also by the ground truth.
     Reached,
-    /// It says so, and the ground truth says otherwise.
+    /// The robot reports its arrival, and the ground truth contradicts it.
     WrongPlace,
-    /// The robot stalls, and no recovery step is left.
+    /// The robot stalled, and no recovery step was left.
     Unreachable,
-    /// Mission time ran out.
     Timeout,
-    /// The simulated robot touched something.
     Collision,
     /// Stopped by hand, or something failed.
     Aborted,
 }
 
 impl Outcome {
-    /// Its name.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Reached => "reached",
@@ -42,18 +39,15 @@ impl Outcome {
 /// How a run ended, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ending {
-    /// How.
     pub outcome: Outcome,
-    /// Why, in a few words.
     pub reason: String,
     /// The row of the failsafe table that ended the mission, by its name.
     pub cause: Option<&'static str>,
-    /// Whether it is what the user asked for: the target reached, or a stop by hand.
+    /// Whether the run ended as the user asked: with the target reached or a stop by hand.
     pub asked_for: bool,
 }
 
 impl Ending {
-    /// An end that nobody asked for.
     pub(crate) fn failed(outcome: Outcome, reason: impl Into<String>) -> Self {
         Self {
             outcome,
@@ -63,7 +57,7 @@ impl Ending {
         }
     }
 
-    /// The same, or the wrong place where a robot that reached its target did not by the ground truth `ended`.
+    /// This ending; or the wrong place, if the ground truth `ended` shows that a robot did not reach its target.
     pub(crate) fn checked(self, mission: &Mission, ended: Option<&GroundTruthTick>) -> Self {
         let distance_m = ended.map_or(0.0, |ended| {
             (ended.x - mission.target.x).hypot(ended.y - mission.target.y)
@@ -79,7 +73,7 @@ impl Ending {
         Self::failed(Outcome::WrongPlace, reason)
     }
 
-    /// What the user asked for.
+    /// An end that the user asked for.
     pub(crate) fn asked_for(outcome: Outcome, reason: impl Into<String>) -> Self {
         Self {
             asked_for: true,

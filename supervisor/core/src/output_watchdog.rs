@@ -1,7 +1,7 @@
-//! Whether each stage answers what it reads: one may beat and yet publish nothing. Pure.
+//! Whether each stage answers its inputs: a stage may beat and yet publish nothing. Pure.
 //!
-//! A stage must publish an output of each tick that all its inputs have reached. So a stage without input is never late,
-//! and of a pipeline that stands still only the stage where it stands is blamed: those behind it have no input.
+//! A stage must publish an output for each tick that all its inputs have reached. So a stage without input is never late,
+//! and if the pipeline stands still, only the stage that stopped it is blamed: the stages behind it have no input.
 
 use std::time::Duration;
 
@@ -12,26 +12,22 @@ use crate::{
     stages::{Stage, TABLE, find},
 };
 
-/// The outputs of every stage.
 pub(crate) struct OutputWatchdog(Vec<StageOutput>);
 
-/// What one stage has published, and since when it has left something unanswered.
+/// The newest output of one stage, and since when its input has been unanswered.
 struct StageOutput {
     stage: &'static Stage,
-    /// How long it may leave its input unanswered.
+    /// Longest time that its input may stay unanswered.
     patience: Duration,
-    /// The stages whose output of a tick it answers.
     reads: Vec<&'static str>,
-    /// The newest tick it has published.
     published: Option<u64>,
-    /// Ticks up to this one were an earlier generation's to answer.
+    /// Ticks up to this one belong to an earlier generation.
     excused: Option<u64>,
     /// Since when its input has been unanswered.
     unanswered_since: Option<Now>,
 }
 
 impl OutputWatchdog {
-    /// Nothing published yet; on a map of so many `cells`.
     pub(crate) fn new(cells: usize) -> Self {
         let output = |stage: &'static Stage| StageOutput {
             stage,
@@ -50,7 +46,6 @@ impl OutputWatchdog {
         Self(TABLE.iter().map(output).collect())
     }
 
-    /// `stage` has published something of `tick`.
     pub(crate) fn on_output(&mut self, stage: &str, tick: u64) {
         if let Some(output) = self.find(stage)
             && output.published < Some(tick)
@@ -59,7 +54,7 @@ impl OutputWatchdog {
         }
     }
 
-    /// A generation of `stage` starts: ticks that were under way by then are an earlier one's.
+    /// A generation of `stage` starts. Ticks under way belong to an earlier one.
     pub(crate) fn on_start(&mut self, stage: &str) {
         let newest = self.0.iter().filter_map(|output| output.published).max();
         if let Some(output) = self.find(stage) {
@@ -67,14 +62,14 @@ impl OutputWatchdog {
         }
     }
 
-    /// Nothing counts as unanswered: the robot stands, and ticks may end on their way.
+    /// Forget unanswered inputs: the robot stands, so ticks may end within the pipeline.
     pub(crate) fn clear_unanswered(&mut self) {
         for output in &mut self.0 {
             output.unanswered_since = None;
         }
     }
 
-    /// The first stage, in the order of the pipeline, that has left its input unanswered for longer than it may.
+    /// The first stage, in the order of the pipeline, whose input is unanswered for too long.
     pub(crate) fn stale(&mut self, now: Now) -> Option<&'static str> {
         let published: Vec<_> = self
             .0
@@ -118,7 +113,7 @@ mod tests {
         watchdog
     }
 
-    /// Who is blamed when nothing further is published for a minute.
+    /// The stage that is blamed when nothing further is published for a minute.
     fn blamed(watchdog: &mut OutputWatchdog) -> Option<&'static str> {
         watchdog
             .stale(Duration::ZERO)
@@ -142,7 +137,7 @@ mod tests {
     #[test]
     fn a_stage_without_input_is_never_blamed() {
         assert_eq!(blamed(&mut published(&[])), None);
-        // The map has not reached the planner, whatever the pose did.
+        // The map has not reached the planner, although the pose has.
         let mut watchdog = published(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
         let blamed = blamed(&mut watchdog);
         for stage in ["mapper", "planner", "controller"] {
@@ -201,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn time_before_the_robot_drove_is_clear_unansweredn() {
+    fn time_before_the_robot_drove_is_cleared() {
         let mut watchdog = published(&[("x80-link", 7)]);
         watchdog.stale(Duration::ZERO);
         watchdog.clear_unanswered();

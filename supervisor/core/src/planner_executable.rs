@@ -1,4 +1,4 @@
-//! The executable that a mission names for the planner: found, checked and made absolute before anything starts.
+//! Finds, checks and makes absolute the executable that a mission names for the planner, before anything starts.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::executable::{self, ExecutableError};
 
-/// The planner that a mission names cannot be started.
+/// The executable that a mission names for its planner cannot be started.
 #[derive(Debug, Error)]
 #[error(
     "planner.executable {}: {problem}; give a path to an executable of a planner, a name on PATH, or leave the key out", named.display()
@@ -18,9 +18,6 @@ pub struct PlannerExecutableError {
 }
 
 /// Make the `planner.executable` of `mission` absolute, if it names one.
-///
-/// # Errors
-/// As [`find`].
 pub fn resolve(mission: &mut Mission) -> Result<(), PlannerExecutableError> {
     if let Some(named) = &mut mission.planner.executable {
         *named = find(named)?;
@@ -28,11 +25,6 @@ pub fn resolve(mission: &mut Mission) -> Result<(), PlannerExecutableError> {
     Ok(())
 }
 
-/// The absolute path of the executable that is `named`: a path from the current directory, or a name alone beside this
-/// executable or on `PATH`.
-///
-/// # Errors
-/// When there is none, or it cannot be executed.
 pub fn find(named: &Path) -> Result<PathBuf, PlannerExecutableError> {
     executable::find(named).map_err(|problem| PlannerExecutableError {
         named: named.to_path_buf(),

@@ -1,4 +1,4 @@
-//! What to do with one stage: a pure function of what happened and when.
+//! The policy for one stage: a pure function from events and their times to actions.
 //!
 //! ```text
 //!          start            beat            exit
@@ -12,114 +12,95 @@
 //!                      +--stop------->+--> Stopping --exit--> Down
 //! ```
 //! Other stages are not touched: a stage that cannot run is held, and the robot stands meanwhile. The one exception is a
-//! bus on which it cannot start: that is recreated under all of them.
+//! bus on which a stage cannot start: it is recreated, and all stages are restarted on it.
 
 use std::{collections::VecDeque, time::Duration};
 
 use crate::stages::Deadlines;
 
-/// A stage that was ready for so long was stable: its next death is a first one.
+/// A generation that was ready for so long was stable; the count of deaths in a row begins again.
 pub const STABLE_AFTER: Duration = Duration::from_millis(500);
-/// Wait before the second start in a row; doubles with each further one. Less than a start takes: one that is killed in
-/// its start-up was mostly unlucky.
+/// Wait before the second start in a row; it doubles with each further one. It is shorter than a start, because a death
+/// in the start-up is mostly chance.
 const FIRST_BACKOFF: Duration = Duration::from_millis(2);
-/// The most to wait between starts: a person who repairs the cause should not wait longer.
+/// Longest wait between starts: a person who has repaired the cause should not wait longer.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
-/// A stage that died so often within [`HOLD_WINDOW`], or in a row without ever having been stable, is held: one that
-/// cannot run at all gets here in two seconds, and no person or test kills the same stage that fast.
+/// A stage that died so often within [`HOLD_WINDOW`], or in a row without having been stable, is held. A stage that
+/// cannot run at all is held after two seconds; no person or test kills one stage that fast.
 pub const HOLD_AFTER: usize = 12;
 /// The window in which deaths are counted.
 pub const HOLD_WINDOW: Duration = Duration::from_secs(10);
-/// Starts in a row that the bus may have blocked, before it is recreated: one may have met what the generation before
-/// left half made, which is removed when it ends.
+/// Starts in a row that the bus may have blocked before it is recreated. A single one may have met incomplete files of
+/// the generation before, which are removed when it ends.
 const BLOCKED_STARTS: u32 = 2;
-/// Time an aborted stage has to write the end of its log.
 const ABORT_GRACE: Duration = Duration::from_millis(100);
-/// Time a terminated stage has to stop in order. The link sends three datagrams in it.
+/// Time for a terminated stage to stop in order. The link sends three datagrams in it.
 const STOP_GRACE: Duration = Duration::from_millis(300);
 
-/// A reading of the supervisor's clock: time since it started.
+/// Time since the supervisor started.
 pub type Now = Duration;
 
-/// What happened to a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Event {
-    /// It has no process and should have one.
     Start,
-    /// It could not be given one.
+    /// Its process could not be started.
     StartFailed,
     /// It beat, not ready yet.
     BeatStarting,
-    /// It beat, ready.
     BeatReady,
-    /// It beats, and does not answer its inputs.
+    /// It beats, but does not answer its inputs.
     OutputStale,
-    /// Its process is gone and reaped.
+    /// Its process is reaped.
     Exited,
-    /// As exited, with the exit code for a bus that refused it.
+    /// Its process is reaped; its exit code says that the bus refused it.
     Refused,
-    /// It should be replaced by a new generation; one that is held is released by it.
+    /// It should be replaced by a new generation. A held stage is released.
     Replace,
-    /// It should stop for good.
+    /// It should stop, without a successor.
     Stop,
-    /// Time passed.
     Time,
 }
 
-/// What to do to a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Start a process.
     Start,
-    /// SIGTERM.
     Terminate,
     /// SIGABRT: the stage hangs.
     Abort,
-    /// SIGKILL.
     Kill,
     /// Stop all stages, recreate the bus, start them again.
     RecreateBus,
 }
 
-/// Where a stage is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
     /// No process, none wanted.
     Down,
-    /// No process; one is started then.
     BackingOff {
-        /// When.
         until: Now,
     },
     /// No process; it died too often, and only an operator starts it again.
     Held,
     /// A process that has not beaten as ready.
     Starting {
-        /// Since when.
         since: Now,
     },
     /// A process that beats.
     Running {
-        /// Since it was ready.
         since: Now,
-        /// Its last beat.
         beat: Now,
     },
-    /// A process that was not ready, without beat or without output for too long: it was aborted.
+    /// A process that was aborted, because it was without readiness, beat or output for too long.
     Aborted {
-        /// For how long it was ready.
         stability: Stability,
-        /// When it is killed.
         kill: Now,
     },
-    /// A process that was asked to stop for its successor; that is no death.
+    /// A process that was asked to stop for its successor. Its end is no death.
     Replaced {
-        /// When it is killed.
         kill: Now,
     },
     /// A process that was asked to stop, and no successor is wanted.
     Stopping {
-        /// When it is killed.
         kill: Now,
     },
 }
@@ -127,7 +108,6 @@ pub enum Phase {
 /// For how long a generation was ready before its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stability {
-    /// It never became ready.
     NeverReady,
     /// It was ready for less than [`STABLE_AFTER`].
     Brief,
@@ -136,7 +116,7 @@ pub enum Stability {
 }
 
 impl Stability {
-    /// Of one that was ready from `since` to its last sign, at `until`.
+    /// The stability of a generation that was ready from `since` to its last sign, at `until`.
     fn of(since: Now, until: Now) -> Self {
         if until.saturating_sub(since) >= STABLE_AFTER {
             Self::Stable
@@ -146,14 +126,13 @@ impl Stability {
     }
 }
 
-/// The policy for one stage.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Policy {
     deadlines: Deadlines,
     phase: Phase,
     /// Deaths in a row, none of a generation that was stable.
     deaths: usize,
-    /// The deaths within the window; at most [`HOLD_AFTER`].
+    /// Deaths within the window; at most [`HOLD_AFTER`].
     recent: VecDeque<Now>,
     /// Starts in a row that the bus may have blocked.
     blocked_starts: u32,
@@ -176,7 +155,6 @@ impl Policy {
         self.recent.len()
     }
 
-    /// Where the stage is.
     pub const fn phase(&self) -> Phase {
         self.phase
     }
@@ -194,7 +172,7 @@ impl Policy {
         }
     }
 
-    /// What to do about `event`.
+    /// The action that `event` calls for.
     pub fn step(&mut self, event: Event, now: Now) -> Option<Action> {
         let due = self.deadline().is_some_and(|deadline| now >= deadline);
         match (self.phase, event) {
@@ -208,7 +186,7 @@ impl Policy {
                 Some(self.start(now))
             }
             (Phase::Starting { .. }, Event::StartFailed) => {
-                // Whatever is used up: not at once again.
+                // Some resource is used up, so it is not started again at once.
                 self.deaths = self.deaths.max(1);
                 self.record_death(Stability::NeverReady, now)
             }
@@ -297,7 +275,7 @@ impl Policy {
         Some(Action::Abort)
     }
 
-    /// SIGKILL cannot be refused, only delayed by the kernel: it is repeated.
+    /// SIGKILL is repeated, because the kernel may delay it.
     fn delay_kill(&mut self, now: Now) {
         if let Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } =
             &mut self.phase
@@ -306,7 +284,7 @@ impl Policy {
         }
     }
 
-    /// A generation has ended that may not have got past the bus. Once recreated, the bus is not blamed again before a
+    /// A generation has ended that the bus may have blocked. After the bus is recreated, it is not recreated again before a
     /// generation was ready.
     fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
         self.blocked_starts = self.blocked_starts.saturating_add(1);
@@ -325,7 +303,7 @@ impl Policy {
         self.recent
             .retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
         self.recent.push_back(now);
-        // One that is held, stopped and started again: no more are counted than make a difference.
+        // A held stage that is stopped and started again can exceed the number that matters.
         if self.recent.len() > HOLD_AFTER {
             self.recent.pop_front();
         }

@@ -23,7 +23,7 @@ const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
 /// A `firsthand` subcommand in a process of its own.
 ///
-/// Through `/proc/self/exe`, so that a rebuild under way does no harm.
+/// It is started through `/proc/self/exe`, so that a rebuild under way does no harm.
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = child("/proc/self/exe");
     command.arg0("firsthand").args(arguments);
@@ -53,20 +53,18 @@ pub struct Process {
     pidfd: OwnedFd,
 }
 
-/// What ended a process.
+/// How a process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExitCause {
-    /// It ended by itself, with this code.
     Exited(i32),
-    /// A signal ended it.
     Signalled {
         /// Its number.
         signal: i32,
         /// Whether it left a core.
         core: bool,
     },
-    /// It was the child of another process, which knows.
+    /// It was the child of another process, which alone is told.
     Unknown,
 }
 
@@ -110,7 +108,7 @@ impl Process {
                 pidfd,
             }),
             Err(error) => {
-                // Unwatched it must not run.
+                // It must not run without being watched.
                 let _ = child.kill();
                 let _ = child.wait();
                 Err(error.into())
@@ -123,7 +121,7 @@ impl Process {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
         let pid = pid.ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
-        // It may have ended meanwhile, and its number be another process's, which must not be signalled.
+        // It may have ended meanwhile, and its id may belong to another process, which must not be signalled.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());
@@ -135,7 +133,6 @@ impl Process {
         })
     }
 
-    /// Its process id.
     pub const fn id(&self) -> u32 {
         self.id
     }
@@ -145,7 +142,6 @@ impl Process {
         self.child.as_mut()?.stdout.take()
     }
 
-    /// Send it a signal, if it still runs.
     pub fn signal(&self, signal: Signal) {
         let _ = pidfd_send_signal(&self.pidfd, signal);
     }
@@ -155,7 +151,6 @@ impl Process {
         self.child.is_some()
     }
 
-    /// Reap it, if it has ended.
     pub fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
         let Some(child) = &mut self.child else {
             let gone = self.wait(Duration::ZERO)?;
@@ -164,7 +159,7 @@ impl Process {
         Ok(child.try_wait()?.map(ExitCause::from))
     }
 
-    /// Wait until it has ended; says whether it has.
+    /// Wait until it has ended. Returns whether it has.
     fn wait(&self, patience: Duration) -> io::Result<bool> {
         poll::is_readable(&self.pidfd, patience)
     }
@@ -178,7 +173,7 @@ impl Process {
             if left.is_zero() {
                 self.signal(Signal::KILL);
             }
-            // Whether it ended is asked above.
+            // The loop's condition asks whether it ended.
             let _ = self.wait(left.max(KILLED_WITHIN));
         }
     }
@@ -191,7 +186,7 @@ impl AsFd for Process {
 }
 
 impl Drop for Process {
-    /// No child is left running, whatever went wrong.
+    /// No child is left running after an error.
     fn drop(&mut self) {
         if let Some(child) = &mut self.child
             && !matches!(child.try_wait(), Ok(Some(_)))

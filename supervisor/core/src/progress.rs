@@ -1,4 +1,4 @@
-//! How far a run has come, as shown to its user.
+//! The progress of a run, as its user sees it.
 
 use std::fmt;
 
@@ -6,11 +6,10 @@ use common::samples::{Action, Cause};
 
 use crate::observer::Record;
 
-/// How far a run has come, as shown to its user.
+/// The progress of a run, as its user sees it.
 pub struct Progress<'a> {
-    /// What was read from the bus so far.
     pub record: &'a Record,
-    /// Stages that run, of how many.
+    /// Stages that run, and all stages.
     pub running: (usize, usize),
     /// Whether the robot is ordered to drive.
     pub driving: bool,
@@ -18,7 +17,6 @@ pub struct Progress<'a> {
     pub straight_m: f64,
 }
 
-/// One line.
 impl fmt::Display for Progress<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (running, all) = self.running;

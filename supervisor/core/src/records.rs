@@ -1,4 +1,4 @@
-//! Files of records in the run directory, one JSON object a line. They only report: one that cannot be written is a
+//! Files of records in the run directory, one JSON object a line. They only report: a record that cannot be written is a
 //! warning in the log, and the mission goes on.
 
 use std::{
@@ -9,9 +9,7 @@ use std::{
 
 use serde::Serialize;
 
-/// The deaths of a run.
 pub const DEATHS: &str = "deaths.jsonl";
-/// The stalls of a run.
 pub(crate) const STALLS: &str = "stalls.jsonl";
 
 /// Append `record` to the file `name` of the run `directory`.

@@ -1,7 +1,7 @@
-//! What another supervisor needs to go on with a run whose supervisor ended.
+//! The state from which another supervisor resumes a run whose supervisor ended.
 //!
-//! The stages and the simulated robot have checkpoints of their own; here is the supervisor's. On a wall clock mission
-//! time stands still without a supervisor: the robot stands too.
+//! The stages and the simulated robot have checkpoints of their own; this is the supervisor's. Mission time stands still
+//! without a supervisor, and so does the robot.
 
 use std::{fs, path::Path};
 
@@ -14,7 +14,7 @@ use dead_reckoning::shell::saved_state;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Room for the encoded [`SupervisorState`], bytes: it is under 90.
+/// Room for the encoded [`SupervisorState`], bytes. It takes under 90.
 const CAPACITY: usize = 256;
 /// The kernel's name for the time since the machine was started.
 const BOOT_ID: &str = "/proc/sys/kernel/random/boot_id";
@@ -26,15 +26,15 @@ const SIMULATOR: &str = "x80-sim";
 /// The state of a supervisor that survives it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SupervisorState {
-    /// An operator said stop, and has not said resume.
+    /// An operator's stop holds.
     pub operator_stop: bool,
-    /// Mission time that such stops took, seconds.
+    /// Mission time of all operators' stops, seconds.
     pub operator_stopped_s: f64,
-    /// Times another supervisor went on with this run.
+    /// Times the run was resumed.
     pub resumes: u32,
     /// The boot of the machine it ran in.
     boot: String,
-    /// When it last saved this, [`boot_ns`]: while the machine is suspended, the robot may be carried off.
+    /// Time of the last save, [`boot_ns`]. That clock also counts time in which the machine is suspended and the robot may be moved.
     saved_ns: u64,
 }
 
@@ -42,12 +42,11 @@ pub struct SupervisorState {
 #[derive(Debug)]
 pub struct StateFile {
     checkpoint: Checkpoint,
-    /// What is saved next.
     pub state: SupervisorState,
 }
 
 impl StateFile {
-    /// For a run that begins, or one that goes on.
+    /// Open it for a new or a resumed run.
     pub fn open(directory: &Path) -> Result<Self, CheckpointError> {
         let file = run::checkpoint_file(directory, "supervisor");
         let (checkpoint, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY)?;
@@ -78,32 +77,24 @@ pub fn age_s(directory: &Path) -> Result<Option<f64>, CheckpointError> {
     Ok(state.map(|state| boot_ns().saturating_sub(state.saved_ns) as f64 * 1e-9))
 }
 
-/// A run whose supervisor ended, to go on with.
+/// A run whose supervisor ended, to be resumed.
 #[derive(Clone, Debug)]
 pub struct RecoveredRun {
     /// Its run file; its clock goes on.
     pub run: Run,
-    /// The first tick that was not made yet.
+    /// The first tick that did not happen yet.
     pub first_tick: u64,
     /// Mission time by then.
     pub time: MissionTime,
 }
 
-/// Why a run cannot be gone on with.
+/// Why a run cannot be resumed.
 #[derive(Debug, Error)]
 pub enum ResumeError {
-    /// It came to its end.
     #[error("the run in {directory} came to its end, see {SUMMARY} there; start a new one")]
-    Ended {
-        /// Its directory.
-        directory: String,
-    },
-    /// The simulated robot left no checkpoint.
+    Ended { directory: String },
     #[error("the simulated robot of the run in {directory} left no checkpoint; start a new run")]
-    NoRobot {
-        /// Its directory.
-        directory: String,
-    },
+    NoRobot { directory: String },
     /// The run file.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -113,7 +104,6 @@ pub enum ResumeError {
 }
 
 impl RecoveredRun {
-    /// The run in `directory`, whose supervisor ended.
     pub fn load(directory: &Path) -> Result<Self, ResumeError> {
         let run = Run::load(directory)?;
         let named = || directory.display().to_string();
@@ -145,7 +135,6 @@ impl RecoveredRun {
         }
     }
 
-    /// How its mission time passes.
     pub const fn pace(&self) -> Pace {
         match self.run.clock {
             MissionClock::Ticks { .. } => Pace::Max,

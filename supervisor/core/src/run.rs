@@ -24,30 +24,29 @@ use crate::{
 pub struct Finished {
     /// How it ended, and why.
     pub ending: Ending,
-    /// The last complete tick before that was decided; none where no tick decided. What came after it does not count: how
-    /// much that is depends on how fast the stop was.
+    /// The last complete tick before the deciding event; none where no tick decided. Later ticks do not count, because their
+    /// number depends on how fast the stop was.
     pub last_tick: Option<u64>,
-    /// From the first motion order to the end, seconds of the robot's clock; of a run that was resumed in wall-clock time,
+    /// From the first motion order to the end, seconds of the robot's clock; for a run that was resumed in wall-clock time,
     /// from the start of the run.
     pub duration_s: f64,
-    /// What was read from the bus.
     pub record: Record,
-    /// What really happened until then, of a simulated robot.
+    /// The ground truth of a simulated robot until then.
     pub truth: Vec<GroundTruthTick>,
     /// Whether the robot was ever ordered to drive.
     pub drove: bool,
     /// Times each stage was started again.
     pub restarts: BTreeMap<&'static str, u32>,
-    /// Times another supervisor went on with the run.
+    /// Times the run was resumed.
     pub resumes: u32,
     /// Generations of the planner started because the robot stalled.
     pub replans: u32,
-    /// Times its sensed belief was forgotten.
+    /// Times the sensed map was reset.
     pub resets: u64,
 }
 
-/// Carry out a run. `attach` is called once, when the robot's bus is there and no stage has started: for consumers that are
-/// to miss nothing. `show` is called a few times a second.
+/// Carry out a run. `attach` is called once, when the robot's bus exists and no stage has started: consumers that start
+/// there miss no sample. `show` is called a few times a second.
 pub fn run(
     options: &Options,
     attach: &mut dyn FnMut(),
@@ -68,7 +67,7 @@ pub fn run(
             Err(error) => break Err(error),
         }
     };
-    // Also after an error the robot is stopped first, and the stages in order.
+    // After an error, too, the robot is stopped first, then the stages in order.
     let stopped = shutdown::stop(&mut supervisor);
     turns.end();
     let ending = ending?;

@@ -1,4 +1,4 @@
-//! Mission time of a run, and its first tick that is not made yet.
+//! Mission time of a run, and the first tick that did not happen yet.
 
 use common::{
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
@@ -12,14 +12,14 @@ use crate::{observer::Record, recovery::RecoveredRun};
 pub(crate) struct RunClock {
     /// How mission time passes.
     pub clock: MissionClock,
-    /// The first tick that no earlier supervisor saw made.
+    /// The first tick that no earlier supervisor has seen.
     first_tick: u64,
     /// Mission time at the start of this supervisor.
     start: MissionTime,
 }
 
 impl RunClock {
-    /// Of a run that goes on.
+    /// The clock of a resumed run.
     pub(crate) fn recovered(run: &RecoveredRun) -> Self {
         Self {
             clock: run.clock(),
@@ -28,7 +28,7 @@ impl RunClock {
         }
     }
 
-    /// Of a run that begins; only a `simulated` robot's time can pass at a pace of its own.
+    /// The clock of a new run. Only a `simulated` robot's time can pass at another pace than the wall clock's.
     pub(crate) fn begin(pace: Pace, rate_hz: f64, simulated: bool) -> Self {
         let clock = match pace {
             Pace::Max if simulated => MissionClock::Ticks {
@@ -54,10 +54,9 @@ impl RunClock {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
 
-    /// The tick that a new generation of a stage starts from: the first one that was not made, where `newest` is the
-    /// newest tick of any sample.
+    /// The tick that a new generation of a stage starts from: the one after `newest`, the newest tick of any sample.
     pub(crate) fn first_tick(&self, newest: Option<u64>) -> u64 {
-        // The link publishes tick 0 before its first.
+        // The link publishes tick 0 before its first tick.
         newest.map_or(0, |tick| tick + 1).max(self.first_tick)
     }
 
@@ -66,8 +65,8 @@ impl RunClock {
         pose.map_or(self.start, |pose| pose.stamp.time())
     }
 
-    /// From the first motion order until `last_tick`, or else the newest one, seconds. in lockstep the `truth` until
-    /// then says it: the time of the simulated robot begins with that order, and passes also while nobody hears it.
+    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the `truth` until then gives it:
+    /// the simulated robot's time begins with that order, and passes also while nobody receives its data.
     pub(crate) fn duration_s(
         &self,
         last_tick: Option<u64>,
@@ -96,7 +95,7 @@ impl RunClock {
                 || self.pose_time(pose),
                 |truth| MissionTime::from_seconds(truth.time_s),
             ),
-            // It passes without a robot or a pose, too.
+            // It passes also without a robot or a pose.
             MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
         }
     }

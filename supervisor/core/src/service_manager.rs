@@ -1,6 +1,6 @@
 //! Notifications to systemd, if it started this process: ready, status, watchdog, stopping.
 //!
-//! Everything here does nothing where there is no `NOTIFY_SOCKET`.
+//! Without `NOTIFY_SOCKET` every function does nothing.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ const STATUS_EVERY: Duration = Duration::from_secs(1);
 
 /// The service manager, as a receiver of notifications.
 pub(crate) struct ServiceManager {
-    /// It kills a process that does not notify it for so long.
+    /// Time without a notification after which it kills the process.
     watchdog: Option<Duration>,
     fed: Option<Instant>,
     shown: Option<Instant>,
@@ -29,7 +29,7 @@ impl ServiceManager {
         }
     }
 
-    /// The service is up. Notified once.
+    /// The service is up. It is notified once.
     pub(crate) fn ready(&mut self) {
         if !self.ready {
             self.ready = true;
@@ -53,8 +53,7 @@ impl ServiceManager {
         }
     }
 
-    /// Feed the watchdog, when that is due. To be called from within the loop and nowhere else: a thread would feed it
-    /// while the loop hangs.
+    /// Feed the watchdog, when that is due. Only the loop may call it: a thread would feed it while the loop hangs.
     pub(crate) fn feed(&mut self) {
         if self.time_to_feed().is_some_and(|left| left.is_zero()) {
             self.fed = Some(Instant::now());
@@ -70,7 +69,7 @@ impl ServiceManager {
     }
 }
 
-/// A service manager that does not listen is no reason to stop the robot.
+/// A failed notification does not stop the robot.
 fn notify(states: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
         tracing::debug!(%error, "systemd does not listen");

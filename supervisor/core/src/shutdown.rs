@@ -1,4 +1,4 @@
-//! The robot to rest and the stages stopped in order: for good, or to recreate the bus.
+//! Bringing the robot to rest and stopping the stages in order: at the end, or to recreate the bus.
 
 use std::time::{Duration, Instant};
 
@@ -7,10 +7,10 @@ use crate::{
     supervisor::Supervisor,
 };
 
-/// Time the link has to confirm that the robot was ordered to stand, before it is stopped.
+/// Time for the link to confirm that the robot was ordered to stand, before the link is stopped.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
 
-/// The robot to rest, then the stages stopped in reverse order, the link last, then the simulated robot.
+/// Bring the robot to rest; stop the stages in reverse order, the link last; then stop the simulated robot.
 pub(crate) fn stop(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
     supervisor.service.stopping();
     supervisor.decision = Decision::ENDING;
@@ -23,10 +23,10 @@ pub(crate) fn stop(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorErro
     Ok(())
 }
 
-/// Recreate the bus under all stages: leftovers of the middleware block the start of one of them. The mission goes on
-/// from the checkpoints of the stages.
+/// Recreate the bus and restart all stages, because files of the middleware block the start of one of them. The mission
+/// goes on from the checkpoints of the stages.
 ///
-/// A consumer of the old bus reads nothing more, and asks [`Bus::is_replaced`](common::bus::Bus::is_replaced).
+/// A consumer of the old bus receives nothing more; it asks [`Bus::is_replaced`](common::bus::Bus::is_replaced).
 pub(crate) fn recreate_bus<'a>(
     mut supervisor: Supervisor<'a>,
     lock: &mut DomainLock,
@@ -34,7 +34,7 @@ pub(crate) fn recreate_bus<'a>(
     tracing::error!("the bus is recreated; consumers must join it again");
     supervisor.decision = Decision::STARTING;
     stand(&mut supervisor)?;
-    // One that dies meanwhile is not started again on the bus that goes.
+    // A stage that dies meanwhile is not started again on the old bus.
     supervisor.stages.start_no_more();
     stop_stages(&mut supervisor)?;
     let mut supervisor = supervisor.with_new_bus(lock)?;
@@ -66,7 +66,7 @@ fn stop_stages(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
         supervisor.wait()?;
         supervisor.bus.observer.take(&mut supervisor.stages)?;
         supervisor.poll_processes(0)?;
-        // The simulated robot's pipe must not fill: it could not answer the link.
+        // The simulated robot's pipe must not fill: the robot could not answer the link.
         supervisor.robot.poll()?;
     }
     Ok(())

@@ -21,25 +21,16 @@ use thiserror::Error;
 
 use crate::process::{Process, firsthand};
 
-/// A simulator that has not written its address by then never will.
+/// Time for the simulator to write its address.
 const STARTUP: Duration = Duration::from_secs(5);
-/// Time it has to stop in order.
 const STOP_GRACE: Duration = Duration::from_millis(300);
 /// A line of ground truth is under 300 bytes; a longer one is an error.
 const LONGEST_LINE: usize = 64 * 1024;
 
-/// Why there is no simulated robot.
 #[derive(Debug, Error)]
 pub enum SimulatorError {
-    /// The system refused.
     #[error("cannot {action} the simulated robot: {source}")]
-    System {
-        /// What was tried.
-        action: String,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// It did not come up.
+    System { action: String, source: io::Error },
     #[error("the simulated robot did not start: {0}")]
     Startup(String),
 }
@@ -56,10 +47,9 @@ pub struct Simulator {
     address: SocketAddr,
 }
 
-/// All that it has written so far.
 struct GroundTruth {
     pipe: ChildStdout,
-    /// The beginning of a line.
+    /// The beginning of an incomplete line.
     unfinished: Vec<u8>,
     listening: Option<SocketAddr>,
     ticks: Vec<GroundTruthTick>,
@@ -123,28 +113,26 @@ impl Simulator {
         }
     }
 
-    /// Where the robot answers.
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Readable when the process ended. Ground truth wakes nobody: it comes when a tick begins, and is read when it ends.
+    /// Readable when the process ended. Ground truth wakes nobody: it comes when a tick begins, and is read when the tick ends.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.process.as_fd()
     }
 
-    /// Read what it has written. Says whether it still runs.
+    /// Read its output. Returns whether it still runs.
     pub fn poll(&mut self) -> Result<bool, SimulatorError> {
         self.truth.take()?;
         Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
     }
 
-    /// The ground truth, tick by tick.
     pub fn truth(&self) -> &[GroundTruthTick] {
         &self.truth.ticks
     }
 
-    /// End it; the ground truth stays.
+    /// End it. The ground truth stays.
     pub fn stop(&mut self) -> Result<(), SimulatorError> {
         self.process.end(STOP_GRACE);
         self.truth.take()

@@ -1,4 +1,4 @@
-//! One stage of a run: its policy, and the process that is its current generation.
+//! One stage of a run: its policy and the process of its current generation.
 
 use std::{
     fs::File,
@@ -32,10 +32,10 @@ pub struct StageProcessError {
     source: io::Error,
 }
 
-/// One stage and its current generation. Times are readings of its owner's clock.
+/// One stage and its current generation. Times are of the owner's clock.
 pub(crate) struct StageProcess {
     pub stage: &'static Stage,
-    /// Of another executable than this one, where the mission names one.
+    /// The mission's executable for this stage, if it names one.
     executable: Option<PathBuf>,
     policy: Policy,
     process: Option<Process>,
@@ -45,16 +45,15 @@ pub(crate) struct StageProcess {
     output: Option<Now>,
     /// Length of its log when this generation was started, bytes.
     log_start: u64,
-    /// When the supervisor noticed that it hung.
     hung: Option<Now>,
-    /// Its last beat says that it was asked to stop.
+    /// Its last beat announced that it stops on request.
     stopping: bool,
-    /// It was found ended in the turn before.
+    /// The turn before found it ended.
     found_ended: bool,
 }
 
 impl StageProcess {
-    /// Of `stage` in `mission`, which does not run yet.
+    /// A stage that does not run yet.
     pub(crate) fn new(stage: &'static Stage, mission: &Mission) -> Self {
         let cells = mission.grid_frame().area();
         Self {
@@ -73,7 +72,6 @@ impl StageProcess {
         }
     }
 
-    /// Where its policy has it.
     pub(crate) const fn phase(&self) -> Phase {
         self.policy.phase()
     }
@@ -83,12 +81,10 @@ impl StageProcess {
         matches!(self.phase(), Phase::Running { .. })
     }
 
-    /// Its process, if there is one.
     pub(crate) const fn process(&self) -> Option<&Process> {
         self.process.as_ref()
     }
 
-    /// Take the process away, to end it.
     pub(crate) fn take_process(&mut self) -> Option<Process> {
         self.process.take()
     }
@@ -98,29 +94,27 @@ impl StageProcess {
         self.process.as_ref().map_or(0, Process::id)
     }
 
-    /// Times it was started again.
     pub(crate) const fn restarts(&self) -> u32 {
         self.generation.saturating_sub(1)
     }
 
-    /// Whether it said that it was asked to stop.
+    /// Whether its last beat announced that it stops on request.
     pub(crate) const fn is_stopping(&self) -> bool {
         self.stopping
     }
 
-    /// When its policy must next look at the clock.
+    /// When its policy needs the next [`Event::Time`].
     pub(crate) fn deadline(&self) -> Option<Now> {
         self.policy.deadline()
     }
 
-    /// What its policy does about `event`.
     pub(crate) fn step(&mut self, event: Event, now: Now) -> Option<Action> {
         self.policy.step(event, now)
     }
 
-    /// Watch the external process that published `health`, if it is a successor. Says whether it is.
+    /// Watch the external process that published `health`, if it is a successor. Returns whether it is.
     pub(crate) fn adopt(&mut self, health: &HealthSample, now: Now) -> bool {
-        // Beats of a process that ended may still be on their way.
+        // Beats of a process that ended may still arrive.
         if self.process.is_some() || self.generation >= health.stamp.generation {
             return false;
         }
@@ -134,7 +128,7 @@ impl StageProcess {
         true
     }
 
-    /// A heartbeat of this stage came. Says whether its process became ready by it.
+    /// A heartbeat of this stage came. Returns whether its process became ready by it.
     pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
         if self.process.is_none() || self.pid() != health.pid {
             return false;
@@ -151,12 +145,11 @@ impl StageProcess {
         !was_running && event == Event::BeatReady
     }
 
-    /// It published a sample.
     pub(crate) fn on_output(&mut self, now: Now) {
         self.output = Some(now);
     }
 
-    /// Start its next generation, which logs to the run `directory`; ticks before `first_tick` are not its own.
+    /// Start its next generation, which logs to the run `directory` and answers ticks from `first_tick` on.
     pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
         let stage = self.stage.name;
         (self.started, self.hung) = (now, None);
@@ -170,7 +163,7 @@ impl StageProcess {
             Ok(process) => self.process = Some(process),
             // Tried again with growing pauses; the other stages go on.
             Err(error) => {
-                tracing::error!(stage, %error, "cannot be started; are processes, descriptors or disk used up?");
+                tracing::error!(stage, %error, "stage cannot be started; are processes, descriptors or disk used up?");
                 self.policy.step(Event::StartFailed, now);
             }
         }
@@ -205,7 +198,6 @@ impl StageProcess {
         directory.join(format!("{}.log", self.stage.name))
     }
 
-    /// Send its process a signal, if there is one.
     pub(crate) fn signal(&mut self, signal: Signal, now: Now) {
         if signal == Signal::ABORT {
             self.hung = Some(now);
@@ -216,8 +208,8 @@ impl StageProcess {
         }
     }
 
-    /// What ended its process, if it has ended. Of an external one that has said nothing of it this is told a turn later: its
-    /// last beat may have come after the beats of this turn were read.
+    /// How its process ended, if it has ended. For an external process that did not announce its end, the result comes a turn
+    /// later, because its last beat may have come after the beats of this turn were read.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
             return Ok(None);
@@ -231,7 +223,7 @@ impl StageProcess {
         Ok(cause.filter(|_| is_known))
     }
 
-    /// Its process is reaped. Returns what is known of it, besides what follows.
+    /// Its process is reaped. Returns the record of the death, without the next step.
     pub(crate) fn record_death(&mut self, cause: ExitCause, directory: &Path, now: Now) -> Death {
         let age = |then: Now| now.saturating_sub(then).as_secs_f64();
         let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();
@@ -253,7 +245,7 @@ impl StageProcess {
         death
     }
 
-    /// Complete the record of a death by what the policy has decided.
+    /// Add the policy's decision to the record of a death.
     pub(crate) fn record_next(&self, death: &mut Death, now: Now) {
         death.deaths_in_window = self.policy.recent_deaths() as u32;
         death.next = match self.phase() {

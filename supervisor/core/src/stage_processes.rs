@@ -1,5 +1,5 @@
-//! The stages of a run, each under its own policy: what happens to them becomes events, and the policies' actions are
-//! carried out.
+//! The stages of a run, each under its own policy. Beats, deaths and deadlines become events of the policies, and the
+//! policies' actions are carried out.
 
 use std::{
     os::fd::{AsFd, BorrowedFd},
@@ -23,15 +23,14 @@ use crate::{
     stages::start_order,
 };
 
-/// Time a stage has to stop in order when its supervisor fails.
+/// Time for a stage to stop in order when its supervisor fails.
 const STOP_GRACE: Duration = Duration::from_millis(300);
 
-/// Who starts a stage, and starts it again.
+/// Who starts and restarts the stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starter {
-    /// The supervisor.
     Supervisor,
-    /// Systemd, a person: an external stage is known once it beats, and its next generation is waited for.
+    /// Systemd or a person. An external stage is known once it beats; after its death the supervisor waits for the next generation.
     External,
 }
 
@@ -42,13 +41,13 @@ pub struct StageProcesses {
     directory: PathBuf,
     clock: ObservedTime,
     starter: Starter,
-    /// A stage that ends stays down.
+    /// Stages that end stay down.
     ending: bool,
     start_blocked: bool,
 }
 
 impl StageProcesses {
-    /// None running yet; their logs go to the run `directory`, map and executables are those of `mission`.
+    /// Stages that do not run yet. They log to the run `directory`.
     pub fn new(directory: PathBuf, starter: Starter, mission: &Mission) -> Self {
         let cells = mission.grid_frame().area();
         let stages = start_order().into_iter();
@@ -69,7 +68,7 @@ impl StageProcesses {
         self.clock.at(Instant::now())
     }
 
-    /// A wait ended that should have taken at most `planned`: the stages are not blamed for what it took beyond that.
+    /// A wait ended that should have taken at most `planned`. Longer time does not count against the stages.
     pub fn on_waited(&mut self, planned: Duration) {
         self.clock.on_waited(planned, Instant::now());
     }
@@ -78,7 +77,7 @@ impl StageProcesses {
         self.stages.iter().position(|it| it.stage.name == stage)
     }
 
-    /// Start every stage that is down on a new bus, in order, from `first_tick` on; external ones are not started here.
+    /// Start every stage that is down, in order, from `first_tick` on. External stages are not started here.
     pub fn start_all(&mut self, first_tick: u64) {
         self.ending = false;
         if self.starter == Starter::External {
@@ -103,7 +102,7 @@ impl StageProcesses {
         deadline.map(|deadline| deadline.saturating_sub(self.now()))
     }
 
-    /// A heartbeat came. Says whether the roster changed by it.
+    /// A heartbeat came. Returns whether the roster changed by it.
     pub fn on_health(&mut self, health: &HealthSample) -> bool {
         let Some(index) = self.position(name_str(&health.stage)) else {
             return false;
@@ -118,7 +117,6 @@ impl StageProcesses {
         stage.on_beat(health, now) || adopted
     }
 
-    /// A stage published something of `tick`.
     pub fn on_output(&mut self, stage: &str, tick: u64) {
         self.watchdog.on_output(stage, tick);
         if let Some(index) = self.position(stage) {
@@ -127,7 +125,7 @@ impl StageProcesses {
         }
     }
 
-    /// Abort a stage that beats and leaves its inputs unanswered, while the robot drives and all stages run.
+    /// Abort a stage that beats but does not answer its inputs, while the robot drives and all stages run.
     pub fn check_outputs(&mut self, driving: bool, first_tick: u64) {
         if !driving || !self.all_running() {
             self.watchdog.clear_unanswered();
@@ -135,18 +133,18 @@ impl StageProcesses {
         }
         let now = self.now();
         if let Some(stage) = self.watchdog.stale(now) {
-            tracing::warn!(stage, "beats, and does not answer what it reads");
+            tracing::warn!(stage, "stage beats but does not answer its inputs");
             if let Some(index) = self.position(stage) {
                 self.apply(index, Event::OutputStale, now, first_tick);
             }
         }
     }
 
-    /// Reap what ended, start successors, meet the deadlines. `first_tick` is where a new generation on `bus` starts.
-    /// Returns the deaths.
+    /// Reap ended stages, start successors, apply deadlines. A new generation on `bus` starts from `first_tick`. Returns the
+    /// deaths.
     pub fn poll(&mut self, bus: &Bus, first_tick: u64) -> Result<Vec<Death>, StageProcessError> {
         let mut deaths = Vec::new();
-        // Heartbeats were taken until now. What follows may wait for the disk, and no stage is late for that.
+        // Heartbeats were read until now. The rest may wait for the disk; that must not make a stage late.
         let taken = self.now();
         for index in 0..self.stages.len() {
             if let Some(cause) = self.stages[index].try_reap()? {
@@ -156,7 +154,7 @@ impl StageProcesses {
                     stage.phase(),
                     Phase::Replaced { .. } | Phase::Stopping { .. }
                 );
-                // Systemd stops the stages before the supervisor that they depend on.
+                // Systemd stops external stages before their supervisor.
                 let by_starter = self.starter == Starter::External && stage.is_stopping();
                 let asked = by_us || by_starter;
                 let mut death = stage.record_death(cause, &self.directory, now);
@@ -170,7 +168,7 @@ impl StageProcesses {
                 };
                 self.apply(index, event, self.now(), first_tick);
                 self.stages[index].record_next(&mut death, self.now());
-                // One that was asked to stop, and has stopped, is no death.
+                // A stage that stopped on request is no death.
                 if asked {
                     tracing::info!(stage = death.stage, cause = %death.cause, "stage ended");
                 } else {
@@ -182,24 +180,24 @@ impl StageProcesses {
         Ok(deaths)
     }
 
-    /// Whether, since this was last asked, a stage was blocked from starting on the bus as it is.
+    /// Whether a stage could not start on this bus since the last call.
     pub fn is_start_blocked(&mut self) -> bool {
         std::mem::take(&mut self.start_blocked)
     }
 
-    /// From now on a stage that ends stays down, until all are started again.
+    /// From now on stages that end stay down, until all are started again.
     pub fn start_no_more(&mut self) {
         self.ending = true;
     }
 
-    /// Replace `stage` by a new generation, which begins at `first_tick`; one that is held is released.
+    /// Replace `stage` by a new generation from `first_tick` on. A held stage is released.
     pub fn replace(&mut self, stage: &str, first_tick: u64) {
         if let Some(index) = self.position(stage) {
             self.apply(index, Event::Replace, self.now(), first_tick);
         }
     }
 
-    /// Stop the last stage, in start order, that has a process or waits for one. Says whether there was one.
+    /// Stop the last stage, in start order, that has a process or waits for one. Returns whether there was one.
     pub fn stop_last(&mut self) -> bool {
         let last = self.stages.iter().rposition(|stage| {
             stage.process().is_some() || !matches!(stage.phase(), Phase::Down | Phase::Held)
@@ -212,7 +210,7 @@ impl StageProcesses {
         last.is_some()
     }
 
-    /// Let the stage's policy decide about `event`, and carry it out.
+    /// Give `event` to the stage's policy, and carry out its action.
     fn apply(&mut self, index: usize, event: Event, now: Now, first_tick: u64) {
         let Some(action) = self.stages[index].step(event, now) else {
             return;
@@ -233,8 +231,8 @@ impl StageProcesses {
             Action::Kill => stage.signal(Signal::KILL, now),
             Action::RecreateBus => {
                 let stage = stage.stage.name;
-                tracing::error!(stage, "cannot start on the bus as it is");
-                // External stages are another's to stop and start.
+                tracing::error!(stage, "stage cannot start on this bus");
+                // External stages are stopped and started by others.
                 self.start_blocked = self.starter == Starter::Supervisor;
             }
         }
@@ -245,7 +243,7 @@ impl StageProcesses {
         self.stages.iter().all(StageProcess::is_running)
     }
 
-    /// Whether a stage is being started, or will be in a moment.
+    /// Whether a stage is being started, or soon will be.
     pub fn any_starting(&self) -> bool {
         let starting = |stage: &StageProcess| {
             matches!(
@@ -256,7 +254,7 @@ impl StageProcesses {
         self.stages.iter().any(starting)
     }
 
-    /// How many stages beat as ready, and how many there are.
+    /// Numbers of stages that beat as ready, and of all stages.
     pub fn running(&self) -> (usize, usize) {
         let running = self.stages.iter().filter(|stage| stage.is_running());
         (running.count(), self.stages.len())
@@ -278,7 +276,6 @@ impl StageProcesses {
         stages.map(|stage| stage.stage.name).collect()
     }
 
-    /// Times each stage was started again.
     pub fn restarts(&self) -> impl Iterator<Item = (&'static str, u32)> + '_ {
         let stages = self.stages.iter();
         stages.map(|stage| (stage.stage.name, stage.restarts()))
@@ -292,8 +289,7 @@ impl StageProcesses {
     }
 }
 
-/// Should a supervisor end without its orderly stop, the stages are still stopped in reverse order: the link, the last,
-/// stops the robot.
+/// After an error of the supervisor, too, the stages are stopped in reverse order: the link, the last, stops the robot.
 impl Drop for StageProcesses {
     fn drop(&mut self) {
         while let Some(mut stage) = self.stages.pop() {

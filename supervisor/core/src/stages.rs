@@ -25,15 +25,14 @@ pub struct Stage {
     pub feedback: &'static [&'static dyn AnyTopic],
     /// Topics it alone writes.
     pub outputs: &'static [&'static dyn AnyTopic],
-    /// Its deadlines on a map without cells.
+    /// Deadlines on a map without cells.
     pub deadlines: Deadlines,
-    /// What each deadline grows by for a million cells of the map.
+    /// Added to each deadline for a million cells of the map.
     pub per_million_cells: Duration,
-    /// What the robot does while the stage is down.
+    /// The robot's behaviour while the stage is down.
     pub while_down: &'static str,
-    /// What its process does.
+    /// The main function of its process.
     pub run: fn(&Start) -> Result<(), StageError>,
-    /// Replays a generation of it.
     pub replay: Begin,
 }
 
@@ -66,16 +65,15 @@ impl Stage {
     }
 }
 
-/// A stage that has not opened its topics by then is stuck, half-made services included: on a loaded
-/// machine of two cores the slowest start seen took a tenth of it.
+/// A stage that has not opened its topics by then is stuck, for example by incomplete services. On a loaded machine of two
+/// cores the slowest start took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
-/// Five beats. A loaded machine with more stages than cores delays one by 200 ms now and then; with 500 ms and builds
-/// beside, three stages that were not hit were aborted in 70 missions. The robot does not wait for it: the link stops it
-/// when the command is stale.
+/// Five beats. A loaded machine with more stages than cores delays a beat by 200 ms now and then; with 500 ms and a build
+/// on the same machine, three healthy stages were aborted in 70 missions. The robot's stop does not depend on it: the link
+/// stops the robot when the command is stale.
 const HEARTBEAT: Duration = Duration::from_millis(750);
-/// An answer takes a hundredth of that where it takes long.
+/// The slowest answers take a hundredth of it.
 const ANSWERS: Duration = Duration::from_secs(1);
-/// The deadlines of most stages.
 const DEADLINES: Deadlines = Deadlines {
     startup: STARTUP,
     heartbeat: HEARTBEAT,
@@ -87,8 +85,8 @@ const PLANNER_DEADLINES: Deadlines = Deadlines {
     heartbeat: Duration::from_secs(2),
     answers: Duration::from_secs(4),
 };
-/// The mapper restores its map, and publishes all of it, in one iteration. Ample: at 16.8 million cells none was late
-/// without it.
+/// The mapper restores its map and publishes all of it in one iteration. At 16.8 million cells no beat was late even
+/// without this allowance.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
 /// At 16.8 million cells the planner did not beat for more than 2 s forty times in a mission, and with this allowance was
 /// never late in a run of 97 s: a full solve, a keyframe of the field and the backlog fall into one iteration.
@@ -164,7 +162,6 @@ pub static TABLE: [Stage; 5] = [
     },
 ];
 
-/// The stage of that name.
 pub fn find(name: &str) -> Option<&'static Stage> {
     TABLE.iter().find(|stage| stage.name == name)
 }
@@ -176,7 +173,7 @@ pub fn unknown(name: &str) -> String {
     format!("no stage is called {name:?}; the stages are {names}")
 }
 
-/// The stages so that each comes after the writers of its inputs. Stopping goes the other way.
+/// The stages in start order: each after the writers of its inputs. They stop in reverse order.
 pub fn start_order() -> Vec<&'static Stage> {
     let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
     while order.len() < TABLE.len() {
@@ -190,7 +187,7 @@ pub fn start_order() -> Vec<&'static Stage> {
                 !waiting.iter().any(|other| other.name == writer)
             })
         });
-        // Inputs that form a circle leave no next; the rest then starts in table order.
+        // If inputs form a circle, there is no such stage; the rest then starts in the table's order.
         order.extend(next.or(waiting.first()));
     }
     order

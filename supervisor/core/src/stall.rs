@@ -1,14 +1,14 @@
 //! Whether the robot stalls, and which recovery step comes next. Pure.
 //!
-//! The paper's rule: a robot that should move and does not has a planner to blame. Recovery steps, in order: replan from
-//! the same belief; forget what was sensed and replan; give up.
+//! The paper's rule: if a robot should move and does not, the planner is at fault. Recovery steps, in order: replan from
+//! the same map; reset the sensed map and replan; give up.
 //!
-//! | cause | seen as | first step |
+//! | cause | sign | first step |
 //! |---|---|---|
 //! | still | it neither drives nor turns | replan |
-//! | pinned | it drives or turns, and stays where it is | replan |
-//! | inside hazard | it stands in hazard, and has driven far without coming out | forget |
-//! | cut off | it stands where no way leads to the target, and has looked around | forget |
+//! | pinned | it drives or turns, and stays at its place | replan |
+//! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
+//! | cut off | no way leads from its place to the target, and it has looked around | reset |
 
 use std::{f64::consts::TAU, time::Duration};
 
@@ -19,36 +19,34 @@ use common::{
 };
 use glam::DVec2;
 
-/// Mission time without motion that is a stall: longer than the slowest turn on the spot takes to begin.
+/// Mission time without motion that is a stall. The slowest turn on the spot begins earlier.
 const STALLED_AFTER: Duration = Duration::from_secs(3);
-/// Mission time without a way to the target that is no passing false echo.
+/// Mission time without a way to the target that is a stall. A false echo is gone earlier.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// Mission time that a planner may compute a field without one that counts, and the robot stand for it: the largest one
-/// takes several seconds, and a new planner would begin again.
+/// Mission time for which the robot may stand while the planner computes a field. The largest field takes several seconds,
+/// and a new planner would begin again.
 const FIELD_WITHIN: Duration = Duration::from_secs(60);
-/// With the evidential method a robot that is cut off first turns so often on the spot, at half the speed it is
-/// ordered.
+/// Turns on the spot that a robot makes first when it is cut off, with the evidential method, at half the ordered speed.
 const SCAN_TURNS: f64 = 1.2;
-/// A robot that gets on turns no more often than so at one place, at the slower of its two rates.
+/// Turns at one place, at the slower of its two rates, beyond which a robot makes no progress.
 const TURNS_AT_A_PLACE: f64 = 2.0;
-/// Farther than this is another place, metres; likewise less for a robot that is to drive slower than that.
+/// A place ends at this distance, metres. For a slow robot it is less.
 const PLACE_M: f64 = 0.2;
-/// Where a robot circles what it should stand on, another place begins beyond this many of its circles.
+/// A robot may circle its target. Its place then ends at this many radii of the circle.
 const CIRCLES: f64 = 1.2;
-/// Less than this is standing still, metres; less still for a robot that is to drive slower than that.
+/// A robot that drove less than this stands still, metres. For a slow robot it is less.
 const MOVED_M: f64 = 0.02;
-/// Less than this is not turning either, radians; likewise.
+/// A robot that turned less than this does not turn, radians. For a slow robot it is less.
 const TURNED_RAD: f64 = 0.1;
-/// The share of what full speed would give that counts as motion: near its target a robot crawls.
+/// Share of the motion at full speed that counts as motion: near its target a robot crawls.
 const SHARE: f64 = 0.05;
-/// A way so long leads out of any margin: several of them on top of each other, metres.
+/// Distance that leads out of any margin, even of several overlapping ones, metres.
 const WAY_OUT_M: f64 = 1.0;
-/// Replans tried before the belief is blamed.
+/// Replans before the map is reset.
 const MOST_REPLANS: u32 = 2;
-/// Beliefs forgotten before the target is called unreachable.
+/// Resets of the map before the target is unreachable.
 const MOST_RESETS: u64 = 3;
 
-/// The cause of a stall of `body` in words.
 pub(crate) fn words(cause: StallCause, body: &Body) -> String {
     let cause = match cause {
         StallCause::Still => "the robot neither drives nor turns, whatever is planned",
@@ -65,7 +63,6 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
     )
 }
 
-/// Log it.
 pub(crate) fn log(stall: &StallSample) {
     let (cause, recovery) = (stall.cause(), stall.recovery());
     let StallSample {
@@ -90,7 +87,6 @@ pub(crate) fn log(stall: &StallSample) {
     );
 }
 
-/// Watches one mission.
 #[derive(Debug)]
 pub(crate) struct StallWatch {
     moved_m: f64,
@@ -101,21 +97,21 @@ pub(crate) struct StallWatch {
     anchor: Option<Anchor>,
     place: Option<Place>,
     cut_off_since: Option<MissionTime>,
-    /// Since when it has stood because the planner computes a field.
+    /// Since when it waits for the planner's field.
     waits_since: Option<MissionTime>,
-    /// What it had travelled when it was first seen in hazard, metres.
+    /// Distance travelled when it was first seen in a hazard, metres.
     inside_hazard_since: Option<f64>,
-    /// Replans at this place, with this belief.
+    /// Replans at this place, since the last reset.
     replans_here: u32,
     replans: u32,
     epoch: u64,
-    /// The tick that was looked at last.
+    /// The last tick that was checked.
     tick: Option<u64>,
     /// Every stall so far.
     stalls: Vec<StallSample>,
 }
 
-/// Where the robot last was seen to move.
+/// The robot's last motion.
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
     time: MissionTime,
@@ -123,24 +119,23 @@ struct Anchor {
     heading: f64,
 }
 
-/// Where the robot has been for a while.
+/// The robot's place for a while.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     since: MissionTime,
     middle: DVec2,
-    /// The nearest it has been to the target there, metres.
+    /// Least distance to the target there, metres.
     nearest_m: f64,
 }
 
 impl StallWatch {
-    /// For the robot of a mission.
     pub(crate) fn new(mission: &Mission) -> Self {
         let seconds = STALLED_AFTER.as_secs_f64();
         let controller = &mission.controller;
         let slowest_turn = TAU / controller.turn_rad_s.min(controller.look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         let car = mission.body().ackermann();
-        // It turns on the spot, else as it drives.
+        // It turns on the spot, or as it drives.
         let on_the_spot = mission.method == Method::Evidential && car.is_none();
         let tightest = car.map_or(0.0, |car| car.least_turning_radius());
         let circle = tightest.max(mission.speed_m_s() / controller.turn_rad_s);
@@ -172,12 +167,12 @@ impl StallWatch {
         }
     }
 
-    /// The belief's current epoch.
+    /// The current epoch of the map.
     pub(crate) const fn epoch(&self) -> u64 {
         self.epoch
     }
 
-    /// Replans and beliefs forgotten in this mission up to `tick`, or in all of it.
+    /// Replans and resets in this mission up to `tick`, or in all of it.
     pub(crate) fn recoveries(&self, tick: Option<u64>) -> (u32, u64) {
         let Some(tick) = tick else {
             return (self.replans, self.epoch);
@@ -196,13 +191,13 @@ impl StallWatch {
         self.stalls.iter().find(is_last)
     }
 
-    /// The tick that was looked at last.
+    /// The last tick that was checked.
     pub(crate) const fn tick(&self) -> Option<u64> {
         self.tick
     }
 
-    /// Look at a tick of a robot that is ordered to drive; each is looked at once. `held` says that something
-    /// else holds the robot: the link's failsafe, a stage that is down.
+    /// Check a tick of a robot that is ordered to drive; each tick once. `held` says that something else holds the robot: the
+    /// link's failsafe, or a stage that is down.
     pub(crate) fn step(
         &mut self,
         pose: &PoseSample,
@@ -212,7 +207,7 @@ impl StallWatch {
         if self.tick.replace(pose.stamp.tick) == Some(pose.stamp.tick) {
             return None;
         }
-        // The belief outlives its supervisor.
+        // The map may be older than this supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
         if held {
             self.hold(pose.stamp.tick);
@@ -238,7 +233,7 @@ impl StallWatch {
             }
             _ => RecoveryStep::GiveUp,
         };
-        // What is tried gets as much time as the robot had.
+        // The recovery step gets as much time as the robot had.
         let now = pose.stamp.time();
         if let (Some(anchor), Some(place)) = (&mut self.anchor, &mut self.place) {
             (anchor.time, place.since) = (now, now);
@@ -259,14 +254,14 @@ impl StallWatch {
         Some(stall)
     }
 
-    /// The robot was not to drive until `tick`: what it did by then is no stall.
+    /// The robot was not ordered to drive until `tick`, so nothing by then is a stall.
     pub(crate) fn hold(&mut self, tick: u64) {
         self.tick = Some(tick);
         (self.anchor, self.place) = (None, None);
         (self.cut_off_since, self.waits_since) = (None, None);
     }
 
-    /// Whether the robot stands because the planner computes a field, and may go on to.
+    /// Whether the robot stands because the planner computes a field, within the time for that.
     fn waits_for_field(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> bool {
         if GuidanceStatus::from_byte(guidance.status) != GuidanceStatus::Waiting {
             self.waits_since = None;
@@ -276,8 +271,7 @@ impl StallWatch {
         now.since(*self.waits_since.get_or_insert(now)) < FIELD_WITHIN
     }
 
-    /// Whether u = 0 where the robot stands, in the field of the current belief, for longer than a robot needs to get
-    /// away.
+    /// Whether u = 0 at the robot, in the field of the current map, for longer than a robot needs to get away.
     fn without_policy(
         &mut self,
         pose: &PoseSample,
@@ -299,7 +293,7 @@ impl StallWatch {
         None
     }
 
-    /// Whether the robot has neither moved nor turned for long, or moves or turns for longer and stays where it is.
+    /// Whether the robot has not moved or turned for a while; or moves or turns for longer and stays at its place.
     fn without_motion(
         &mut self,
         pose: &PoseSample,
@@ -327,13 +321,13 @@ impl StallWatch {
             self.place = Some(arrived);
             self.replans_here = 0;
         } else if arrived.nearest_m <= place.nearest_m - self.moved_m {
-            // One that crawls to its target gets on, too.
+            // A robot that crawls to its target makes progress, too.
             self.place = Some(Place {
                 middle: place.middle,
                 ..arrived
             });
         }
-        // It looks around first, and that has a time of its own.
+        // The planner looks around first; that has a timeout of its own.
         if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
             return None;
         }

@@ -1,5 +1,5 @@
-//! What the loop does about stalls: it looks for them, starts the planner anew or resets the belief, and ends the mission when
-//! no step is left.
+//! The part of the loop that looks for stalls, restarts the planner or resets the belief, and ends the mission when no
+//! recovery step is left.
 
 use std::time::Instant;
 
@@ -18,7 +18,7 @@ impl Supervisor<'_> {
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let in_ticks = self.clock.in_ticks();
         if self.decision.order() != Order::Drive {
-            // in lockstep no time passes meanwhile.
+            // In lockstep no time passes meanwhile.
             if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
                 self.stall_watch.hold(pose.stamp.tick);
             }
@@ -54,16 +54,16 @@ impl Supervisor<'_> {
         Ok(None)
     }
 
-    /// Look at the ticks that were not looked at, up to the next at which the robot stalls.
+    /// Check the ticks that are not checked yet, up to the next one at which the robot stalls.
     fn next_stall(&mut self) -> Option<StallSample> {
         let record = &self.bus.observer.record;
         let in_ticks = self.clock.in_ticks();
         let stopped = record.link.is_none_or(|link| link.stopped());
-        // in lockstep no time passes while something holds the robot.
+        // In lockstep no time passes while something holds the robot.
         let held = !in_ticks && (stopped || !self.stages.all_running());
-        // Of a tick without its command not all may be here yet.
+        // A tick without its command may be incomplete here.
         let newest = record.published().tick.filter(|_| in_ticks);
-        // Several may have passed since the last look: a stall is one whether each was seen alone or not.
+        // Several ticks may have passed since the last check. Each is checked, so the result does not depend on their number.
         let mut found = None;
         for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
             if newest.is_some_and(|newest| pose.stamp.tick > newest) {
@@ -81,18 +81,17 @@ impl Supervisor<'_> {
         Some(stall)
     }
 
-    /// Carry out a recovery step.
     fn carry_out(&mut self, step: RecoveryStep) -> Result<(), SupervisorError> {
         match step {
             RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
-            // The new epoch is in the directive.
+            // The directive carries the new epoch.
             RecoveryStep::Reset => self.publish_state()?,
             RecoveryStep::GiveUp => {}
         }
         Ok(())
     }
 
-    /// The end of a mission that has no recovery step left.
+    /// The ending of a mission that has no recovery step left.
     fn given_up(&self) -> Option<Ending> {
         let stall = self.stall_watch.gave_up()?;
         let words = stall::words(stall.cause(), &self.options.mission.body());
@@ -100,8 +99,8 @@ impl Supervisor<'_> {
         Some(Ending::failed(Outcome::Unreachable, reason))
     }
 
-    /// After the run: the tick at which there was no recovery step left, and what that ends the mission with. On a clock of
-    /// ticks how many ticks were looked at before the end was seen depends on the machine, so the others are now.
+    /// After the run: the tick at which no recovery step was left, and the mission's ending. In lockstep the number of ticks
+    /// that were checked before the end depends on the machine, so the others are checked now.
     pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
         while self.clock.in_ticks()
             && self.stall_watch.gave_up().is_none()
@@ -111,7 +110,7 @@ impl Supervisor<'_> {
         Some((tick, self.given_up()?))
     }
 
-    /// Tell the link how far it may go, if that is news.
+    /// Publish the limit of the link, if it changed.
     pub(crate) fn publish_tick_limit(&mut self) -> Result<(), SupervisorError> {
         let limit = self.lockstep.limit();
         if self.published_limit.replace(limit) != Some(limit) {

@@ -1,4 +1,4 @@
-//! The loop of one robot's supervisor: gathers what happened, lets the pure functions decide, carries it out.
+//! The loop of one robot's supervisor: it reads events, asks the pure functions for decisions, and carries them out.
 
 use std::{os::unix::fs::symlink, path::PathBuf, time::Instant};
 
@@ -36,23 +36,18 @@ use crate::{
     stall::StallWatch,
 };
 
-/// What a run is made from.
 pub struct Options {
-    /// What to do.
     pub mission: Mission,
-    /// The robot that does it.
     pub robot: RobotName,
-    /// How mission time passes; a real robot only knows wall-clock.
+    /// Speed of mission time. A real robot's is always wall-clock time.
     pub pace: Pace,
-    /// Where logs, checkpoints and results go; must exist.
+    /// Directory of logs, checkpoints and results; it must exist.
     pub directory: PathBuf,
-    /// Who starts the stages.
     pub starter: Starter,
-    /// The run in that directory, to go on with; none begins one.
+    /// The run to resume; without one a new run begins.
     pub recovered: Option<RecoveredRun>,
 }
 
-/// The robot that is driven.
 pub(crate) struct Robot {
     /// Its process, if it is a simulated one.
     pub simulator: Option<Simulator>,
@@ -60,7 +55,6 @@ pub(crate) struct Robot {
 }
 
 impl Robot {
-    /// The robot of a mission; a simulated one is started.
     fn start(options: &Options) -> Result<Self, SupervisorError> {
         if let Some(address) = &options.mission.robot.address {
             let address = address.parse::<Address<String>>()?.resolve()?;
@@ -76,7 +70,7 @@ impl Robot {
         })
     }
 
-    /// Read the ground truth. Says whether a simulated robot's process still runs.
+    /// Read the ground truth. Returns whether a simulated robot's process still runs.
     pub(crate) fn poll(&mut self) -> Result<bool, SupervisorError> {
         match &mut self.simulator {
             Some(simulator) => Ok(simulator.poll()?),
@@ -88,7 +82,7 @@ impl Robot {
 /// The supervisor of one run.
 pub(crate) struct Supervisor<'a> {
     pub options: &'a Options,
-    // Dropped in this order: the stages end before the robot.
+    // The fields are dropped in this order: the stages end before the robot.
     pub stages: StageProcesses,
     pub robot: Robot,
     pub bus: BusEndpoints,
@@ -123,7 +117,7 @@ impl<'a> Supervisor<'a> {
             Some(run) => {
                 state_file.state.resumes += 1;
                 let (tick, seconds) = (run.first_tick, run.time.seconds());
-                tracing::warn!(tick, seconds, "the run goes on");
+                tracing::warn!(tick, seconds, "the run is resumed");
                 RunClock::recovered(run)
             }
             None => RunClock::begin(
@@ -166,19 +160,19 @@ impl<'a> Supervisor<'a> {
         if options.starter == Starter::External {
             let link = Domain::of(options.robot.clone()).run_link();
             symlink(directory, &link).map_err(system(format!("make {}", link.display())))?;
-            // Systemd starts the stages after this.
+            // Systemd starts the stages after this notification.
             supervisor.service.ready();
         }
         Ok(supervisor)
     }
 
-    /// The same with a new bus; no stage may use the old one.
+    /// Recreate the bus. No stage may use the old one.
     pub(crate) fn with_new_bus(self, lock: &mut DomainLock) -> Result<Self, SupervisorError> {
         let bus = self.bus.recreate(lock)?;
         Ok(Self { bus, ..self })
     }
 
-    /// Iterate until the mission ends; or, without an ending, until the bus must be recreated.
+    /// Iterate until the mission ends. Returns none if the bus must be recreated.
     pub(crate) fn drive(
         &mut self,
         signals: &mut Signals,
@@ -209,7 +203,6 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// One iteration: read, restart, decide, judge.
     fn iterate(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let roster_changed = self.bus.observer.take(&mut self.stages)?;
         let first_tick = self.first_tick();
@@ -227,7 +220,7 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// Do what operators ask. Says whether anything was asked.
+    /// Carry out the requests of operators. Returns whether there was one.
     fn take_requests(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
         let mut asked = false;
         while let Some(request) = self.bus.take_request()? {
@@ -240,11 +233,11 @@ impl<'a> Supervisor<'a> {
                     self.stages.replace(stage, first_tick);
                 }
                 RequestKind::Stop => {
-                    tracing::warn!("an operator says stop");
+                    tracing::warn!("an operator stops the robot");
                     self.state_file.state.operator_stop = true;
                 }
                 RequestKind::Resume => {
-                    tracing::warn!("an operator says resume");
+                    tracing::warn!("an operator lets the robot go on");
                     self.state_file.state.operator_stop = false;
                 }
             }
@@ -252,7 +245,7 @@ impl<'a> Supervisor<'a> {
         Ok(asked)
     }
 
-    /// Reap and restart stages; log, publish and record each death once. Says whether there was one.
+    /// Reap and restart stages; log, publish and record each death once. Returns whether there was one.
     pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool, SupervisorError> {
         let deaths = self.stages.poll(self.bus.bus(), first_tick)?;
         for death in &deaths {
@@ -264,7 +257,7 @@ impl<'a> Supervisor<'a> {
         Ok(!deaths.is_empty())
     }
 
-    /// Decide whether the robot may drive. Says whether that changed.
+    /// Decide whether the robot may drive. Returns whether the decision changed.
     fn decide_order(&mut self) -> bool {
         let record = &self.bus.observer.record;
         let decision = order::decide(&order::Snapshot {
@@ -289,12 +282,11 @@ impl<'a> Supervisor<'a> {
         changed
     }
 
-    /// Whether the mission names an executable for the planner: that one need not publish a field.
+    /// Whether the mission names an executable for the planner. Such a planner need not publish a field.
     fn is_planner_foreign(&self) -> bool {
         self.options.mission.planner.executable.is_some()
     }
 
-    /// Judge whether the mission is over.
     fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
         let now = Instant::now();
         let record = &self.bus.observer.record;
@@ -326,7 +318,6 @@ impl<'a> Supervisor<'a> {
         )
     }
 
-    /// When the mission is given up.
     pub(crate) const fn deadline(&self) -> Deadline {
         Deadline {
             timeout_s: self.options.mission.timeout_s,
@@ -340,29 +331,30 @@ impl<'a> Supervisor<'a> {
             .first_tick(self.bus.observer.record.newest_tick())
     }
 
-    /// The epoch that holds.
+    /// The epoch that is in force.
     fn epoch(&self) -> u64 {
         let epoch = self.stall_watch.epoch();
         epoch - u64::from(self.lockstep.withholds(epoch))
     }
 
-    /// The tick and the time that the supervisor's samples are published as of.
+    /// The tick and the time of the supervisor's own samples.
     pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
-        // An external stage takes its first tick from here: it must not be one that was made.
+        // An external stage takes its first tick from this sample, so the tick must be a new one.
         let tick = self.first_tick().saturating_sub(1);
         let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
         (tick, time)
     }
 
-    /// Save the state, then publish the order and the roster: what an operator asked is confirmed by the roster.
+    /// Save the state, then publish the order and the roster. The roster confirms an operator's request, so the state is
+    /// saved before.
     pub(crate) fn publish_state(&mut self) -> Result<(), SupervisorError> {
         if let Err(error) = self.state_file.save() {
-            // It only matters to a supervisor that goes on after this one: no reason to end the mission.
-            tracing::error!(%error, "what was asked would not survive this supervisor");
+            // Only a supervisor that resumes this run needs the state, so the mission goes on.
+            tracing::error!(%error, "cannot save the state; a supervisor that resumes this run will not know the last requests");
         }
         let (tick, time) = self.published_as_of();
         if self.clock.in_ticks() {
-            // Before the order that starts the first tick.
+            // The limit is published before the order that starts the first tick.
             self.published_limit = None;
             self.publish_tick_limit()?;
         }
@@ -386,7 +378,6 @@ impl<'a> Supervisor<'a> {
         Ok(())
     }
 
-    /// Show how far the run has come.
     fn show_progress(&mut self, show: &mut dyn FnMut(&Progress<'_>)) {
         let progress = Progress {
             record: &self.bus.observer.record,

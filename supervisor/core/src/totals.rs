@@ -1,17 +1,17 @@
-//! Totals of what the wheels were commanded and how the robot looked, as of each of the newest ticks: what came after the
-//! end does not count, and the end may be read after it.
+//! Totals of the wheels' commands and of the robot's looks, as of each of the newest ticks. Ticks after the end of the
+//! mission do not count, and may be read before the end is known.
 
 use std::collections::VecDeque;
 
 use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus};
 
-/// Ticks whose totals are kept: that of the arrival must still be there when the command is seen.
+/// Ticks whose totals are stored: that of the arrival must still be there when its command is read.
 const MOST: usize = 1024;
 
 /// Totals that grow from tick to tick.
 #[derive(Clone, Debug)]
 pub struct Totals<T> {
-    /// Oldest first, one a tick.
+    /// Oldest first, one for each tick.
     newest: VecDeque<(u64, T)>,
 }
 
@@ -24,7 +24,7 @@ impl<T> Default for Totals<T> {
 }
 
 impl<T: Copy + Default> Totals<T> {
-    /// Add what `tick` brought; a tick that is given again is counted once.
+    /// Add the totals of `tick`. A tick that is given again is counted once.
     pub(crate) fn add(&mut self, tick: u64, add: impl FnOnce(T) -> T) {
         let (last, totals) = match self.newest.back() {
             Some(&(last, totals)) => (Some(last), totals),
@@ -40,7 +40,6 @@ impl<T: Copy + Default> Totals<T> {
     }
 
     /// The totals of all ticks up to `tick`.
-    #[must_use]
     pub fn at(&self, tick: u64) -> T {
         let until = self.newest.iter().rev().find(|(of, _)| *of <= tick);
         until.map_or(T::default(), |&(_, totals)| totals)
@@ -54,7 +53,7 @@ pub struct WheelTotals {
 }
 
 impl WheelTotals {
-    /// Only commands that drive count: every mission begins and ends at rest.
+    /// Only driving commands count: every mission begins and ends at rest.
     pub(crate) fn with(self, command: &CommandSample) -> Self {
         if CommandState::from_byte(command.state) != CommandState::Driving {
             return self;
@@ -66,25 +65,24 @@ impl WheelTotals {
         }
     }
 
-    /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
-    #[must_use]
+    /// Dynamic range of the wheel signals: greatest commanded speed of either wheel minus the least, rad/s.
     pub fn range_rad_s(self) -> Option<f64> {
         self.extremes.map(|[least, greatest]| greatest - least)
     }
 }
 
-/// How the robot stopped to look.
+/// The robot's stops to look around.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LookTotals {
-    /// Times it did.
+    /// Number of looks.
     pub looks: u64,
-    /// Ticks it looked.
+    /// Ticks of all looks.
     pub ticks: u64,
     looking: bool,
 }
 
 impl LookTotals {
-    /// With one more tick.
+    /// These totals with one more tick.
     pub(crate) fn with(self, guidance: &GuidanceSample) -> Self {
         let looking = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look;
         Self {

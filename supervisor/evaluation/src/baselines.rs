@@ -2,14 +2,14 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`belief`] | the map as a planner follows it: free cells, lines of sight |
-//! | [`planner`] | what goes into a planner's step and what comes out |
+//! | [`belief`] | a planner's copy of the map: free cells, lines of sight |
+//! | [`planner`] | input and output of a planner's step |
 //! | [`wavefront`] | the shortest path over the map, planned anew in every tick; pure |
-//! | [`bug`] | Bug2: straight to the target, and around what is in the way; pure |
+//! | [`bug`] | Bug2: straight to the target, and around hazards; pure |
 //! | [`shell`] | wires either of them to the topics |
 //!
-//! Both take unknown cells for free, as the harmonic planner does. Neither looks before it goes: that is the
-//! harmonic planner's active sensing, under the evidential method.
+//! Both take unknown cells for free, like the harmonic planner. Neither looks around before it drives: that is the harmonic
+//! planner's active sensing, with the evidential method.
 
 pub mod belief;
 pub mod bug;

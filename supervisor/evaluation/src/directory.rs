@@ -1,4 +1,4 @@
-//! The directory of an evaluation: a new one, or that of the same evaluation to go on with.
+//! The directory of an evaluation: a new one, or the one of an evaluation that is resumed.
 
 use std::{
     fs, io,
@@ -7,42 +7,29 @@ use std::{
 
 use thiserror::Error;
 
-/// In the directory: the command that gives its rows.
+/// Name of the file of the command that gives its rows.
 const PLAN_FILE: &str = "plan.txt";
-/// In the directory: the page of results.
+/// Name of the page of results.
 pub const PAGE_FILE: &str = "index.html";
 
 /// Why a directory cannot be used.
 #[derive(Debug, Error)]
 pub enum DirectoryError {
-    /// What is to be gone on with was another.
+    /// The directory is of another command.
     #[error("--resume: what was begun in {} was another: {earlier}", directory.display())]
     Another {
-        /// The directory.
         directory: PathBuf,
-        /// Its command.
+        /// The command of the directory.
         earlier: String,
     },
-    /// There is something, and nothing was said of going on with it.
+    /// It has results, and `resume` is not set.
     #[error("{} holds results; go on with them with --resume, or give another --out", directory.display())]
-    Taken {
-        /// The directory.
-        directory: PathBuf,
-    },
-    /// The file system.
+    Taken { directory: PathBuf },
     #[error("cannot use {} for results: {source}; give another --out", path.display())]
-    System {
-        /// What was to be made or written.
-        path: PathBuf,
-        /// The system's word.
-        source: io::Error,
-    },
+    System { path: PathBuf, source: io::Error },
 }
 
-/// `directory` for the rows of `command`, made if it is not there. Returns it as an absolute path.
-///
-/// # Errors
-/// When it holds results and `resume` is not set, or those of another command, or cannot be written.
+/// Make `directory` for the rows of `command`, or check that it is of that command. Returns its absolute path.
 pub fn claim(directory: &Path, command: &str, resume: bool) -> Result<PathBuf, DirectoryError> {
     let file = directory.join(PLAN_FILE);
     let system = |path: &Path| {

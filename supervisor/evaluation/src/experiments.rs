@@ -1,12 +1,12 @@
-//! The experiments of the paper, repeated with many seeds through the real processes, beside what the paper reports.
+//! The experiments of the paper, repeated with many seeds through the real processes, beside the paper's values.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`experiment`] | THE table of experiments: their missions, and what the paper reports of each |
-//! | [`method`] | how they are run: by the paper's method and by the default one |
-//! | [`result`] | what became of one experiment by one method |
-//! | [`expectation`] | what the paper says of its experiments, and whether it holds here |
-//! | [`report`] | all of it as a table, a page and objects |
+//! | [`experiment`] | THE table of experiments: their missions, and the paper's report of each |
+//! | [`method`] | the methods: the paper's and the default one |
+//! | [`result`] | the result of one experiment by one method |
+//! | [`expectation`] | the paper's claims, and whether they hold here |
+//! | [`report`] | the results as text, a page and JSON objects |
 
 pub mod expectation;
 pub mod experiment;

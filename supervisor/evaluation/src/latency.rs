@@ -1,4 +1,4 @@
-//! How long a mission's ticks and solves took: a table beside that of the results, because no two runs share it.
+//! Latencies of a mission's ticks and solves. They have a table of their own, because they differ in every run.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,34 +12,26 @@ use crate::{
 /// One mission's latencies, microseconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Latency {
-    /// The world.
     pub world: String,
     /// Seed of the simulation's noise.
     pub seed: u64,
-    /// The setting's name.
     pub setting: String,
-    /// A tick, from the datagram in to the datagram out: median.
+    /// A tick, from the datagram in to the datagram out.
     pub tick_p50_us: Option<f64>,
-    /// The same, 99 of 100.
     pub tick_p99_us: Option<f64>,
-    /// The same, the longest.
     pub tick_max_us: Option<f64>,
-    /// A full solve of the field: median.
+    /// A full solve of the field.
     pub full_solve_p50_us: Option<f64>,
-    /// The same, 99 of 100.
     pub full_solve_p99_us: Option<f64>,
-    /// The same, the longest.
     pub full_solve_max_us: Option<f64>,
-    /// A local update of the field: median.
+    /// A local update of the field.
     pub local_update_p50_us: Option<f64>,
-    /// The same, 99 of 100.
     pub local_update_p99_us: Option<f64>,
-    /// The same, the longest.
     pub local_update_max_us: Option<f64>,
 }
 
 impl Latency {
-    /// Of the mission of `row`, which ended with `summary`.
+    /// The latencies of the mission of `row`, from its `summary`.
     pub(crate) fn new(row: &Row, summary: &Summary) -> Self {
         let (world, seed, setting) = row.key();
         let Summary {
@@ -71,8 +63,7 @@ impl Record for Latency {
     }
 }
 
-/// What the page says of a duration: its name, and the medians over the missions of median, 99 % and longest,
-/// microseconds.
+/// A line of the page: a duration's name, and the medians over the missions of median, 99 % and longest, microseconds.
 pub(crate) type Line = (&'static str, [Option<f64>; 3]);
 
 /// The medians over all missions of `setting`.

@@ -1,4 +1,4 @@
-//! Readers of map files in common formats: which cells a robot can be in.
+//! Readers of map files in common formats. A map says which cells are free.
 //!
 //! | module | reads |
 //! |---|---|
@@ -6,11 +6,9 @@
 //! | `image` | a PGM (any Netpbm) or PNG image |
 //! | `moving_ai` | the `.map` grids of the MovingAI benchmarks |
 //!
-//! [`load`] chooses one by the file's name, [`load_placed`] reads a ROS map with its place in metres. [`Map`] is what they
-//! read, [`MapError`] why they could not.
+//! [`load`] chooses a reader by the file's name; [`load_placed`] reads a ROS map with its place in metres.
 //!
-//! Files come from anywhere: sizes are checked before memory is taken, and everything that cannot be read is refused
-//! with the file, the cause and the remedy.
+//! Files are not trusted: sizes are checked before memory is allocated, and errors name the file, the cause and the remedy.
 
 mod error;
 mod file;
@@ -25,7 +23,7 @@ pub use error::MapError;
 pub use map::{Map, PlacedMap};
 pub use ros::load_placed;
 
-/// The map in `file`, whose name says how to read it.
+/// The map in `file`. The ending of its name says its format.
 pub fn load(file: &Path) -> Result<Map, MapError> {
     let extension = file
         .extension()

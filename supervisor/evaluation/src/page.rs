@@ -1,13 +1,11 @@
-//! What every page of results has: its head, its end, and text where markup is read.
+//! The common parts of result pages: head, end and escaped text.
 
-/// The page up to its first heading, which is `title`.
-#[must_use]
+/// The page up to its first heading, with `title`.
 pub fn head(title: &str) -> String {
     styled_head(title, "")
 }
 
-/// The same with further rules of CSS.
-#[must_use]
+/// The head with further rules of CSS.
 pub fn styled_head(title: &str, style: &str) -> String {
     let title = escaped(title);
     format!(
@@ -16,15 +14,14 @@ pub fn styled_head(title: &str, style: &str) -> String {
     )
 }
 
-/// What a page ends with.
+/// The end of a page.
 pub const END: &str = "</body></html>\n";
 
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\
 table{border-collapse:collapse;display:block;overflow-x:auto}td,th{border:1px solid #cbd2d9;padding:.3em .6em;text-align:left;vertical-align:top}\
 code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);margin:.5em .2em;vertical-align:top}img{width:100%}";
 
-/// `text` where markup is read; control characters, which it cannot contain, as spaces.
-#[must_use]
+/// `text` escaped for HTML, with spaces in place of control characters.
 pub fn escaped(text: &str) -> String {
     text.replace(char::is_control, " ")
         .replace('&', "&amp;")

@@ -1,4 +1,4 @@
-//! All of an evaluation as one page: totals, paired differences, every failure with its picture.
+//! The page of an evaluation: totals, paired differences, every failure with its picture.
 
 use std::fmt::{self, Write as _};
 
@@ -11,18 +11,16 @@ use crate::{
     totals::{Comparison, Totals},
 };
 
-/// The totals of every setting, and how each differs from the first.
+/// The totals of every setting, and the differences of each from the first.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// In the order of the settings.
     pub totals: Vec<Totals>,
-    /// All but the first against the first.
+    /// Each setting but the first, compared with the first.
     pub comparisons: Vec<Comparison>,
 }
 
 impl Report {
-    /// Of the rows of `plan`.
-    #[must_use]
     pub fn new(plan: &Plan, rows: &[Row]) -> Self {
         let names: Vec<&str> = plan.settings.iter().map(|setting| &*setting.name).collect();
         let comparisons = names.iter().skip(1);
@@ -58,7 +56,7 @@ impl fmt::Display for Report {
 }
 
 impl Totals {
-    /// Name, value and digits of what is known besides the shares.
+    /// Name, value and digits of the figures besides the shares.
     fn metrics(&self) -> impl Iterator<Item = (&'static str, f64, usize)> {
         let metrics = [
             ("median time, s", self.median_time_s, 1),
@@ -73,8 +71,7 @@ impl Totals {
     }
 }
 
-/// The page; pictures are beside it, as [`Plan::picture`] says. `command` is how to make it again.
-#[must_use]
+/// The page; pictures are beside it, as [`Plan::picture`] says. `command` reproduces the results.
 pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
     let rows = results.rows.rows();
     let report = Report::new(plan, rows);

@@ -8,25 +8,21 @@ use crate::{
     table::{Table, TableError},
 };
 
-/// In the directory: the rows.
+/// Name of the file of rows.
 const ROWS_FILE: &str = "rows.csv";
-/// In the directory: how long ticks and solves took; apart from the rows, which are the same in every run.
+/// Name of the file of latencies. The rows are the same in every run, latencies are not.
 const LATENCIES_FILE: &str = "latencies.csv";
 
-/// What missions gave.
+/// The tables of an evaluation.
 #[derive(Debug)]
 pub struct Results {
-    /// Their results.
+    /// The results of missions.
     pub rows: Table<Row>,
-    /// Their latencies.
     pub latencies: Table<Latency>,
 }
 
 impl Results {
-    /// Those in `directory`, or empty ones.
-    ///
-    /// # Errors
-    /// When they cannot be read or written.
+    /// The tables in `directory`, or empty ones.
     pub fn open(directory: &Path) -> Result<Self, TableError> {
         Ok(Self {
             rows: Table::open(&directory.join(ROWS_FILE))?,
@@ -34,10 +30,6 @@ impl Results {
         })
     }
 
-    /// Sort both by world, seed and setting.
-    ///
-    /// # Errors
-    /// When the disk is full, say.
     pub fn sort(&mut self) -> Result<(), TableError> {
         self.rows.sort()?;
         self.latencies.sort()

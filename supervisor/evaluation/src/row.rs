@@ -13,17 +13,14 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// At the target, nothing touched.
+    /// The robot is at the target and has touched nothing.
     Success,
-    /// The robot touched something.
     Collision,
-    /// Mission time ran out.
     Timeout,
-    /// The robot believed to have arrived, and had not.
+    /// The robot reported its arrival in a wrong place.
     WrongPlace,
-    /// The robot believed that no way leads to the target; one does.
+    /// The robot gave up although a path to the target exists.
     Unreachable,
-    /// Something failed.
     Aborted,
 }
 
@@ -38,8 +35,6 @@ impl Outcome {
         Self::Aborted,
     ];
 
-    /// The word for it.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Success => "success",
@@ -52,41 +47,37 @@ impl Outcome {
     }
 }
 
-/// One mission's result. Metres and mission seconds; without latencies, which no two runs share: these have a table of
-/// their own, see [`Latency`](crate::latency::Latency).
+/// One mission's result, in metres and mission seconds. Latencies differ in every run and have a table of their own, see
+/// [`Latency`](crate::latency::Latency).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// The world.
     pub world: String,
     /// Seed of the simulation's noise.
     pub seed: u64,
-    /// The setting's name.
     pub setting: String,
-    /// The planner.
     pub planner: String,
-    /// By the ground truth.
     pub outcome: Outcome,
-    /// What the run said.
+    /// The reason in the run's summary.
     pub reason: String,
-    /// From when the clock started.
+    /// Time since the clock started.
     pub time_s: f64,
-    /// Driven in truth.
+    /// Distance driven by the ground truth.
     pub path_m: f64,
-    /// Start to target.
+    /// Straight distance from start to target.
     pub straight_m: f64,
-    /// The shortest way of the body.
+    /// Length of the body's shortest path.
     pub shortest_m: f64,
-    /// K of the paper: path over straight distance.
+    /// K of the paper: path divided by straight distance.
     pub k: f64,
     /// Success weighted by path length: shortest / max(path, shortest), 0 without success.
     pub spl: f64,
-    /// The BARN score; none without an optimal time.
+    /// BARN score; none without an optimal time.
     pub barn_score: Option<f64>,
-    /// Least true clearance on the way.
+    /// Least true clearance.
     pub min_clearance_m: Option<f64>,
-    /// Believed against true position at the end.
+    /// Distance from the estimated to the true position at the end.
     pub pose_error_m: Option<f64>,
-    /// Root mean square of that, by the covariance of the last pose.
+    /// Its expected root mean square, by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
     /// True distance to the target at the end.
     pub true_distance_m: Option<f64>,
@@ -100,9 +91,9 @@ pub struct Row {
     pub looks: u64,
     /// Time it looked.
     pub look_s: f64,
-    /// Fresh planners given to a stalled robot.
+    /// Restarts of the planner after stalls.
     pub replans: u64,
-    /// Times the sensed belief was reset.
+    /// Resets of the sensed map.
     pub resets: u64,
     /// Full solves of the field.
     pub full_solves: u64,
@@ -110,12 +101,11 @@ pub struct Row {
     pub local_updates: u64,
 }
 
-/// A robot at this many optimal times or less gets the best score, at this many or more the worst.
+/// A robot that takes the first number of optimal times or less gets the best score, the second or more the worst.
 const BARN_CLIP: [f64; 2] = [2.0, 8.0];
 
 impl Row {
     /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
-    #[must_use]
     pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
         let rules = &trial.rules;
         let straight_m = trial.mission.target.length();
@@ -166,8 +156,7 @@ impl Row {
         }
     }
 
-    /// A mission that gave no summary.
-    #[must_use]
+    /// The row of a mission without a summary.
     pub fn aborted(trial: &Trial, seed: u64, setting: &Setting, reason: String) -> Self {
         let nothing = Summary {
             outcome: "aborted".to_owned(),
@@ -202,7 +191,7 @@ impl Record for Row {
     }
 }
 
-/// What the ground truth says of how a run ended.
+/// The outcome by the ground truth.
 fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
     let there = summary
         .true_distance_m

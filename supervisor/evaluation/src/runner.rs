@@ -21,34 +21,32 @@ use crate::{
     trial::Trial,
 };
 
-/// Name of the picture that a run leaves in its directory.
+/// Name of a run's picture in its directory.
 const PICTURE: &str = "picture.svg";
 
-/// What to run.
+/// The missions to run.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The worlds.
     pub trials: Vec<Trial>,
-    /// Every one of them on every world.
+    /// The settings; each runs on every world.
     pub settings: Vec<Setting>,
-    /// Missions on every world, each with noise of its own.
+    /// Missions on each world for each setting, with different noise.
     pub repeats: u64,
-    /// Which noise they have.
+    /// The source of their noise seeds.
     pub noise: NoiseSeeds,
-    /// Besides those of failures, the pictures of missions with this noise seed are kept.
+    /// Pictures of missions with this noise seed are kept, too, not only of failures.
     pub pictured_seed: Option<u64>,
-    /// Missions at once.
+    /// Missions in parallel.
     pub jobs: usize,
-    /// Where worlds, rows and pictures of failures go; exists.
+    /// Directory of worlds, rows and pictures of failures; it must exist.
     pub directory: PathBuf,
 }
 
-/// Where the noise seeds of the missions come from.
 #[derive(Clone, Copy, Debug)]
 pub enum NoiseSeeds {
-    /// Every world has the same: this one and those that follow it.
+    /// Every world has the same seeds: this one and the following ones.
     Counted(u64),
-    /// Every mission has one of its own, derived from the seed of the set.
+    /// Every mission has a seed of its own, derived from the seed of the set.
     Derived(u64),
 }
 
@@ -66,8 +64,8 @@ impl NoiseSeeds {
     }
 }
 
-/// `bits` so that each of them changes about half of the result, and no two numbers give the same: multiplications by odd
-/// numbers and shifts, as in the finaliser of MurmurHash3 (A. Appleby, 2011).
+/// An invertible hash of `bits`: multiplications by odd numbers and shifts, as in the finaliser of MurmurHash3 (A. Appleby,
+/// 2011).
 const fn mixed(bits: u32) -> u32 {
     let bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);
     let bits = (bits ^ (bits >> 13)).wrapping_mul(0xc2b2_ae35);
@@ -77,17 +75,10 @@ const fn mixed(bits: u32) -> u32 {
 /// Why an evaluation ended early.
 #[derive(Debug, Error)]
 pub enum RunnerError {
-    /// The table.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// A file or a process.
     #[error("cannot {action}: {source}")]
-    System {
-        /// What was tried.
-        action: String,
-        /// The system's word.
-        source: io::Error,
-    },
+    System { action: String, source: io::Error },
 }
 
 fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> RunnerError {
@@ -95,18 +86,16 @@ fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> RunnerError {
     move |source| RunnerError::System { action, source }
 }
 
-/// How far it is.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Missions that ended, those of an earlier part among them.
+    /// Missions that ended, including those of an earlier part.
     pub ended: usize,
     /// All missions.
     pub all: usize,
-    /// Missions that this part has ended.
+    /// Missions that ended in this part.
     pub ended_now: usize,
 }
 
-/// One mission to run.
 struct Job<'a> {
     trial: &'a Trial,
     setting: &'a Setting,
@@ -114,14 +103,13 @@ struct Job<'a> {
 }
 
 impl Plan {
-    /// Where the mission file of a trial lies.
+    /// The path of a trial's mission file.
     fn mission_file(&self, trial: &Trial) -> PathBuf {
         let name = format!("{}.toml", trial.world);
         self.directory.join("worlds").join(name)
     }
 
-    /// Where the picture of a mission lies, if it was kept.
-    #[must_use]
+    /// The path of a mission's picture, if it was kept.
     pub fn picture(&self, row: &Row) -> PathBuf {
         self.directory.join(picture(row))
     }
@@ -146,8 +134,7 @@ impl Plan {
     }
 }
 
-/// Where the picture of a mission lies in the directory of its plan.
-#[must_use]
+/// The path of a mission's picture in the directory of its plan.
 pub fn picture(row: &Row) -> PathBuf {
     let folder = match row.outcome {
         Outcome::Success => "pictures",
@@ -160,10 +147,7 @@ pub fn picture(row: &Row) -> PathBuf {
     ))
 }
 
-/// Run all missions of `plan` whose rows are not in `results` yet. `watch` is told after each.
-///
-/// # Errors
-/// When a file cannot be written. A mission that fails is a row.
+/// Run all missions of `plan` whose rows are not in `results` yet. `watch` is called after each.
 pub fn run(
     plan: &Plan,
     results: &mut Results,
@@ -212,7 +196,7 @@ pub fn run(
         drop(give);
         for ended in rows {
             let (row, latency) = ended?;
-            // First, so that a mission whose row is there has both.
+            // Latencies are written first, so that a mission with a row has both.
             latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
             results.rows.add(row)?;
             progress.ended += 1;
@@ -223,7 +207,7 @@ pub fn run(
     })
 }
 
-/// One mission, in processes of its own. One that gave no summary has no latencies.
+/// Run one mission, in processes of its own. Without a summary it has no latencies.
 fn mission(
     plan: &Plan,
     job: &Job<'_>,
@@ -267,7 +251,7 @@ fn mission(
         }
     };
     if plan.keeps_picture(&row) {
-        // A mission that could not start has none.
+        // A mission that could not start has no picture.
         let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
     }
     let _ = fs::remove_dir_all(&directory);

@@ -1,12 +1,11 @@
-//! What missions on the same worlds differ by.
+//! A setting: planner and mission keys that are compared on the same worlds.
 
-/// The planner that is `firsthand`'s own.
+/// The name of `firsthand`'s own planner.
 pub const HARMONIC: &str = "harmonic";
 
-/// What is set for all missions of a row of totals.
+/// The setting of all missions of a row of totals.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Its name.
     pub name: String,
     /// The planner: [`HARMONIC`], or the executable in its place.
     pub planner: String,

@@ -1,8 +1,8 @@
-//! Whether a body gets from start to target at all, and how short its way can be.
+//! The shortest path of a body from start to target, if there is one.
 //!
-//! A disc on a grid of 5 cm: cells nearer to a thing than its radius are blocked, A* over eight neighbours finds a
-//! way, and corners that a straight line can cut are cut. What comes out is at most some percent longer than the
-//! shortest way; a gap is found to be open where it is wider than the body by a cell.
+//! The body is a disc on a grid of 5 cm: cells nearer to a thing than its radius are blocked, A* over eight neighbours finds a
+//! path, and straight lines shorten it. The result is at most some percent longer than the shortest path; a gap counts as open
+//! if it is wider than the body by a cell.
 
 use common::geometry::{Piece, Shapes};
 use glam::{DVec2, IVec2};
@@ -10,27 +10,24 @@ use pathfinding::prelude::astar;
 
 /// Side of a cell, metres.
 const CELL_M: f64 = 0.05;
-/// How far around start, target and things the way may lead, metres.
+/// Margin around start, target and things in which the path may lead, metres.
 const RIM_M: f64 = 0.5;
-/// More cells than this are no world of a small robot: 100 m by 100 m.
+/// Most cells of a world: 100 m by 100 m.
 const MOST_CELLS: f64 = 4e6;
 /// A* counts in thousandths of a cell.
 const STRAIGHT: u32 = 1000;
 const DIAGONAL: u32 = 1414;
 
-/// What was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShortestPath {
-    /// A way of so many metres.
+    /// The length of the path, metres.
     Found(f64),
-    /// There is none.
     None,
-    /// The world is too large to look.
+    /// The world is too large for the search.
     TooLarge,
 }
 
-/// The shortest way of a disc of `radius` metres from `start` to `target` among `shapes`.
-#[must_use]
+/// The shortest path of a disc of `radius` metres from `start` to `target` among `shapes`.
 pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) -> ShortestPath {
     let Some(grid) = Grid::new(shapes, start, target, radius) else {
         return ShortestPath::TooLarge;
@@ -50,7 +47,7 @@ pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) 
     })
 }
 
-/// What remains at least, on a grid with diagonals.
+/// The least remaining cost on a grid with diagonals.
 fn octile(from: IVec2, to: IVec2) -> u32 {
     let away = (from - to).abs();
     let (less, more) = (away.min_element() as u32, away.max_element() as u32);
@@ -120,7 +117,7 @@ impl Grid {
         inside && !self.blocked[self.index(cell)]
     }
 
-    /// Free neighbours with their distance; a diagonal squeezes through no corner.
+    /// Free neighbours with their distance. A diagonal step cuts no corner of a blocked cell.
     fn neighbours(&self, cell: IVec2) -> impl Iterator<Item = (IVec2, u32)> + '_ {
         let steps = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| IVec2::new(dx, dy)));
         steps.filter_map(move |step| {
@@ -138,7 +135,7 @@ impl Grid {
         })
     }
 
-    /// Length of the way over `cells` with every corner cut that a straight line can cut, metres.
+    /// Length of the path over `cells` after shortening it by straight lines, metres.
     fn straightened(&self, cells: &[IVec2], start: DVec2, target: DVec2) -> f64 {
         let mut points: Vec<DVec2> = cells.iter().map(|&cell| self.centre(cell)).collect();
         if let Some(first) = points.first_mut() {
@@ -185,7 +182,7 @@ mod tests {
 
     #[test]
     fn the_way_around_a_wall_is_as_long_as_by_hand() {
-        // Around the end at (1, 1), the body's radius off it: two legs of about sqrt(1 + 1.2^2).
+        // The path leads around the end at (1, 1) at the body's radius: two legs of about sqrt(1 + 1.2^2).
         let shapes = wall(&[[1.0, -9.0], [1.0, 1.0]]);
         let found = shortest_path(&shapes, DVec2::ZERO, DVec2::new(2.0, 0.0), 0.2);
         let ShortestPath::Found(length) = found else {

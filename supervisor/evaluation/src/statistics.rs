@@ -1,4 +1,4 @@
-//! Intervals: how sure a share or a difference of shares is.
+//! Shares, differences of shares and their confidence intervals; medians and means.
 
 use serde::Serialize;
 
@@ -8,16 +8,12 @@ const Z: f64 = 1.959_963_984_540_054;
 /// A value with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The value.
     pub value: f64,
-    /// Lower end.
     pub low: f64,
-    /// Upper end.
     pub high: f64,
 }
 
-/// The share of `hits` among `n`, with Wilson's interval (Wilson 1927).
-#[must_use]
+/// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
 pub fn share(hits: usize, n: usize) -> Estimate {
     if n == 0 {
         return Estimate {
@@ -38,9 +34,8 @@ pub fn share(hits: usize, n: usize) -> Estimate {
     }
 }
 
-/// The difference of two shares on the same `n` worlds: `gained` of them have it only in the second setting, `lost`
-/// only in the first. Wald's interval with half a pair added to each cell (Agresti and Min 2005).
-#[must_use]
+/// The difference of two shares on the same `n` worlds: `gained` worlds count only in the second setting, `lost` only in the
+/// first. Wald's interval with half a pair added to each cell (Agresti and Min 2005).
 pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     let (gained, lost, n) = (gained as f64, lost as f64, n as f64);
     let value = if n > 0.0 {
@@ -58,26 +53,21 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     }
 }
 
-/// The median; none of nothing.
-#[must_use]
+/// The median; none without values.
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Some(Spread::of(values)?.median)
 }
 
-/// Where the middle of some values lies, and the middle half of them.
+/// The quartiles of some values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// A quarter of the values is below.
     pub low: f64,
-    /// Half of them is.
     pub median: f64,
-    /// Three quarters are.
     pub high: f64,
 }
 
 impl Spread {
-    /// Of some values, linear between neighbours; none of nothing.
-    #[must_use]
+    /// The quartiles, linear between neighbours; none without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);
@@ -98,8 +88,7 @@ impl Spread {
     }
 }
 
-/// The mean; none of nothing.
-#[must_use]
+/// The mean; none without values.
 pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
     (n > 0.0).then_some(sum / n)

@@ -1,8 +1,8 @@
-//! What a mission's run says of itself at its end.
+//! The part of a run's summary that an evaluation reads.
 
 use serde::Deserialize;
 
-/// Quantiles of a duration, microseconds; none of nothing.
+/// Quantiles of a duration, microseconds; none if it did not occur.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 pub(crate) struct Quantiles {
     pub(crate) p50: Option<f64>,
@@ -10,7 +10,7 @@ pub(crate) struct Quantiles {
     pub(crate) max: Option<f64>,
 }
 
-/// What is read of the last line of `firsthand run --json`.
+/// Fields of the last line of `firsthand run --json`.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Summary {
     pub(crate) outcome: String,

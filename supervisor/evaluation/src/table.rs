@@ -1,4 +1,4 @@
-//! Rows in a CSV file, one for each mission: appended as missions end, sorted when all have.
+//! A CSV file with a row for each mission: appended as missions end, sorted when all have ended.
 
 use std::{
     collections::BTreeSet,
@@ -10,16 +10,15 @@ use std::{
 use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
-/// World, noise seed and setting: what makes a mission the one it is.
+/// World, noise seed and setting, which identify a mission.
 pub type Key = (String, u64, String);
 
 /// A row of a table.
 pub trait Record: Serialize + DeserializeOwned {
-    /// Of which mission it is.
+    /// The key of its mission.
     fn key(&self) -> Key;
 }
 
-/// A table that cannot be read or written.
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {problem}", file.display())]
 pub struct TableError {
@@ -28,7 +27,7 @@ pub struct TableError {
     problem: String,
 }
 
-/// The file, and what is in it.
+/// The file and its rows.
 #[derive(Debug)]
 pub struct Table<R> {
     file: PathBuf,
@@ -36,10 +35,7 @@ pub struct Table<R> {
 }
 
 impl<R: Record> Table<R> {
-    /// A table in `file`: with the rows that are there already, or empty.
-    ///
-    /// # Errors
-    /// When it is there and no table.
+    /// The table in `file`: with its rows, or empty.
     pub fn open(file: &Path) -> Result<Self, TableError> {
         let mut table = Self {
             file: file.to_path_buf(),
@@ -48,29 +44,23 @@ impl<R: Record> Table<R> {
         if file.exists() {
             let mut reader = csv::Reader::from_path(file).map_err(table.failed("read"))?;
             let whole = reader.deserialize().map_while(Result::ok);
-            // A row that was cut off is run again.
+            // A mission whose row was cut off is run again.
             table.rows = whole.collect();
         }
         table.save()?;
         Ok(table)
     }
 
-    /// What is in it.
-    #[must_use]
     pub fn rows(&self) -> &[R] {
         &self.rows
     }
 
-    /// The missions whose rows are there.
-    #[must_use]
+    /// The missions with a row.
     pub fn keys(&self) -> BTreeSet<Key> {
         self.rows.iter().map(R::key).collect()
     }
 
     /// Append a row to the file.
-    ///
-    /// # Errors
-    /// When the disk is full, say.
     pub fn add(&mut self, row: R) -> Result<(), TableError> {
         let opened = File::options().append(true).open(&self.file);
         let opened = opened.map_err(|error| self.failed("append to")(error.into()))?;
@@ -83,10 +73,7 @@ impl<R: Record> Table<R> {
         Ok(())
     }
 
-    /// Sort the rows, by world, seed and setting, and write them anew; of two of one mission the later one.
-    ///
-    /// # Errors
-    /// When the disk is full, say.
+    /// Sort the rows by world, seed and setting, and rewrite the file. If a mission has two rows, the later one stays.
     pub fn sort(&mut self) -> Result<(), TableError> {
         self.rows.reverse();
         self.rows.sort_by_key(R::key);
@@ -94,7 +81,7 @@ impl<R: Record> Table<R> {
         self.save()
     }
 
-    /// Write all rows to a new file and put it in the place of the old one.
+    /// Replace the file by one with all rows.
     fn save(&self) -> Result<(), TableError> {
         let unfinished = self.file.with_extension("csv.new");
         let write = || -> Result<(), csv::Error> {

@@ -1,4 +1,4 @@
-//! The result of each setting over all its missions, and how two settings differ on the same ones.
+//! The result of each setting over all its missions, and the differences of two settings on the same missions.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -9,12 +9,10 @@ use crate::{
     statistics::{Estimate, mean, median, paired_difference, share},
 };
 
-/// What became of the missions of one setting. Rates are shares of all; medians are over the successes.
+/// The totals of one setting. Rates are shares of all missions; medians are over the successes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Totals {
-    /// The setting.
     pub setting: String,
-    /// Missions.
     pub count: usize,
     /// Share that succeeded.
     pub success: f64,
@@ -22,9 +20,9 @@ pub struct Totals {
     pub collision: f64,
     /// Share that ran out of time.
     pub timeout: f64,
-    /// Share that believed to have arrived and had not.
+    /// Share that reported an arrival in a wrong place.
     pub wrong_place: f64,
-    /// Share that gave up although there was a way.
+    /// Share that gave up although a path exists.
     pub unreachable: f64,
     /// Share that failed otherwise.
     pub aborted: f64,
@@ -34,7 +32,7 @@ pub struct Totals {
     pub median_k: Option<f64>,
     /// Mean SPL of all.
     pub spl: Option<f64>,
-    /// Mean BARN score of all; none where it does not apply.
+    /// Mean BARN score of all; none if it does not apply.
     pub barn_score: Option<f64>,
     /// Median of the least clearance of the successes, metres.
     pub median_clearance_m: Option<f64>,
@@ -45,8 +43,6 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Of the rows of `setting`.
-    #[must_use]
     pub fn of(setting: &str, rows: &[Row]) -> Self {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
         let successes = || {
@@ -78,33 +74,27 @@ impl Totals {
         }
     }
 
-    /// The share of `outcome` with its interval.
-    #[must_use]
     pub fn share(&self, outcome: Outcome) -> Option<Estimate> {
         self.shares.get(&outcome).copied()
     }
 }
 
-/// How the second of two settings differs from the first on the same worlds with the same noise.
+/// The differences of the second setting from the first on the same worlds with the same noise.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// The first.
     pub from: String,
-    /// The second.
     pub to: String,
-    /// Missions that both have.
+    /// Missions that both settings have.
     pub pairs: usize,
     /// Change of the share of successes.
     pub success: Estimate,
     /// Change of the share of collisions.
     pub collision: Estimate,
-    /// Median over missions in which both succeeded of the second's time over the first's.
+    /// Median ratio of the second's time to the first's, over missions in which both succeeded.
     pub time_ratio: Option<f64>,
 }
 
 impl Comparison {
-    /// Of the rows of two settings.
-    #[must_use]
     pub fn of(from: &str, to: &str, rows: &[Row]) -> Self {
         let key = |row: &Row| (row.world.clone(), row.seed);
         let of = |setting: &str| -> BTreeMap<_, &Row> {
@@ -141,7 +131,7 @@ impl Comparison {
 }
 
 impl fmt::Display for Estimate {
-    /// Like `.620 [.564, .673]`.
+    /// For example `.620 [.564, .673]`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:.3} [{:.3}, {:.3}]", self.value, self.low, self.high)
     }

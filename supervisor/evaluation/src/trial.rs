@@ -1,4 +1,4 @@
-//! One trial: a mission in a world that can be crossed, and the rules it is judged by.
+//! A trial: a mission in a solvable world, and the rules of its judgement.
 
 use common::{
     geometry::Shapes,
@@ -10,17 +10,17 @@ use supervisor::outcome::RIGHT_PLACE_M;
 
 use crate::shortest_path::{ShortestPath, shortest_path};
 
-/// The perimeter's width is a multiple of this, metres: a whole number of cells by either method.
+/// The perimeter's width is a multiple of this, metres: a whole number of cells by both methods.
 const WIDTH_STEP_M: f64 = 0.1;
-/// Free ground between what stands in a world and the perimeter around it, metres.
+/// Free ground between the things of a world and the perimeter, metres.
 const RIM_M: f64 = 0.6;
 
-/// How a mission's end is judged by the ground truth.
+/// The rules by which the ground truth judges a mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
-    /// Farther than this from the target, a robot that says it has arrived is in the wrong place, metres.
+    /// Distance from the target beyond which an arrival is in the wrong place, metres.
     pub success_within_m: f64,
-    /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does; else with the mission.
+    /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does, or with the mission.
     pub clock_after_departure: bool,
     /// Time of the reference path at 2 m/s, seconds, for the BARN score; none elsewhere.
     pub optimal_time_s: Option<f64>,
@@ -39,34 +39,28 @@ impl Default for Rules {
 /// A world with a start and a target, in the frame of the world it comes from.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What stands there, metres.
+    /// The things in it, metres.
     pub shapes: Shapes,
-    /// Where the robot starts, metres.
     pub start: DVec2,
-    /// Its heading there, radians counter-clockwise from x.
+    /// Heading at the start, radians counter-clockwise from x.
     pub heading: f64,
-    /// Where it is to go, metres.
     pub target: DVec2,
 }
 
-/// A mission on a world that was checked to be solvable.
+/// A mission in a world that is solvable.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The world's name: its kind and number.
     pub world: String,
     /// The mission, its origin at the start of the robot.
     pub mission: Mission,
-    /// Length of the shortest way of the robot's body, metres.
+    /// Length of the body's shortest path, metres.
     pub shortest_m: f64,
-    /// How it is judged.
     pub rules: Rules,
 }
 
 impl Trial {
     /// The trial `world` in `scene`, if a body of `radius_m` can get from start to target with `margin_m` to spare.
-    ///
-    /// # Errors
-    /// When no mission can be made of it, such as a world that is too large.
     pub fn new(
         world: String,
         scene: &Scene,
@@ -90,8 +84,7 @@ impl Trial {
 }
 
 impl Trial {
-    /// The trial `world` by `mission` as it is, if a body can get from start to target in its world.
-    #[must_use]
+    /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
     pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
         let start = mission.start_pose().position;
         match shortest_path(&mission.obstacles(), start, mission.target, body.swept_m()) {
@@ -106,7 +99,7 @@ impl Trial {
     }
 }
 
-/// The body that a world must let through.
+/// The body for which a world must be solvable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySize {
     /// Radius of the robot, metres.
@@ -116,14 +109,13 @@ pub struct BodySize {
 }
 
 impl BodySize {
-    /// Half the width of the narrowest way, metres.
-    #[must_use]
+    /// Half the width of the narrowest passage, metres.
     pub fn swept_m(&self) -> f64 {
         self.radius_m + self.margin_m
     }
 }
 
-/// Mission seconds for a way of `metres`: four times what a robot at 0.25 m/s needs, and half a minute.
+/// Mission seconds for a path of `metres`: four times the time of a robot at 0.25 m/s, and half a minute.
 fn timeout_s(metres: f64) -> f64 {
     (30.0 + 16.0 * metres).round()
 }
@@ -148,7 +140,7 @@ fn mission(world: &str, scene: &Scene, shortest_m: f64) -> Result<Mission, Missi
     Ok(mission)
 }
 
-/// The corners of what holds `shapes`, the origin and the target, metres.
+/// The corners of the bounding box of `shapes`, the origin and the target, metres.
 fn bounds(shapes: &Shapes, target: DVec2) -> (DVec2, DVec2) {
     let all = shapes.pieces().map(|piece| piece.bounds());
     let ends = (DVec2::ZERO.min(target), DVec2::ZERO.max(target));

@@ -1,4 +1,4 @@
-//! Worlds to try a robot on: drawn from a seed, or read from files. Each was checked to be solvable for the body.
+//! Worlds for an evaluation, drawn from a seed or read from files. Each is checked to be solvable for the body.
 
 mod barn;
 mod corridors;
@@ -18,10 +18,10 @@ use self::{corridors::Bends, files::Asked, random::Random, rooms::Doors};
 pub use self::{ends::Ends, error::WorldError, found::Found};
 use crate::trial::{BodySize, Rules, Scene};
 
-/// Draws that may fail in a row before a kind of world is taken for unsolvable.
+/// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
 
-/// Where worlds come from.
+/// The source of worlds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Worlds {
     /// Rooms, one in three with a door.
@@ -59,7 +59,7 @@ impl FromStr for Worlds {
     }
 }
 
-/// As [`FromStr`] reads it.
+/// The name that [`FromStr`] reads.
 impl fmt::Display for Worlds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self, DRAWN.iter().find(|(_, worlds)| worlds == self)) {
@@ -69,10 +69,7 @@ impl fmt::Display for Worlds {
     }
 }
 
-/// `count` trials of `worlds` under `seed`; of files all, without a count. `ends` are for maps alone.
-///
-/// # Errors
-/// When a file cannot be read, `ends` are given without a map, or no world can be crossed.
+/// `count` trials of `worlds` under `seed`; without a count all files. `ends` are only for maps.
 pub fn find(
     worlds: &Worlds,
     count: Option<usize>,

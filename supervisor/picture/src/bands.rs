@@ -117,7 +117,6 @@ impl<'a> Bands<'a> {
         self.levels
     }
 
-    /// The layer.
     pub(super) fn layer(&self) -> String {
         let mut finest = self.style.finest;
         loop {

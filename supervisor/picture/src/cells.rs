@@ -63,7 +63,6 @@ impl BelievedHazard {
         !self.perimeter.is_empty()
     }
 
-    /// The layer.
     pub(super) fn layer(&self) -> String {
         [
             (&self.perimeter, ink::PERIMETER),

@@ -38,7 +38,6 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
 }
 
-/// A chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// Above it.
@@ -55,7 +54,6 @@ pub struct Chart {
 
 impl Chart {
     /// The text of an SVG file.
-    #[must_use]
     pub fn svg(&self) -> String {
         let along = |axis: usize| {
             let points = self.series.iter().flat_map(|series| &series.points);

@@ -10,7 +10,6 @@ use super::page::{PLOT_SIDE, View, metres};
 pub(super) struct Lattice {
     /// Columns.
     pub(super) cols: usize,
-    /// Rows.
     pub(super) rows: usize,
     /// Width of all columns on the sheet.
     pub(super) width: f64,

@@ -33,7 +33,6 @@ const SYMBOL: f64 = 19.0;
 const WORDS: f64 = 50.0;
 
 impl Legend<'_> {
-    /// The layer.
     pub(super) fn layer(&self) -> String {
         let mut column = Column::at(DVec2::new(COLUMN, PLOT_TOP + 10.0));
         self.motion_rows(&mut column);

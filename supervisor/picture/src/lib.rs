@@ -79,7 +79,6 @@ fn has_isolated_cells(
 }
 
 /// `scene` as the text of an SVG file.
-#[must_use]
 pub fn svg(scene: &Scene<'_>) -> String {
     drawn(scene, |view, plot, legend| {
         [
@@ -96,7 +95,6 @@ pub fn svg(scene: &Scene<'_>) -> String {
 }
 
 /// `scene` as a figure: no title, no captions, the legend below, and text that is read where the figure is small.
-#[must_use]
 pub fn figure_svg(scene: &Scene<'_>) -> String {
     drawn(scene, |view, plot, legend| {
         margin::figure(scene, &plot, view, legend)
@@ -105,7 +103,6 @@ pub fn figure_svg(scene: &Scene<'_>) -> String {
 
 /// Plots side by side, two in a row, each below its title. Without axes and legend: those of [`figure_svg`] of the same mission
 /// stand for them.
-#[must_use]
 pub fn panels_svg(title: &str, panels: &[(String, Scene<'_>)]) -> String {
     let plots = panels
         .iter()

@@ -75,7 +75,6 @@ impl<'a> Motion<'a> {
         self.every.map(|(seconds, _)| seconds)
     }
 
-    /// The layer.
     pub(super) fn layer(&self, view: &View) -> String {
         let radius = view.px(self.mission.body().radius_m);
         let start = self.mission.start_pose();

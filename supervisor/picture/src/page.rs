@@ -221,7 +221,6 @@ impl Path {
         self.pen = None;
     }
 
-    /// A circle.
     pub(super) fn circle(&mut self, centre: DVec2, radius: f64) {
         let (x, y) = (Px(centre.x - radius), Px(centre.y));
         let (r, there, back) = (Px(radius), Px(2.0 * radius), Px(-2.0 * radius));

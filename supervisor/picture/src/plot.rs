@@ -44,7 +44,6 @@ pub struct Axis {
 
 impl Axis {
     /// A linear axis.
-    #[must_use]
     pub fn linear(label: &str) -> Self {
         Self {
             label: label.to_owned(),
@@ -53,7 +52,6 @@ impl Axis {
     }
 
     /// A logarithmic axis.
-    #[must_use]
     pub fn logarithmic(label: &str) -> Self {
         Self {
             label: label.to_owned(),

@@ -44,7 +44,6 @@ const STRAIGHT: f64 = 0.9985;
 /// Half the width and half the length of an arrowhead, on the sheet.
 const ARROWHEAD: (f64, f64) = (2.3, 3.4);
 
-/// The layer.
 pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> String {
     let cell = lattice.width / lattice.cols.max(1) as f64;
     let mut spacing = style.spacing.max(style.least_cells * cell);

@@ -97,7 +97,6 @@ pub struct Timeline {
 
 impl Timeline {
     /// The text of an SVG file.
-    #[must_use]
     pub fn svg(&self) -> String {
         let lanes = &self.lanes[..self.lanes.len().min(MOST_LANES)];
         let x = Range::to(self.duration_s);

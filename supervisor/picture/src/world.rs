@@ -85,7 +85,6 @@ impl Outline {
     }
 }
 
-/// The layer.
 pub(super) fn layer(view: &View, world: &Shapes) -> String {
     let outlines = Outline::ALL
         .into_iter()

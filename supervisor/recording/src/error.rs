@@ -1,63 +1,39 @@
-//! What can go wrong with a recording.
+//! Errors of recordings.
 
 use std::{io, path::PathBuf};
 
 use common::bus::BusError;
 use thiserror::Error;
 
-/// What can go wrong with a recording.
+/// Errors of recordings.
 #[derive(Debug, Error)]
 pub enum RecordingError {
-    /// The file system refused.
     #[error("cannot {action} recording {file}: {source}")]
     File {
-        /// What was tried.
         action: &'static str,
-        /// The file.
         file: PathBuf,
-        /// What the system reports.
         source: io::Error,
     },
-    /// The file cannot be written any more.
     #[error("cannot write recording {file}: {problem}; is the disk full?")]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the writer reports.
-        problem: String,
-    },
-    /// A directory without a recording.
+    Write { file: PathBuf, problem: String },
     #[error("{0} holds no recording.mcap: give a run that was recorded, or a recording")]
     NoRecording(PathBuf),
-    /// A directory with several.
     #[error(
         "{directory} holds several recordings, of a run that was resumed: give one of them, up to {last}"
     )]
     Several {
-        /// The directory.
         directory: PathBuf,
-        /// The last of them.
+        /// The newest of them.
         last: PathBuf,
     },
-    /// It is not a recording of ours.
+    /// It is not a recording of `firsthand`.
     #[error("{file} is no recording of firsthand: {problem}; `firsthand record` makes one")]
-    Foreign {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A message is not what its topic carries.
+    Foreign { file: PathBuf, problem: String },
+    /// A message does not match its topic.
     #[error(
         "{file} holds a message on {topic:?} that this version does not know; read it with the version that wrote it"
     )]
-    Message {
-        /// The file.
-        file: PathBuf,
-        /// The topic.
-        topic: String,
-    },
-    /// The bus.
+    Message { file: PathBuf, topic: String },
     #[error(transparent)]
     Bus(#[from] BusError),
 }

@@ -19,14 +19,14 @@ use mcap::{
 
 use crate::{error::RecordingError, foxglove, schema};
 
-/// A chunk is written when it has so many bytes, and [`CHUNK_EVERY`].
+/// A chunk is written when it has so many bytes, or after [`CHUNK_EVERY`].
 const CHUNK_BYTES: u64 = 1 << 19;
-/// What a recorder that is killed loses at most.
+/// Longest time between two chunks: a killed recorder loses no more.
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
-/// The name of the metadata record that says what was recorded.
+/// The name of the metadata record about the run.
 pub(crate) const RUN: &str = "run";
 
-/// A recording that is written.
+/// A recording that is being written.
 pub(crate) struct RecordingFile {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,
@@ -43,8 +43,8 @@ pub(crate) fn now_ns() -> u64 {
 }
 
 impl RecordingFile {
-    /// Make the file, which must not exist, `about` a run, with a channel for each of `topics`. It gets its name when all of that
-    /// is written: whatever is called so can be read.
+    /// Make a new file `about` a run, with a channel for each of `topics`. It gets its name when all of that is written, so a
+    /// file of this name can always be read.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn EncodedTopic],
@@ -66,7 +66,7 @@ impl RecordingFile {
             .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is written in one piece when it is whole, and never touched again.
+            // A chunk is written in one piece when it is complete, and never changed.
             .disable_seeking(true);
         let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
         let mut recording = Self {
@@ -111,7 +111,7 @@ impl RecordingFile {
         Ok(())
     }
 
-    /// Keep `message`, a sample of a topic.
+    /// Add `message`, a sample of a topic.
     pub(crate) fn sample(
         &mut self,
         spec: &Spec,
@@ -122,7 +122,7 @@ impl RecordingFile {
         self.write(spec.name, stamp.sequence, published, message)
     }
 
-    /// Keep `json`, of mission time `stamp_ns` if it has one.
+    /// Add `json`, of mission time `stamp_ns` if it has one.
     pub(crate) fn json(
         &mut self,
         topic: &'static str,
@@ -133,7 +133,7 @@ impl RecordingFile {
         self.write(topic, 0, published, json.to_string().as_bytes())
     }
 
-    /// When mission time was 0, as publish times have it, nanoseconds since 1970.
+    /// Time of mission time 0 on the clock of publish times, nanoseconds since 1970.
     pub(crate) const fn began_ns(&self) -> u64 {
         self.began_ns
     }
@@ -145,7 +145,7 @@ impl RecordingFile {
         publish_time: u64,
         message: &[u8],
     ) -> Result<(), RecordingError> {
-        // A topic that was not asked for.
+        // This topic is not recorded.
         let Some(&channel_id) = self.channels.get(topic) else {
             return Ok(());
         };
@@ -159,7 +159,6 @@ impl RecordingFile {
         written.map_err(failed(&self.path))
     }
 
-    /// Say what is recorded.
     fn metadata(&mut self, metadata: BTreeMap<String, String>) -> Result<(), RecordingError> {
         let name = RUN.to_owned();
         let record = Metadata { name, metadata };
@@ -168,7 +167,7 @@ impl RecordingFile {
         self.flush()
     }
 
-    /// Write what came, if that was not done for [`CHUNK_EVERY`].
+    /// Write the current chunk, if the last one was written [`CHUNK_EVERY`] ago.
     pub(crate) fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         if self.chunk_began.elapsed() >= CHUNK_EVERY {
             self.flush()?;
@@ -181,7 +180,7 @@ impl RecordingFile {
         self.writer.flush().map_err(failed(&self.path))
     }
 
-    /// Write the rest, and the summary by which readers find their way.
+    /// Write the rest, and the summary that readers use as an index.
     pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
         self.writer.finish().map(drop).map_err(failed(&self.path))
     }

@@ -1,4 +1,4 @@
-//! What viewers draw, in Foxglove's schemas as JSON (<https://docs.foxglove.dev/docs/sdk/schemas>): the pose, the safety map,
+//! Messages for viewers, in Foxglove's schemas as JSON (<https://docs.foxglove.dev/docs/sdk/schemas>): the pose, the safety map,
 //! the sonar's cone with the trajectory, log lines.
 
 use common::{
@@ -20,14 +20,14 @@ pub(crate) const CHANNELS: &[(&str, &str)] = &[
     ("recorder", "firsthand.Recorder"),
 ];
 
-/// The frame of the mission: all coordinates are in it.
+/// The name of the mission's frame, in which all coordinates are.
 const FRAME: &str = "mission";
 /// Mission time between scenes and between maps, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// Points of the trajectory that are drawn; of a longer one every second, fourth ... is.
+/// Points of the trajectory that are drawn. From a longer one every second, fourth, ... point is drawn.
 const TRAJECTORY: usize = 1000;
 
-/// Viewers know the schemas by their names; what each is made of is published at the address above.
+/// Viewers know the schemas by their names; their fields are published at the address above.
 pub(crate) fn schema(name: &str) -> String {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -37,7 +37,7 @@ pub(crate) fn schema(name: &str) -> String {
     .to_string()
 }
 
-/// What has been seen so far.
+/// The state of the drawing so far.
 pub(crate) struct Drawn {
     mission: Option<Mission>,
     grid: Replica<u8>,
@@ -45,7 +45,7 @@ pub(crate) struct Drawn {
     scene_ns: Option<u64>,
     pose: Pose2,
     trajectory: Vec<[f64; 2]>,
-    /// Every so manyth pose is kept.
+    /// Every `stride`-th pose is stored.
     stride: usize,
     poses: usize,
 }
@@ -67,7 +67,7 @@ impl Drawn {
         }
     }
 
-    /// What is drawn because of a `message` of `topic`; mission time 0 is `began_ns` since 1970.
+    /// The messages for viewers that follow from a `message` of `topic`. Mission time 0 is `began_ns` since 1970.
     pub(crate) fn take(&mut self, topic: &str, message: &[u8], began_ns: u64) -> Option<Drawing> {
         if topic == topics::POSE.spec().name {
             return Some(self.pose(&decode_sample(message)?, began_ns));
@@ -170,7 +170,7 @@ impl Drawn {
     }
 }
 
-/// The outline of what the front sonar saw: from the sensor to both ends of the arc, and along it.
+/// The outline of the front sonar's cone: from the sensor to both ends of the arc, and along it.
 fn cone(mission: &Mission, robot: Pose2, range: &RangeSample) -> Vec<[f64; 2]> {
     /// Half the angle in which the data sheet promises echoes, degrees.
     const HALF_CONE_DEG: f64 = 15.0;
@@ -194,9 +194,8 @@ fn cone(mission: &Mission, robot: Pose2, range: &RangeSample) -> Vec<[f64; 2]> {
     [sensor].into_iter().chain(arc).chain([sensor]).collect()
 }
 
-/// A line of the log of `process`, now.
 pub(crate) fn log(process: &str, line: &str, now_ns: u64) -> Value {
-    // The numbers of foxglove.LogLevel; lines without a level say why a process ended.
+    // The numbers of foxglove.LogLevel. Lines without a level say why a process ended, so they are errors.
     let level = ["DEBUG", "INFO", "WARN", "ERROR"]
         .iter()
         .position(|level| line.split_whitespace().take(3).any(|word| word == *level));
@@ -230,7 +229,7 @@ fn pose(x: f64, y: f64, heading: f64) -> Value {
     })
 }
 
-/// As JSON carries bytes (RFC 4648).
+/// Base64, in which JSON carries bytes (RFC 4648).
 fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);

@@ -1,20 +1,20 @@
-//! Recordings: everything on a robot's bus in one file, written by a consumer like any other, read by reports, replayed.
+//! Recordings: all samples of a robot's bus in one file, written by a consumer, read by reports and replays.
 //!
 //! # The file
 //! MCAP, in chunks compressed with LZ4; each chunk is written whole, at least once a second. A recorder that is killed
 //! leaves a file that ends after its last whole chunk.
 //!
 //! - A channel for each topic of the table that its column `logged` names, under the topic's name. A message is one
-//!   sample, whole, in the CDR encoding of ROS 2; its schema is the text of a ROS 2 message (`ros2msg`), made from the
-//!   topic's layout. Of a topic of slices a message is the `header` and its `elements`.
+//!   whole sample in the CDR encoding of ROS 2; its schema is the text of a ROS 2 message (`ros2msg`), made from the
+//!   topic's layout. A message of a topic of slices has a `header` and `elements`.
 //! - Channels for viewers, in Foxglove's schemas as JSON: `foxglove/pose` (`foxglove.PoseInFrame`), `foxglove/grid`
 //!   (`foxglove.Grid`), `foxglove/scene` (`foxglove.SceneUpdate`: the sonar's cone and the trajectory), `log`
-//!   (`foxglove.Log`: what the stages and the supervisor wrote into their logs).
-//! - A channel `recorder` (JSON): how many samples of each topic the recorder lost so far, whenever that grows.
-//! - A metadata record `run`: robot, mission, seed, build, machine, and `run_toml`, the run as its stages were given it.
+//!   (`foxglove.Log`: the logs of the stages and the supervisor).
+//! - A channel `recorder` (JSON): numbers of samples by topic that the recorder lost so far, whenever they grow.
+//! - A metadata record `run`: robot, mission, seed, build, machine, and `run_toml`, the run file of the stages.
 //!
-//! The log time of a message is when the recorder took it, nanoseconds since 1970. The publish time is the start of
-//! the recording plus the sample's mission time. The sequence of a message is its sample's.
+//! The log time of a message is the time at which the recorder read it, nanoseconds since 1970. The publish time is the start
+//! of the recording plus the sample's mission time. The sequence of a message is that of its sample.
 //!
 //! A new run of the robot begins a new file: `F.mcap`, `F-2.mcap`.
 //!
@@ -43,13 +43,13 @@
 //! |---|---|
 //! | [`schema`] | the schema of a topic, made from its layout |
 //! | `file` | writing the file |
-//! | `foxglove` | what viewers draw |
+//! | `foxglove` | messages for viewers |
 //! | `log_files` | lines that the processes of a run append to their logs |
-//! | `losses` | which samples did not come |
-//! | [`recorder`] | the consumer |
+//! | `losses` | samples that the recorder missed |
+//! | [`recorder`] | the recorder |
 //! | [`reader`] | reading the file |
 //! | [`replay`] | recordings replayed to the bit (feature `replay`) |
-//! | `error` | what can go wrong |
+//! | `error` | errors |
 
 mod error;
 mod file;

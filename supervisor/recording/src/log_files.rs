@@ -8,19 +8,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Bytes that are taken of one log at once.
+/// Most bytes that are read of one log at once.
 const AT_ONCE: usize = 1 << 16;
 
 /// Follows the logs of one run.
 #[derive(Debug)]
 pub(crate) struct LogFiles {
     directory: PathBuf,
-    /// How far each was read, and the line that is not whole yet.
+    /// The position in each log, and its incomplete last line.
     read: HashMap<PathBuf, (u64, Vec<u8>)>,
 }
 
 impl LogFiles {
-    /// From their beginning, or only what is appended from now on.
+    /// Follow logs from their beginning, or only lines from now on.
     pub(crate) fn follow(directory: &Path, from_the_beginning: bool) -> Self {
         let mut files = Self {
             directory: directory.to_path_buf(),
@@ -46,7 +46,7 @@ impl LogFiles {
             .collect()
     }
 
-    /// Give `each` the process and the text of every line that was appended. What cannot be read now is tried again.
+    /// Call `each` with the process and the text of every new line. A log that cannot be read is tried again later.
     pub(crate) fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
         for file in self.files() {
             let process = file
@@ -74,7 +74,7 @@ impl LogFiles {
     }
 }
 
-/// The text of `file`; what is longer than `most` bytes is cut off.
+/// The text of `file`, at most `most` bytes.
 pub(crate) fn text(file: &Path, most: u64) -> Option<String> {
     let mut text = String::new();
     File::open(file)

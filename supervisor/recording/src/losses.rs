@@ -1,4 +1,4 @@
-//! Which samples did not come, and which came before: the numbers of a writer's samples follow each other.
+//! Counts missing samples and detects repeated ones: each writer numbers its samples.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -16,11 +16,11 @@ const STAMP: std::ops::Range<usize> = 4..28;
 struct Last {
     sequence: u32,
     crc32: u32,
-    /// On which of the buses it came.
+    /// The number of its bus.
     bus: u32,
 }
 
-/// Counts what did not come, on one bus.
+/// Counts missing samples.
 #[derive(Debug, Default)]
 pub(crate) struct Losses {
     /// By topic, stage where every stage writes, and generation.
@@ -31,9 +31,9 @@ pub(crate) struct Losses {
 }
 
 impl Losses {
-    /// A sample came. Says whether it is new: whoever joins a bus again is given the last sample of each writer once more.
+    /// Take a sample. Returns whether it is new: a consumer that joins a bus again receives the last sample of each writer again.
     pub(crate) fn came(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> bool {
-        // Each request is a process of its own.
+        // Each request has a writer of its own.
         if spec.writer == OPERATOR {
             return true;
         }
@@ -49,7 +49,7 @@ impl Losses {
             crc32: crc32fast::hash(message),
             bus: self.bus,
         };
-        // Whoever attaches late has lost nothing.
+        // Samples before the first one read are not lost.
         let Some(last) = self.last.insert(key, now) else {
             return true;
         };
@@ -63,18 +63,18 @@ impl Losses {
         (now.sequence, now.crc32) != (last.sequence, last.crc32)
     }
 
-    /// A bus was joined again, another one or the same: writers may have begun again, and what was published meanwhile is no
-    /// loss that can be counted.
+    /// A bus was joined, another one or the same again. Writers may have restarted, and samples published meanwhile cannot be
+    /// counted.
     pub(crate) const fn joined_again(&mut self) {
         self.bus += 1;
     }
 
-    /// How many of each topic, if that grew since this was last asked.
+    /// Losses by topic, if they grew since the last call.
     pub(crate) fn grown(&mut self) -> Option<&BTreeMap<&'static str, u64>> {
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }
 
-    /// How many in all.
+    /// Total losses.
     pub(crate) fn total(&self) -> u64 {
         self.counts.values().sum()
     }

@@ -1,4 +1,4 @@
-//! Reading the file. It is outside: nothing in it is believed, and no more is held than one chunk.
+//! Reads the file. Its content is not trusted, and only one chunk is held in memory.
 
 use std::{
     collections::BTreeMap,
@@ -22,24 +22,23 @@ use mcap::{
 
 use crate::{error::RecordingError, file::RUN, recorder::numbered};
 
-/// No record or chunk of ours is longer, bytes.
+/// Most bytes of a record or chunk. The recorder's are shorter.
 const LONGEST_RECORD: usize = 1 << 28;
 
-/// How a file ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// As its recorder meant it.
+    /// The file is complete.
     Complete,
-    /// Its recorder was killed, or its disk was full: it ends after the last whole chunk.
+    /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
     Cut {
-        /// From the first message to the last that is there.
+        /// From the first message to the last.
         after: Duration,
-        /// What is wrong with what follows.
+        /// The problem after that.
         problem: String,
     },
 }
 
-/// A recording: of one run, or a part of one.
+/// A recording of one run, or of a part of one.
 #[derive(Clone, Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -54,11 +53,10 @@ pub struct Recording {
 /// A message of any topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Its topic.
     pub topic: Arc<str>,
     /// When the recorder took it, nanoseconds since 1970.
     pub log_ns: u64,
-    /// The number of the sample among those of its writer.
+    /// The sample's number, counted by its writer.
     pub sequence: u32,
     /// In the topic's encoding.
     pub data: Vec<u8>,
@@ -69,7 +67,6 @@ pub struct Message {
 pub struct Sample<P> {
     /// When the recorder took it, nanoseconds since 1970.
     pub log_ns: u64,
-    /// The sample.
     pub sample: P,
 }
 
@@ -78,23 +75,21 @@ pub struct Sample<P> {
 pub struct SliceSample<H, T> {
     /// When the recorder took it, nanoseconds since 1970.
     pub log_ns: u64,
-    /// The header.
     pub header: H,
     /// The slice.
     pub elements: Vec<T>,
 }
 
-/// Parts of a run that are looked for at most.
+/// Most parts of a run.
 const MOST_PARTS: usize = 1000;
 
-/// Where the recordings of a run go, the first one first: a run that is resumed begins another.
+/// The files of a run's recordings, in order: a resumed run begins another.
 pub fn places(run: &Path) -> impl Iterator<Item = PathBuf> {
     let first = run.join("recording.mcap");
     (1..).map(move |number| numbered(&first, number))
 }
 
-/// The recordings in a run's directory, the first one first.
-#[must_use]
+/// The recordings in a run's directory, in order.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
     places(run)
         .take(MOST_PARTS)
@@ -103,11 +98,8 @@ pub fn parts(run: &Path) -> Vec<PathBuf> {
 }
 
 impl Recording {
-    /// Read what `path` says of itself, and how it ends: all of it is read once, and none is held. Of a run's directory it
-    /// is the recording in it.
-    ///
-    /// # Errors
-    /// When it cannot be read, is no recording of a run, or a directory with none or several.
+    /// Read the run, the counts and the end of the recording at `path`, a file or a run's directory. The file is read once and
+    /// not held in memory.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         if path.is_dir() {
             return match &parts(path)[..] {
@@ -173,31 +165,24 @@ impl Recording {
     }
 
     /// The file.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The run, as its stages were given it: mission, clock, robot.
-    #[must_use]
+    /// The run file of the stages: mission, clock, robot.
     pub const fn run(&self) -> &Run {
         &self.run
     }
 
-    /// The run as TOML.
-    #[must_use]
     pub fn run_text(&self) -> &str {
         self.about("run_toml")
     }
 
-    /// Which build recorded it.
-    #[must_use]
+    /// The build that recorded it.
     pub fn build(&self) -> &str {
         self.about("build")
     }
 
-    /// On which machine.
-    #[must_use]
     pub fn machine(&self) -> &str {
         self.about("machine")
     }
@@ -206,35 +191,27 @@ impl Recording {
         self.about.get(key).map_or("", String::as_str)
     }
 
-    /// How it ends.
-    #[must_use]
     pub const fn end(&self) -> &End {
         &self.end
     }
 
-    /// Messages of each topic.
-    #[must_use]
+    /// Numbers of messages by topic.
     pub const fn counts(&self) -> &BTreeMap<String, u64> {
         &self.counts
     }
 
-    /// Samples of each topic that the recorder says it lost.
-    #[must_use]
+    /// Numbers of samples by topic that the recorder lost.
     pub const fn lost(&self) -> &BTreeMap<String, u64> {
         &self.lost
     }
 
     /// When the first and the last message were taken, nanoseconds since 1970; none without messages.
-    #[must_use]
     pub const fn bounds_ns(&self) -> Option<(u64, u64)> {
         self.bounds
     }
 
-    /// The messages of the topics that `wanted` names, in the order of the file; all without names. They end where the file
-    /// is cut.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
+    /// The messages of the topics that `wanted` names, or of all without names, in the order of the file. They end where the
+    /// file is cut.
     pub fn messages(&self, wanted: &[&str]) -> Result<Messages, RecordingError> {
         Ok(Messages {
             records: Some(Records::open(&self.path)?),
@@ -243,9 +220,6 @@ impl Recording {
     }
 
     /// The samples of `topic`, in the order of the file.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
     pub fn samples<P: Payload + Stamped + Layout>(
         &self,
         topic: &'static Topic<P>,
@@ -258,9 +232,6 @@ impl Recording {
     }
 
     /// The headers and slices of `topic`, in the order of the file.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
     pub fn slices<H: Payload + Stamped + Layout, T: Payload + Layout>(
         &self,
         topic: &'static SliceTopic<H, T>,
@@ -278,7 +249,7 @@ impl Recording {
         })
     }
 
-    /// What `decode` makes of the messages of `topic`, given their times and data.
+    /// The results of `decode` for the messages of `topic`, given their times and data.
     fn decoded<S, D: Fn(u64, &[u8]) -> Option<S>>(
         &self,
         topic: &str,
@@ -301,7 +272,7 @@ impl Recording {
     }
 }
 
-/// What a message of the recorder itself says.
+/// A message of the recorder itself.
 fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
     #[derive(serde::Deserialize)]
     struct Recorder {
@@ -314,7 +285,7 @@ fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
 /// The messages of some topics, in the order of the file.
 #[derive(Debug)]
 pub struct Messages {
-    /// None once all were given.
+    /// None after the last.
     records: Option<Records>,
     wanted: Vec<String>,
 }
@@ -354,15 +325,15 @@ impl Iterator for Messages {
     }
 }
 
-/// What is read of a file.
+/// An item of a file.
 enum Found {
     Metadata(String, BTreeMap<String, String>),
     Message(MessageHeader, Vec<u8>),
 }
 
-/// Why reading ends before the end.
+/// Why reading stops early.
 enum Stop {
-    /// Nothing after this is whole.
+    /// The rest is incomplete or damaged.
     Cut(String),
     Error(RecordingError),
 }
@@ -390,7 +361,7 @@ impl Records {
             file: path.to_path_buf(),
             source,
         })?;
-        // Nothing of a chunk is believed before all of it was checked.
+        // A chunk is checked as a whole before its content is used.
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(LONGEST_RECORD);
@@ -410,7 +381,7 @@ impl Records {
         })
     }
 
-    /// The next record that matters; none at the end of a complete file.
+    /// The next relevant record; none at the end of a complete file.
     fn next(&mut self) -> Result<Option<Found>, Stop> {
         while let Some(event) = self.reader.next_event() {
             let cut = |error: McapError| Stop::Cut(error.to_string());

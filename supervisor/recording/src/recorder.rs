@@ -1,7 +1,7 @@
-//! The consumer: attaches to a robot at any time, keeps what is published, follows the robot from run to run.
+//! The recorder is a consumer: it attaches to a robot at any time, records all topics, and follows the robot from run to run.
 //!
-//! It holds nothing but the chunk that is written next: when the disk is slow or the machine busy, samples that no longer
-//! fit in the bus's buffers are lost to it and counted, and no stage waits.
+//! It holds only the chunk that is written next. When the disk is slow or the machine busy, samples that no longer fit in
+//! the bus's buffers are lost to it and counted. No stage waits.
 
 use std::{
     collections::BTreeMap,
@@ -26,27 +26,25 @@ use crate::{
     losses::Losses,
 };
 
-/// Samples come at least so often to the recorder, whatever wakes it.
+/// Longest time between two reads of the bus.
 const POLL: Duration = Duration::from_millis(10);
-/// How often logs are looked at.
+/// Time between two reads of the logs.
 const LOGS_EVERY: Duration = Duration::from_millis(250);
-/// No run file is longer, bytes.
+/// Most bytes of a run file.
 const LONGEST_RUN_FILE: u64 = 1 << 24;
 /// Niceness of the process: stages that answer the robot go first.
 const NICE: i32 = 5;
 
-/// What to record, and where.
 #[derive(Clone)]
 pub struct Options {
-    /// The robot.
     pub domain: Domain,
-    /// The file; that of the robot's next run is called `F-2.mcap`.
+    /// The file. That of the robot's next run is called `F-2.mcap`.
     pub out: PathBuf,
-    /// The topics; none for those that the table logs.
+    /// The topics; without names, those that the table logs.
     pub topics: Option<Vec<&'static dyn EncodedTopic>>,
-    /// Whether topics that are logged with fields are kept, too.
+    /// Whether topics that the table logs only with fields are recorded too.
     pub fields: bool,
-    /// The directory of the one run that is recorded; none to find it, and to follow the robot from run to run.
+    /// The directory of the one run that is recorded; none to find it and to follow the robot from run to run.
     pub run: Option<PathBuf>,
 }
 
@@ -63,28 +61,25 @@ impl Options {
     }
 }
 
-/// What happens, for who started the recorder.
+/// Events for the caller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Happened<'a> {
-    /// It is attached, and nothing from now on is missed; into this file.
+    /// It is attached, and records into this file from now on.
     Attached(&'a Path),
-    /// A file is complete; so many samples were lost to it.
+    /// A file is complete. So many samples were lost.
     Complete(&'a Path, u64),
 }
 
 /// The readers of one bus.
 type Readers = Vec<(&'static dyn EncodedTopic, Box<dyn EncodedReader>)>;
 
-/// Record until `stop` says so; of one run, until that ends.
-///
-/// # Errors
-/// When a file cannot be made or written, or a bus that is there cannot be used.
+/// Record until `stop` returns true; a single run until its end.
 pub fn record(
     options: &Options,
     stop: &mut dyn FnMut() -> bool,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result<(), RecordingError> {
-    // Where that is refused they share the processor.
+    // If that is refused, the recorder shares the processor with the stages.
     let _ = rustix::process::nice(NICE);
     let chosen = options.topics();
     let open = |bus: &Bus| -> Result<Readers, BusError> {
@@ -92,7 +87,7 @@ pub fn record(
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
-    // The end of a tick; and the start of a generation, which may be killed at once.
+    // It wakes at the end of a tick, and at the start of a generation, which may be killed soon.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
         .also_on([&topics::INPUTS as &'static dyn topics::AnyTopic]);
     let mut current: Option<CurrentRun> = None;
@@ -107,7 +102,7 @@ pub fn record(
         };
         if news == Some(true) {
             let holder = options.domain.supervisor().ok().flatten();
-            // Another supervisor goes on with the run, and starts a recorder of its own.
+            // Another supervisor resumes the run, and starts a recorder of its own.
             if options.run.is_some() && supervisor.is_some() && supervisor != holder {
                 if let Some(mut ended) = current.take() {
                     ended.finish(tell)?;
@@ -116,7 +111,7 @@ pub fn record(
             }
             supervisor = holder;
             let run = find_run(options);
-            // A bus that was made anew within the run goes into the same file.
+            // Samples of a bus that was recreated within the run go into the same file.
             if let Some(mut ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
                 ended.finish(tell)?;
             }
@@ -151,7 +146,7 @@ pub fn record(
     }
 }
 
-/// The directory of the run that is under way.
+/// The directory of the current run.
 fn find_run(options: &Options) -> Option<PathBuf> {
     let link = options.domain.run_directory();
     options.run.clone().or_else(|| fs::read_link(link).ok())
@@ -170,7 +165,7 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
 struct CurrentRun {
     path: PathBuf,
     directory: Option<PathBuf>,
-    /// None once it is complete.
+    /// None if it is complete.
     file: Option<RecordingFile>,
     drawn: Drawn,
     losses: Losses,
@@ -228,7 +223,7 @@ impl CurrentRun {
         })
     }
 
-    /// Keep what was published.
+    /// Record all new samples.
     fn take(&mut self, readers: &mut Readers) -> Result<(), RecordingError> {
         let Some(file) = &mut self.file else {
             return Ok(());
@@ -286,13 +281,13 @@ impl CurrentRun {
     }
 }
 
-/// The build: its version, and a checksum of this very executable.
+/// The build: its version, and a checksum of this executable.
 fn build() -> String {
     let crc = fs::read("/proc/self/exe").map_or(0, |bytes| crc32fast::hash(&bytes));
     format!("{}, executable crc32 {crc:08x}", env!("CARGO_PKG_VERSION"))
 }
 
-/// The machine: its name, system and processors.
+/// The machine: name, system and processors.
 fn machine() -> String {
     let text = |file| fs::read_to_string(file).unwrap_or_default();
     let (name, system) = (

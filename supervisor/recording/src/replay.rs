@@ -1,18 +1,18 @@
-//! Replays: every generation of every stage of a recording, fed with what its step took, through the same step, started from
-//! the checkpoint it was started from. What comes out is compared to what was recorded, to the bit.
+//! Replays every generation of every stage of a recording: from its checkpoint, through the same step, with the recorded
+//! inputs. The outputs are compared with the recorded ones to the bit.
 //!
-//! A generation is replayed from its beginning, since its state follows from all it took. What was recorded of it in part
-//! is not replayed in part: the report says why it was not.
+//! A generation is replayed only from its beginning, because its state follows from all its inputs. The report says why a
+//! generation was not replayed.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`report`] | what a replay found |
-//! | `generation` | one generation, replayed while its inputs come |
+//! | [`report`] | the result of a replay |
+//! | `generation` | one generation, replayed while its inputs are read |
 //! | `pieces` | the entries of a generation's inputs, from their pieces |
-//! | [`driver`] | a recording, replayed |
-//! | [`values`] | the fields of a message, for words about a difference |
+//! | [`driver`] | the replay of a recording |
+//! | [`values`] | the fields of a message as text |
 //! | [`diff`] | where two recordings part |
-//! | `samples` | samples of a tick, and where two of them differ |
+//! | `samples` | recorded samples of a tick, and where two of them differ |
 //! | [`live`] | a recording played on a bus, with stages in processes of their own |
 
 pub mod diff;

@@ -5,21 +5,19 @@ use common::{
     topics::AnyTopic,
 };
 
-/// What a schema is called and says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schema {
     /// `firsthand/msg/Pose`.
     pub name: String,
-    /// Field by field, then the messages in it.
+    /// Its fields, then the messages that it contains.
     pub text: String,
 }
 
-/// Between messages.
+/// The separator of messages.
 const RULE: &str =
     "================================================================================\n";
 
 /// The schema of the messages of `topic`.
-#[must_use]
 pub fn of(topic: &dyn AnyTopic) -> Schema {
     let (header, element) = topic.layout();
     let mut parts = Vec::new();
@@ -71,7 +69,7 @@ fn fields(structure: &Structure, parts: &mut Vec<Structure>) -> String {
 fn kind(of: &Kind, parts: &mut Vec<Structure>) -> String {
     match of {
         Kind::Number(name) => number(name).to_owned(),
-        // A schema has no arrays of arrays: one after another they are one array.
+        // A schema has no arrays of arrays; they become one array.
         Kind::Array(inner, length) => match &**inner {
             Kind::Array(inner, more) => kind(&Kind::Array(inner.clone(), length * more), parts),
             inner => format!("{}[{length}]", kind(inner, parts)),
@@ -83,7 +81,6 @@ fn kind(of: &Kind, parts: &mut Vec<Structure>) -> String {
     }
 }
 
-/// The name of a number in messages.
 fn number(rust: &str) -> &str {
     match rust {
         "u8" => "uint8",

@@ -19,7 +19,6 @@ pub enum ReportError {
     File {
         /// What was tried.
         action: &'static str,
-        /// The file.
         file: PathBuf,
         /// What the system reports.
         source: io::Error,

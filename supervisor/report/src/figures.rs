@@ -13,7 +13,6 @@ use crate::{beliefs::Belief, content::Content};
 /// Buckets of the latency's histogram in an octave.
 const PER_OCTAVE: f64 = 8.0;
 
-/// A figure.
 pub(crate) struct Figure {
     /// Name of its file, without ending.
     pub(crate) name: &'static str,

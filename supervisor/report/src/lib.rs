@@ -49,9 +49,6 @@ pub const PAGE: &str = "report.html";
 
 /// Write the report of `run`, a run's directory or a recording, into `out`: by default `report` in the run's directory, or
 /// `F-report` beside the recording `F.mcap`. The page.
-///
-/// # Errors
-/// When there is no recording, it cannot be read, or the report cannot be written.
 pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
     let source = Source::find(run)?;
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);

@@ -1,4 +1,4 @@
-//! Signals to random stages at random times, and what became of the missions: a test of the supervisor through real
+//! Signals to random stages at random times, and the results of the missions: a test of the supervisor through real
 //! processes.
 //!
 //! Each mission is run twice with one seed: undisturbed, then attacked. It must reach its target without touching
@@ -6,20 +6,20 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`Options`] | what is attacked, and how |
-//! | `schedule` | which stage gets which signal when, seeded |
+//! | [`Options`] | the mission that is attacked, and the kinds of attack |
+//! | `schedule` | the seeded schedule of signals |
 //! | `mission` | one mission, undisturbed and attacked |
-//! | `series` | what the missions have in common |
-//! | `attack`, `subscriptions` | the attacker of one mission; what it reads from the bus |
-//! | `kind`, `recovery` | how a process is hit; one that was, until its successor works |
-//! | [`Consumer`], `consumers`, `terminal`, `words` | consumers that are hit, and started again; a terminal for one that draws; a user's command |
-//! | `replays` | the missions' recordings, replayed |
-//! | `resources`, `leftovers` | what a process holds; what outlived a mission |
+//! | `series` | the state that the missions share |
+//! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
+//! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
+//! | [`Consumer`], `consumers`, `terminal`, `words` | consumers that are hit and restarted; a terminal for one that draws; a user's command |
+//! | `replays` | replays of the missions' recordings |
+//! | `resources`, `leftovers` | resources of a process; files and processes that outlived a mission |
 //! | [`Report`] | the result of all missions |
 //! | [`signals`] | the table of signals, THE file format |
-//! | [`robot_fault`] | THE table of the ways in which a robot lies to its link |
-//! | `robot_faults`, `proxy`, `fault_injector` | missions of such robots; the wire, and what becomes of the bytes on it |
-//! | [`StopTimeTable`] | how long each moved after that |
+//! | [`robot_fault`] | THE table of robot faults |
+//! | `robot_faults`, `proxy`, `fault_injector` | missions of faulty robots; the proxy before the robot; the changes of its bytes |
+//! | [`StopTimeTable`] | how long each moved after its fault |
 
 mod attack;
 mod consumer;
@@ -55,7 +55,7 @@ pub use stop_time_table::{Entry, StopTimeTable};
 
 use series::Series;
 
-/// Attack missions, one after the other, until enough signals were sent. `show` is called after each.
+/// Attack missions, one after the other, until enough signals are sent. `show` is called after each.
 pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, ChaosError> {
     let mut series = Series::new(options)?;
     while !series.is_over() {

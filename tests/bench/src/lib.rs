@@ -2,8 +2,16 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`chaos`] | signals to random processes at random times, and what became of the missions; faults of the robot |
+//! | [`chaos`] | signals to random processes at random times; faults of the robot |
 //! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
 
 pub mod chaos;
 pub mod tick;
+
+/// The value that `share` of all values do not exceed; none of nothing.
+pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    values.get((last as f64 * share).round() as usize).copied()
+}

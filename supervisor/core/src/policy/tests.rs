@@ -12,7 +12,7 @@ const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
 }
 
-/// Of the link: beats due every 750 ms, ready due after 3 s.
+/// The link's deadlines: a beat every 750 ms, ready after 3 s.
 fn running() -> Policy {
     let mut policy = Policy::new(TABLE[0].deadlines);
     assert_eq!(policy.step(Event::Start, ms(0)), Some(Action::Start));
@@ -181,7 +181,7 @@ fn a_bus_that_blocks_starts_is_recreated_once() {
                 Event::Exited
             };
             answers.push(policy.step(event, now));
-            // As when all stages are stopped and started.
+            // All stages are stopped and started.
             policy.step(Event::Stop, now);
             assert_eq!(policy.step(Event::Start, now), Some(Action::Start));
         }
@@ -270,7 +270,6 @@ struct Generation {
     sign: Now,
     /// Asked to stop, for a successor or for good: that is no death.
     stopping: bool,
-    /// Aborted.
     aborted: bool,
     /// When it is to be killed.
     kill: Option<Now>,
@@ -335,7 +334,7 @@ impl Model {
         }
     }
 
-    /// What must be done by the rules alone.
+    /// The action that the rules demand.
     fn expect(&mut self, event: Event) -> Option<Action> {
         let now = self.now;
         let due = self.due().is_some_and(|due| now >= due);
@@ -479,7 +478,7 @@ impl Model {
         pauses
     }
 
-    /// The same with the clock set back: two models of equal ages are equal.
+    /// This model with its clock set back: two models of equal ages are equal.
     fn at_zero(&self) -> Self {
         // A common origin of all times, so that what lies behind stays behind.
         const ORIGIN: Duration = Duration::from_secs(100);

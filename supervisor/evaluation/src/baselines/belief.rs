@@ -1,4 +1,4 @@
-//! The map as a planner follows it: which cells are free, and what a straight line crosses.
+//! A planner's copy of the map: free cells and lines of sight.
 
 use common::{
     grid::{Applied, Cell, CellState, GridFrame, Replica},
@@ -6,7 +6,7 @@ use common::{
 };
 use glam::DVec2;
 
-/// A line of sight is looked at in steps of this part of a cell.
+/// Step along a line of sight, as a share of a cell.
 const SIGHT_STEP: f64 = 0.1;
 
 /// A planner's copy of the `grid`.
@@ -16,17 +16,15 @@ pub struct Belief {
     header: GridHeader,
 }
 
-/// A map that has come: how its cells lie, and which are free. The margin of the body is in the hazard cells already.
+/// A complete map. Hazard cells include the margin of the body.
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
-    /// How the cells lie.
     pub frame: GridFrame,
     cells: &'a [u8],
 }
 
 impl Belief {
-    /// Follow one sample of `grid`. Says whether it could be followed: after a version that is missing the map is of no
-    /// use until a keyframe comes.
+    /// Apply one sample of `grid`. Returns false if a version is missing; then there is no map until a keyframe comes.
     pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
         let followed = self.grid.apply(&header.part, cells) != Applied::Missed;
         if followed {
@@ -35,14 +33,12 @@ impl Belief {
         followed
     }
 
-    /// The header of the newest sample that was followed.
-    #[must_use]
+    /// The header of the newest sample that was applied.
     pub const fn header(&self) -> &GridHeader {
         &self.header
     }
 
     /// The map; none before the first keyframe.
-    #[must_use]
     pub fn map(&self) -> Option<Map<'_>> {
         Some(Map {
             frame: self.grid.frame()?,
@@ -52,8 +48,7 @@ impl Belief {
 }
 
 impl Map<'_> {
-    /// Whether `cell` is in the map and no hazard. Nobody need have looked there.
-    #[must_use]
+    /// Whether `cell` is in the map and not a hazard. It may be unknown.
     pub fn is_free(&self, cell: Cell) -> bool {
         let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
         let byte = inside.then(|| self.cells.get(self.frame.index(cell)).copied());
@@ -62,13 +57,11 @@ impl Map<'_> {
     }
 
     /// The cell at `point` (metres), if it is free.
-    #[must_use]
     pub fn free_cell_at(&self, point: DVec2) -> Option<Cell> {
         self.frame.cell_at(point).filter(|&cell| self.is_free(cell))
     }
 
     /// The neighbour of `cell` by so many columns and rows, if it is free and no corner of a hazard is cut on the way.
-    #[must_use]
     pub fn neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
         let step = |cols, rows| {
             let next = Cell {
@@ -81,9 +74,7 @@ impl Map<'_> {
         (step(cols, 0).is_some() && step(0, rows).is_some()).then_some(next)
     }
 
-    /// The last free point before a hazard on the straight line between two points (metres); none where nothing is in
-    /// the way.
-    #[must_use]
+    /// The last free point before a hazard on the straight line between two points (metres); none if the line is free.
     pub fn last_free(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
         let steps = (from.distance(to) / (SIGHT_STEP * self.frame.resolution_m)).ceil();
         let steps = steps.clamp(1.0, f64::from(u32::MAX)) as u32;
@@ -93,19 +84,17 @@ impl Map<'_> {
     }
 
     /// Whether the straight line between two points (metres) crosses free cells only.
-    #[must_use]
     pub fn sees(&self, from: DVec2, to: DVec2) -> bool {
         self.last_free(from, to).is_none()
     }
 
-    /// The middle of the free cell nearest to `point` (metres); none where there is no free cell.
-    #[must_use]
+    /// The middle of the free cell nearest to `point` (metres); none without a free cell.
     pub fn nearest_free(&self, point: DVec2) -> Option<DVec2> {
         let last = f64::from(self.frame.cells) - 1.0;
         let middle = self.frame.to_cells(point).round();
         let middle = middle.clamp(DVec2::ZERO, DVec2::splat(last));
         let mut nearest: Option<(f64, DVec2)> = None;
-        // Squares of growing size; one that is wholly farther than the nearest cell so far holds no nearer one.
+        // The search goes in squares of growing size, until all cells of a square are farther than the nearest one so far.
         for reach in 0..self.frame.cells {
             let edge = f64::from(reach) - 1.0;
             if nearest.is_some_and(|(distance, _)| edge * self.frame.resolution_m > distance) {

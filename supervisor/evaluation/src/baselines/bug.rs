@@ -23,37 +23,37 @@ use crate::baselines::{
 };
 use boundary::Place;
 
-/// A hazard so near ahead is met; the robot heads for a point of the boundary no farther than this; metres.
+/// Distance at which a hazard ahead counts as met, and to the point of the boundary that the robot heads for, metres.
 const AHEAD_M: f64 = 0.3;
-/// A robot that was so far from where it met a hazard has left that place, metres.
+/// Distance at which the robot has left the place where it met a hazard, metres.
 const AWAY_M: f64 = 0.5;
-/// On the line from start to target: so near to it, in cells and at least in metres.
+/// Distance within which the robot is on the line from start to target, in cells, and at least in metres.
 const ON_LINE_CELLS: f64 = 0.75;
 const ON_LINE_M: f64 = 0.05;
 /// The most cells of a boundary that are looked at ahead.
 const MOST_CELLS: usize = 256;
 
-/// What must survive the process.
+/// The state that must survive the process.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// The epoch of the belief that the rest is of: all begins anew when what was sensed is forgotten.
+    /// The epoch of the map. With a new epoch all state is reset.
     epoch: u64,
-    /// Where the line to the target begins, metres; none before the first pose.
+    /// Start of the line to the target, metres; none before the first pose.
     line_from: Option<DVec2>,
-    /// The hazard that the robot goes around.
+    /// The hazard that the robot circumvents.
     following: Option<Following>,
-    /// The robot came back to where it met the hazard.
+    /// The robot came back to the place where it met the hazard.
     enclosed: bool,
 }
 
-/// A hazard that is gone around.
+/// A hazard that the robot circumvents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Following {
-    /// Where the robot met it, metres.
+    /// The place where the robot met it, metres.
     hit: DVec2,
-    /// Where on the boundary it is.
+    /// The robot's place on the boundary.
     place: Place,
-    /// Whether it was away from there.
+    /// Whether the robot has left the place where it met the hazard.
     was_away: bool,
 }
 
@@ -141,7 +141,7 @@ impl Bug {
     }
 }
 
-/// The straight way to the target.
+/// The straight line to the target.
 #[derive(Clone, Copy, Debug)]
 struct Straight<'a> {
     map: &'a Map<'a>,
@@ -185,8 +185,8 @@ impl Straight<'_> {
 }
 
 impl Following {
-    /// Go on along the boundary to the place nearest to `here`. Says whether there is a boundary still; the map may have
-    /// changed since, then it is followed on from near the robot, most nearly to the `left` of the way to the target.
+    /// Advance along the boundary to the place nearest to `here`. Returns whether there still is a boundary. If the map has
+    /// changed, the boundary is followed from near the robot, most nearly to the `left` of the line to the target.
     fn is_led_on(&mut self, map: &Map<'_>, here: DVec2, left: DVec2) -> bool {
         if !self.place.is_on(map) {
             let cells = [Some(self.place.cell), map.free_cell_at(here)];
@@ -208,7 +208,7 @@ impl Following {
         true
     }
 
-    /// The boundary from here on, as far as it is looked at.
+    /// The boundary from here on, up to [`MOST_AHEAD`] cells.
     fn ahead<'a>(&self, map: &'a Map<'_>) -> impl Iterator<Item = Place> + 'a {
         // A boundary of steps is up to sqrt(2) times as long as it is wide, and folds.
         let cells = (2.0 * AHEAD_M / map.frame.resolution_m).ceil() as usize;
@@ -216,7 +216,7 @@ impl Following {
         std::iter::successors(Some(from), |place| place.next(map)).take(cells.min(MOST_CELLS) + 1)
     }
 
-    /// Whether the robot has come back to where it met the hazard.
+    /// Whether the robot has come back to the place where it met the hazard.
     fn is_back(&self, map: &Map<'_>) -> bool {
         let here = map.frame.centre_of(self.place.cell);
         self.was_away && here.distance(self.hit) <= map.frame.resolution_m

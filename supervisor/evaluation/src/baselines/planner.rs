@@ -1,4 +1,4 @@
-//! What goes into a planner's step, what comes out, and what every planner's guidance says besides the way.
+//! Input and output of a planner's step, and the guidance that all planners share.
 
 use common::{
     mission::{Method, Mission},
@@ -8,57 +8,54 @@ use glam::DVec2;
 
 use crate::baselines::belief::Map;
 
-/// How fast a robot leaves a hazard it stands in, m/s: something is near. The harmonic planner's, under the evidential
-/// method.
+/// Speed of a robot that leaves a hazard, m/s: that of the harmonic planner with the evidential method.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// What a planner takes.
+/// An input of a planner.
 #[derive(Clone, Copy, Debug)]
 pub enum Input<'a> {
     /// A sample of `grid`.
     Grid {
-        /// Its header.
         header: &'a GridHeader,
         /// The cells of its window.
         cells: &'a [u8],
     },
-    /// The pose of the tick: it is answered with guidance.
+    /// The pose of the tick, which is answered with guidance.
     Pose(&'a PoseSample),
 }
 
-/// What follows from an input.
+/// The result of an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
     /// The map is up to date.
     Followed,
     /// A version of the map is missing.
     Missed,
-    /// The answer to a pose.
+    /// The guidance for a pose.
     Guidance(GuidanceSample),
 }
 
-/// What a planner says of a pose.
+/// The direction at a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Way {
-    /// No map yet.
+    /// There is no map yet.
     Unknown,
-    /// Straight to this point, metres.
+    /// Go straight to this point, metres.
     To(DVec2),
-    /// The robot stands in a hazard: straight to this point, metres, slowly.
+    /// The robot stands in a hazard: go slowly and straight to this point, metres.
     Out(DVec2),
-    /// There is none.
+    /// There is no path.
     None,
 }
 
 impl Way {
-    /// Out of the hazard that a robot at `point` (metres) stands in.
-    #[must_use]
+    /// The way out of the hazard for a robot at `point` (metres).
     pub fn out(map: &Map<'_>, point: DVec2) -> Self {
         map.nearest_free(point).map_or(Self::None, Self::Out)
     }
 }
 
-/// What guidance is made from, besides the way.
+/// Makes guidance from a [`Way`].
 #[derive(Clone, Copy, Debug)]
 pub struct Guide {
     /// X_T, metres.
@@ -68,7 +65,6 @@ pub struct Guide {
 
 impl Guide {
     /// For the robot of `mission`.
-    #[must_use]
     pub fn new(mission: &Mission) -> Self {
         Self {
             target: mission.target,
@@ -77,17 +73,16 @@ impl Guide {
     }
 
     /// The guidance that sends the robot of `sample` along `way` on the map of `belief`.
-    #[must_use]
     pub fn sample(&self, sample: &PoseSample, way: Way, belief: &GridHeader) -> GuidanceSample {
         let pose = sample.pose();
         let to_target = self.target - pose.position;
-        // A robot that stands on the point goes on as it faces.
+        // A robot that stands on the point keeps its heading.
         let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());
         let (status, direction, limit) = match way {
             Way::Unknown => (GuidanceStatus::Waiting, DVec2::ZERO, 0.0),
             Way::To(point) => (GuidanceStatus::Along, toward(point), f64::INFINITY),
             Way::Out(point) => (GuidanceStatus::WayOut, toward(point), WAY_OUT_M_S),
-            // It may be an echo that was none: one look around before the map is blamed, as the harmonic planner has it.
+            // An echo may have been false: the robot looks around once before the map is reset, as with the harmonic planner.
             Way::None if self.looks_around => {
                 (GuidanceStatus::Unreachable, pose.axis().perp(), 0.0)
             }

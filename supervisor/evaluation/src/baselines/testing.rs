@@ -1,4 +1,4 @@
-//! What the tests share: drawn maps, missions, poses.
+//! Maps, missions and poses for tests.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;

@@ -1,6 +1,5 @@
-//! The shortest path over the map, planned anew in every tick, as robots with a global planner of the kind of NavFn or A*
-//! do: A* over eight neighbours that cuts no corner, and guidance to the farthest point of the path that is near and in
-//! sight.
+//! The shortest path over the map, planned anew in every tick, like the global planners NavFn or A*: A* over eight neighbours
+//! that cuts no corner, and guidance to the farthest point of the path that is near and in sight.
 
 use common::{
     clock::MissionTime,
@@ -33,7 +32,7 @@ pub struct Wavefront {
 impl Step for Wavefront {
     type Input<'a> = Input<'a>;
     type Output = Outcome;
-    /// None: it plans from the map alone.
+    /// It has no state: it plans from the map alone.
     type State = ();
 
     fn new(mission: &Mission) -> Self {

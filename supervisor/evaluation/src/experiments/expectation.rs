@@ -1,4 +1,4 @@
-//! What the paper says of its experiments, as conditions on medians, and whether it holds here.
+//! The paper's claims as conditions on medians, and whether they hold here.
 
 use serde::Serialize;
 
@@ -12,35 +12,32 @@ use crate::{
     statistics::Spread,
 };
 
-/// What the paper says.
+/// A claim of the paper.
 #[derive(Debug)]
 struct Claim {
-    /// The experiment it is of.
     experiment: &'static str,
-    /// As a condition.
+    /// The claim as a condition.
     text: &'static str,
-    /// The figure it is about.
     figure: Figure,
-    /// Where the figure must lie.
+    /// The least value of the figure.
     from: f64,
-    /// See `from`.
+    /// The greatest value.
     to: f64,
 }
 
 /// A figure of one experiment.
 #[derive(Clone, Copy, Debug)]
 enum Figure {
-    /// The share that arrived.
+    /// The share of missions that arrived.
     Arrival,
-    /// A median.
     Median(fn(&Spreads) -> Option<Spread>),
-    /// A median over the same one of another experiment.
+    /// A median divided by that of another experiment.
     Over(&'static str, fn(&Spreads) -> Option<Spread>),
 }
 
-/// A figure below 1 by any amount.
+/// The bound of a figure that must be below 1.
 const LESS: f64 = 1.0 - 1e-9;
-/// A figure above 1 by any amount.
+/// The bound of a figure that must be above 1.
 const MORE: f64 = 1.0 + 1e-9;
 
 macro_rules! claims {
@@ -49,7 +46,7 @@ macro_rules! claims {
     };
 }
 
-/// "About half" is 0.4 to 0.6, "about 0.7" is 0.6 to 0.8; a deviation is minor up to a fifth of the way.
+/// "About half" is 0.4 to 0.6, "about 0.7" is 0.6 to 0.8; a deviation is minor up to a fifth of the path.
 static CLAIMS: [Claim; 15] = claims! {
     "1a": "safety events: none", Figure::Median(|of| of.safety_events), 0.0, 0.0;
     "1a": "K is 1: a straight line", Figure::Median(|of| of.k), 0.9, 1.05;
@@ -68,23 +65,19 @@ static CLAIMS: [Claim; 15] = claims! {
     "5-modulated": "wheel range over constant: less", Figure::Over("5-constant", |of| of.wheel_range_rad_s), 0.0, LESS;
 };
 
-/// What the paper says, and what was found by one method.
+/// A claim of the paper, and the figure of one method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Expectation {
-    /// The experiment it is of.
     pub experiment: &'static str,
-    /// The method.
     pub method: &'static str,
-    /// What the paper says, as a condition.
+    /// The claim as a condition.
     pub claim: &'static str,
-    /// The figure.
     pub found: f64,
-    /// Whether it is as the paper says.
+    /// Whether the claim holds.
     pub holds: bool,
 }
 
-/// Every claim whose figures are in `rows`.
-#[must_use]
+/// Every claim whose figures are known.
 pub fn expectations(rows: &[Row]) -> Vec<Expectation> {
     let of = |method: Method| {
         CLAIMS.iter().filter_map(move |claim| {

@@ -1,5 +1,4 @@
-//! THE table of experiments. The paper gives no dimensions of its worlds: they are laid out here, and are the missions
-//! that ship.
+//! THE table of experiments. The paper gives no dimensions of its worlds; the shipped missions choose them.
 
 use std::path::Path;
 
@@ -11,44 +10,37 @@ use crate::{
     trial::{BodySize, Trial},
 };
 
-/// Free ground that a world leaves the body on both sides of its narrowest way, metres.
+/// Free ground on both sides of the body in the narrowest passage of a world, metres.
 const MARGIN_M: f64 = 0.05;
-/// Experiment 3: the drum here is not known, metres. A robot that does not sense touches what it does not know on its
-/// way; by the field of the others the way does not lead past this one.
+/// Experiment 3: the drum at this place is not known, metres. A robot without sensing touches unknown things on its path; the
+/// field of the other drums does not lead past this one.
 const UNKNOWN_AT_M: (f64, f64) = (2.3, -1.7);
 
 /// An experiment of section V.B of the paper.
 #[derive(Debug)]
 pub struct Experiment {
-    /// Its number there, and what varies.
+    /// Its number in the paper, and the variant.
     pub name: &'static str,
-    /// What it is.
     pub title: &'static str,
-    /// What the paper reports of it.
+    /// The paper's report of it.
     pub reported: &'static str,
-    /// The time the paper reports, seconds.
+    /// The paper's time, seconds.
     pub reported_time_s: Option<f64>,
-    /// Name and text of the shipped mission it starts from.
+    /// Name and text of the shipped mission that it changes.
     mission: (&'static str, &'static str),
-    /// What differs from that mission.
+    /// The changes to that mission.
     change: fn(&mut Mission),
-    /// Which methods it makes a difference to.
+    /// The methods that it is run by.
     methods: &'static [Method],
 }
 
-/// No experiment has that name, or its mission is not what it should be.
 #[derive(Debug, Error)]
 pub enum ExperimentError {
-    /// No such experiment.
     #[error("no experiment is called {name:?}; give some of {}", names())]
-    Unknown {
-        /// The name.
-        name: String,
-    },
-    /// The mission does not hold.
+    Unknown { name: String },
+    /// The mission is invalid.
     #[error(transparent)]
     Mission(#[from] MissionError),
-    /// The robot cannot get through.
     #[error(
         "experiment {name}: the robot cannot get to the target; move what stands in its mission"
     )]
@@ -167,15 +159,11 @@ pub static TABLE: [Experiment; 9] = [
 
 impl Experiment {
     /// Whether it is run by `method`.
-    #[must_use]
     pub fn is_run_by(&self, method: Method) -> bool {
         self.methods.contains(&method)
     }
 
-    /// Its mission, but for the method.
-    ///
-    /// # Errors
-    /// When the shipped mission does not hold, which its test rules out.
+    /// Its mission, without the method.
     pub fn mission(&self) -> Result<Mission, MissionError> {
         let (name, text) = self.mission;
         let mut mission = Mission::parse(text, Path::new(name))?;
@@ -185,10 +173,7 @@ impl Experiment {
         Ok(mission)
     }
 
-    /// The same as a trial of the evaluation.
-    ///
-    /// # Errors
-    /// Also when the robot cannot get to the target.
+    /// The experiment as a trial of the evaluation.
     pub fn trial(&self) -> Result<Trial, ExperimentError> {
         let mission = self.mission()?;
         let body = BodySize {
@@ -200,10 +185,7 @@ impl Experiment {
     }
 }
 
-/// The experiments of these names in the order of the table, all if there are none.
-///
-/// # Errors
-/// When there is none of a name.
+/// The experiments of these names in the order of the table; without names all.
 pub fn named(names: &[String]) -> Result<Vec<&'static Experiment>, ExperimentError> {
     let is_known = |name: &String| TABLE.iter().any(|experiment| experiment.name == name);
     if let Some(name) = names.iter().find(|name| !is_known(name)) {

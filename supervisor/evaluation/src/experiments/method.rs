@@ -1,27 +1,24 @@
-//! How the experiments are run.
+//! The methods of the experiments.
 
 use common::mission::Realism;
 
 use crate::setting::{HARMONIC, Setting};
 
-/// Share of the time that the radio is out with measured realism: the paper's link fades, and it does not say how much.
+/// Share of the time of radio outage with measured realism. The paper's link fades; the paper gives no number.
 const OUTAGE_SHARE: f64 = 0.2;
 
 /// The methods that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's, exactly as printed: also its dead reckoning, (21).
+    /// The paper's method, with its dead reckoning, (21).
     Paper,
-    /// The default one.
+    /// The default method.
     Evidential,
 }
 
 impl Method {
-    /// Both, in the order of the reports.
     pub const ALL: [Self; 2] = [Self::Paper, Self::Evidential];
 
-    /// Its name.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Paper => "paper",
@@ -29,8 +26,7 @@ impl Method {
         }
     }
 
-    /// What it sets in every mission.
-    #[must_use]
+    /// Its setting for every mission.
     pub fn setting(self, realism: Realism) -> Setting {
         let own: &[&str] = match self {
             Self::Paper => &["method='paper'", "dead_reckoning.integration='euler'"],

@@ -1,4 +1,4 @@
-//! The experiments as a table in text, as a page, as objects.
+//! The results of the experiments as text, as a page and as JSON objects.
 
 use std::fmt::{self, Write as _};
 
@@ -25,7 +25,7 @@ pub struct Report<'a> {
     expectations: Vec<Expectation>,
 }
 
-/// A column of what was measured: title, value, digits.
+/// A column of measured values: title, value, digits.
 type Column = (&'static str, fn(&Spreads) -> Option<Spread>, usize);
 
 const COLUMNS: [Column; 7] = [
@@ -68,8 +68,6 @@ fn cells(experiment: &Experiment, result: &ExperimentResult) -> Vec<(&'static st
 }
 
 impl<'a> Report<'a> {
-    /// Of the rows of `experiments`.
-    #[must_use]
     pub fn new(experiments: &[&'static Experiment], rows: &'a [Row]) -> Self {
         let results = experiments.iter().map(|&experiment| {
             let by = |method| ExperimentResult::of(experiment, method, rows);
@@ -89,8 +87,7 @@ impl<'a> Report<'a> {
         })
     }
 
-    /// An object for each experiment: what the paper reports, what was found by each method, what of it holds.
-    #[must_use]
+    /// An object for each experiment: the paper's values, those of each method, and the claims that hold.
     pub fn objects(&self) -> Vec<Value> {
         let of = |(experiment, results): &(&'static Experiment, Vec<ExperimentResult>)| {
             let mut object = Map::new();
@@ -122,8 +119,7 @@ impl<'a> Report<'a> {
         self.results.iter().map(of).collect()
     }
 
-    /// All of it as a page; pictures are beside it. `command` is how to make it again.
-    #[must_use]
+    /// The page; pictures are beside it. `command` reproduces the results.
     pub fn html(&self, command: &str, pictured_seed: u64) -> String {
         let mut page = head("The paper's experiments");
         // Writing to a String cannot fail.
@@ -190,7 +186,7 @@ impl<'a> Report<'a> {
 }
 
 impl fmt::Display for Report<'_> {
-    /// The table, and what of the paper's claims holds.
+    /// The table, and the claims that hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let lines: Vec<_> = self.lines().collect();
         let Some(first) = lines.first() else {

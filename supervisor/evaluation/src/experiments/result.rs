@@ -1,4 +1,4 @@
-//! What became of one experiment by one method.
+//! The result of one experiment by one method.
 
 use serde::Serialize;
 
@@ -8,37 +8,33 @@ use crate::{
     statistics::{Estimate, Spread, share},
 };
 
-/// Over the seeds. Spreads are over the missions that arrived; none where none did.
+/// The result over all seeds. Spreads are over the missions that arrived; none if none did.
 #[derive(Clone, Debug)]
 pub struct ExperimentResult {
-    /// The method.
     pub method: Method,
-    /// Missions.
     pub count: usize,
-    /// Those that arrived, by the ground truth.
+    /// Missions that arrived, by the ground truth.
     pub arrived: usize,
-    /// Those that touched something.
+    /// Missions that touched something.
     pub touched: usize,
-    /// Those that stopped elsewhere: by dead reckoning they were at the target.
+    /// Missions that ended elsewhere, at the target only by dead reckoning.
     pub wrong_place: usize,
-    /// Those that ended otherwise: out of time, gave up, failed.
+    /// Missions that ran out of time, gave up or failed.
     pub others: usize,
-    /// Share that arrived.
     pub arrival: Estimate,
-    /// What was measured.
     pub spreads: Spreads,
 }
 
-/// What was measured on the missions that arrived: quartiles.
+/// Quartiles over the missions that arrived.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Spreads {
     /// Mission time until the arrival, seconds.
     pub time_s: Option<Spread>,
-    /// Driven, metres.
+    /// Distance driven, metres.
     pub path_m: Option<Spread>,
-    /// K: the path over the straight distance.
+    /// K: path divided by straight distance.
     pub k: Option<Spread>,
-    /// Least clearance on the way, metres.
+    /// Least clearance, metres.
     pub clearance_m: Option<Spread>,
     /// Range samples that put a hazard on the map.
     pub safety_events: Option<Spread>,
@@ -49,8 +45,7 @@ pub struct Spreads {
 }
 
 impl ExperimentResult {
-    /// Of the rows of `experiment` by `method`; none if there are none.
-    #[must_use]
+    /// The result of `experiment` by `method` from its rows; none without rows.
     pub fn of(experiment: &Experiment, method: Method, rows: &[Row]) -> Option<Self> {
         let is_its = |row: &&Row| row.world == experiment.name && row.setting == method.as_str();
         let rows: Vec<&Row> = rows.iter().filter(is_its).collect();

@@ -1,4 +1,4 @@
-//! Map files are read with limits: of length, and of cells.
+//! Reads map files with limits of length and of cells.
 
 use std::{
     fs::{self, File},
@@ -10,13 +10,13 @@ use harmonic::MAX_SIDE;
 
 use crate::maps::error::MapError;
 
-/// A regular file of at most `most` bytes, opened. Anything else might never end.
+/// Open a regular file of at most `most` bytes. Other files may never end.
 pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
     let unreadable = |cause| MapError::Unreadable {
         file: file.to_owned(),
         cause,
     };
-    // Before opening: to open a pipe is to wait for its other end.
+    // The check comes before opening, because opening a pipe waits for its other end.
     let metadata = fs::metadata(file).map_err(unreadable)?;
     if !metadata.is_file() {
         return Err(MapError::NotAFile {
@@ -33,7 +33,7 @@ pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
     File::open(file).map_err(unreadable)
 }
 
-/// All of a file of at most `most` bytes.
+/// The content of a file of at most `most` bytes.
 pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     let mut bytes = Vec::new();
     open(file, most)?
@@ -46,7 +46,7 @@ pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     Ok(bytes)
 }
 
-/// Refuses a size no map has.
+/// Refuse a map that is empty or too large.
 pub(crate) fn check_size(file: &Path, cols: u64, rows: u64) -> Result<(), MapError> {
     let sides = 1..=MAX_SIDE as u64;
     if sides.contains(&cols) && sides.contains(&rows) {

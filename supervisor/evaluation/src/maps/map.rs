@@ -1,20 +1,17 @@
-//! A map of cells.
+//! A map of free and blocked cells.
 
 /// A map of cells, row-major, row 0 at the top.
 #[derive(Debug)]
 pub struct Map {
-    /// Columns.
     pub cols: usize,
-    /// Rows.
     pub rows: usize,
     /// Everything that is not free, and the whole rim.
     pub blocked: Vec<bool>,
 }
 
-/// A map of cells, and where it lies.
+/// A map and its place.
 #[derive(Debug)]
 pub struct PlacedMap {
-    /// The cells.
     pub map: Map,
     /// Side of a cell, metres.
     pub cell_m: f64,
@@ -23,7 +20,7 @@ pub struct PlacedMap {
 }
 
 impl Map {
-    /// A map of `free` cells. Its rim counts as blocked, as the perimeter of a mission does.
+    /// A map of `free` cells. Its rim is blocked, like the perimeter of a mission.
     pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
         let mut blocked: Vec<bool> = free.map(|free| !free).collect();
         for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {

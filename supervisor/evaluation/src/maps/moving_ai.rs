@@ -1,6 +1,6 @@
 //! The grids of the MovingAI benchmarks: N. R. Sturtevant, "Benchmarks for Grid-Based Pathfinding" (2012).
 //!
-//! A header of four lines, `type`, `height`, `width` and `map`, then a character a cell.
+//! The file has a header of four lines, `type`, `height`, `width` and `map`, then a character for each cell.
 
 use std::path::Path;
 
@@ -12,10 +12,9 @@ use crate::maps::{
     map::Map,
 };
 
-/// The largest map with two characters at the end of every line, and its header.
+/// Most bytes: the largest map with two characters at the end of every line, and its header.
 const LONGEST: u64 = MAX_SIDE as u64 * (MAX_SIDE as u64 + 2) + 4096;
 
-/// The map in such a file.
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
     parse(file, &read(file, LONGEST)?)
 }
@@ -61,13 +60,13 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
     Ok(Map::new(cols, rows, free.into_iter()))
 }
 
-/// Columns and rows, and the lines that follow are the cells.
+/// Read the header. Returns columns and rows; the following lines are the cells.
 fn header<'a>(
     file: &Path,
     lines: &mut impl Iterator<Item = &'a [u8]>,
 ) -> Result<(u64, u64), MapError> {
     let (mut cols, mut rows, mut begun) = (None, None, false);
-    // `type` says how a robot moves from cell to cell: not what is free.
+    // `type` is the kind of motion from cell to cell and is not used.
     for line in lines.take(4) {
         let text = String::from_utf8_lossy(line);
         let mut words = text.split_whitespace();
@@ -92,7 +91,7 @@ fn header<'a>(
     }
 }
 
-/// Whether a robot can be there: plain ground and swamp, not out of bounds, trees and water. None is no cell.
+/// Whether a robot can be there: on plain ground and swamp, not out of bounds, in trees or water. None for another character.
 fn is_free(cell: u8) -> Option<bool> {
     match cell {
         b'.' | b'G' | b'S' => Some(true),

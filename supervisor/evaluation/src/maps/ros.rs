@@ -1,6 +1,6 @@
-//! Map files of the ROS map_server: a YAML that names an image and says how to read it.
+//! Map files of the ROS map_server: a YAML file that names an image and its thresholds.
 //!
-//! [`load`] does not read resolution and origin: a field is solved in cells. [`load_placed`] does.
+//! [`load`] does not read resolution and origin, because a field is solved in cells. [`load_placed`] does.
 
 use std::{
     ops::RangeInclusive,
@@ -16,14 +16,14 @@ use crate::maps::{
     map::{Map, PlacedMap},
 };
 
-/// A map file says a dozen short things.
+/// Most bytes of a map file, which has a dozen short lines.
 const LONGEST: u64 = 64 << 10;
-/// Sides of a cell that a map of a building may have, metres.
+/// Range of a cell's side, metres.
 const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
-/// Nothing lies farther from the origin than this, metres.
+/// Largest distance from the origin, metres.
 const FARTHEST_M: f64 = 1e6;
 
-/// The keys that matter here; other programs keep theirs in the same file.
+/// The keys that are read. The file may have keys of other programs.
 #[derive(Deserialize)]
 struct MapFile {
     image: PathBuf,
@@ -34,7 +34,7 @@ struct MapFile {
     mode: Option<String>,
 }
 
-/// The keys that say where the map lies.
+/// The keys of the map's place.
 #[derive(Deserialize)]
 struct Place {
     resolution: f64,
@@ -96,11 +96,11 @@ fn text(file: &Path) -> Result<String, MapError> {
         .map_err(|_| MapError::malformed(file, "not UTF-8 text; give the YAML of a map_server map"))
 }
 
-/// The keys of `text` that `T` has; `needed` says what that is at least.
+/// The keys of `text` that `T` has. `needed` names the least that the file must have.
 fn parse<T: DeserializeOwned>(file: &Path, text: &str, needed: &str) -> Result<T, MapError> {
     serde_saphyr::from_str(text).map_err(|error| {
         let problem = error.to_string();
-        // What follows shows the source over several lines.
+        // The rest of the message shows the source over several lines.
         let cause = problem.lines().next().unwrap_or_default();
         MapError::malformed(
             file,

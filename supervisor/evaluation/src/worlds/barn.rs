@@ -1,7 +1,7 @@
 //! The cylinder worlds of the BARN challenge: from its Gazebo `.world` files, or from a table of cylinders
 //! (`world,x_m,y_m,radius_m`, plain or gzip) beside an optional `index.csv` with each world's optimal time.
 //!
-//! Start, goal and rules are the challenge's: from (-2.25, 3) heading +y to (-2.25, 13), success within 1 m of it, the
+//! Start, goal and rules are those of the challenge: from (-2.25, 3) with heading +y to (-2.25, 13), success within 1 m, the
 //! clock starts after 0.1 m, 100 s at most.
 
 use std::{
@@ -21,14 +21,14 @@ use crate::trial::{Rules, Scene};
 
 const START: DVec2 = DVec2::new(-2.25, 3.0);
 const GOAL: DVec2 = DVec2::new(-2.25, 13.0);
-/// A robot within this of the goal has succeeded, metres.
+/// Distance from the goal within which a robot has succeeded, metres.
 const SUCCESS_WITHIN_M: f64 = 1.0;
-/// Walls left and right, metres, and the wall behind the start; the far side is open.
+/// The walls left and right and the wall behind the start, metres; the far side is open.
 const SIDES_M: [f64; 2] = [-4.425, -0.075];
 const BEHIND_M: f64 = 0.075;
-/// The side walls end here, metres.
+/// The end of the side walls, metres.
 const SIDES_END_M: f64 = 9.6;
-/// A world file is some hundred kilobytes, the table of all of them one megabyte.
+/// Most bytes of a file. A world file has some hundred kilobytes, the table of all worlds one megabyte.
 const LONGEST: u64 = 64 << 20;
 /// Mission seconds allowed: the challenge's 100 s and time to turn before the clock starts.
 pub(super) const TIMEOUT_S: f64 = 120.0;
@@ -42,14 +42,14 @@ struct Cylinder {
     radius_m: f64,
 }
 
-/// One row of the index; it has further columns.
+/// One row of the index, which has further columns.
 #[derive(Deserialize)]
 struct IndexRow {
     world: u32,
     optimal_time_s: f64,
 }
 
-/// A world's name, what stands in it and its rules.
+/// A world's name, shapes and rules.
 pub(super) type Found = (String, Scene, Rules);
 
 /// Every world of a table of cylinders, in the order of their numbers.
@@ -78,7 +78,6 @@ pub(super) fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
     Ok(cylinders.into_iter().map(world).collect())
 }
 
-/// The world of a Gazebo `.world` file.
 pub(super) fn gazebo(file: &Path) -> Result<Found, WorldError> {
     let mut text = String::new();
     open(file)?
@@ -95,7 +94,7 @@ pub(super) fn gazebo(file: &Path) -> Result<Found, WorldError> {
     Ok((format!("barn-{name}"), scene(drums), rules(None)))
 }
 
-/// The cylinders of a world's models: each stands where the last `<pose>` before its radius says. None without any.
+/// The cylinders of a world's models: each stands at the last `<pose>` before its radius. None without cylinders.
 fn cylinders(text: &str) -> Option<Vec<Drum>> {
     let mut drums = Vec::new();
     for model in text.split("<model ").skip(1) {
@@ -118,7 +117,7 @@ fn cylinders(text: &str) -> Option<Vec<Drum>> {
             });
         }
     }
-    // The state of the world, at the end of the file, says once more where each stands: the same.
+    // The world's state at the end of the file repeats the poses.
     drums.dedup();
     (!drums.is_empty()).then_some(drums)
 }

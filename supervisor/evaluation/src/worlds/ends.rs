@@ -1,11 +1,10 @@
-//! Where missions on a map start and end: as given, or as the file `config.txt` of an MRPB map says, three tests each:
+//! Starts and targets on a map: as given, or from the file `config.txt` of an MRPB map, which has three tests:
 //!
 //! ```text
 //! <arg name="initial_pose_x" default="-12.5"/>
 //! ```
 //!
-//! and likewise `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`; the heading at the goal is not
-//! asked for here.
+//! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The heading at the goal is not used.
 
 use std::{fs::File, io::Read as _, path::Path};
 
@@ -13,9 +12,9 @@ use glam::DVec2;
 
 use super::error::WorldError;
 
-/// Such a file says some twenty short things.
+/// Most bytes of such a file, which has some twenty short lines.
 const LONGEST: u64 = 64 << 10;
-/// Its keys: a test is complete once it has all of them.
+/// The keys of a test.
 const KEYS: [&str; 5] = [
     "initial_pose_x",
     "initial_pose_y",
@@ -27,17 +26,15 @@ const KEYS: [&str; 5] = [
 /// Start and target of a mission, in the frame of its map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
-    /// Where the robot starts, metres.
     pub start: DVec2,
-    /// Its heading there, radians counter-clockwise from x.
+    /// Heading at the start, radians counter-clockwise from x.
     pub heading: f64,
-    /// Where it is to go, metres.
     pub target: DVec2,
 }
 
 /// The tests of a `config.txt`, in its order.
 pub(super) fn read(file: &Path) -> Result<Vec<Ends>, WorldError> {
-    // Before opening: to open a pipe is to wait for its other end.
+    // The check comes before opening, because opening a pipe waits for its other end.
     if !file.is_file() {
         return Err(WorldError::malformed(
             file,

@@ -1,4 +1,4 @@
-//! Why worlds cannot be had.
+//! Errors of worlds.
 
 use std::{
     io,
@@ -9,50 +9,39 @@ use crate::maps::MapError;
 use common::mission::MissionError;
 use thiserror::Error;
 
-/// Worlds that cannot be had.
 #[derive(Debug, Error)]
 pub enum WorldError {
-    /// The file system refused.
     #[error("cannot read {}: {source}; give a kind of world, a file or a folder, see `firsthand help evaluate-worlds`", file.display())]
-    Unreadable {
-        /// What was given.
-        file: PathBuf,
-        /// The system's word.
-        source: io::Error,
-    },
-    /// It is not what its name says.
+    Unreadable { file: PathBuf, source: io::Error },
+    /// The file is invalid.
     #[error("{}: {problem}", file.display())]
     Malformed {
-        /// The file.
         file: PathBuf,
-        /// What is wrong, and what to do.
+        /// The problem and the remedy.
         problem: String,
     },
-    /// A map that cannot be read.
     #[error(transparent)]
     Map(#[from] MapError),
-    /// A map of more than a building.
+    /// A map is too large.
     #[error("{}: {side_m:.0} m on a side, a world has at most {most_m:.0} m; crop the map", file.display())]
     TooLarge {
-        /// The map.
         file: PathBuf,
-        /// Its longer side, metres.
         side_m: f64,
-        /// The longest that is taken, metres.
+        /// The limit, metres.
         most_m: f64,
     },
     /// Start and target were given for worlds that have their own.
     #[error("--start and --target are for ROS maps; give one to --worlds, or leave them out")]
     NoMap,
-    /// No mission can be made of it.
+    /// The mission is invalid.
     #[error(transparent)]
     Mission(#[from] MissionError),
-    /// Nothing there that a body of that size can cross.
+    /// A body of that size can cross no world of the source.
     #[error(
         "none of the worlds can be crossed by a body of {swept_m:.2} m around its centre; give others, or a smaller robot"
     )]
     Unsolvable {
-        /// Half the width of the narrowest way, metres.
+        /// Half the width of the narrowest passage, metres.
         swept_m: f64,
     },
 }

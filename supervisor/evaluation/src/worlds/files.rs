@@ -20,24 +20,24 @@ use crate::trial::{BodySize, Rules, Scene, Trial};
 
 /// Starts and targets drawn on a map without any, if no number is asked for.
 const DRAWN: usize = 10;
-/// The stream of random numbers that they are drawn from.
+/// Their stream of random numbers.
 const DRAWN_KIND: u64 = 7;
-/// Beside a map: its tests, as MRPB keeps them.
+/// Name of a map's file of tests, as in MRPB.
 const TESTS_FILE: &str = "config.txt";
 
-/// What is asked of files.
+/// Options for files.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
-    /// So many worlds; all, and ten on each map without tests, if unsaid.
+    /// Number of worlds; without it all, and ten on each map without tests.
     pub count: Option<usize>,
-    /// Of starts and targets that are drawn.
+    /// Seed of drawn starts and targets.
     pub seed: u64,
     /// Start and target on every map.
     pub ends: Option<Ends>,
 }
 
-/// The worlds of a file, or of every file in a folder and in the folders there that is one, by name; the number asked
-/// for, spread evenly.
+/// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
+/// spread.
 pub(super) fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, WorldError> {
     let files = if path.is_dir() {
         files_of(path).map_err(WorldError::unreadable(path))?
@@ -66,7 +66,7 @@ pub(super) fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, 
     if asked.ends.is_some() && maps == 0 {
         return Err(WorldError::NoMap);
     }
-    // A world's name is that of its file in the results.
+    // In the results a world has the name of its file.
     let mut names = BTreeSet::new();
     for Trial { world, .. } in &found.trials {
         if !names.insert(world) {
@@ -82,7 +82,7 @@ pub(super) fn read(path: &Path, asked: Asked, body: &BodySize) -> Result<Found, 
     Ok(found)
 }
 
-/// The worlds in a folder and in the folders there, by name.
+/// The worlds in a folder and its subfolders, sorted by name.
 fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in entries(folder)? {
@@ -103,7 +103,6 @@ fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
         .collect()
 }
 
-/// A mission file as a world.
 fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
     let mission = Mission::load(file)?;
     found.add_solvable(Trial::of_mission(mission.name.clone(), mission, body));
@@ -125,7 +124,7 @@ fn add_barn(
     Ok(())
 }
 
-/// A ROS map as worlds: with the ends asked for, else its tests, else drawn ones.
+/// A ROS map as worlds: with the given ends, or its tests, or drawn ones.
 fn add_map(
     found: &mut Found,
     file: &Path,
@@ -151,7 +150,7 @@ fn add_map(
             heading: ends.heading,
             target: ends.target,
         };
-        // Off the free ground nothing is near, and nothing is solved.
+        // A start outside the free ground is not connected to anything.
         if scene.shapes.is_empty() {
             found.unsolvable += 1;
             continue;
@@ -161,7 +160,7 @@ fn add_map(
     Ok(())
 }
 
-/// The file's own name; its folder's where the file is called `map`, as MRPB's are.
+/// The name of the file, or of its folder if the file is called `map`, as in MRPB.
 fn map_name(file: &Path) -> String {
     let named = match file.file_stem() {
         Some(stem) if stem == "map" => file.parent().and_then(Path::file_name).unwrap_or(stem),
@@ -170,7 +169,7 @@ fn map_name(file: &Path) -> String {
     named.to_string_lossy().into_owned()
 }
 
-/// What a file holds, by its name.
+/// The kind of a file, by its name.
 #[derive(Clone, Copy)]
 enum Kind {
     Mission,

@@ -1,6 +1,6 @@
-//! A ROS map as a world: what is not known to be free is solid, a wall or not seen by whoever made the map.
+//! A ROS map as a world: every cell that is not known to be free is solid.
 //!
-//! Only cells beside ground that the start is connected to can be met; they become boxes, as few as runs of cells make.
+//! Only solid cells beside ground that is connected to the start matter. They become as few boxes as runs of cells allow.
 
 use std::{collections::VecDeque, f64::consts::PI, path::Path};
 
@@ -10,13 +10,13 @@ use glam::DVec2;
 
 use super::{ends::Ends, error::WorldError, random::Random};
 
-/// Sides of a map of a building, metres: what the check of solvability looks at.
+/// Longest side of a map, metres: that of the check of solvability.
 const LARGEST_M: f64 = 95.0;
-/// More boxes than this are no building.
+/// Most boxes of a map.
 const MOST_BOXES: usize = 20_000;
-/// Straight distance of a target that is drawn, metres.
+/// Range of the straight distance to a drawn target, metres.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
-/// Starts that may be drawn without a target for them.
+/// Starts that are drawn before the search for a target is given up.
 const MOST_STARTS: usize = 50;
 
 /// The floor of a building.
@@ -40,7 +40,7 @@ impl Floor {
         Ok(Self { map })
     }
 
-    /// What stands around the ground that a robot at `start` is connected to, metres.
+    /// The shapes around the ground that is connected to `start`, metres.
     pub(super) fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes, WorldError> {
         let free: Vec<bool> = self.map.map.blocked.iter().map(|it| !it).collect();
         let reached = self.connected(&free, self.cell(start));
@@ -66,7 +66,7 @@ impl Floor {
     pub(super) fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
         let roomy = self.roomy(swept_m);
         let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();
-        // Where one draw finds nothing, the next would hardly.
+        // If one draw finds nothing, the next hardly would.
         streams
             .map_while(|mut random| self.draw_one(&mut random, &roomy, &places))
             .collect()
@@ -180,7 +180,7 @@ impl Floor {
                 continue;
             }
             let (col, row) = (first % cols, first / cols);
-            // To the right as far as cells are solid, and down while that helps.
+            // The box grows to the right as far as cells are solid, and down while that covers more.
             let run = (first..(row + 1) * cols).take_while(|&cell| blocked[cell]);
             let width = run
                 .filter(|&cell| wanted[cell])

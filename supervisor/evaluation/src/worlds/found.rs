@@ -1,20 +1,19 @@
-//! What a search for worlds gathers.
+//! The result of a search for worlds.
 
 use common::mission::MissionError;
 
 use crate::trial::{BodySize, Rules, Scene, Trial};
 
-/// Trials, and what was left out on the way to them.
+/// Trials, and the number of worlds that were left out.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// Each solvable.
     pub trials: Vec<Trial>,
     /// Worlds that the body could not cross.
     pub unsolvable: usize,
 }
 
 impl Found {
-    /// Add the trial `world` in `scene` and give it back; count it as left out where the body cannot cross it.
+    /// Add the trial `world` in `scene` and return it; if the body cannot cross the world, count it as left out.
     pub(super) fn add(
         &mut self,
         world: String,
@@ -38,7 +37,7 @@ impl Found {
         self.trials.last_mut()
     }
 
-    /// Keep `count` of the trials, evenly spread over them.
+    /// Reduce the trials to `count`, evenly spread.
     pub(super) fn spread(&mut self, count: usize) {
         let all = self.trials.len();
         if count < all {

@@ -1,5 +1,5 @@
-//! Rooms with furniture: tables and chairs on legs 2 to 3 cm thick, low platforms, shelves that overhang, soft sofas and
-//! curtains. What is where as seen from above does not say what the sonar hears or the body touches; heights and echoes do.
+//! Rooms with furniture: tables and chairs on legs 2 to 3 cm thick, low platforms, overhanging shelves, soft sofas and
+//! curtains. Heights and echoes decide what the sonar detects and what the body touches.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -11,14 +11,14 @@ use crate::trial::Scene;
 
 /// Things per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];
-/// Nothing stands nearer than this to start and target, metres.
+/// Free distance around start and target, metres.
 const KEPT_FREE_M: f64 = 0.5;
-/// Amplitude of the echo of cloth over that of something hard.
+/// Amplitude of an echo from cloth, relative to a hard surface.
 const SOFT: f64 = 0.1;
-/// From a curtain to the wall behind it, metres.
+/// Distance from a curtain to the wall behind it, metres.
 const BEHIND_CURTAIN_M: f64 = 0.12;
 
-/// Room `number`: the density goes round with the number.
+/// Room `number`. The number selects the density.
 pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     let distance = random.within(4.0, 7.0);
     let half_width = random.within(2.0, 3.0);
@@ -40,7 +40,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
         let (thing, reach) = thing(random, at);
         let place = Place { at, reach };
         let ends_free = thing.clearance(DVec2::ZERO).min(thing.clearance(target)) > KEPT_FREE_M;
-        // Furniture stands beside furniture, chairs a little below tables; walls end it.
+        // Furniture may touch other furniture, and chairs stand partly below tables; walls limit it.
         if ends_free && place.is_inside(least, greatest) && !taken.iter().any(|it| it.meets(&place))
         {
             taken.push(place);
@@ -59,7 +59,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     }
 }
 
-/// What a thing takes of the floor: a disc of radius `reach`, metres.
+/// Whether a disc of radius `reach` on the floor is free, metres.
 struct Place {
     at: DVec2,
     reach: f64,
@@ -67,7 +67,7 @@ struct Place {
 
 impl Place {
     fn is_inside(&self, least: DVec2, greatest: DVec2) -> bool {
-        // Corners may be in a wall: something stands against it.
+        // Corners may be in a wall, because furniture stands against it.
         let reach = self.reach * 0.7;
         (self.at - reach).cmpge(least).all() && (self.at + reach).cmple(greatest).all()
     }
@@ -77,9 +77,9 @@ impl Place {
     }
 }
 
-/// A thing at `at`, and the radius of what it takes, metres.
+/// A thing at `at`, and the radius of its floor space, metres.
 fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
-    // Most furniture is along the walls.
+    // Most furniture stands along the walls.
     let angle = match random.below(3) {
         0 => random.within(0.0, PI),
         _ => [0.0, FRAC_PI_2][random.below(2)],
@@ -133,7 +133,7 @@ fn on_legs(random: &mut Random, top: &Box2, bottom_m: f64, top_m: f64) -> Shapes
     let radius_m = random.within(0.010, 0.015);
     let middle = top.at;
     let legs = top.corners().map(|corner| Drum {
-        // All of it below the top.
+        // The legs are below the top.
         at: corner + (middle - corner).normalize_or_zero() * 2.0 * radius_m,
         radius_m,
         top_m: Some(bottom_m),

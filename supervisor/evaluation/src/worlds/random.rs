@@ -1,9 +1,8 @@
-//! The random numbers that worlds are drawn from: a seed gives the same worlds for ever.
+//! Random numbers for worlds: a seed always gives the same worlds.
 
 use glam::DVec2;
 use rand_pcg::{Pcg64, rand_core::Rng as _};
 
-/// A stream of random numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Random(Pcg64);
 

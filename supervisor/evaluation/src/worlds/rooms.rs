@@ -9,23 +9,23 @@ use glam::DVec2;
 use super::random::Random;
 use crate::trial::Scene;
 
-/// Share of the floor over which things are strewn, things per square metre: sparse, usual, dense.
+/// Things per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
-/// Nothing stands nearer than this to start and target, metres.
+/// Free distance around start and target, metres.
 const KEPT_FREE_M: f64 = 0.5;
 /// Share of rooms with a partition.
 const DOOR_SHARE: f64 = 1.0 / 3.0;
 
-/// What kinds of room are drawn.
+/// The kinds of room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Doors {
     /// One in three has a partition with a door.
     Some,
-    /// All have.
+    /// All have a partition with a door.
     All,
 }
 
-/// Room `number`: the density goes round with the number.
+/// Room `number`. The number selects the density.
 pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
     let distance = random.within(4.0, 8.0);
     let half_width = random.within(1.6, 3.0);
@@ -98,7 +98,7 @@ fn partition(shapes: &mut Shapes, at: f64, middle: f64, gap: f64, half_width: f6
     }
 }
 
-/// A drum, a box or a loose wall at `at`, unless start or target would not be free.
+/// A drum, a box or a loose wall at `at`; none if start or target would not be free.
 fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2) {
     let is_free =
         |reach: f64| at.length() > reach + KEPT_FREE_M && at.distance(target) > reach + KEPT_FREE_M;

@@ -1,4 +1,4 @@
-//! U traps across the straight way: of walls and of drums, of several depths and widths, the robot heading any way.
+//! U traps across the straight path: of walls and of drums, of several depths and widths, with any heading of the robot.
 
 use common::geometry::{Drum, Shapes, Wall};
 use glam::DVec2;
@@ -6,13 +6,13 @@ use glam::DVec2;
 use super::random::Random;
 use crate::trial::Scene;
 
-/// Where the bottom of the U stands, metres ahead.
+/// Distance from the start to the bottom of the U, metres.
 const BOTTOM_M: f64 = 2.4;
-/// From drum to drum, metres: less than a body passes.
+/// Gap between drums, metres. A body does not pass it.
 const DRUM_SPACING_M: f64 = 0.36;
 const DRUM_RADIUS_M: f64 = 0.17;
 
-/// What the sides of a trap are made of.
+/// The sides of a trap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sides {
     /// Smooth walls.
@@ -21,7 +21,7 @@ pub(super) enum Sides {
     Drums,
 }
 
-/// Trap `number`: its sides and the robot's heading go round with the number, in steps of 45 degrees.
+/// Trap `number`. The number selects the sides and the robot's heading, in steps of 45 degrees.
 pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     let sides = [Sides::Walls, Sides::Drums][number % 2];
     let heading_deg = 45.0 * (number / 2 % 8) as f64;

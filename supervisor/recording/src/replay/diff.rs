@@ -1,4 +1,4 @@
-//! Where two recordings part: the first tick in which a stage published something else, and what it had read by then.
+//! Where two recordings part: the first tick in which a stage published other values, and its inputs by then.
 
 use std::fmt;
 
@@ -13,20 +13,16 @@ use crate::{
 /// Where two recordings part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Parting {
-    /// Lines of the run file that differ: mission, seed, clock. Where the robot answers and what it is called are left out.
+    /// Lines of the run file that differ: mission, seed, clock. Address and name of the robot are left out.
     pub run: Vec<String>,
-    /// The builds, where they differ.
+    /// The builds, if they differ.
     pub builds: Option<[String; 2]>,
-    /// The first difference.
     pub first: Option<First>,
-    /// Ticks that both have.
+    /// Ticks that are in both.
     pub ticks: u64,
 }
 
 /// Find where `first` and `second` part.
-///
-/// # Errors
-/// When a file cannot be read.
 pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingError> {
     let mut parting = Parting {
         run: run_differences(first.run_text(), second.run_text()),
@@ -72,7 +68,7 @@ fn run_differences(first: &str, second: &str) -> Vec<String> {
 /// The last sample of each tick on one topic.
 struct Ticks<I> {
     messages: I,
-    /// Read already: of the next tick.
+    /// A sample of the next tick that was read already.
     next: Option<Message>,
     slices: bool,
 }
@@ -82,7 +78,7 @@ impl<I: Iterator<Item = Result<Message, RecordingError>>> Ticks<I> {
         let mut last = self.next.take();
         for message in self.messages.by_ref() {
             let message = message?;
-            // The whole map, published again for new readers, may come in any tick.
+            // A keyframe for new readers may come in any tick.
             if self.slices && is_keyframe(&message.data) {
                 continue;
             }
@@ -91,7 +87,7 @@ impl<I: Iterator<Item = Result<Message, RecordingError>>> Ticks<I> {
                     self.next = Some(message);
                     break;
                 }
-                // An earlier tick is given again.
+                // An earlier tick was published again.
                 _ => last = Some(message),
             }
         }
@@ -115,7 +111,7 @@ fn first_in(
     let (mut left, mut right) = (one.tick()?, other.tick()?);
     let mut both = 0;
     while let (Some(a), Some(b)) = (&left, &right) {
-        // A sample that a recorder lost says nothing.
+        // A sample that a recorder lost is no difference.
         match tick_of(&a.data).cmp(&tick_of(&b.data)) {
             std::cmp::Ordering::Less => left = one.tick()?,
             std::cmp::Ordering::Greater => right = other.tick()?,

@@ -1,4 +1,4 @@
-//! A recording, replayed: one pass over the file, all generations side by side.
+//! Replays a recording in one pass over the file, all generations side by side.
 
 use std::{
     collections::BTreeMap,
@@ -24,16 +24,14 @@ use crate::{
     },
 };
 
-/// What to replay, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The stages, by their names; all without names.
     pub stages: Vec<String>,
-    /// Compare from this mission time on: a state follows from all that was taken before, so that is computed, too.
+    /// Compare from this mission time on. Earlier ticks are computed, too, because the state follows from them.
     pub from: MissionTime,
-    /// As fast as the machine can, or so many times mission time.
     pub pace: Pace,
-    /// The run to replay in place of the recorded one: what another mission would have done with the same inputs.
+    /// A run to replay in place of the recorded one, to try another mission with the same inputs.
     pub run: Option<Run>,
 }
 
@@ -48,13 +46,10 @@ impl Default for Options {
     }
 }
 
-/// A link's own account of itself follows from what its process did, besides its step.
+/// Topics that the link's process computes outside its step. They are not compared.
 const NOT_COMPUTED: [&str; 1] = ["link"];
 
 /// Replay `recording`.
-///
-/// # Errors
-/// When the file cannot be read, or holds a message that this version does not know.
 pub fn replay(recording: &Recording, options: &Options) -> Result<Report, RecordingError> {
     let counts = recording.counts();
     let recorded = |topic: &str| counts.contains_key(topic);
@@ -125,7 +120,7 @@ fn wait_for(message: &Message, rate: f64, began: Instant) {
 
 struct Generations {
     chosen: Vec<&'static Stage>,
-    /// By the stage's place in the table, its name, and number.
+    /// By the stage's place in the table, and the number of the generation.
     all: BTreeMap<(usize, &'static str, u32), Generation>,
 }
 
@@ -144,7 +139,7 @@ impl Generations {
         )
     }
 
-    /// Take a message; an error names the topic that it is not of.
+    /// Take a message. The error names the topic that it does not match.
     fn take(&mut self, setting: &Setting<'_>, message: Message) -> Result<(), &'static str> {
         let topic = &*message.topic;
         if topic == topics::INPUTS.spec().name {

@@ -1,5 +1,5 @@
-//! One generation, replayed while its inputs come. Its outputs may come before its inputs or after: what has no partner yet
-//! waits for it.
+//! One generation, which is replayed while its inputs are read. A recorded output may come before the input it follows from or
+//! after it; each waits for its partner.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -21,29 +21,29 @@ use crate::replay::{
     values,
 };
 
-/// Where the stamp's generation and sequence stand in a message, behind the encoding's header.
+/// Places of the stamp's generation and sequence in a message, behind the encoding's header.
 const GENERATION: usize = 20;
 const SEQUENCE: usize = 24;
-/// Entries before an output that a difference shows.
+/// Inputs before an output that a difference shows.
 const SHOWN_INPUTS: usize = 4;
-/// Characters of each.
+/// Most characters of each.
 const SHOWN_LENGTH: usize = 600;
 
-/// What all generations of a recording have in common.
+/// The data that all generations of a recording share.
 pub(crate) struct Setting<'a> {
     pub(crate) run: &'a Run,
     /// Topics that were recorded.
     pub(crate) recorded: &'a dyn Fn(&str) -> bool,
-    /// Outputs before this time are computed and not compared.
+    /// Outputs before this time are computed but not compared.
     pub(crate) from: MissionTime,
-    /// Whether the file ends before its recorder did.
+    /// Whether the file was cut off.
     pub(crate) cut: bool,
 }
 
 /// The body of an entry.
 type Body = Rc<Vec<u8>>;
 
-/// An output that was computed, and what went in before.
+/// A computed output, and the inputs before it.
 struct Computed {
     sequence: u32,
     message: Vec<u8>,
@@ -57,7 +57,6 @@ struct Channel {
     recorded: VecDeque<(u32, Vec<u8>)>,
 }
 
-/// One generation.
 pub(crate) struct Generation {
     stage: &'static Stage,
     number: u32,
@@ -71,7 +70,7 @@ pub(crate) struct Generation {
     compared: u64,
     unrecorded: u64,
     pieces_came: bool,
-    /// It beat as ready, or published an output: it took something.
+    /// It beat as ready or published an output, so it has taken an input.
     worked: bool,
 }
 
@@ -94,12 +93,12 @@ impl Generation {
         }
     }
 
-    /// It is known to have taken something.
+    /// It is known to have taken an input.
     pub(crate) const fn worked(&mut self) {
         self.worked = true;
     }
 
-    /// A piece of its inputs came.
+    /// Take a piece of its inputs.
     pub(crate) fn piece(&mut self, setting: &Setting<'_>, sequence: u32, piece: &[u8]) {
         self.pieces_came = true;
         if self.is_over() {
@@ -172,7 +171,7 @@ impl Generation {
         }
     }
 
-    /// A sample that it published came.
+    /// Take a recorded output.
     pub(crate) fn output(
         &mut self,
         setting: &Setting<'_>,
@@ -188,7 +187,7 @@ impl Generation {
         }
     }
 
-    /// Compare what has a partner on `topic`.
+    /// Compare the outputs on `topic` that have a partner.
     fn compare(&mut self, setting: &Setting<'_>, topic: &str) {
         while let Some(channel) = self.channels.get_mut(topic) {
             let (Some((sequence, _)), Some(computed)) =
@@ -251,7 +250,7 @@ impl Generation {
         self.reset();
     }
 
-    /// Hold nothing of a generation that is over.
+    /// Drop the data of a generation that is over.
     fn reset(&mut self) {
         self.pieces = Pieces::default();
         self.replay = None;

@@ -1,11 +1,11 @@
-//! A recording, played: what was recorded is published again on a robot's bus, where any consumer reads it as it reads a robot,
-//! and stages run in processes of their own in place of the recorded ones, which take what is played.
+//! Plays a recording on a robot's bus: any consumer reads it like a robot. Live stages, in processes of their own, replace
+//! recorded ones and read the played samples.
 //!
-//! Played as fast as the machine can, a tick is over when every live stage has answered it as often as the recorded one did,
-//! so a stage that a debugger holds holds the time. Played at a pace, time goes on whatever they do.
+//! With `--pace max` a tick is over when every live stage has answered it on the topics on which the recorded one did, so
+//! time stands still while a debugger holds a stage. At another pace time does not wait.
 //!
-//! A live stage starts as at the beginning of a mission, and is not started again. The link has no live process: it would
-//! doubt a robot that drives as the recording says and not as it is told.
+//! A live stage starts as at the beginning of a mission, and is not restarted. The link has no live process: a robot that
+//! drives as recorded and not as commanded would be implausible to it.
 
 mod error;
 mod order;
@@ -47,7 +47,7 @@ pub use self::{
     report::{LiveReport, LiveStageReport},
 };
 
-/// Not played: who was there and what they were asked for; a process of that number is another one now.
+/// Topics that are not played: processes and requests. The process ids belong to other processes now.
 static NOT_PLAYED: [&dyn AnyTopic; 5] = [
     &topics::ROSTER,
     &topics::HEALTH,
@@ -55,42 +55,36 @@ static NOT_PLAYED: [&dyn AnyTopic; 5] = [
     &topics::REQUESTS,
     &topics::FAULTS,
 ];
-/// A slice of a topic that is no map has at most so many elements.
+/// Most elements of a slice of a topic that is no map.
 const LONGEST_PIECE: usize = 1 << 16;
-/// How often it is looked whether to stop.
+/// Longest wait until a stop request is seen.
 const POLL: Duration = Duration::from_millis(50);
-/// An answer that is waited for this long is told.
+/// A wait of this length for an answer is reported.
 const TELL_AFTER: Duration = Duration::from_secs(2);
 
-/// What to play, and how.
 pub struct Options {
     /// Name of the robot whose place the recording takes.
     pub robot: RobotName,
     /// The stages that run in processes of their own.
     pub stages: Vec<&'static Stage>,
-    /// As fast as the machine can, or so many times mission time.
     pub pace: Pace,
-    /// Played as fast as the machine can until this time.
+    /// Until this time it is played as fast as possible.
     pub from: MissionTime,
-    /// What the live stages are given in place of the recorded mission.
+    /// The mission of the live stages, if it is not the recorded one.
     pub mission: Option<Mission>,
 }
 
-/// What happens, for who plays.
+/// Events for the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Happened {
-    /// This stage is ready, in this process.
+    /// A stage is ready, in this process.
     Ready(&'static str, u32),
-    /// It is played.
     Playing,
-    /// This stage has not answered this tick.
+    /// A stage has not answered this tick yet.
     Waiting(&'static str, u64),
 }
 
-/// Play `recording` until its end, or until `stop` says so.
-///
-/// # Errors
-/// When the file cannot be read, the robot's name is taken, or a live stage ends.
+/// Play `recording` until its end, or until `stop` returns true.
 pub fn play(
     recording: &Recording,
     options: &Options,
@@ -132,7 +126,7 @@ pub fn play(
     Ok(player.report())
 }
 
-/// The topic of a message that may be played.
+/// The topic of a message, if it is played.
 fn writer_of(topic: &str) -> Option<&'static dyn EncodedTopic> {
     let named = |known: &str| known == topic;
     if NOT_PLAYED.iter().any(|other| named(other.spec().name)) {
@@ -142,7 +136,7 @@ fn writer_of(topic: &str) -> Option<&'static dyn EncodedTopic> {
     known.find(|known| named(known.spec().name)).copied()
 }
 
-/// The robot's place, taken by a recording. Fields are dropped in this order: the bus last.
+/// The bus and the live stages of a played recording. The fields are dropped in this order, the bus last.
 struct Player {
     stages: Vec<LiveStage>,
     writers: BTreeMap<&'static str, Box<dyn EncodedWriter>>,
@@ -150,7 +144,7 @@ struct Player {
     waiter: Waiter,
     bus: Rc<Bus>,
     _lock: DomainLock,
-    /// Of the run file and the logs of the live stages.
+    /// Directory of the run file and of the live stages' logs.
     _directory: TempDir,
     longest: usize,
     pace: Pace,
@@ -166,7 +160,7 @@ impl Player {
         let mission = options.mission.as_ref().unwrap_or(&recorded.mission);
         let run = Run {
             robot: options.robot.clone(),
-            // What a live stage does follows from what is played, not from when.
+            // A live stage's behaviour follows from the played samples, not from the wall clock.
             clock: MissionClock::Ticks {
                 period_ns: (1e9 / mission.robot.rate_hz) as u64,
             },
@@ -211,7 +205,7 @@ impl Player {
         })
     }
 
-    /// Wait until every live stage beats as ready. Says whether they do; they do not where it was asked to stop.
+    /// Wait until every live stage beats as ready. Returns false if it was asked to stop.
     fn wait_until_ready(
         &mut self,
         stop: &mut dyn FnMut() -> bool,
@@ -240,7 +234,7 @@ impl Player {
         Ok(())
     }
 
-    /// An error where a live stage has ended.
+    /// Fails if a live stage has ended.
     fn check_stages(&mut self) -> Result<(), LiveError> {
         for live in &mut self.stages {
             let stage = live.stage.name;
@@ -258,9 +252,9 @@ impl Player {
         Ok(())
     }
 
-    /// Take what the live stages published. Returns one that has not answered the tick under way.
+    /// Read the samples of the live stages. Returns one that has not answered the current tick.
     fn look(&mut self) -> Result<Option<&'static str>, LiveError> {
-        // Whoever beats wakes this process, too.
+        // Heartbeats wake this process too, and are dropped.
         while self.health.take()?.is_some() {}
         let mut waiting = None;
         for live in &mut self.stages {
@@ -272,8 +266,7 @@ impl Player {
         Ok(waiting)
     }
 
-    /// The tick under way is over: wait for the answers of live stages where time waits for them, and compare. Says
-    /// whether to go on.
+    /// End the current tick: with `--pace max` wait for the answers of the live stages; then compare. Returns whether to go on.
     fn await_answers(
         &mut self,
         stop: &mut dyn FnMut() -> bool,
@@ -297,7 +290,7 @@ impl Player {
         Ok(!stop())
     }
 
-    /// Wait until `time` has come. Says whether to go on.
+    /// Wait until `time`. Returns whether to go on.
     fn await_time(
         &mut self,
         time: MissionTime,

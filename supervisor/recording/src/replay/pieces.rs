@@ -1,4 +1,4 @@
-//! The entries of a generation's inputs, from their pieces: see [`common::inputs`].
+//! Joins the pieces of a generation's inputs to entries, see [`common::inputs`].
 
 use common::inputs::LONGEST_ENTRY;
 
@@ -7,18 +7,18 @@ use common::inputs::LONGEST_ENTRY;
 pub(crate) struct Pieces {
     next: u32,
     bytes: Vec<u8>,
-    /// So many of the bytes were given.
+    /// Number of the bytes that are consumed.
     given: usize,
 }
 
-/// Pieces that do not follow each other, or hold no entries.
+/// Pieces that do not follow each other, or hold no valid entries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Broken {
     /// The recording has no piece before this number.
     NoBeginning(u32),
     /// So many pieces after this number are missing.
     Missing(u32, u32),
-    /// This piece comes after that one, which is a later one.
+    /// The first piece comes after the second, which is a later one.
     OutOfOrder(u32, u32),
     /// An entry of this many bytes.
     NoEntry(usize),
@@ -45,7 +45,7 @@ impl std::fmt::Display for Broken {
 }
 
 impl Pieces {
-    /// The next piece came.
+    /// Add the next piece.
     pub(crate) fn push(&mut self, sequence: u32, piece: &[u8]) -> Result<(), Broken> {
         match (self.next, sequence.checked_sub(self.next)) {
             (_, Some(0)) => {}
@@ -60,7 +60,7 @@ impl Pieces {
         Ok(())
     }
 
-    /// The body of the next whole entry.
+    /// The body of the next complete entry.
     pub(crate) fn entry(&mut self) -> Result<Option<Vec<u8>>, Broken> {
         let rest = &self.bytes[self.given..];
         let Some((length, rest)) = rest.split_first_chunk() else {

@@ -1,13 +1,12 @@
-//! What a replay found.
+//! The result of a replay.
 
 use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-/// What a replay found.
+/// The result of a replay.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
-    /// By stage.
     pub stages: BTreeMap<&'static str, StageReport>,
     /// The first difference by tick.
     pub difference: Option<Difference>,
@@ -15,74 +14,64 @@ pub struct Report {
     pub cut_after_s: Option<f64>,
 }
 
-/// What a replay found of one stage.
+/// The result of a replay for one stage.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StageReport {
     /// Generations whose outputs are equal to the bit.
     pub equal: u64,
     /// Generations with a difference.
     pub different: u64,
-    /// Generations that took nothing: they ended before.
+    /// Generations that ended before their first input.
     pub without_step: u64,
-    /// Generations that were not replayed: which, and why.
+    /// Generations that were not replayed, with reasons.
     pub not_replayed: BTreeMap<u32, String>,
-    /// Inputs that steps took.
+    /// Inputs of all steps.
     pub inputs: u64,
-    /// Samples that were compared.
     pub compared: u64,
-    /// Samples that were computed and not recorded.
+    /// Samples that were computed but not recorded.
     pub unrecorded: u64,
 }
 
-/// What became of one generation.
+/// The result of a replay for one generation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// Equal to the bit.
     Equal,
-    /// It took nothing.
+    /// It ended before its first input.
     WithoutStep,
-    /// It differs.
     Different,
-    /// It was not replayed, and why.
+    /// It was not replayed, for this reason.
     NotReplayed(String),
 }
 
 /// The first difference of a generation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// The stage.
     pub stage: &'static str,
-    /// The generation.
     pub generation: u32,
-    /// The tick.
     pub tick: u64,
-    /// The topic.
     pub topic: String,
     /// The field; of a slice, with its index.
     pub field: String,
-    /// What was recorded.
     pub recorded: String,
-    /// What the replay computed.
     pub computed: String,
-    /// What the step had just taken.
+    /// The last inputs of the step.
     pub inputs: Vec<String>,
 }
 
 impl Report {
     /// Generations of all stages that are equal to the bit.
-    #[must_use]
     pub fn equal(&self) -> u64 {
         self.stages.values().map(|stage| stage.equal).sum()
     }
 
     /// Generations of all stages that were not replayed.
-    #[must_use]
     pub fn not_replayed(&self) -> usize {
         let stages = self.stages.values();
         stages.map(|stage| stage.not_replayed.len()).sum()
     }
 
-    /// Keep `difference` if none before it is of an earlier tick.
+    /// Store `difference`, if it is of an earlier tick than the stored one.
     pub(crate) fn differs(&mut self, difference: Difference) {
         let later = |first: &Difference| first.tick > difference.tick;
         if self.difference.as_ref().is_none_or(later) {

@@ -1,4 +1,4 @@
-//! Samples of a tick as they are recorded: when they are of, and where two of them differ.
+//! Recorded samples of a tick: their tick and time, and where two of them differ.
 
 use common::{
     clock::MissionTime,
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::replay::values;
 
-/// The topics of a tick that are compared, in the order in which one follows from the other.
+/// The topics of a tick that are compared, in causal order.
 pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::RANGE,
     &topics::WHEELS,
@@ -17,7 +17,7 @@ pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::GUIDANCE,
     &topics::COMMAND,
 ];
-/// What a process measures of itself, or how often it was replaced: no two runs have the same.
+/// Fields that a process measures of itself, or that count its restarts. No two runs have the same.
 const OWN: [&str; 6] = [
     "stamp.generation",
     "stamp.sequence",
@@ -27,29 +27,26 @@ const OWN: [&str; 6] = [
     "local_updates",
 ];
 
-/// The first difference.
+/// The first difference of two recordings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct First {
-    /// The tick.
     pub tick: u64,
     /// Its mission time, seconds.
     pub time_s: f64,
     /// The first of the topics of that tick that differs.
     pub topic: &'static str,
-    /// Who wrote it.
+    /// The writer of the topic.
     pub writer: &'static str,
-    /// The first field that does.
+    /// The first field that differs.
     pub field: String,
     /// Its value in both.
     pub values: [String; 2],
 }
 
-/// The tick of a message.
 pub(crate) fn tick_of(message: &[u8]) -> u64 {
     number(message, 4)
 }
 
-/// The mission time of a message.
 pub(crate) fn time_of(message: &[u8]) -> MissionTime {
     MissionTime(number(message, 12))
 }
@@ -59,14 +56,14 @@ fn number(message: &[u8], at: usize) -> u64 {
     bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes))
 }
 
-/// `keyframe` of a grid's part: behind stamp, version and five numbers.
+/// Place of a grid's `keyframe`: behind stamp, version and five numbers.
 pub(crate) fn is_keyframe(message: &[u8]) -> bool {
     message.get(4 + 24 + 8 + 20) == Some(&1)
 }
 
-/// What differs between two samples of the same tick on `topic`, but for what a process measures of itself.
+/// The first field that differs between two samples of the same tick on `topic`, apart from a process's own measurements.
 pub(crate) fn difference(topic: &'static dyn AnyTopic, a: &[u8], b: &[u8]) -> Option<First> {
-    // Behind the stamp's generation and sequence.
+    // The fields behind the stamp's generation and sequence.
     if a.get(..20) == b.get(..20) && a.get(28..) == b.get(28..) {
         return None;
     }

@@ -1,12 +1,11 @@
-//! The fields of a message, one after another, as text: for words about a difference.
+//! The fields of a message as text, to describe a difference.
 
 use common::{
     bus::{Kind, cdr},
     topics::AnyTopic,
 };
 
-/// The fields of a message of `topic`: names and values, in their order. They end where the message does.
-#[must_use]
+/// The fields of a message of `topic`: names and values, in order. They end where the message ends.
 pub fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
     let Some(bytes) = message.strip_prefix(&cdr::HEADER) else {
         return Vec::new();
@@ -34,7 +33,6 @@ pub fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
 }
 
 /// The first field in which two messages of `topic` differ: its name, and both values.
-#[must_use]
 pub fn first_difference(
     topic: &dyn AnyTopic,
     first: &[u8],
@@ -98,7 +96,7 @@ impl<'a> Walk<'a> {
             "u32" => u32::from_le_bytes(*self.number(4)?.first_chunk()?).to_string(),
             "u64" => u64::from_le_bytes(*self.number(8)?.first_chunk()?).to_string(),
             "i32" => i32::from_le_bytes(*self.number(4)?.first_chunk()?).to_string(),
-            // As many digits as tell two values apart.
+            // Digits that distinguish any two values.
             "f32" => format!("{:?}", f32::from_le_bytes(*self.number(4)?.first_chunk()?)),
             "f64" => format!("{:?}", f64::from_le_bytes(*self.number(8)?.first_chunk()?)),
             _ => return None,

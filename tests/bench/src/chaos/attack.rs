@@ -33,39 +33,37 @@ use crate::chaos::{
     subscriptions::{POLL, Subscriptions},
 };
 
-/// The generation of whatever a supervisor publishes: its successor has a bus of its own.
+/// The generation of a supervisor's samples. Its successor has a bus of its own.
 const NEWEST: u32 = u32::MAX;
-/// Signals to one stage within the window of the hold rule. One that dies more often is held until an operator releases
-/// it, and here there is none. A signal may be followed by one in the start-up, and each may be counted late.
+/// Signals to one stage within the window of the hold rule. A stage that dies more often is held until an operator releases
+/// it, and chaos has no operator. A second signal may follow in the start-up, and each may be counted late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
 
-/// What the attacker knows of a mission.
+/// The attacker's knowledge of a mission.
 #[derive(Default)]
 pub(crate) struct Attack {
-    /// Seed of the mission.
     seed: u64,
     /// Mission time of the newest wheel sample.
     time: Option<MissionTime>,
     consumers: Consumers,
     entries: Vec<RosterEntry>,
     supervisor: u32,
-    /// It was hit: what it and its stages still publish is no sign of its successor.
+    /// The supervisor was hit. Later samples of it and its stages are no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     pending: Vec<PendingRecovery>,
-    /// Signals of which no more is measured.
+    /// Signals whose measurement is complete.
     measured: Vec<Row>,
-    /// Generations that were frozen alone: those may be taken for hung.
+    /// Generations that were frozen alone. The supervisor may abort these as hung.
     frozen: Vec<(&'static str, u32)>,
-    /// Stages that were hit lately, and when.
+    /// Recent hits of stages and their times.
     hits: Vec<(&'static str, Instant)>,
     pose: Option<PoseSample>,
-    /// What the supervisor held when its robot began to drive, and when it was last looked at.
+    /// The supervisor's resources when its robot began to drive, and at the last check.
     resources: Option<[Resources; 2]>,
 }
 
 impl Attack {
-    /// Of the mission with that seed, and these consumers.
     pub(crate) fn new(seed: u64, consumers: Consumers) -> Self {
         Self {
             seed,
@@ -87,7 +85,7 @@ impl Attack {
         self.driving = false;
         self.entries.clear();
         self.resources = None;
-        // The stages of a supervisor that was hit go with it.
+        // The stages of a supervisor that was hit end with it.
         let is_stage = |recovery: &mut PendingRecovery| recovery.stage != SUPERVISOR;
         let ended = self.pending.extract_if(.., is_stage);
         self.measured.extend(ended.map(|recovery| recovery.row));
@@ -98,13 +96,13 @@ impl Attack {
             }
             match Subscriptions::join(series.options, child.id()) {
                 Ok(Some(subscriptions)) => break subscriptions,
-                // Not up yet.
+                // The bus does not exist yet.
                 Ok(None) | Err(_) => std::thread::park_timeout(POLL),
             }
         };
         let mut next = Instant::now() + series.schedule.pause();
         while child.try_reap().map_err(system("reap"))?.is_none() && began.elapsed() < patience {
-            // A hit that is overdue waits for the robot to drive.
+            // An overdue hit waits for the robot to drive.
             let due = next.checked_duration_since(Instant::now());
             let timeout = due.unwrap_or(POLL).min(self.time_to_startup_hit());
             subscriptions.roster.waiter.wait(timeout.min(POLL))?;
@@ -127,7 +125,7 @@ impl Attack {
         Ok(())
     }
 
-    /// Keep the signals of which no more is measured.
+    /// Write the rows of the signals whose measurement is complete.
     fn keep_measured(
         &mut self,
         series: &mut Series<'_>,
@@ -140,7 +138,7 @@ impl Attack {
         Ok(())
     }
 
-    /// The mission is over: nothing more is measured.
+    /// The mission is over: end all measurements.
     pub(crate) fn end(
         &mut self,
         series: &mut Series<'_>,
@@ -152,7 +150,7 @@ impl Attack {
         self.keep_measured(series, robot)
     }
 
-    /// Of a signal of `kind` to that generation of `stage`, now.
+    /// The row of a signal of `kind` that is sent to a generation of `stage` now.
     fn row(&self, stage: &str, kind: Kind, generation: Option<u32>) -> Row {
         let time_s = self.time.map(MissionTime::seconds);
         Row::new(self.seed, time_s, stage, kind, generation)
@@ -164,14 +162,14 @@ impl Attack {
         (consumers.hit_recordings(), consumers.other_recordings())
     }
 
-    /// Whether the supervisor was hit, and no successor works yet.
+    /// Whether the supervisor was hit and has no working successor yet.
     pub(crate) fn supervisor_is_down(&self) -> bool {
         self.pending
             .iter()
             .any(|recovery| recovery.stage == SUPERVISOR)
     }
 
-    /// Stages that were aborted as hung, by the `deaths` of the run, and were not frozen alone.
+    /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
     pub(crate) fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
         let frozen = |death: &Value| {
             self.frozen.iter().any(|(stage, generation)| {
@@ -185,14 +183,14 @@ impl Attack {
             .collect()
     }
 
-    /// How far the last published pose was from the ground truth of its tick, metres; none without both.
+    /// Distance from the last published pose to the ground truth of its tick, metres; none without both.
     pub(crate) fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
         Some(tick.pose_error_m(&pose))
     }
 
-    /// Read what came: which stages run, beat and publish.
+    /// Read new samples: which stages run, beat and publish.
     fn read(
         &mut self,
         subscriptions: &mut Subscriptions,
@@ -213,7 +211,7 @@ impl Attack {
             self.entries = entries.to_vec();
             if self.driving {
                 self.on_supervisor_sign(true, report);
-                // What ended processes held is freed once their successors work.
+                // Resources of ended processes are freed once their successors work.
                 if self.pending.is_empty()
                     && let Some(resources) = Resources::of(self.supervisor)
                 {
@@ -268,7 +266,7 @@ impl Attack {
         }
     }
 
-    /// A sign of a generation of `stage`: a beat as ready, or a sample of a tick.
+    /// A sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool, report: &mut Report) {
         let awaited = |recovery: &PendingRecovery| {
             recovery.stage == stage && generation > recovery.generation
@@ -282,16 +280,16 @@ impl Attack {
         }
     }
 
-    /// Stop supervisor and stages together, and let them go on after `pause`.
+    /// Freeze supervisor and stages together, and thaw them after `pause`.
     fn freeze_all(&mut self, pause: Duration, report: &mut Report) {
-        // One that hangs alone stays so.
+        // A stage that is frozen alone stays frozen.
         let hangs = |entry: &&RosterEntry| {
             self.frozen
                 .contains(&(name_str(&entry.stage), entry.generation))
         };
         let stages = self.entries.iter().filter(|entry| !hangs(entry));
         let stages = stages.map(|entry| entry.pid);
-        // The supervisor first: it must not see the stages stand still.
+        // The supervisor is frozen first: it must not see frozen stages.
         let all: Vec<u32> = std::iter::once(self.supervisor).chain(stages).collect();
         let all: Vec<Pid> = all
             .iter()
@@ -302,20 +300,20 @@ impl Attack {
         while let Some(left) = pause.checked_sub(began.elapsed()) {
             std::thread::park_timeout(left);
         }
-        // The supervisor last.
+        // The supervisor is thawed last.
         for pid in all.iter().rev() {
             let _ = kill_process(*pid, Signal::CONT);
         }
         report.hit(EVERYTHING, Kind::FreezeAll);
         let row = self.row(EVERYTHING, Kind::FreezeAll, None);
         self.measured.push(row);
-        // What took longer only because nothing ran is no time of recovery.
+        // The pause does not count as time of recovery.
         for recovery in &mut self.pending {
             recovery.at += began.elapsed();
         }
     }
 
-    /// Hit a consumer, the supervisor, or a stage that runs and has no pending recovery.
+    /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
     fn hit(&mut self, series: &mut Series<'_>) -> Result<(), ChaosError> {
         let Series {
             options,
@@ -390,7 +388,7 @@ impl Attack {
         times.min().unwrap_or(Duration::MAX)
     }
 
-    /// Hit the successors whose time has come in their start-up.
+    /// Hit the successors that are due in their start-up.
     fn hit_starting(&mut self, report: &mut Report) {
         for recovery in &mut self.pending {
             recovery.schedule_startup_hit(&self.entries);

@@ -19,15 +19,14 @@ use crate::chaos::{
     words::{self, WordsError},
 };
 
-/// The subcommand that becomes a consumer's program, and ends with its parent.
+/// The subcommand that executes a consumer's program, and ends with its parent.
 pub const SUBCOMMAND: &str = "consumer";
 
-/// A consumer that is hit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Consumer {
-    /// The recorder that the run itself starts. Nobody starts it again within its run.
+    /// The recorder that the run itself starts. It is not restarted within its run.
     RunRecorder,
-    /// One more `firsthand record`.
+    /// Another `firsthand record`.
     Record,
     /// `firsthand top`, on a terminal of its own.
     Top,
@@ -35,7 +34,7 @@ pub enum Consumer {
     Hz,
     /// `firsthand logs -f`.
     Logs,
-    /// A user's.
+    /// A command of the user.
     Given(GivenConsumer),
 }
 
@@ -94,8 +93,7 @@ impl FromStr for GivenConsumer {
 }
 
 impl Consumer {
-    /// Those of this executable. Without terminals `hz` stands in for `top`.
-    #[must_use]
+    /// The consumers of this executable. Without terminals `hz` replaces `top`.
     pub fn own() -> Vec<Self> {
         let shows = match terminal::open() {
             Ok(_) => Self::Top,
@@ -104,8 +102,7 @@ impl Consumer {
         vec![Self::RunRecorder, Self::Record, shows, Self::Logs]
     }
 
-    /// What it is called in results.
-    #[must_use]
+    /// Its name in results.
     pub fn name(&self) -> &str {
         match self {
             Self::RunRecorder => "run's recorder",
@@ -117,7 +114,7 @@ impl Consumer {
         }
     }
 
-    /// The command that starts it for `robot`; one that records, into `recording`. None of the run's own recorder.
+    /// The command that starts it for `robot`; a recorder writes into `recording`. None for the run's own recorder.
     pub(crate) fn command(&self, robot: &RobotName, recording: &Path) -> Option<Command> {
         let own = |arguments: &[&str]| {
             let mut words: Vec<OsString> = vec!["/proc/self/exe".into()];

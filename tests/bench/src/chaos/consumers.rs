@@ -1,4 +1,4 @@
-//! The consumers of one mission: processes that are hit, and started again.
+//! The consumers of one mission: processes that are hit and restarted.
 
 use std::{
     ffi::OsStr,
@@ -23,48 +23,44 @@ use crate::chaos::{
     terminal,
 };
 
-/// A recorder writes its last chunk within milliseconds; a user's program may take its time.
+/// Time to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-/// Bytes of what a consumer said last.
+/// Bytes of a consumer's last output that are read.
 const LONGEST_LINE: u64 = 500;
 
-/// The consumers of one mission.
 #[derive(Default)]
 pub(crate) struct Consumers {
     all: Vec<Running>,
     setting: Option<Setting>,
-    /// What the run's own recorder wrote when it was hit.
+    /// Recordings of the run's own recorder that was hit.
     hit_recordings: Vec<PathBuf>,
 }
 
-/// What each is started with.
+/// Arguments of every consumer.
 struct Setting {
     robot: RobotName,
-    /// Where recordings go, and what consumers say.
+    /// Directory of recordings and of the consumers' standard error.
     directory: PathBuf,
 }
 
-/// A consumer, while it runs.
+/// A running consumer.
 struct Running {
     consumer: Consumer,
-    /// None of one that ended by itself, and of the run's recorder unless that is frozen.
+    /// None if it ended by itself; of the run's recorder only while that is frozen.
     process: Option<Process>,
     starts: u32,
     frozen_until: Option<Instant>,
-    /// The file of its standard error.
     said: PathBuf,
 }
 
-/// A signal that reached a consumer.
 pub(crate) struct Hit {
-    /// Its name.
     pub(crate) name: String,
-    /// How often it was started in this mission; none of the run's recorder.
+    /// Its starts in this mission; none for the run's recorder.
     pub(crate) generation: Option<u32>,
 }
 
 impl Consumers {
-    /// Start all; their files go into `directory`, which is made.
+    /// Start all. Their files go into the new `directory`.
     pub(crate) fn start(
         options: &Options,
         directory: PathBuf,
@@ -97,7 +93,6 @@ impl Consumers {
         })
     }
 
-    /// How many there are.
     pub(crate) fn len(&self) -> usize {
         self.all.len()
     }
@@ -107,7 +102,6 @@ impl Consumers {
         &self.hit_recordings
     }
 
-    /// Recordings of other recorders.
     pub(crate) fn other_recordings(&self) -> Vec<PathBuf> {
         let directory = self.setting.as_ref().map(|setting| &setting.directory);
         let entries = directory.and_then(|directory| fs::read_dir(directory).ok());
@@ -120,7 +114,7 @@ impl Consumers {
         recordings
     }
 
-    /// Let those go on whose time has come; count those that ended by themselves.
+    /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
     pub(crate) fn maintain(&mut self, report: &mut Report) -> Result<(), ChaosError> {
         for running in &mut self.all {
             if running
@@ -147,8 +141,8 @@ impl Consumers {
         Ok(())
     }
 
-    /// Hit the consumer at `index`: kill it and start it again, or freeze it for `pause`. None if no signal was sent: it is
-    /// frozen already, or had ended by itself and is started again. `supervisor` is the run's process.
+    /// Hit the consumer at `index`: kill and restart it, or freeze it for `pause`. Returns none if no signal was sent, because
+    /// it is frozen already, or had ended by itself and is restarted. `supervisor` is the run's process.
     pub(crate) fn hit(
         &mut self,
         index: usize,
@@ -185,7 +179,7 @@ impl Consumers {
             running.frozen_until = Some(Instant::now() + pause);
             report.consumer(&name).frozen += 1;
         } else {
-            // Its process is reaped as it is dropped.
+            // Dropping the process reaps it.
             running.process = None;
             running.frozen_until = None;
             report.consumer(&name).killed += 1;
@@ -194,7 +188,7 @@ impl Consumers {
         Ok(Some(Hit { name, generation }))
     }
 
-    /// The mission is over: let all write what they have, and end.
+    /// The mission is over: let all consumers write their files and end.
     pub(crate) fn end(&mut self) {
         for running in &mut self.all {
             running.thaw();
@@ -211,7 +205,7 @@ impl Consumers {
 }
 
 impl Running {
-    /// Start it (again). The run's own recorder is the run's to start.
+    /// Start or restart it, unless it is the run's own recorder.
     fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), ChaosError> {
         let Setting { robot, directory } = setting;
         let recording = directory.join(format!("record-{}.mcap", self.starts + 1));
@@ -235,13 +229,13 @@ impl Running {
         Ok(())
     }
 
-    /// Let it go on, if it is frozen.
+    /// Thaw it, if it is frozen.
     fn thaw(&mut self) {
         if self.frozen_until.take().is_none() {
             return;
         }
         if self.consumer == Consumer::RunRecorder {
-            // It is another's child: nothing here waits for it.
+            // The recorder is a child of the run, which reaps it.
             if let Some(recorder) = self.process.take() {
                 recorder.signal(Signal::CONT);
             }
@@ -251,7 +245,7 @@ impl Running {
     }
 }
 
-/// The last line of what a consumer said.
+/// The last line of a consumer's standard error.
 fn last_line(said: &Path) -> Option<String> {
     let mut file = File::open(said).ok()?;
     let length = file.metadata().ok()?.len();
@@ -267,7 +261,7 @@ fn last_line(said: &Path) -> Option<String> {
 /// Signal a child that is not reaped yet, and the processes that it started.
 fn signal_all(process: &Process, signal: Signal) {
     if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
-        // One that has ended is no failure.
+        // A process that has ended needs no signal.
         let _ = kill_process_group(pid, signal);
     }
 }

@@ -9,21 +9,15 @@ use crate::chaos::signals::SignalsError;
 /// Why chaos ended early.
 #[derive(Debug, Error)]
 pub enum ChaosError {
-    /// The bus.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The simulated robot.
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
-    /// The table of signals.
     #[error(transparent)]
     Signals(#[from] SignalsError),
-    /// A process or a file.
     #[error("cannot {action}: {source}")]
     System {
-        /// What was tried.
         action: &'static str,
-        /// The system's error.
         source: std::io::Error,
     },
     /// A mission ended without a summary.

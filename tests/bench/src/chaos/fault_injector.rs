@@ -1,4 +1,4 @@
-//! What a lying robot's bytes become on their way. Pure: bytes and times in, bytes and times out.
+//! Changes the bytes between robot and link as a robot fault says. Pure: bytes and times in, bytes and times out.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -9,40 +9,40 @@ use rand_pcg::{Pcg64, rand_core::Rng};
 
 use crate::chaos::robot_fault::RobotFault;
 
-/// How late frames are that are late.
+/// Delay of late frames.
 const LATE: Duration = Duration::from_secs(2);
-/// How old a frame is that comes again, ...
+/// Age of an old frame that comes again.
 const OLD: Duration = Duration::from_secs(3);
-/// ... and how often.
+/// Period of such frames.
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
-/// Between slow frames: three times a second.
+/// Period of slow frames: three a second.
 const SLOW: Duration = Duration::from_millis(333);
 /// The stuck echo, centimetres.
 const STUCK_CM: u8 = 8;
 /// Ultrasonic bytes at the front of a standard frame's data.
 const ULTRASONIC: usize = 6;
-/// Motor frames that are kept: as many as come in [`OLD`] at ten times the usual rate.
+/// Motor frames that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
-/// Bytes for the host, and when.
+/// Bytes for the host, and their time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Late {
-    /// On the clock that the bytes came by.
+    /// Time on the clock of the incoming bytes.
     pub(crate) at: Duration,
     pub(crate) bytes: Vec<u8>,
 }
 
-/// A robot that tells the truth until it is told to lie.
+/// Passes bytes unchanged until its fault begins.
 #[derive(Debug)]
 pub(crate) struct FaultInjector {
     fault: RobotFault,
-    lies: bool,
+    faulty: bool,
     chance: Pcg64,
-    /// The channel of faults of one encoder.
+    /// The encoder of a fault of one encoder.
     channel: usize,
     from_robot: Decoder,
     from_host: Decoder,
-    /// The motor frame that came last, and the last one before it lied.
+    /// The newest motor frame, and the last one before the fault.
     last: MotorSensors,
     base: MotorSensors,
     base_data: Vec<u8>,
@@ -52,18 +52,17 @@ pub(crate) struct FaultInjector {
     next_slow: [Duration; 256],
     /// The last command that moved the wheels.
     moving: Option<Motion>,
-    /// The robot was stopped by other means than speed 0.
+    /// The link stopped the robot by other means than speed 0.
     disabled: bool,
 }
 
 impl FaultInjector {
-    /// One that will lie like that, seeded.
     pub(crate) fn new(fault: RobotFault, seed: u64) -> Self {
         let mut chance = Pcg64::new(u128::from(seed), 13);
         let channel = (chance.next_u64() % 2) as usize;
         Self {
             fault,
-            lies: false,
+            faulty: false,
             chance,
             channel,
             from_robot: Decoder::default(),
@@ -79,15 +78,15 @@ impl FaultInjector {
         }
     }
 
-    /// Lie from now on.
+    /// Begin the fault.
     pub(crate) fn begin(&mut self) {
-        if !self.lies {
-            self.lies = true;
+        if !self.faulty {
+            self.faulty = true;
             self.base = self.last;
         }
     }
 
-    /// Bytes of the robot that came at `now`: what the host gets, and when.
+    /// Convert bytes that the robot sent at `now` into those for the host.
     pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let mut decoder = std::mem::take(&mut self.from_robot);
         decoder.push(bytes);
@@ -95,19 +94,19 @@ impl FaultInjector {
         while let Some(frame) = decoder.next_frame() {
             if let Ok(Report::Motor(sensors)) = Report::parse(&frame) {
                 self.last = sensors;
-                if !self.lies {
+                if !self.faulty {
                     self.base_data = frame.data.to_vec();
                 }
                 self.keep(&frame, now);
             }
-            if self.lies {
+            if self.faulty {
                 self.pass(&frame, now, &mut out);
             } else {
                 frame.encode(&mut out);
             }
         }
         self.from_robot = decoder;
-        if self.lies && self.fault == RobotFault::OldFrames && now >= self.next_again {
+        if self.faulty && self.fault == RobotFault::OldFrames && now >= self.next_again {
             self.next_again = now + AGAIN_EVERY;
             let old = self.kept.iter().rfind(|kept| kept.at + OLD <= now);
             more.extend(old.map(|old| Late {
@@ -115,7 +114,7 @@ impl FaultInjector {
                 bytes: old.bytes.clone(),
             }));
         }
-        let at = if self.lies && self.fault == RobotFault::FramesLate {
+        let at = if self.faulty && self.fault == RobotFault::FramesLate {
             now + LATE
         } else {
             now
@@ -124,7 +123,7 @@ impl FaultInjector {
         first.into_iter().chain(more).collect()
     }
 
-    /// Bytes of the host: what the robot gets. `moves` is called for each command that moves its wheels.
+    /// Convert bytes of the host into those for the robot. `moves` is called for each command that moves the wheels.
     pub(crate) fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
         let mut decoder = std::mem::take(&mut self.from_host);
         decoder.push(bytes);
@@ -155,14 +154,14 @@ impl FaultInjector {
     }
 
     fn keeps_speed(&self) -> bool {
-        self.lies && self.fault == RobotFault::DoesNotStop
+        self.faulty && self.fault == RobotFault::DoesNotStop
     }
 
     fn keep(&mut self, frame: &Frame<'_>, now: Duration) {
         let mut bytes = Vec::new();
         frame.encode(&mut bytes);
         self.kept.push_back(Late { at: now, bytes });
-        // One that is older than asked for stays, as the oldest.
+        // One frame that is older than [`OLD`] stays.
         while self.kept.len() > MOST_KEPT
             || self.kept.get(1).is_some_and(|next| next.at + OLD <= now)
         {
@@ -170,7 +169,7 @@ impl FaultInjector {
         }
     }
 
-    /// Append what becomes of a frame of the robot.
+    /// Append the changed `frame` of the robot.
     fn pass(&mut self, frame: &Frame<'_>, now: Duration, out: &mut Vec<u8>) {
         let is_sensor = matches!(frame.did, did::MOTOR | did::CUSTOM | did::STANDARD);
         let with_data = |data: &[u8], out: &mut Vec<u8>| Frame { data, ..*frame }.encode(out);
@@ -204,7 +203,7 @@ impl FaultInjector {
         }
     }
 
-    /// What the encoders say instead of `true_ones`.
+    /// The counts that the fault makes of `true_ones`.
     fn counted(&mut self, fault: RobotFault, true_ones: MotorSensors) -> MotorSensors {
         let mut told = true_ones;
         let base = self.base.encoders;
@@ -252,7 +251,7 @@ fn is_moving(motion: &Motion) -> bool {
     motion.quantity == Quantity::Velocity && [0, 1].into_iter().any(|channel| target(channel) != 0)
 }
 
-/// `turned` counts on from `position`.
+/// `position` advanced by `turned` counts.
 fn wrapped(position: u16, turned: i32) -> u16 {
     (i32::from(position) + turned).rem_euclid(i32::from(COUNT_CYCLE)) as u16
 }

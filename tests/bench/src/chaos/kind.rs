@@ -7,23 +7,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Kind {
-    /// SIGKILL.
     Kill,
     /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
-    /// SIGABRT, as a panic of a program that cannot unwind. Not SIGSEGV: Rust's runtime takes the first for an
-    /// overflow of the stack, finds none, and goes on.
+    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV would not do: Rust's runtime takes the first one for an overflow of
+    /// the stack, finds none, and goes on.
     Crash,
-    /// SIGTERM.
     Terminate,
-    /// SIGSTOP: it hangs.
+    /// SIGSTOP.
     Freeze,
     /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
     FreezeAll,
 }
 
 impl Kind {
-    /// The signal.
     pub(crate) const fn signal(self) -> Signal {
         match self {
             Self::Kill | Self::KillAtStart => Signal::KILL,
@@ -33,7 +30,6 @@ impl Kind {
         }
     }
 
-    /// In words.
     pub(crate) const fn as_str(self) -> &'static str {
         match self {
             Self::Kill => "killed",

@@ -1,10 +1,10 @@
-//! What outlived a mission.
+//! Files, shared memory and processes that outlived a mission.
 
 use std::{fs, path::Path};
 
 use common::domain::{Domain, RobotName, SHARED_MEMORY};
 
-/// Files, shared memory of `robot` and processes with files in `directory` that are still there: paths, and what runs.
+/// Files and shared memory of `robot`, and processes with files in `directory`, that still exist: paths and command lines.
 pub(crate) fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let domain = Domain::of(robot.clone());
     let prefix = domain.shared_memory_prefix();
@@ -29,7 +29,6 @@ pub(crate) fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     found
 }
 
-/// Names of what is in a directory.
 fn names(directory: &Path) -> impl Iterator<Item = String> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     entries.map(|entry| entry.file_name().to_string_lossy().into_owned())

@@ -25,7 +25,7 @@ use supervisor::{
     simulator::Simulator,
 };
 
-/// A mission that takes longer is stopped; at a wall-clock pace it takes half a minute.
+/// A mission that takes longer is stopped. In wall-clock time a mission takes half a minute.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 pub(crate) fn command(
@@ -48,7 +48,7 @@ pub(crate) fn command(
     child(command, out)
 }
 
-/// Go on with the run whose supervisor was hit.
+/// Resume the run whose supervisor was hit.
 fn resume(directory: &Path, records: bool) -> Result<Command, ChaosError> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
@@ -58,8 +58,8 @@ fn resume(directory: &Path, records: bool) -> Result<Command, ChaosError> {
     child(command, directory)
 }
 
-/// As a child that ends with this process; standard output is piped, standard error goes to a file beside the run's
-/// directory.
+/// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
+/// beside the run's directory.
 fn child(mut command: Command, directory: &Path) -> Result<Command, ChaosError> {
     let stderr = directory.with_extension("stderr");
     let stderr = File::options().create(true).append(true).open(stderr);
@@ -74,7 +74,7 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
     serde_json::from_str(text.trim()).map_err(|_| ChaosError::NoSummary(text.into_owned()))
 }
 
-/// The summary of the mission without an attack, to compare with: at the same pace where ticks are compared, too.
+/// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
 pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
     let directory = options.directory.join("undisturbed");
     let pace = if options.only_consumers {
@@ -89,7 +89,7 @@ pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosEr
     parse(&output.stdout)
 }
 
-/// Attack the mission, and report. Its files stay if it went wrong.
+/// Attack the mission, and report. Its files stay if something was wrong.
 pub(crate) fn attack(
     series: &mut Series<'_>,
     seed: u64,
@@ -121,7 +121,7 @@ pub(crate) fn attack(
     let began = Instant::now();
     let summary = loop {
         let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
-        // A supervisor that was hit leaves no summary, unless it had just ended the run.
+        // A supervisor that was hit leaves no summary, unless the run had just ended.
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
             break parse(&summary)?;
         }
@@ -171,18 +171,18 @@ fn deaths(directory: &Path) -> Vec<Value> {
     lines.filter_map(Result::ok).collect()
 }
 
-/// How much worse than the undisturbed run's the pose may be at the end, metres.
+/// Allowed pose error at the end beyond that of the undisturbed run, metres.
 ///
-/// Each signal may cost one wheel count of way. And a run that was hit goes another way, so its wheels are read at other
-/// fractions of a count: one count between the wheels turns the heading by `count / track`, which is that much of the
-/// distance to the target across it.
+/// Each signal may cost one wheel count of travel. Besides, a run that was hit takes another path, so its wheels are read at
+/// other fractions of a count: one count between the wheels turns the heading by `count / track`, which displaces the robot by
+/// that fraction of the distance to the target.
 fn pose_allowance_m(mission: &Mission, kills: u32) -> f64 {
     let body = mission.body();
     let target = mission.start_pose().position.distance(mission.target);
     body.metres_per_count() * (f64::from(kills) + target / body.track_m)
 }
 
-/// A robot that does not end with its supervisor.
+/// Start a robot that does not end with its supervisor.
 pub(crate) fn robot(
     options: &Options,
     seed: u64,
@@ -196,7 +196,7 @@ pub(crate) fn robot(
     Ok(Simulator::start(directory, &mission, options.pace)?)
 }
 
-/// One generation of a supervisor under attack. Returns its standard output.
+/// Attack one generation of the supervisor. Returns its standard output.
 fn one_supervisor(
     series: &mut Series<'_>,
     start: Command,
@@ -211,7 +211,7 @@ fn one_supervisor(
     attacked.map(|()| summary)
 }
 
-/// Read its standard output to the end, by a thread: a long summary would fill the pipe.
+/// Read its standard output to the end in a thread, because a long summary would fill the pipe.
 pub(crate) fn read_stdout(child: &mut Process) -> JoinHandle<Vec<u8>> {
     let stdout = child.take_stdout();
     std::thread::spawn(move || {

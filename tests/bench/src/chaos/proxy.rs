@@ -1,4 +1,4 @@
-//! The wire between link and simulated robot, with a [`FaultInjector`] on it: UDP, in a thread.
+//! A UDP proxy between link and simulated robot, in a thread, with a [`FaultInjector`].
 
 use std::{
     io,
@@ -20,20 +20,20 @@ use crate::chaos::{
     robot_fault::RobotFault,
 };
 
-/// How soon the thread sees that it is to lie, or to end.
+/// Longest wait until the thread sees that the fault begins or the proxy ends.
 const LOOK: Duration = Duration::from_millis(10);
-/// Datagrams that are held at most: two seconds of them, at a hundred times the usual rate.
+/// Most datagrams that are held: those of two seconds at a hundred times the usual rate.
 const MOST_HELD: usize = 16_384;
 
-/// What the thread is told, and tells.
+/// The state that the thread shares with its owner.
 #[derive(Debug, Default)]
 struct Shared {
-    lies: AtomicBool,
+    faulty: AtomicBool,
     ends: AtomicBool,
     last_moving: Mutex<Option<Instant>>,
 }
 
-/// A running proxy; it ends when it is dropped.
+/// A running proxy. It ends when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Proxy {
     address: SocketAddr,
@@ -42,7 +42,7 @@ pub(crate) struct Proxy {
 }
 
 impl Proxy {
-    /// Between the robot at `robot` and whoever speaks first.
+    /// Start a proxy between the robot at `robot` and the host that sends first.
     pub(crate) fn start(
         robot: SocketAddr,
         fault: RobotFault,
@@ -62,7 +62,7 @@ impl Proxy {
         };
         let thread = std::thread::spawn(move || {
             while !wire.shared.ends.load(Ordering::Relaxed) {
-                // A datagram that cannot be sent is lost, as on a radio; so is what comes before the other end listens.
+                // A datagram that cannot be sent, for example before the other end listens, is lost, as on a radio.
                 let _ = wire.turn();
             }
         });
@@ -73,14 +73,13 @@ impl Proxy {
         })
     }
 
-    /// Where the link finds the robot.
     pub(crate) const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Lie from now on.
-    pub(crate) fn lie(&self) {
-        self.shared.lies.store(true, Ordering::Relaxed);
+    /// Begin the fault.
+    pub(crate) fn begin_fault(&self) {
+        self.shared.faulty.store(true, Ordering::Relaxed);
     }
 
     /// When the host last ordered a wheel to turn.
@@ -99,7 +98,7 @@ impl Drop for Proxy {
     }
 }
 
-/// One for the host, one for the robot.
+/// A socket for the host and one for the robot.
 fn sockets(robot: SocketAddr) -> io::Result<(UdpSocket, UdpSocket)> {
     let front = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
     let back = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
@@ -109,7 +108,7 @@ fn sockets(robot: SocketAddr) -> io::Result<(UdpSocket, UdpSocket)> {
     Ok((front, back))
 }
 
-/// The thread's own.
+/// The state of the thread.
 struct Wire {
     front: UdpSocket,
     back: UdpSocket,
@@ -121,13 +120,13 @@ struct Wire {
 }
 
 impl Wire {
-    /// Wait for something, and pass on what is due.
+    /// Wait for a datagram, and pass on those that are due.
     fn turn(&mut self) -> io::Result<()> {
         let now = self.began.elapsed();
         let due = self.held.iter().map(|late| late.at.saturating_sub(now));
         let timeout = due.min().unwrap_or(LOOK).min(LOOK);
         poll::readable(&[self.front.as_fd(), self.back.as_fd()], Some(timeout))?;
-        if self.shared.lies.load(Ordering::Relaxed) {
+        if self.shared.faulty.load(Ordering::Relaxed) {
             self.injector.begin();
         }
         let mut buffer = [0; 65_536];

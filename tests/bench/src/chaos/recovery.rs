@@ -1,4 +1,4 @@
-//! A stage that was hit, until its successor works.
+//! The recovery of a stage that was hit, until its successor works.
 
 use std::time::{Duration, Instant};
 
@@ -10,24 +10,23 @@ use crate::chaos::{
     signals::{Row, ms_since},
 };
 
-/// A stage that was hit, until its successor works.
+/// The recovery of a stage that was hit, until its successor works.
 pub(crate) struct PendingRecovery {
     pub(crate) stage: &'static str,
     pub(crate) generation: u32,
     pub(crate) at: Instant,
     startup_hit: StartupHit,
-    /// What is known of it.
+    /// The measurements so far.
     pub(crate) row: Row,
 }
 
-/// Whether the successor is to be hit in its first milliseconds.
+/// The hit of a successor in its first milliseconds, if any.
 #[derive(Clone, Copy)]
 pub(crate) enum StartupHit {
-    /// No.
     None,
-    /// So long after its start.
+    /// This long after its start.
     After(Duration),
-    /// It has started, and is hit then.
+    /// It has started, and is hit at this time.
     At {
         when: Instant,
         process: u32,
@@ -36,7 +35,6 @@ pub(crate) enum StartupHit {
 }
 
 impl PendingRecovery {
-    /// Of `generation` of `stage`, hit now, which `row` says.
     pub(crate) fn new(
         stage: &'static str,
         generation: u32,
@@ -52,18 +50,15 @@ impl PendingRecovery {
         }
     }
 
-    /// The supervisor's record of the death was read.
     pub(crate) fn noticed(&mut self) {
         self.row.noticed_ms.get_or_insert_with(|| ms_since(self.at));
     }
 
-    /// No wheel turns.
     pub(crate) fn rests(&mut self) {
         self.row.rest_ms.get_or_insert_with(|| ms_since(self.at));
     }
 
-    /// A sign of the successor was read: a beat as ready, or a sample of a tick. Says whether that was the last that is
-    /// measured.
+    /// A sign of the successor was read: a ready beat, or a sample of a tick. Returns whether the measurement is complete.
     pub(crate) fn sign(&mut self, beat: bool, recovery: &mut Recovery) -> bool {
         let took_ns = self.at.elapsed().as_nanos() as u64;
         let frozen = self.row.kind == Kind::Freeze;
@@ -85,7 +80,7 @@ impl PendingRecovery {
         true
     }
 
-    /// If the successor is to be hit in its start-up, and is among `entries`, decide when.
+    /// If the successor is to be hit in its start-up and is among `entries`, set the time of the hit.
     pub(crate) fn schedule_startup_hit(&mut self, entries: &[RosterEntry]) {
         let successor = entries.iter().find(|entry| {
             name_str(&entry.stage) == self.stage
@@ -110,7 +105,7 @@ impl PendingRecovery {
         }
     }
 
-    /// Process and generation of the successor, once, when it is to be hit.
+    /// Process and generation of the successor, once, when its hit is due.
     pub(crate) fn take_due_startup_hit(&mut self) -> Option<(u32, u32)> {
         match self.startup_hit {
             StartupHit::At {

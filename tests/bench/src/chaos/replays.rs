@@ -1,4 +1,4 @@
-//! The missions' recordings, replayed: every generation of every stage, bit-equal or not.
+//! Replays of the missions' recordings: whether every generation of every stage is bit-equal.
 
 use std::{
     fmt, fs,
@@ -11,46 +11,45 @@ use recording::{
 };
 use serde::Serialize;
 
-/// What became of the recordings whose recorders were hit, or attached in the midst of a mission.
+/// Results of recordings whose recorders were hit, or attached during a mission.
 #[derive(Debug, Default, Serialize)]
 struct Partial {
     recordings: u64,
     /// Recordings that end before their recorder did.
     cut: u64,
-    /// Recordings that do not say of which run they are: their recorder was killed before it had written that.
+    /// Recordings that do not name their run, because the recorder was killed before it had written that.
     not_begun: u64,
-    /// Generations whose outputs are equal to the bit, as far as they are recorded.
+    /// Generations whose recorded outputs are equal to the bit.
     equal: u64,
     without_step: u64,
     compared: u64,
-    /// Generations that were recorded in part: their state does not follow from what is there.
+    /// Generations that were recorded in part, so that their state cannot be computed.
     not_replayed: u64,
 }
 
-/// What became of the recordings of all missions.
+/// Results of the recordings of all missions.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Replays {
     recordings: u64,
     /// Generations whose outputs are equal to the bit.
     equal: u64,
-    /// Generations that took nothing before they ended.
+    /// Generations without input before they ended.
     without_step: u64,
-    /// Samples that were compared.
     compared: u64,
-    /// Generations that differ or could not be replayed, and recordings that could not be read: which, and why.
+    /// Generations that differ or could not be replayed, and recordings that could not be read, with reasons.
     wrong: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     partial: Option<Partial>,
 }
 
 impl Replays {
-    /// Whether every generation of every recording is.
+    /// Whether every generation of every recording is equal.
     pub(crate) const fn all_equal(&self) -> bool {
         self.wrong.is_empty()
     }
 
-    /// Replay what was recorded of the mission in `directory`. Says whether all of it is bit-equal. Of the recordings of it that
-    /// are among those `hit`, and of `others`, only what is in them.
+    /// Replay the recordings of the mission in `directory`. Returns whether all of it is bit-equal. Recordings among `hit` and
+    /// `others` are replayed only as far as they go.
     pub(crate) fn add(
         &mut self,
         seed: u64,
@@ -84,7 +83,7 @@ impl Replays {
         self.wrong.len() == before
     }
 
-    /// Replay a recording that need not be whole.
+    /// Replay a recording that may be incomplete.
     fn replay_partial(&mut self, seed: u64, file: &Path) {
         let partial = self.partial.get_or_insert_default();
         partial.recordings += 1;

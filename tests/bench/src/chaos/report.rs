@@ -14,10 +14,10 @@ use crate::chaos::{
 };
 use supervisor::stages::TABLE;
 
-/// What is hit where supervisor and stages are frozen together.
+/// The name for supervisor and stages together.
 pub(crate) const EVERYTHING: &str = "everything";
 
-/// So many of what outlived missions are named.
+/// Leftovers that are listed by name.
 const NAMED: usize = 20;
 
 /// The result of all missions under attack. Times in milliseconds.
@@ -26,7 +26,7 @@ pub struct Report {
     missions: u64,
     reached: u64,
     collisions: u64,
-    /// Missions that did not reach the target, touched something or lost the pose: their seeds and what was wrong.
+    /// Missions that did not reach the target, touched something or lost the pose: seeds and reasons.
     wrong: Vec<String>,
     /// Stages aborted as hung that were not frozen alone.
     healthy_aborted: u64,
@@ -37,20 +37,19 @@ pub struct Report {
     consumers: BTreeMap<String, ConsumerCounts>,
     #[serde(serialize_with = "recoveries")]
     recovery_ms: BTreeMap<&'static str, Recovery>,
-    /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and in that mission the
-    /// signals sent.
+    /// Largest pose error at the end beyond the same seed's undisturbed run, metres, and the signals of that mission.
     worst_pose_excess_m: f64,
     worst_pose_kills: u32,
-    /// The longest that a wheel turned after the last command the robot had received, mission seconds.
+    /// Longest time that a wheel turned after the last command the robot had received, mission seconds.
     longest_stopping_time_s: f64,
-    /// Files, shared memory, processes that outlived a mission.
+    /// Files, shared memory and processes that outlived a mission.
     pub leftovers: usize,
-    /// The first of them: after which mission, and what.
+    /// The first of them, with the missions that left them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     left_behind: Vec<String>,
-    /// The most that a supervisor held more at its end than when its robot began to drive.
+    /// Largest growth of a supervisor's resources from its robot's departure to its end.
     supervisor_growth: Resources,
-    /// What became of the missions' recordings, if they were replayed.
+    /// Results of replaying the missions' recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     replays: Option<Replays>,
     /// Ticks with and without consumers, if nothing else is hit.
@@ -61,10 +60,10 @@ pub struct Report {
     began: Instant,
 }
 
-/// What became of a consumer in all missions.
+/// Counts of a consumer in all missions.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct ConsumerCounts {
-    /// Times it was killed, at any moment since its start.
+    /// Times it was killed.
     pub killed: u32,
     /// Times it was frozen for a moment.
     pub frozen: u32,
@@ -72,7 +71,7 @@ pub(crate) struct ConsumerCounts {
     pub started: u32,
     /// Times it ended without a signal of chaos.
     pub ended_by_itself: u32,
-    /// How it did that last, and the last line that it said.
+    /// The last such end, and the last line of its standard error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_end: Option<String>,
 }
@@ -97,15 +96,14 @@ impl fmt::Display for ConsumerCounts {
     }
 }
 
-/// From the signal to the successor.
+/// Times from the signal to the successor.
 #[derive(Debug, Default)]
 pub(crate) struct Recovery {
-    /// To its first beat that says ready, after which it works; of those that were not frozen, which are noticed
-    /// because they do not beat.
+    /// To its first ready beat, after kills: a death is noticed at once.
     pub ready: Histogram,
-    /// The same of those that were frozen.
+    /// To its first ready beat, after freezes: these are noticed by missing beats.
     pub after_freeze: Histogram,
-    /// To its first sample of a tick; up to a tick longer.
+    /// To its first sample of a tick, which may come up to a tick later.
     pub output: Histogram,
 }
 
@@ -117,7 +115,6 @@ pub struct End {
     pub reason: String,
     pub collisions: u64,
     pub pose_excess_m: f64,
-    /// The most that is allowed.
     pub pose_allowance_m: f64,
     pub stopping_time_s: f64,
     pub kills: u32,
@@ -149,12 +146,10 @@ impl Report {
         }
     }
 
-    /// Missions that ended.
     pub const fn missions(&self) -> u64 {
         self.missions
     }
 
-    /// Signals sent.
     pub fn signals(&self) -> u32 {
         let consumers = self.consumers.values();
         let to_consumers: u32 = consumers.map(|counts| counts.killed + counts.frozen).sum();
@@ -183,7 +178,7 @@ impl Report {
         self.recovery_ms.entry(stage).or_default()
     }
 
-    /// Count a mission. Says whether it reached the target without a touch, and knew its pose.
+    /// Count a mission. Returns whether it reached the target without a contact, and knew its pose.
     pub fn add_mission(&mut self, end: &End) -> bool {
         self.missions += 1;
         self.collisions += end.collisions;
@@ -219,7 +214,6 @@ impl Report {
         self.wrong.len() == before
     }
 
-    /// What becomes of the missions' recordings.
     pub(crate) fn replays(&mut self) -> &mut Replays {
         self.replays.get_or_insert_default()
     }
@@ -240,13 +234,13 @@ impl Report {
         self.took_s = self.began.elapsed().as_secs_f64();
     }
 
-    /// Whether every mission reached the target without a touch and knew its pose. The files of one that did not stay.
+    /// Whether every mission reached the target without a contact and knew its pose. The files of other missions stay.
     pub fn is_right(&self) -> bool {
         let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
         self.wrong.is_empty() && replayed
     }
 
-    /// These outlived the mission that has just ended.
+    /// Count leftovers of the last mission.
     pub(crate) fn left_behind(&mut self, found: Vec<String>) {
         self.leftovers += found.len();
         let missing = NAMED.saturating_sub(self.left_behind.len());
@@ -256,7 +250,7 @@ impl Report {
         self.left_behind.extend(named);
     }
 
-    /// Whether every mission did, and left nothing behind.
+    /// Whether every mission was right and left nothing behind.
     pub fn is_clean(&self) -> bool {
         self.is_right() && self.leftovers == 0
     }

@@ -1,24 +1,23 @@
-//! What a process holds.
+//! Resources of a process.
 
 use std::fs;
 
 use common::process_status;
 use serde::Serialize;
 
-/// What a process holds.
+/// Resources of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Resources {
-    /// Open descriptors.
     pub descriptors: i64,
-    /// Memory that is its own, KiB.
+    /// Private memory, KiB.
     pub memory_kib: i64,
 }
 
 impl Resources {
-    /// Of process `pid`; none when it has ended.
+    /// The resources of process `pid`; none if it has ended.
     pub(crate) fn of(pid: u32) -> Option<Self> {
         let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as i64;
-        // Not the pages of shared memory: these are the bus's, and are mapped as samples are read.
+        // Pages of shared memory belong to the bus and do not count.
         let memory = process_status::field(&pid.to_string(), "RssAnon")?;
         let memory_kib = memory.trim_end_matches(" kB").parse().ok()?;
         Some(Self {

@@ -1,74 +1,52 @@
-//! THE table of the ways in which a robot lies to its link, and what is promised under each.
+//! THE table of robot faults: wrong data that a robot sends to its link, and the promise under each.
 
 use serde::{Serialize, Serializer};
 
-/// From the fault to the last moving command, and to wheels at rest, at most: 1.5 s of motion until what was commanded and
-/// what is reported are known to disagree, half a second to come to rest. Seconds.
+/// Longest time from the fault to the last moving command and to wheels at rest, seconds: 1.5 s of motion until command and
+/// report are known to disagree, half a second to come to rest.
 pub const REST_WITHIN_S: f64 = 2.0;
-/// Where the motion that shows the fault comes later: counts that become 0 are first those of a robot that restarted; wheels
-/// that are swapped are seen in turns; nine slow frames make a rate. Each command lasts for 0.25 s meanwhile.
+/// Longest time where the fault shows later, seconds: counts of 0 first look like a restart of the robot; swapped encoders
+/// show in turns; a rate needs nine slow frames. Each command lasts for 0.25 s meanwhile.
 pub const REST_LATER_S: f64 = 4.0;
 
-/// What is promised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
     /// The robot is at rest within [`REST_WITHIN_S`] and stays so, with a reason, and touches nothing.
     Rests,
-    /// The same within [`REST_LATER_S`].
+    /// The robot is at rest within [`REST_LATER_S`] and stays so, with a reason, and touches nothing.
     RestsLater,
-    /// It touches nothing, and does not call a wrong place its target: what it is told is poor, and not false.
+    /// It touches nothing, and does not report its arrival in a wrong place: its data are poor, but not false.
     Unharmed,
 }
 
-/// One way to lie.
+/// A fault of a robot's data. [`TABLE`] says what each does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RobotFault {
-    /// Nothing comes from the robot.
     Silence,
-    /// The data of every motor frame are 0xFF.
     MotorOnes,
-    /// They are 0.
     MotorZeros,
-    /// They are those of the first one, for ever.
     MotorRepeated,
-    /// One encoder does not count.
     EncoderDead,
-    /// The encoders of left and right are swapped.
     EncodersSwapped,
-    /// One encoder counts backwards.
     EncoderReversed,
-    /// Counts and speeds are random in each frame.
     CountsRandom,
-    /// Counts begin again from 0 without silence.
     CountsReset,
-    /// Every ultrasonic byte is 0, which is not a valid reading.
     SonarZero,
-    /// No standard frame comes.
     SonarMissing,
-    /// Every ultrasonic byte is 8 cm.
     SonarStuck,
-    /// All that the robot sends comes 2 s late.
     FramesLate,
-    /// Every 2 s a motor frame of 3 s ago comes again.
     OldFrames,
-    /// No sensor frame comes, acknowledgements do.
     StreamsStop,
-    /// The robot keeps to the last speed it was given when it is given 0.
     DoesNotStop,
-    /// Sensor frames come three times a second.
     FramesSlow,
 }
 
-/// A row of the table.
 #[derive(Debug)]
 pub struct Row {
-    /// Which.
     pub fault: RobotFault,
-    /// Its name on the command line and in reports.
+    /// Name on the command line and in reports.
     pub name: &'static str,
-    /// What the robot does, in words.
     pub what: &'static str,
-    /// What is promised.
     pub promise: Promise,
 }
 
@@ -81,7 +59,6 @@ const fn row(fault: RobotFault, name: &'static str, promise: Promise, what: &'st
     }
 }
 
-/// Every way to lie.
 #[rustfmt::skip]
 pub static TABLE: &[Row] = &[
     row(RobotFault::Silence, "silence", Promise::Rests, "nothing comes from the robot any more"),
@@ -104,8 +81,7 @@ pub static TABLE: &[Row] = &[
 ];
 
 impl Promise {
-    /// Within which time of the fault the robot rests, seconds; none where it may go on.
-    #[must_use]
+    /// Time from the fault to rest, seconds; none if the robot may go on.
     pub const fn rest_within_s(self) -> Option<f64> {
         match self {
             Self::Rests => Some(REST_WITHIN_S),
@@ -116,18 +92,14 @@ impl Promise {
 }
 
 impl RobotFault {
-    /// Its row.
-    #[must_use]
     pub fn row(self) -> &'static Row {
-        // Every fault has one: `every_fault_has_one_row`.
+        // A test ensures that every fault has a row.
         TABLE
             .iter()
             .find(|row| row.fault == self)
             .unwrap_or(&TABLE[0])
     }
 
-    /// The fault of that name.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         let row = TABLE.iter().find(|row| row.name == name)?;
         Some(row.fault)
@@ -152,7 +124,7 @@ mod tests {
             assert_eq!(row.fault.row().name, row.name);
         }
         assert_eq!(RobotFault::FramesSlow as usize + 1, TABLE.len());
-        assert_eq!(RobotFault::named("honest"), None);
+        assert_eq!(RobotFault::named("none"), None);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Missions of a robot that lies from some moment on, and what became of the robot.
+//! Missions of a robot that has a fault from some moment on, and the robot's behaviour after it.
 
 use std::{
     fs,
@@ -32,28 +32,24 @@ use crate::chaos::{
     stop_time_table::{Entry, StopTimeTable},
 };
 
-/// The robot lies from so long after it has departed, seconds: at least, and how much more at most.
-const LIES_AFTER_S: (f64, f64) = (1.0, 4.0);
-/// A robot that has moved so far has departed, metres.
+/// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
+const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
+/// Distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
-/// How long a robot that lies is watched: several times as long as it may move, ...
+/// How long a faulty robot is watched: several times as long as it may move.
 const WATCHED: Duration = Duration::from_secs(10);
-/// ... or until it has arrived, where it may go on: only there it can call a wrong place its target.
+/// How long a faulty robot is watched that may go on: until it has arrived, because only then it can report a wrong place.
 const WATCHED_ON_ITS_WAY: Duration = Duration::from_secs(90);
-/// A mission that does not depart within this is given up.
 const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
-/// Time that a mission has to end in order.
 const END_GRACE: Duration = Duration::from_secs(5);
-/// Between looks at the robot.
+/// Pause between checks of the robot.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Which robots lie how, and how often.
+/// The faults, and the missions of each.
 pub struct FaultOptions {
-    /// The mission, the robot and the first seed; the rest is not asked.
+    /// The mission, the robot and the first seed; the rest is not used.
     pub base: Options,
-    /// The ways to lie.
     pub faults: Vec<RobotFault>,
-    /// Missions for each.
     pub missions: u32,
 }
 
@@ -82,7 +78,6 @@ pub fn run_robot_faults(
     Ok(table)
 }
 
-/// One mission.
 fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, ChaosError> {
     let mut robot = mission::robot(options, seed, &files.join("robot"))?;
     let proxy = Proxy::start(robot.address(), fault, seed)?;
@@ -108,27 +103,25 @@ fn start(
     Process::spawn(start).map_err(system("start a mission"))
 }
 
-/// What was seen of a mission.
+/// The observations of a mission.
 #[derive(Debug, Default)]
 struct Observed {
-    /// When the robot began to lie, and which tick of the ground truth was the newest then.
-    lies: Option<(Instant, usize)>,
+    /// When the fault began, and the newest tick of the ground truth then.
+    fault_began: Option<(Instant, usize)>,
     /// The last command that moved a wheel.
     last_moving: Option<Instant>,
-    /// When the watch ended.
     ended: Option<Instant>,
-    /// Whether the mission had ended by itself by then.
+    /// Whether the mission ended by itself before that.
     ended_by_itself: bool,
-    /// The newest word of the link.
     link: Option<LinkSample>,
-    /// The machine's time at mission time 0 of the robot: the least that any tick says, because none is read before it is
-    /// written.
+    /// The machine's time at the robot's mission time 0: the least estimate of all ticks, because a tick is read some time
+    /// after it is written.
     epoch: Option<Instant>,
     ticks: usize,
 }
 
 impl Observed {
-    /// Until the mission ends, or the robot was watched for long enough.
+    /// Watch until the mission ends, or for as long as the fault needs.
     fn watch(
         &mut self,
         options: &Options,
@@ -139,9 +132,9 @@ impl Observed {
         proxy: &Proxy,
     ) -> Result<(), ChaosError> {
         let began = Instant::now();
-        let (least, more) = LIES_AFTER_S;
+        let (least, more) = FAULT_AFTER_S;
         let chance = Pcg64::new(u128::from(seed), 17 + fault as u128).next_u64() >> 11;
-        let lies_after_s = least + more * chance as f64 / (1_u64 << 53) as f64;
+        let fault_after_s = least + more * chance as f64 / (1_u64 << 53) as f64;
         let (mut departed, mut stop, mut link) = (None, None, None);
         loop {
             self.ended = Some(Instant::now());
@@ -151,7 +144,7 @@ impl Observed {
             if let Some(reader) = link.get_or_insert_with(|| self::link(options)) {
                 self.hear(reader)?;
             } else {
-                // The bus is not there yet.
+                // The bus does not exist yet.
                 link = None;
             }
             self.ended_by_itself = child.try_reap().map_err(system("reap"))?.is_some();
@@ -160,7 +153,7 @@ impl Observed {
                 None => WATCHED_ON_ITS_WAY,
             };
             let patience = self
-                .lies
+                .fault_began
                 .map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
             if self.ended_by_itself || Instant::now() >= patience {
                 break;
@@ -171,11 +164,11 @@ impl Observed {
                 departed = gone.map(|tick| tick.time_s);
             }
             let due = |tick: &GroundTruthTick| {
-                departed.is_some_and(|departed| tick.time_s >= departed + lies_after_s)
+                departed.is_some_and(|departed| tick.time_s >= departed + fault_after_s)
             };
-            if self.lies.is_none() && newest.is_some_and(due) {
-                proxy.lie();
-                self.lies = Some((Instant::now(), self.ticks));
+            if self.fault_began.is_none() && newest.is_some_and(due) {
+                proxy.begin_fault();
+                self.fault_began = Some((Instant::now(), self.ticks));
                 if fault == RobotFault::DoesNotStop {
                     stop = Some(operator_stop(options)?);
                 }
@@ -188,7 +181,7 @@ impl Observed {
         Ok(())
     }
 
-    /// Look at what the robot wrote.
+    /// Read the robot's new ground truth.
     fn take(&mut self, truth: &[GroundTruthTick]) {
         let now = Instant::now();
         for tick in truth.get(self.ticks..).unwrap_or_default() {
@@ -209,7 +202,6 @@ impl Observed {
         Ok(())
     }
 
-    /// What it comes to.
     fn entry(
         &self,
         options: &Options,
@@ -237,7 +229,7 @@ impl Observed {
         let mut entry = Entry {
             fault,
             seed,
-            lied: false,
+            fault_began: false,
             last_moving_s: None,
             rest_s: None,
             watched_s: 0.0,
@@ -245,24 +237,25 @@ impl Observed {
             outcome,
             reason,
         };
-        let (Some((lies, tick)), Some(epoch), Some(ended)) = (self.lies, self.epoch, self.ended)
+        let (Some((began, tick)), Some(epoch), Some(ended)) =
+            (self.fault_began, self.epoch, self.ended)
         else {
             return entry;
         };
-        let since_lies = |time: Instant| time.saturating_duration_since(lies).as_secs_f64();
+        let since_fault = |time: Instant| time.saturating_duration_since(began).as_secs_f64();
         let at_time = |time_s: f64| {
             epoch.checked_add(Duration::try_from_secs_f64(time_s).unwrap_or_default())
         };
-        entry.lied = true;
-        entry.watched_s = since_lies(ended);
-        entry.last_moving_s = Some(self.last_moving.map_or(0.0, since_lies));
-        // The run's own end stops the robot: only what it did until then counts.
+        entry.fault_began = true;
+        entry.watched_s = since_fault(ended);
+        entry.last_moving_s = Some(self.last_moving.map_or(0.0, since_fault));
+        // The end of the run stops the robot, so only ticks before it count.
         let counts = |tick: &&GroundTruthTick| at_time(tick.time_s).is_some_and(|at| at <= ended);
         let track_m = options.loaded.body().track_m;
         let mut watched = truth.get(tick..).unwrap_or_default().iter().filter(counts);
         let moving = watched.clone().rfind(|tick| !is_at_rest(tick, track_m));
         let moved_until = moving.and_then(|tick| at_time(tick.time_s));
-        entry.rest_s = Some(moved_until.map_or(0.0, since_lies));
+        entry.rest_s = Some(moved_until.map_or(0.0, since_fault));
         let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
         let before = tick.checked_sub(1).and_then(|before| truth.get(before));
         entry.collisions = contacts(watched.next_back()).saturating_sub(contacts(before));
@@ -270,25 +263,25 @@ impl Observed {
     }
 }
 
-/// Whether both wheels are.
+/// Whether both wheels are at rest.
 fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
     tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
 }
 
-/// The link's words, as soon as they can be read.
+/// A reader of the link's samples, once the bus exists.
 fn link(options: &Options) -> Option<Reader<LinkSample>> {
     let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos").ok()?;
     bus.reader(&topics::LINK).ok()
 }
 
-/// An operator's stop.
+/// Start an operator's stop.
 fn operator_stop(options: &Options) -> Result<Process, ChaosError> {
     let mut command = firsthand(&["stop", "--robot", &options.robot.to_string()]);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     Process::spawn(command).map_err(system("stop the robot"))
 }
 
-/// What a mission must be for this: the robot is brought along, and its time is the machine's.
+/// Check that the mission uses a simulated robot in wall-clock time.
 pub fn check(mission: &Mission) -> Result<(), &'static str> {
     if mission.robot.address.is_some() {
         return Err("chaos brings its own robot; leave robot.address out");

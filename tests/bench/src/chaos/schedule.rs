@@ -1,4 +1,4 @@
-//! Which stage gets which signal when: seeded, so that a schedule can be repeated.
+//! The schedule of signals: seeded, so that it can be repeated.
 
 use std::{ops::Range, time::Duration};
 
@@ -7,23 +7,24 @@ use supervisor::stages::TABLE;
 
 use crate::chaos::kind::Kind;
 
-/// Between two signals on average: each stage gets one every two to three seconds, and was stable before.
+/// Mean time between two signals. Each stage gets one every two to three seconds, and is stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
-/// A successor that is hit in its start-up is hit within this of its start: the time it joins the bus.
+/// A hit in the start-up falls within this time of the start, in which the stage joins the bus.
 const STARTUP: Duration = Duration::from_millis(12);
-/// Share of the signals scheduled for a successor in its start-up, where that is asked for. A fifth of all signals are
-/// sent to one; the rest is not sent, because there was no successor, or it was ready too soon.
+/// Share of the signals that are followed by one to the successor in its start-up, with `--include-startup`. A fifth of all
+/// signals are such; the rest is not sent, because there was no successor, or it was ready too soon.
 const STARTUP_SHARE: f64 = 0.3;
 
-/// Share of the signals that hit the supervisor, where that is asked for: a hundred in two thousand.
+/// Share of the signals that hit the supervisor, with `--include-supervisor`.
 const SUPERVISOR_SHARE: f64 = 0.05;
 
-/// Share of the signals that hit a consumer, where there are any.
+/// Share of the signals that hit a consumer, if there are any.
 const CONSUMER_SHARE: f64 = 0.5;
 
-/// Share of the hits that freeze everything, where that is asked for; the others fall as they do otherwise.
+/// Share of the hits that freeze everything, with `--freeze-all`.
 const FREEZE_ALL_SHARE: f64 = 0.5;
-/// For how long everything, or a consumer, is frozen, seconds: less than a stage's deadline, up to three times as long.
+/// Range of the time for which everything, or a consumer, is frozen, seconds: from less than a stage's deadline to three times
+/// as long.
 const FREEZE_S: Range<f64> = 0.3..1.5;
 
 /// A seeded sequence of decisions.
@@ -40,23 +41,21 @@ impl Schedule {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Until the next signal: exponential, so that it may come at any moment.
+    /// Time to the next signal, exponentially distributed.
     pub(crate) fn pause(&mut self) -> Duration {
         MEAN_PAUSE.mul_f64(-(1.0 - self.uniform()).ln())
     }
 
-    /// The stage to hit.
     pub(crate) fn stage(&mut self) -> &'static str {
         let index = (self.uniform() * TABLE.len() as f64) as usize;
         TABLE[index.min(TABLE.len() - 1)].name
     }
 
-    /// Whether to hit the supervisor instead.
     pub(crate) fn supervisor(&mut self) -> bool {
         self.uniform() < SUPERVISOR_SHARE
     }
 
-    /// How to hit the supervisor. Not by SIGTERM, which ends the run; one that is frozen only systemd notices.
+    /// How to hit the supervisor. SIGTERM would end the run, and only systemd notices a frozen supervisor.
     pub(crate) fn supervisor_kind(&mut self) -> Kind {
         match self.uniform() {
             ..0.8 => Kind::Kill,
@@ -64,26 +63,26 @@ impl Schedule {
         }
     }
 
-    /// Whether to freeze everything instead, and for how long.
+    /// The time to freeze everything, if it is to be frozen instead of a stage.
     pub(crate) fn freeze_all(&mut self) -> Option<Duration> {
         let frozen = self.uniform() < FREEZE_ALL_SHARE;
         frozen.then(|| self.freeze())
     }
 
-    /// For how long something is frozen that is not left to the supervisor.
+    /// The time for which everything or a consumer is frozen.
     fn freeze(&mut self) -> Duration {
         let Range { start, end } = FREEZE_S;
         Duration::from_secs_f64(start + (end - start) * self.uniform())
     }
 
-    /// Which of so many consumers to hit instead of a stage or the supervisor, `always` or now and then; how, and for how
-    /// long where it is frozen.
+    /// The consumer to hit instead of a stage or the supervisor, `always` or sometimes; and for how long it is frozen, or none to
+    /// kill it.
     pub(crate) fn consumer(
         &mut self,
         count: usize,
         always: bool,
     ) -> Option<(usize, Kind, Duration)> {
-        // Where there are none, the sequence of decisions is the same as ever.
+        // Without consumers the sequence of decisions is the same as before there were any.
         if count == 0 || self.uniform() >= CONSUMER_SHARE && !always {
             return None;
         }
@@ -95,7 +94,6 @@ impl Schedule {
         Some((index.min(count - 1), kind, self.freeze()))
     }
 
-    /// How to hit it.
     pub(crate) fn kind(&mut self) -> Kind {
         match self.uniform() {
             ..0.6 => Kind::Kill,
@@ -105,9 +103,9 @@ impl Schedule {
         }
     }
 
-    /// Whether to hit the successor too, and how long after its start.
+    /// The time after its start at which to hit the successor too, if it is to be hit.
     pub(crate) fn startup_hit(&mut self) -> Option<Duration> {
-        // Their share of all signals, as a share of those that can be followed by one.
+        // The share of all signals, as a share of those that can be followed by one.
         let hit = self.uniform() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
         hit.then(|| STARTUP.mul_f64(self.uniform()))
     }

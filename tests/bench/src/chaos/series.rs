@@ -1,4 +1,4 @@
-//! What the missions of one chaos have in common.
+//! The state that the missions of one chaos share.
 
 use crate::chaos::{
     error::ChaosError,
@@ -8,12 +8,12 @@ use crate::chaos::{
     signals::{Row, SignalsFile},
 };
 
-/// What the missions of one chaos have in common.
+/// The state that the missions of one chaos share.
 pub(crate) struct Series<'a> {
     pub(crate) options: &'a Options,
     pub(crate) schedule: Schedule,
     pub(crate) report: Report,
-    /// Where results are kept.
+    /// The table of signals, if results are written.
     pub(crate) signals: Option<SignalsFile>,
 }
 
@@ -28,7 +28,7 @@ impl<'a> Series<'a> {
         })
     }
 
-    /// Keep all that is known of a signal.
+    /// Write the row of a signal.
     pub(crate) fn keep(&mut self, row: &Row) -> Result<(), ChaosError> {
         match &mut self.signals {
             Some(file) => Ok(file.add(row)?),
@@ -36,7 +36,6 @@ impl<'a> Series<'a> {
         }
     }
 
-    /// Whether enough signals were sent.
     pub(crate) fn is_over(&self) -> bool {
         self.report.signals() >= self.options.kills
     }

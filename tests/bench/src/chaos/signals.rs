@@ -1,5 +1,5 @@
-//! `signals.csv`: a row for each signal that was sent, written when all that is measured of it is known. A chaos that is killed
-//! leaves the rows it had.
+//! `signals.csv`: a row for each signal, written when its last measurement is known. A chaos that is killed leaves the rows
+//! that are known by then.
 
 use std::{
     fs::{self, File},
@@ -15,36 +15,34 @@ use crate::chaos::kind::Kind;
 /// The file's name in the directory of results.
 pub const FILE_NAME: &str = "signals.csv";
 
-/// A signal. What was not measured is an empty cell.
+/// A signal. A value that was not measured is an empty cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Row {
-    /// The mission, by its seed.
+    /// The mission's seed.
     pub(crate) mission: u64,
     /// Mission time of the newest wheel sample that was read before the signal, seconds.
     pub(crate) time_s: Option<f64>,
     /// The stage, `supervisor`, `everything`, or the consumer's name.
     pub(crate) stage: String,
-    /// How it was hit.
     pub(crate) kind: Kind,
-    /// Its generation; of a consumer, how often it was started in that mission. None of the supervisor, of everything
-    /// and of the run's own recorder.
+    /// Its generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for
+    /// the run's own recorder.
     pub(crate) generation: Option<u32>,
-    /// Whether it was hit in its first milliseconds, on purpose.
+    /// Whether it was to be hit in its first milliseconds.
     pub(crate) start_up: bool,
-    /// From the signal until the supervisor's record of the death was read, milliseconds. Of stages alone.
+    /// From the signal until the supervisor's record of the death was read, milliseconds. Only for stages.
     pub(crate) noticed_ms: Option<f64>,
-    /// Until the successor's first sign of work was read, milliseconds. Of stages and the supervisor.
+    /// From the signal until the successor's first sign of work was read, milliseconds. For stages and the supervisor.
     pub(crate) ready_ms: Option<f64>,
-    /// Until the successor's first sample of a tick was read, milliseconds. Likewise.
+    /// From the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
     pub(crate) first_output_ms: Option<f64>,
-    /// Until the first sample in which no wheel turned, milliseconds; none where that did not come before the first output.
+    /// From the signal until the first sample in which no wheel turned, milliseconds; none if it did not come before the first output.
     pub(crate) rest_ms: Option<f64>,
-    /// From the newest pose to the true one when the row was written, metres; known where the robot is a process of its
-    /// own, so that its ground truth is read during the mission.
+    /// From the newest pose to the true one when the row was written, metres. It is known only if the robot is a process of its
+    /// own, whose ground truth is read during the mission.
     pub(crate) pose_error_m: Option<f64>,
 }
 
-/// Names of the columns.
 const HEADER: [&str; 11] = [
     "mission",
     "time_s",
@@ -60,7 +58,6 @@ const HEADER: [&str; 11] = [
 ];
 
 impl Row {
-    /// Of a signal of `kind` to that generation of `stage`.
     pub(crate) fn new(
         mission: u64,
         time_s: Option<f64>,
@@ -106,7 +103,7 @@ pub(crate) struct SignalsFile {
 }
 
 impl SignalsFile {
-    /// A new file in `directory`, which is made.
+    /// Make `directory` and the file in it.
     pub(crate) fn create(directory: &Path) -> Result<Self, SignalsError> {
         let path = directory.join(FILE_NAME);
         fs::create_dir_all(directory).map_err(failed("make the directory of", &path))?;
@@ -127,7 +124,6 @@ impl SignalsFile {
         Ok(Self { path, writer })
     }
 
-    /// Write `row`, whole.
     pub(crate) fn add(&mut self, row: &Row) -> Result<(), SignalsError> {
         let written = self.writer.serialize(row);
         written.map_err(failed("write", &self.path))?;
@@ -167,7 +163,7 @@ mod tests {
         for row in [&plain, &odd] {
             file.add(row).unwrap();
         }
-        // As another process reads it, while the writer is there.
+        // Another process reads it like this while it is written.
         assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
         let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
         assert!(

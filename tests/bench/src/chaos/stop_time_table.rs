@@ -1,4 +1,4 @@
-//! The stop-time table: how long a robot moved after it began to lie.
+//! The stop-time table: how long robots moved after their fault.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -6,34 +6,31 @@ use serde::Serialize;
 
 use crate::chaos::robot_fault::{Promise, REST_LATER_S, REST_WITHIN_S, RobotFault};
 
-/// One mission of a robot that lied.
+/// One mission of a robot with a fault.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
-    /// How.
     pub fault: RobotFault,
-    /// The mission's seed.
     pub seed: u64,
-    /// Whether it came to that: a mission may end before.
-    pub lied: bool,
-    /// From the fault to the last command that moved a wheel, as the link sent it, seconds.
+    /// Whether the fault began: a mission may end before.
+    pub fault_began: bool,
+    /// From the fault to the link's last command that moves a wheel, seconds.
     pub last_moving_s: Option<f64>,
     /// From the fault to the last tick in which a wheel turned, by the ground truth, seconds.
     pub rest_s: Option<f64>,
-    /// How long after the fault it was watched, seconds.
+    /// Time from the fault to the end of the watch, seconds.
     pub watched_s: f64,
     /// Touches after the fault.
     pub collisions: u64,
-    /// How the mission ended; `goes on` where it had not when the watch ended.
+    /// How the mission ended; `goes on` if it had not when the watch ended.
     pub outcome: String,
-    /// Why; of a mission that goes on, why the link lets no command pass, empty where it does.
+    /// Why it ended; for a mission that goes on, why the link lets no command pass, empty if commands pass.
     pub reason: String,
 }
 
 impl Entry {
-    /// Whether what is promised was kept.
-    #[must_use]
+    /// Whether the robot did as promised.
     pub fn is_kept(&self) -> bool {
-        let unharmed = self.lied && self.collisions == 0 && self.outcome != "wrong_place";
+        let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
         let Some(limit_s) = self.fault.row().promise.rest_within_s() else {
             return unharmed;
         };
@@ -42,16 +39,14 @@ impl Entry {
     }
 }
 
-/// All missions.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StopTimeTable {
-    /// In the order they were run.
+    /// In the order of the missions.
     pub entries: Vec<Entry>,
 }
 
 impl StopTimeTable {
-    /// Whether every promise was kept.
-    #[must_use]
+    /// Whether every robot did as promised.
     pub fn is_kept(&self) -> bool {
         self.entries.iter().all(Entry::is_kept)
     }
@@ -74,7 +69,7 @@ impl fmt::Display for StopTimeTable {
             let last = longest(&entries, |entry| entry.last_moving_s);
             let rest = longest(&entries, |entry| entry.rest_s);
             let kept = format!("{kept} of {}", entries.len());
-            // The worst says most.
+            // The worst mission is shown.
             let worst = entries.iter().find(|entry| !entry.is_kept());
             let told = worst.or(entries.first()).map_or(String::new(), |entry| {
                 let reason = match &*entry.reason {
@@ -99,7 +94,7 @@ impl fmt::Display for StopTimeTable {
     }
 }
 
-/// Kinds of which that is promised.
+/// Names of the faults with this promise.
 fn names(promise: Promise) -> String {
     let table = crate::chaos::robot_fault::TABLE.iter();
     let names: Vec<_> = table
@@ -109,9 +104,9 @@ fn names(promise: Promise) -> String {
     names.join(", ")
 }
 
-/// The longest time of all; of a robot that still moved at the end of the watch, more than that.
+/// The longest time of all; marked as a lower bound if the robot still moved at the end of the watch.
 fn longest(entries: &[&Entry], time: impl Fn(&Entry) -> Option<f64>) -> String {
-    /// A robot that is watched to its end while it moves was last seen to move a tick or two before.
+    /// A robot that moves until the end of the watch was last seen to move a tick or two before.
     const STILL_S: f64 = 0.5;
     let moving = |entry: &Entry| {
         let longest = time(entry)?;
@@ -134,7 +129,7 @@ mod tests {
         Entry {
             fault,
             seed: 1,
-            lied: true,
+            fault_began: true,
             last_moving_s: Some(0.7),
             rest_s: Some(0.9),
             watched_s: 10.0,
@@ -154,7 +149,7 @@ mod tests {
             (Entry { rest_s: Some(9.9), ..entry(Silence) }, false),
             (Entry { collisions: 1, ..entry(Silence) }, false),
             (Entry { reason: String::new(), ..entry(Silence) }, false),
-            (Entry { lied: false, ..entry(Silence) }, false),
+            (Entry { fault_began: false, ..entry(Silence) }, false),
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
             (Entry { outcome: "wrong_place".to_owned(), ..entry(CountsReset) }, false),

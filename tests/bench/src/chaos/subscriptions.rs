@@ -1,4 +1,4 @@
-//! What the attacker reads from the bus.
+//! The attacker's readers on the bus.
 
 use std::time::Duration;
 
@@ -15,10 +15,10 @@ use common::{
 
 use crate::chaos::{error::ChaosError, options::Options};
 
-/// How long to wait for the bus before the processes are looked at again.
+/// Wait for the bus between checks of the processes.
 pub(crate) const POLL: Duration = Duration::from_millis(50);
 
-/// What the attacker reads from the bus of one generation of the supervisor.
+/// The attacker's readers on the bus of one generation of the supervisor.
 pub(crate) struct Subscriptions {
     pub(crate) roster: Roster,
     pub(crate) deaths: Reader<DeathSample>,
@@ -31,8 +31,7 @@ pub(crate) struct Subscriptions {
 }
 
 impl Subscriptions {
-    /// Join the bus. None if it is the bus of another than `supervisor`: one that was killed leaves its bus, and its
-    /// successor removes it.
+    /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
     pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, ChaosError> {
         let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;

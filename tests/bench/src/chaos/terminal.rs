@@ -1,4 +1,4 @@
-//! A terminal without a person, for a program that draws on one.
+//! A pseudo-terminal for a program that draws on one.
 
 use std::{
     fs::File,
@@ -12,7 +12,6 @@ use rustix::{
     termios::{Winsize, tcsetwinsize},
 };
 
-/// Lines and columns.
 const SIZE: Winsize = Winsize {
     ws_row: 24,
     ws_col: 80,
@@ -20,7 +19,7 @@ const SIZE: Winsize = Winsize {
     ws_ypixel: 0,
 };
 
-/// Both ends of a terminal: who holds the first reads what is drawn on the second.
+/// Both ends of a terminal: the first reads the text that a program writes to the second.
 pub(crate) fn open() -> io::Result<(File, File)> {
     let reads: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     grantpt(&reads)?;
@@ -29,14 +28,14 @@ pub(crate) fn open() -> io::Result<(File, File)> {
     let name = ptsname(&reads, Vec::new())?;
     let name = name.to_str().map_err(io::Error::other)?;
     let mut draws = File::options();
-    // It does not become the terminal that controls this process.
+    // It must not become the controlling terminal of this process.
     draws.read(true).write(true);
     draws.custom_flags(OFlags::NOCTTY.bits().cast_signed());
     let draws = draws.open(name)?;
     Ok((reads.into(), draws))
 }
 
-/// Read, by a thread, whatever is drawn, until nobody draws any more.
+/// Read and drop the program's output in a thread, until the program ends.
 pub(crate) fn read_all(mut reads: File) {
     std::thread::spawn(move || {
         let mut some = [0; 4096];

@@ -1,21 +1,21 @@
-//! How long ticks took in missions whose consumers were hit, and in the same missions without any.
+//! Tick latencies of missions whose consumers were hit, and of the same missions without consumers.
 
 use std::fmt;
 
 use serde::Serialize;
 use serde_json::Value;
 
-/// Of each mission half and 99 in 100 of its ticks took at most so long, microseconds.
+use crate::quantile;
+
+/// Median and 99 % quantile of the ticks of each mission, microseconds.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct TickLatencies {
-    /// With consumers that are hit.
     with_us: Vec<[f64; 2]>,
-    /// Without any.
     without_us: Vec<[f64; 2]>,
 }
 
 impl TickLatencies {
-    /// A mission was run without consumers, and again with them: the summaries of both.
+    /// Add the summaries of a mission without consumers and with them.
     pub(crate) fn add(&mut self, without: &Value, with: &Value) {
         let of = |summary: &Value| {
             let latency = |share| summary["tick_latency_us"][share].as_f64();
@@ -30,9 +30,7 @@ impl TickLatencies {
 
 /// The median of the missions' values at `place`; NaN without missions.
 fn median(missions: &[[f64; 2]], place: usize) -> f64 {
-    let mut values: Vec<f64> = missions.iter().map(|mission| mission[place]).collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    quantile(missions.iter().map(|values| values[place]), 0.5).unwrap_or(f64::NAN)
 }
 
 impl fmt::Display for TickLatencies {

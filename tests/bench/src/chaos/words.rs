@@ -1,14 +1,12 @@
-//! A command as words: what a shell's quotes mean, and nothing else of a shell.
+//! Splits a command into words, with a shell's quotes and nothing else of a shell.
 
 use thiserror::Error;
 
-/// A command that has no words, or does not end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub(crate) enum WordsError {
-    /// Nothing.
     #[error("there is nothing in it")]
     Nothing,
-    /// Something is open at its end.
+    /// A quote or escape is open at its end.
     #[error("it ends within {0}")]
     Unfinished(&'static str),
     /// No program takes such a word.
@@ -16,14 +14,14 @@ pub(crate) enum WordsError {
     Zero,
 }
 
-/// The words of `command`. White space parts them, except between '...' or "..."; a backslash takes the next character as it
-/// is, except between '...'. Variables, patterns, pipes are characters like any others.
+/// The words of `command`. White space separates them, except between '...' or "..."; a backslash takes the next character
+/// literally, except between '...'. Variables, patterns and pipes are ordinary characters.
 pub(crate) fn split(command: &str) -> Result<Vec<String>, WordsError> {
     if command.contains('\0') {
         return Err(WordsError::Zero);
     }
     let mut words = Vec::new();
-    // A word that was begun: it may be empty, as "" is.
+    // The current word. It may be empty, as "" is.
     let mut word: Option<String> = None;
     let mut quote: Option<char> = None;
     let mut characters = command.chars();

@@ -13,7 +13,7 @@ use supervisor::stages;
 
 use super::error::TickError;
 
-/// The way of a tick: through every stage of the table, and again through those that have feedback.
+/// The path of a tick: every stage of the table, then again those with feedback.
 fn way() -> impl Iterator<Item = (&'static str, Answers)> {
     let stages = stages::TABLE.iter();
     let again = stages.clone().filter(|stage| !stage.feedback.is_empty());
@@ -32,13 +32,13 @@ pub(super) struct Budget {
 const WAKE: &str = "wake";
 
 impl Budget {
-    /// Add what the stages of the run in `directory` saved. A stage that was killed has saved nothing.
+    /// Add the times that the stages of the run in `directory` saved. A killed stage has saved none.
     pub(super) fn add(&mut self, directory: &Path) -> Result<(), TickError> {
         let mut published = BTreeMap::new();
         for (row, (stage, answers)) in way().enumerate() {
             let times = load(directory, stage, answers)?;
             for times in &times {
-                // Of a tick that was given twice, the sample that woke it is not known.
+                // If a tick was given twice, the sample that woke the stage is not known.
                 if let Some(since) = published.get(&times.tick)
                     && times.awake_ns >= *since
                 {
@@ -60,18 +60,21 @@ impl Budget {
         self.rows.entry((row, name)).or_default()
     }
 
-    /// The table, rows in the order of the way.
+    /// The rows, in the order of the path.
     pub(super) fn rows(mut self) -> Vec<Row> {
         let mut rows = Vec::new();
         for (row, (stage, answers)) in way().enumerate() {
             let mut cells = Vec::new();
             for name in columns() {
                 let times = self.column(row, name);
-                times.sort_unstable();
+                let quantile = |share| {
+                    let us = times.iter().map(|&ns| ns as f64 / 1e3);
+                    crate::quantile(us, share)
+                };
                 cells.push(Cell {
                     item: name,
-                    p50_us: quantile_us(times, 0.5),
-                    p99_us: quantile_us(times, 0.99),
+                    p50_us: quantile(0.5),
+                    p99_us: quantile(0.99),
                 });
             }
             rows.push(Row {
@@ -86,13 +89,6 @@ impl Budget {
 
 fn columns() -> impl Iterator<Item = &'static str> {
     std::iter::once(WAKE).chain(Item::ALL.map(Item::name))
-}
-
-/// Of sorted nanoseconds; none of nothing.
-fn quantile_us(sorted: &[u64], share: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let rank = (last as f64 * share).round() as usize;
-    sorted.get(rank).map(|&ns| ns as f64 / 1e3)
 }
 
 /// The times that all generations of `stage` saved.
@@ -116,7 +112,7 @@ fn load(directory: &Path, stage: &str, answers: Answers) -> Result<Vec<TickTimes
     Ok(all)
 }
 
-/// A stage's part of a tick, or the second one of a stage that has feedback.
+/// A stage's part of a tick, or its second part if it has feedback.
 #[derive(Debug, Serialize)]
 pub(super) struct Row {
     stage: &'static str,
@@ -124,7 +120,7 @@ pub(super) struct Row {
     cells: Vec<Cell>,
 }
 
-/// What one item takes, microseconds; none where it was not measured.
+/// The time of one item, microseconds; none if it was not measured.
 #[derive(Debug, Serialize)]
 struct Cell {
     item: &'static str,

@@ -16,7 +16,7 @@ use super::error::{TickError, system};
 /// How often a consumer looks whether it is asked to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// Start so many for `robot`. They end when they are dropped.
+/// Start `number` consumers of `robot`. They end when they are dropped.
 pub(super) fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, TickError> {
     let own = std::process::id().to_string();
     let consumer = |_| {
@@ -27,7 +27,7 @@ pub(super) fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, Tick
     (0..number).map(consumer).collect()
 }
 
-/// Be one, until asked to stop.
+/// Run a consumer, until it is asked to stop.
 pub fn run(robot: &RobotName, supervisor: u32) -> Result<(), TickError> {
     let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     become_child("consumer", supervisor)?;

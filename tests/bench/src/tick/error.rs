@@ -11,43 +11,31 @@ use super::hops::LOST;
 /// Why a tick could not be measured.
 #[derive(Debug, Error)]
 pub enum TickError {
-    /// The domain.
     #[error(transparent)]
     Domain(#[from] DomainError),
-    /// The bus.
     #[error(transparent)]
     Bus(#[from] BusError),
     /// A forwarder's or consumer's process, from within.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// A process or a file.
     #[error("cannot {action}: {source}")]
     System {
-        /// The action that failed.
         action: &'static str,
-        /// The system's error.
         source: io::Error,
     },
     /// A sample went out and none came back.
     #[error("no sample came back within {LOST:?}; is the machine overloaded?")]
     Lost,
-    /// No such forwarder.
     #[error("no forwarder stands for {0:?}")]
     Place(String),
     /// A mission ended without a summary.
     #[error("the mission gave no summary: {0}")]
     NoSummary(String),
-    /// A mission that measured nothing.
     #[error("nothing was measured; does the mission drive at all?")]
     Nothing,
     /// A file of measured times that cannot be read.
     #[error("{}: {problem}", file.display())]
-    Times {
-        /// The file.
-        file: PathBuf,
-        /// The problem with it.
-        problem: String,
-    },
+    Times { file: PathBuf, problem: String },
 }
 
 /// The system refused to do `action`.

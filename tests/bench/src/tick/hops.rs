@@ -1,7 +1,7 @@
-//! The latency of five hops between processes that do no work: what the bus alone costs.
+//! The latency of five hops between processes that do no work: the cost of the bus alone.
 //!
-//! The same topics, payloads, wakeups and waits as a tick's, each forwarded at once: wheels, pose, grid, guidance,
-//! command. What a tick takes beyond that is the stages' work.
+//! Topics, payloads, wakeups and waits are those of a tick, and each sample is forwarded at once: wheels, pose, grid,
+//! guidance, command. The rest of a tick's time is the stages' work.
 
 use std::time::{Duration, Instant};
 
@@ -23,19 +23,19 @@ use supervisor::{
 
 use super::error::{TickError, system};
 
-/// Cells of the smallest map, which no forwarder looks at.
+/// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
 /// The forwarders, by the stage that each stands for.
 const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
 /// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
 pub(super) const LOST: Duration = Duration::from_secs(5);
-/// Between samples sent to forwarders that may not be up yet.
+/// Pause between samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
-/// Trips before those that count: all memory is mapped by then.
+/// Trips before the measurement, which map all memory.
 const WARM_UP: u64 = 200;
 
-/// Send `trips` samples around the forwarders, one every `period`, or one behind the other; those that warm up, always
-/// one behind the other.
+/// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
+/// back.
 pub fn measure(
     robot: &RobotName,
     trips: u64,
@@ -64,7 +64,7 @@ pub fn measure(
             if began.elapsed() >= LOST {
                 return Err(TickError::Lost);
             }
-            // While warming up a forwarder may be missing; then the sample is sent again.
+            // During the warm-up a forwarder may be missing; then the sample is sent again.
             if sent_ns == 0 || trip < WARM_UP {
                 sent_ns = monotonic_ns();
                 start.publish(trip, MissionTime::default(), WheelSample::default())?;
@@ -88,7 +88,7 @@ pub fn measure(
     Ok(latencies)
 }
 
-/// Be the forwarder that stands for the stage `place`.
+/// Run the forwarder that stands for the stage `place`.
 pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), TickError> {
     let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     become_child(place, supervisor)?;
@@ -105,7 +105,7 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<
     Ok(())
 }
 
-/// Forwards all that came.
+/// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
 fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, TickError> {

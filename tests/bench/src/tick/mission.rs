@@ -19,14 +19,14 @@ use super::{
     process_set::{ProcessSet, Used},
 };
 
-/// The mission, as `run` is asked for it.
+/// The mission, as it is given to `run`.
 pub(super) struct Mission<'a> {
     pub(super) name: &'a str,
     pub(super) set: &'a [String],
     pub(super) robot: &'a RobotName,
     pub(super) pace: Pace,
     pub(super) record: bool,
-    /// So many processes read its grid and field.
+    /// Processes that read its grid and field.
     pub(super) consumers: u32,
 }
 
@@ -37,18 +37,18 @@ pub(super) struct Ticks {
     pub(super) p50_us: f64,
     pub(super) p99_us: f64,
     pub(super) max_us: f64,
-    /// What its processes used; none of a short one.
+    /// Resources of its processes; none for a short mission.
     pub(super) used: Option<Used>,
 }
 
-/// How often its processes are looked at.
+/// Pause between measurements of its processes.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// The directory of the run, removed in the end.
 struct Directory(PathBuf);
 
 impl Directory {
-    /// Made by this process, so that it may remove it: `firsthand-UID` there is all robots of a user.
+    /// The name is not `firsthand-UID`, which is the directory of all robots of a user.
     fn make() -> Result<Self, TickError> {
         let name = format!("firsthand-latency-{}", std::process::id());
         let directory = std::env::temp_dir().join(name);
@@ -64,7 +64,7 @@ impl Drop for Directory {
 }
 
 impl Mission<'_> {
-    /// Run it. Its stages measure their items only for a `budget`: that takes time itself.
+    /// Run it. Its stages measure their items only for a `budget`, because measuring takes time.
     pub(super) fn measure(&self, budget: Option<&mut Budget>) -> Result<Ticks, TickError> {
         let directory = Directory::make()?;
         let (robot, pace) = (self.robot.to_string(), self.pace.to_string());
@@ -79,7 +79,7 @@ impl Mission<'_> {
         if budget.is_some() {
             command.env(latency_budget::ASKED_FOR, "1");
         }
-        // They wait for the bus, and follow it; they are none of the mission's processes.
+        // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
         let _consumers = consumers::start(self.robot, self.consumers)?;
         let run = command
             .stdout(Stdio::piped())
@@ -96,7 +96,7 @@ impl Mission<'_> {
                 Err(RecvTimeoutError::Disconnected) => return Err(TickError::Nothing),
             }
         };
-        // It has sent what it had.
+        // The thread has ended, because it has sent its result.
         let _ = waiting.join();
         let ticks = ticks(&output, processes.used())?;
         if let Some(budget) = budget {
@@ -106,7 +106,7 @@ impl Mission<'_> {
     }
 }
 
-/// What the mission's summary says.
+/// The tick latencies of the mission's summary.
 fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, TickError> {
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).map_err(|_| {
         let errors = String::from_utf8_lossy(&output.stderr);

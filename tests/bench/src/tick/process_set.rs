@@ -1,4 +1,4 @@
-//! What a process and all that it started use, as the kernel counts it in `/proc`.
+//! Resources of a process and its descendants, from `/proc`.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -9,18 +9,18 @@ use std::{
 use common::process_status;
 use rustix::param::clock_ticks_per_second;
 
-/// What a set of processes uses.
+/// Resources of a set of processes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Used {
-    /// Times a second that one of their threads was woken: it had given the processor back to wait.
+    /// Voluntary context switches of all threads in a second: each wait ends with a wakeup.
     pub(super) wakeups_per_s: f64,
     /// Share of one core, 1 for all of it.
     pub(super) cpu_share: f64,
-    /// Memory, each shared page divided among those that map it, MiB.
+    /// Proportional memory, MiB: each shared page is divided among the processes that map it.
     pub(super) pss_mib: f64,
 }
 
-/// A process and its descendants, looked at now and then.
+/// A process and its descendants.
 #[derive(Debug)]
 pub(super) struct ProcessSet {
     root: u32,
@@ -29,7 +29,7 @@ pub(super) struct ProcessSet {
     pss_kib: u64,
 }
 
-/// What was counted until a moment.
+/// The counts at a moment.
 #[derive(Clone, Debug)]
 struct Counts {
     at: Instant,
@@ -43,8 +43,6 @@ struct Count {
 }
 
 impl ProcessSet {
-    /// `root` and what it starts.
-    #[must_use]
     pub(super) const fn of(root: u32) -> Self {
         Self {
             root,
@@ -54,7 +52,7 @@ impl ProcessSet {
         }
     }
 
-    /// Count now. While processes are still starting, counting begins anew; when the first has ended, it is over.
+    /// Count now. Counting begins anew whenever a process has started, and stops when the first has ended.
     pub(super) fn look(&mut self) {
         let all = descendants(self.root);
         let processes: BTreeMap<_, _> = all
@@ -69,7 +67,7 @@ impl ProcessSet {
         let started = known.is_none_or(|known| all.iter().any(|one| !known.contains_key(one)));
         let ended = known.is_some_and(|known| known.keys().any(|one| !all.contains(one)));
         if started {
-            // Of the first look only: to add up the pages takes a process some of its time.
+            // Memory is read only once, because that takes a process some of its time.
             self.pss_kib = all.iter().filter_map(|&process| pss_kib(process)).sum();
             self.first = Some(counts);
             self.last = None;
@@ -78,8 +76,7 @@ impl ProcessSet {
         }
     }
 
-    /// What they used between the first look and the last; none without two.
-    #[must_use]
+    /// The resources between the first look and the last; none without two looks.
     pub(super) fn used(&self) -> Option<Used> {
         let (first, last) = (self.first.as_ref()?, self.last.as_ref()?);
         let over = (last.at - first.at).as_secs_f64();
@@ -115,14 +112,14 @@ impl Count {
     }
 }
 
-/// Where the parent's number stands in [`stat`], and the time outside the kernel, which that in the kernel follows.
+/// Places in [`stat`] of the parent's id and of the user time, which the system time follows.
 const PARENT: usize = 0;
 const USER_TIME: usize = 10;
 
-/// The numbers of `/proc/PID/stat` from the parent's on; those that are negative as 0.
+/// The numbers of `/proc/PID/stat` from the parent's id on; negative ones as 0.
 fn stat(process: u32) -> Option<Vec<u64>> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // Its name, in parentheses, may hold anything; after it come the state and then numbers.
+    // The process's name, in parentheses, may contain anything; after it come the state and then numbers.
     let (_, rest) = stat.rsplit_once(") ")?;
     let numbers = rest.split_ascii_whitespace().skip(1);
     Some(numbers.map(|word| word.parse().unwrap_or(0)).collect())
@@ -175,7 +172,7 @@ mod tests {
 
     #[test]
     fn a_process_and_its_child_are_counted_until_one_ends() {
-        // A shell, and a child of it, which ends with its input.
+        // A shell and its child, which ends with its input.
         let mut shell = Command::new("sh")
             .args(["-c", "exec 3<&0; cat <&3 & echo started; wait"])
             .stdin(Stdio::piped())

@@ -1,4 +1,4 @@
-//! How ticks follow each other, which decides what they cost: caches are warm or cold, cores awake or asleep.
+//! How ticks follow each other. Their cost depends on it: caches are warm or cold, cores awake or asleep.
 
 use std::{fmt, time::Duration};
 
@@ -7,9 +7,7 @@ use common::clock::Pace;
 /// How ticks follow each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Regime {
-    /// At once.
     BackToBack,
-    /// One every period.
     Rate {
         /// Ticks a second.
         hz: f64,
@@ -17,7 +15,7 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Of a mission of `rate_hz` ticks a mission second, at `pace`; or of `asked_hz` ticks a second.
+    /// The regime of a mission with `rate_hz` ticks in a mission second at `pace`; or with `asked_hz` ticks a second.
     pub fn new(asked_hz: Option<f64>, pace: Pace, rate_hz: f64) -> Self {
         match (asked_hz, pace) {
             (Some(hz), _) => Self::Rate { hz },
@@ -26,7 +24,7 @@ impl Regime {
         }
     }
 
-    /// The pace at which a mission of `rate_hz` ticks a mission second has it.
+    /// The pace that gives a mission with `rate_hz` ticks in a mission second this regime.
     pub fn pace(self, rate_hz: f64) -> Pace {
         match self {
             Self::BackToBack => Pace::Max,
@@ -34,7 +32,7 @@ impl Regime {
         }
     }
 
-    /// From tick to tick; none when they follow at once.
+    /// Time from tick to tick; none if they follow at once.
     pub fn period(self) -> Option<Duration> {
         match self {
             Self::BackToBack => None,
@@ -63,7 +61,7 @@ pub fn parse_hz(text: &str) -> Result<f64, String> {
 }
 
 const SLOWEST_HZ: f64 = 0.1;
-/// A tick takes a good part of a millisecond: faster is back to back.
+/// A tick takes up to a millisecond, so faster is back to back.
 const FASTEST_HZ: f64 = 1000.0;
 
 #[cfg(test)]

@@ -1,9 +1,11 @@
-//! What was measured, as it is printed.
+//! The result, as it is printed.
 
 use std::fmt;
 
 use common::latency::Histogram;
 use serde::Serialize;
+
+use crate::quantile;
 
 use super::{
     budget::{Row, Table},
@@ -12,7 +14,7 @@ use super::{
     regime::Regime,
 };
 
-/// What was measured, microseconds.
+/// The result, microseconds.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// How ticks and hops followed each other.
@@ -27,34 +29,35 @@ pub struct Report {
     hops_max_us: f64,
     /// Ratio of the medians, tick to hops.
     ratio: f64,
-    /// Of the same at 99 %.
+    /// Ratio at 99 %.
     ratio_p99: f64,
-    /// Of the mission's processes, supervisor and simulated robot among them; none of a mission of a second or two.
+    /// Of the mission's processes, including supervisor and simulated robot; none for a mission of a second or two.
     wakeups_per_s: Option<f64>,
     cpu_share: Option<f64>,
     pss_mib: Option<f64>,
-    /// By stage and item; none unless asked for.
+    /// By stage and item, with `--budget`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) budget: Option<Vec<Row>>,
 }
 
 impl Report {
-    /// None of nothing. Of the rounds' quantiles the medians count: a shared machine has good and bad moments.
+    /// None without measurements. The medians of the rounds' quantiles count, because the load of a shared machine changes.
     pub(super) fn new(
         regime: Regime,
         hops: &Histogram,
         trips: u64,
         rounds: &[Ticks],
     ) -> Option<Self> {
-        let middle = |of: fn(&Ticks) -> f64| median(rounds.iter().map(of));
+        let middle = |of: fn(&Ticks) -> f64| quantile(rounds.iter().map(of), 0.5);
         let (tick_p50_us, tick_p99_us) = (middle(|tick| tick.p50_us)?, middle(|tick| tick.p99_us)?);
         let (hops_p50_us, hops_p99_us) = (hops.quantile_us(0.5)?, hops.quantile_us(0.99)?);
         let used = |of: fn(&Used) -> f64| {
-            median(
+            quantile(
                 rounds
                     .iter()
                     .filter_map(|ticks| ticks.used.as_ref())
                     .map(of),
+                0.5,
             )
         };
         Some(Self {
@@ -75,12 +78,6 @@ impl Report {
             budget: None,
         })
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 impl fmt::Display for Report {

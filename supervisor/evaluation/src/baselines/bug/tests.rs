@@ -63,7 +63,7 @@ impl Drive {
         assert_eq!(outcome, Outcome::Followed);
     }
 
-    /// What it says where the robot is.
+    /// The planner's answer for the robot's place.
     fn guidance(&mut self) -> GuidanceSample {
         let pose = pose(self.at.into());
         match self.bug.step(Input::Pose(&pose), MissionTime::default()) {

@@ -14,7 +14,7 @@ const WALL: [&str; 9] = [
     "....#....",
 ];
 
-/// What a planner with target (0.3, 0) says on the map `rows` of a robot at (x, y).
+/// The answer of a planner with target (0.3, 0) on the map `rows` to a robot at (x, y).
 fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
     let mut planner = Wavefront::new(&mission([0.3, 0.0]));
     let (header, cells) = drawn(rows);
@@ -54,7 +54,7 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
         );
         assert!(driven < 2.0, "no end of it, at {at}");
     }
-    // Over the end of the wall, the corner kept: two legs of 0.3 by 0.3 m and back, 0.85 m; cells round them up.
+    // The path leads around the end of the wall: two legs of 0.3 by 0.3 m, 0.85 m in all; cells round it up.
     assert!((0.8..1.1).contains(&driven), "{driven}");
 }
 

@@ -1,4 +1,4 @@
-//! Messages in the order of their ticks: a recorder that was kept waiting takes each topic's samples of several ticks at once.
+//! Sorts messages by tick: a delayed recorder reads the samples of several ticks topic by topic.
 
 use std::collections::BTreeMap;
 
@@ -6,10 +6,10 @@ use common::topics;
 
 use crate::{Message, RecordingError, replay::samples::tick_of};
 
-/// So many messages are held: those of some hundred ticks, which is more than a bus holds for its recorder.
+/// Messages that are held: those of some hundred ticks, which is more than a bus holds for its recorder.
 const HELD: usize = 4096;
 
-/// Gives messages by tick, those of a tick in the order of the table of topics, those of a topic as they come.
+/// Gives messages by tick, within a tick by the table of topics, within a topic in the order of the file.
 pub(super) struct ByTick<I> {
     messages: I,
     held: BTreeMap<(u64, usize, u64), Message>,

@@ -1,4 +1,4 @@
-//! What live stages did.
+//! The result of live stages.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -6,23 +6,22 @@ use serde::Serialize;
 
 use crate::replay::samples::First;
 
-/// What live stages published beside what was recorded.
+/// The comparison of live samples with recorded ones.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LiveReport {
-    /// By stage.
     pub stages: BTreeMap<&'static str, LiveStageReport>,
-    /// Where one first differs from what was recorded.
+    /// The first difference between a live sample and the recorded one.
     pub first: Option<First>,
     /// Samples that were played.
     pub played: u64,
 }
 
-/// What one published.
+/// The comparison for one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LiveStageReport {
     /// Ticks that both it and the recorded stage answered.
     pub answered: u64,
-    /// Of these, with the same values.
+    /// Those of them with equal values.
     pub equal: u64,
     /// Ticks that only the recorded stage answered in time.
     pub unanswered: u64,

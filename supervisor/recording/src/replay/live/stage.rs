@@ -1,4 +1,4 @@
-//! A stage that runs in a process of its own, and what it publishes beside what was recorded.
+//! A live stage, in a process of its own, and the comparison of its samples with the recorded ones.
 
 use std::{
     fs::{self, File},
@@ -24,12 +24,11 @@ use supervisor::{
 use super::{error::LiveError, report::LiveStageReport};
 use crate::replay::samples::{COMPARED, First, difference, is_keyframe, tick_of};
 
-/// A stage that was asked to stop is killed after this.
+/// Time between SIGTERM and SIGKILL to a stage.
 const GRACE: Duration = Duration::from_secs(2);
-/// Of the log of a stage that ended, characters that an error shows.
+/// Characters of the log of an ended stage that an error shows.
 const LAST_WORDS: usize = 400;
 
-/// One live stage.
 pub(super) struct LiveStage {
     pub(super) stage: &'static Stage,
     process: Process,
@@ -37,20 +36,20 @@ pub(super) struct LiveStage {
     answers: Vec<Answers>,
 }
 
-/// What it publishes on one topic.
+/// Its samples on one topic.
 struct Answers {
     topic: &'static dyn topics::EncodedTopic,
     reader: Box<dyn EncodedReader>,
-    /// The recorded sample of the tick under way.
+    /// The recorded sample of the current tick.
     recorded: Option<Vec<u8>>,
-    /// The live one of the newest tick.
+    /// The live sample of the newest tick.
     given: Option<Vec<u8>>,
     report: LiveStageReport,
     first: Option<First>,
 }
 
 impl LiveStage {
-    /// Start `stage` of `run` in `directory`, on `bus`; `waiter` then wakes for what it publishes, and for its end.
+    /// Start `stage` of `run` in `directory`, on `bus`. `waiter` then wakes for its samples and for its end.
     pub(super) fn start(
         stage: &'static Stage,
         run: &Run,
@@ -102,7 +101,7 @@ impl LiveStage {
         })
     }
 
-    /// How it ended, and its last words; none while it runs.
+    /// How it ended, and the end of its log; none while it runs.
     pub(super) fn ended(&mut self) -> io::Result<Option<(ExitCause, String)>> {
         let Some(cause) = self.process.try_reap()? else {
             return Ok(None);
@@ -113,7 +112,7 @@ impl LiveStage {
         Ok(Some((cause, words.trim().to_owned())))
     }
 
-    /// A sample that the recorded stage published in the tick under way. Says whether it is this stage's.
+    /// Take a recorded sample of the current tick. Returns whether it is this stage's.
     pub(super) fn recorded(&mut self, topic: &str, message: &[u8]) -> bool {
         let own = |answers: &&mut Answers| answers.topic.spec().name == topic;
         if let Some(answers) = self.answers.iter_mut().find(own) {
@@ -128,7 +127,7 @@ impl LiveStage {
             .any(|name| name == topic)
     }
 
-    /// Take what it published. Says whether it has answered all of `tick` that the recorded stage answered.
+    /// Read its samples. Returns whether it has answered `tick` on every topic on which the recorded stage did.
     pub(super) fn has_answered(&mut self, tick: u64) -> Result<bool, BusError> {
         let mut all = true;
         for answers in &mut self.answers {
@@ -146,7 +145,7 @@ impl LiveStage {
         }
     }
 
-    /// What was found: numbers, and the first difference.
+    /// The counts, and the first difference.
     pub(super) fn report(&self) -> (LiveStageReport, Option<First>) {
         let mut report = LiveStageReport::default();
         let mut first: Option<First> = None;
@@ -170,7 +169,7 @@ impl Drop for LiveStage {
 }
 
 impl Answers {
-    /// The whole map, published again for new readers, answers no tick.
+    /// A keyframe for new readers answers no tick.
     fn is_answer(&self, message: &[u8]) -> bool {
         self.topic.layout().1.is_none() || !is_keyframe(message)
     }

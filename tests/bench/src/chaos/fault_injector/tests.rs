@@ -11,7 +11,7 @@ const fn encoder(position: u16) -> Encoder {
     }
 }
 
-/// What a robot with these counts sends in a tick.
+/// The bytes that a robot with these counts sends in a tick.
 fn tick(counts: [u16; 2]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let motor = MotorSensors {
@@ -37,7 +37,7 @@ fn at(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
 }
 
-/// The reports in what was passed on, all of which must be sound.
+/// The reports in the bytes that were passed on. All must be valid.
 fn reports(passed: &[Late]) -> Vec<Report> {
     let mut decoder = Decoder::default();
     let mut reports = Vec::new();
@@ -56,7 +56,7 @@ fn reports(passed: &[Late]) -> Vec<Report> {
     reports
 }
 
-/// What the host gets of a tick with `counts`, of a robot that stood at (100, 200) when it began to lie.
+/// The bytes for the host of a tick with `counts`, from a robot that stood at (100, 200) when its fault began.
 fn faulted(fault: RobotFault, counts: [u16; 2]) -> (FaultInjector, Vec<Late>) {
     let mut injector = FaultInjector::new(fault, 1);
     injector.report(&tick([100, 200]), at(1.0));
@@ -81,20 +81,20 @@ fn sonar(passed: &[Late]) -> Option<u8> {
 }
 
 #[test]
-fn a_robot_tells_the_truth_until_it_lies_and_every_lie_is_a_sound_frame() {
+fn bytes_pass_unchanged_until_the_fault_begins_and_every_frame_of_a_fault_is_valid() {
     for row in TABLE {
         let mut injector = FaultInjector::new(row.fault, 1);
-        let honest = injector.report(&tick([100, 200]), at(1.0));
-        assert_eq!(honest.len(), 1, "{}", row.name);
+        let passed = injector.report(&tick([100, 200]), at(1.0));
+        assert_eq!(passed.len(), 1, "{}", row.name);
         assert_eq!(
-            (honest[0].at, &honest[0].bytes),
+            (passed[0].at, &passed[0].bytes),
             (at(1.0), &tick([100, 200]))
         );
         injector.begin();
         for number in 0..50 {
             let now = at(1.1 + 0.1 * f64::from(number));
             let passed = injector.report(&tick([110, 210]), now);
-            // Panics where one is broken.
+            // It panics if a frame is invalid.
             let reports = reports(&passed);
             let acknowledged = reports.contains(&Report::System(SystemSignal::Ack));
             assert_eq!(
@@ -134,7 +134,7 @@ fn the_encoders_lie_as_the_table_says() {
 }
 
 #[test]
-fn the_sonar_lies_as_the_table_says() {
+fn the_sonar_is_wrong_as_the_table_says() {
     let told = |fault| sonar(&faulted(fault, [150, 190]).1);
     assert_eq!(told(RobotFault::SonarZero), Some(0));
     assert_eq!(told(RobotFault::SonarMissing), None);
@@ -186,7 +186,11 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
     let mut heard =
         |injector: &mut FaultInjector, bytes: &[u8]| injector.order(bytes, &mut || moved += 1);
     assert_eq!(heard(&mut injector, &go), go);
-    assert_eq!(heard(&mut injector, &stop), stop, "it obeys before it lies");
+    assert_eq!(
+        heard(&mut injector, &stop),
+        stop,
+        "the robot stops before its fault"
+    );
     injector.begin();
     assert_eq!(heard(&mut injector, &stop), go);
     assert_eq!(heard(&mut injector, &suspend), suspend);
