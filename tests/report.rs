@@ -27,7 +27,7 @@ fn a_run_ends_with_a_report_of_every_figure_and_of_a_planner_that_was_killed() {
     assert_eq!(code, Some(0), "{summary}");
     let report = directory.path().join("run/report");
     let page = fs::read_to_string(report.join("report.html")).unwrap();
-    assert!(page.contains("<td>planner</td><td>generation 1 ended by signal 9"));
+    assert!(page.contains("<td>planner</td><td>generation 1 died (signal 9)"));
     assert!(page.contains("<td>planner</td><td>generation 2 is ready"));
     assert!(page.contains("1 (reached)"));
     assert!(!page.contains("http"), "the page refers to something else");
@@ -51,7 +51,7 @@ fn a_run_ends_with_a_report_of_every_figure_and_of_a_planner_that_was_killed() {
     assert!(written.status.success());
     let page = String::from_utf8(written.stdout).unwrap();
     let page = fs::read_to_string(page.trim_end()).unwrap();
-    assert!(page.contains("generation 1 ended by signal 9"));
+    assert!(page.contains("generation 1 died (signal 9)"));
     assert!(page.contains("how it ended is not known here"));
     assert_nothing_left("report-kill");
 }

@@ -12,7 +12,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::poll;
+use common::{
+    poll,
+    samples::{DeathCause, DeathSample},
+};
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
@@ -80,17 +83,29 @@ impl From<ExitStatus> for ExitCause {
     }
 }
 
+impl From<&DeathSample> for ExitCause {
+    fn from(death: &DeathSample) -> Self {
+        let signal = death.code;
+        match DeathCause::from_byte(death.cause) {
+            DeathCause::Exited => Self::Exited(death.code),
+            DeathCause::Signalled => Self::Signalled {
+                signal,
+                core: false,
+            },
+            DeathCause::SignalledWithCore => Self::Signalled { signal, core: true },
+            DeathCause::Unknown => Self::Unknown,
+        }
+    }
+}
+
 impl fmt::Display for ExitCause {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Exited(code) => write!(to, "exit code {code}"),
-            Self::Unknown => to.write_str("not our child; systemctl status says how"),
+            Self::Unknown => to.write_str("ended; systemctl status says how"),
             Self::Signalled { signal, core } => {
-                match Signal::from_named_raw(signal) {
-                    Some(named) => write!(to, "{named:?}")?,
-                    None => write!(to, "signal {signal}")?,
-                }
-                to.write_str(if core { ", core dumped" } else { "" })
+                let core = if core { ", core dumped" } else { "" };
+                write!(to, "signal {signal}{core}")
             }
         }
     }

@@ -42,10 +42,10 @@ pub(super) const MISSION: Style = Style {
 /// Share of the map that may lie below the last level: close to hazards u has no floor.
 const BELOW: f64 = 0.02;
 
-/// Where the level sets lie: at -step, -2 step, ..., -count step of log2 u.
+/// The levels: -step, -2 step, ..., -count step of log2 u.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
-    /// From one to the next, in log2 u.
+    /// Step between levels, in log2 u.
     pub(super) step: f64,
     /// How many.
     pub(super) count: u32,
@@ -112,7 +112,7 @@ impl<'a> Bands<'a> {
         })
     }
 
-    /// Where the level sets lie.
+    /// The levels.
     pub(super) const fn levels(&self) -> Levels {
         self.levels
     }
@@ -167,7 +167,7 @@ struct Samples {
     values: Vec<f64>,
 }
 
-/// What a level set crosses on its way: the side from a sample to the next one along x or y.
+/// A side that a level set crosses: from a sample to the next one along x or y.
 #[derive(Clone, Copy)]
 enum Side {
     Below,
@@ -282,7 +282,7 @@ impl Samples {
         }
     }
 
-    /// Where `level` crosses that side, on the sheet.
+    /// The point on the sheet where `level` crosses that side.
     fn position(&self, lattice: &Lattice, crossing: usize, level: f64) -> DVec2 {
         let from = crossing / 2;
         let (col, row) = (from % self.across, from / self.across);

@@ -1,4 +1,4 @@
-//! What was believed hazardous at the end, by where the belief came from.
+//! Hazard cells of the map at the end, by their source.
 
 use common::grid::CellState;
 use glam::DVec2;
@@ -76,7 +76,6 @@ impl BelievedHazard {
 
 /// Cells of several kinds in square blocks of `side` cells.
 pub(super) struct Blocks<'a, Kind> {
-    /// Where the cells lie.
     pub(super) lattice: &'a Lattice,
     /// Cells along the side of a block.
     pub(super) side: usize,

@@ -30,7 +30,7 @@ pub enum Mark {
 /// Values to draw.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// What they are, for the legend.
+    /// Name for the legend.
     pub name: String,
     /// How they are drawn.
     pub mark: Mark,
@@ -42,13 +42,13 @@ pub struct Series {
 pub struct Chart {
     /// Above it.
     pub title: String,
-    /// What it shows, in a sentence, for those who cannot see it.
+    /// A description in a sentence, for people who cannot see it.
     pub description: String,
     /// Along the foot.
     pub x: Axis,
     /// Along the left side.
     pub y: Axis,
-    /// What is drawn; the first ones below the others.
+    /// The series; the first ones are drawn below the others.
     pub series: Vec<Series>,
 }
 
@@ -94,7 +94,7 @@ impl Chart {
     }
 }
 
-/// Of each stretch the least and the greatest: a peak is never lost.
+/// The least and the greatest value of each interval, so that no peak is lost.
 fn reduced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     if points.len() <= MOST_POINTS {
         return points.to_vec();

@@ -21,7 +21,7 @@ pub(super) struct Lattice {
 /// How a lattice lies.
 #[derive(Clone, Copy, Debug)]
 enum Placing {
-    /// By way of the mission frame, metres, y up.
+    /// In the mission frame, metres, y up.
     Mission { frame: GridFrame, view: View },
     /// As an image: the first row at the top, cells of so many units from a corner of the sheet.
     Image { corner: DVec2, cell: f64 },
@@ -58,7 +58,7 @@ impl Lattice {
         self.cols.max(self.rows)
     }
 
-    /// Where a place given in cells (cell centres at whole numbers) lies on the sheet.
+    /// The point on the sheet of a place in cells (cell centres at whole numbers).
     pub(super) fn place(&self, cells: DVec2) -> DVec2 {
         match &self.placing {
             Placing::Mission { frame, view } => view.place(metres(frame, cells)),

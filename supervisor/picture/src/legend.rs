@@ -1,4 +1,4 @@
-//! What the legend says: every symbol of the plot, in words.
+//! The legend explains every symbol of the plot.
 
 use common::geometry::Shapes;
 use glam::DVec2;
@@ -12,7 +12,7 @@ use super::{
     world::Outline,
 };
 
-/// What the legend has to explain: only what is drawn.
+/// The symbols that are drawn and need an explanation.
 pub(super) struct Legend<'a> {
     pub(super) view: &'a View,
     pub(super) levels: Option<Levels>,
@@ -26,7 +26,7 @@ pub(super) struct Legend<'a> {
 
 /// Left edge of the legend.
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
-/// From one row to the next.
+/// Distance between rows.
 const ROW: f64 = 25.0;
 /// Middle of the symbols, and where their text starts, from the left edge of a column.
 const SYMBOL: f64 = 19.0;
@@ -160,7 +160,6 @@ impl Legend<'_> {
 /// A column of rows that grows downwards.
 pub(super) struct Column {
     x: f64,
-    /// Where the next row stands.
     pub(super) y: f64,
     /// The rows so far.
     pub(super) text: String,

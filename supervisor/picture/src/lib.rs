@@ -48,6 +48,7 @@ use common::{
 pub use self::{
     chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
+    page::escape,
     plot::{Axis, Scale},
     raster::png,
     scene::{Facts, Scene},

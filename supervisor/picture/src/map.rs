@@ -20,14 +20,14 @@ const LARGEST: usize = 2368;
 const SMALL: usize = 100;
 /// Longest side of those, pixels.
 const SMALL_SIDE: usize = 1200;
-/// Around the map, pixels.
+/// Margin around the map, pixels.
 const FRAME: f64 = 16.0;
 
 const WALL: &str = "#1d2430";
 const CUT_OFF: &str = "#c9ccd1";
 const TARGET: &str = "#e4342b";
 
-/// From warm light at the target into deep water.
+/// Colours from the target outwards.
 static BANDS: bands::Style = bands::Style {
     budget: usize::MAX,
     finest: 1200,
@@ -52,7 +52,7 @@ const LINES: streamlines::Style = streamlines::Style {
     stroke: (1.0, 0.6, 0.8),
 };
 
-/// What there is to draw of a field, row-major, the first row at the top.
+/// A field, row-major, the first row at the top.
 pub struct FieldOnMap<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
@@ -64,7 +64,7 @@ pub struct FieldOnMap<'a> {
     pub target: (usize, usize),
 }
 
-/// What a cell is drawn as.
+/// The appearance of a cell.
 #[derive(Clone, Copy, Eq, PartialEq)]
 enum Kind {
     Reachable,
@@ -114,7 +114,7 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     )
 }
 
-/// Over cells from which no way leads to the target.
+/// The pattern over cells from which no path leads to the target.
 const HATCH: &str = "<pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" \
      patternTransform=\"rotate(45)\"><path d=\"M0 0V8\" stroke=\"#8b9199\" stroke-width=\"3\"/></pattern>";
 
@@ -191,7 +191,7 @@ fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize
         .flat_map(move |row| columns.clone().map(move |col| row * cols + col))
 }
 
-/// A bull's eye that is seen from afar.
+/// A large bull's eye.
 fn target(lattice: &Lattice, (col, row): (usize, usize)) -> String {
     let at = lattice.place(DVec2::new(col as f64, row as f64));
     let (x, y) = (Px(at.x), Px(at.y));

@@ -1,4 +1,4 @@
-//! Around the plot: title, axes, captions; and where the legend of a figure goes.
+//! The parts around the plot: title, axes, captions; and the place of a figure's legend.
 
 use glam::DVec2;
 
@@ -18,7 +18,7 @@ const ACROSS: usize = 150;
 const MOST_CAPTIONS: usize = 8;
 /// Below the plot, before the first caption.
 const BELOW: f64 = 58.0;
-/// From one line of captions to the next.
+/// Distance between lines of captions.
 const LINE: f64 = 18.0;
 
 /// The start of the file: size, description, definitions.
@@ -89,7 +89,7 @@ pub(super) fn axes(view: &View) -> String {
     axes_in(view, 1.0)
 }
 
-/// The same with text `size` times as large, and as much fewer ticks.
+/// The frame with text `size` times as large, and that many times fewer ticks.
 fn axes_in(view: &View, size: f64) -> String {
     let step = round_up(view.side_m() * size / 12.0);
     let digits = (-step.log10().floor()).max(0.0) as usize;
@@ -213,7 +213,7 @@ pub(super) fn panels(title: &str, plots: &[(&str, String)]) -> String {
     )
 }
 
-/// What the layers of the plot refer to.
+/// Definitions that the layers of the plot use.
 fn definitions() -> String {
     format!(
         "<defs><clipPath id=\"plot\"><rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" \

@@ -139,7 +139,7 @@ impl<'a> Motion<'a> {
         )
     }
 
-    /// Where it ended: the true body filled, the believed one dashed.
+    /// The end of the run: the true body filled, the estimated one dashed.
     fn end(&self, view: &View, radius: f64) -> String {
         let body = |pose: Option<&Pose2>, style: &str| {
             let mut path = Path::default();

@@ -26,7 +26,7 @@ pub(super) mod ink {
     pub(crate) const TEXT: &str = "#1f2933";
     /// Text of less weight.
     pub(crate) const QUIET: &str = "#5b6773";
-    /// Where there is no way to the target, or no field at all.
+    /// Cells without a path to the target or without a field.
     pub(crate) const NOWHERE: &str = "#eceef0";
     /// Lines of E.
     pub(crate) const GUIDANCE: &str = "#3f5f86";
@@ -36,11 +36,11 @@ pub(super) mod ink {
     pub(crate) const KNOWN: &str = "#8f78c4";
     /// Cells of the perimeter.
     pub(crate) const PERIMETER: &str = "#9aa5b1";
-    /// What is really there.
+    /// Real shapes.
     pub(crate) const WORLD: &str = "#27313b";
-    /// The way really driven.
+    /// The true trajectory.
     pub(crate) const TRUTH: &str = "#0b0f14";
-    /// The way believed.
+    /// The estimated trajectory.
     pub(crate) const BELIEVED: &str = "#d1126f";
     /// Target, and success.
     pub(crate) const TARGET: &str = "#087f4b";
@@ -82,7 +82,7 @@ impl View {
         self.side_m
     }
 
-    /// Where `point` (metres) lies on the sheet.
+    /// The place of `point` (metres) on the sheet.
     pub(super) fn place(&self, point: DVec2) -> DVec2 {
         let from_low = (point - self.low) * self.px(1.0);
         DVec2::new(PLOT_LEFT + from_low.x, PLOT_TOP + PLOT_SIDE - from_low.y)
@@ -250,7 +250,7 @@ impl Path {
 }
 
 /// `text` as XML character data of at most `limit` characters.
-pub(super) fn escape(text: &str, limit: usize) -> String {
+pub fn escape(text: &str, limit: usize) -> String {
     let mut escaped = String::new();
     for (nth, character) in text.chars().enumerate() {
         if nth + 1 >= limit && text.chars().nth(limit).is_some() {

@@ -1,4 +1,4 @@
-//! What charts have in common: a sheet of fixed width, ranges with round ticks, axes with units, a legend.
+//! The common parts of charts: a sheet of fixed width, ranges with round ticks, axes with units, a legend.
 
 use glam::DVec2;
 
@@ -14,7 +14,7 @@ pub(super) const RIGHT: f64 = WIDTH - 20.0;
 const TEXT: f64 = 14.0;
 /// About the width of a character of the text.
 const CHARACTER: f64 = 8.6;
-/// From one row of the legend to the next.
+/// Distance between rows of the legend.
 const ROW: f64 = 21.0;
 /// Room of a symbol of the legend, and from one entry to the next.
 const SYMBOL: f64 = 38.0;
@@ -29,14 +29,14 @@ const ACROSS: usize = 70;
 pub enum Scale {
     /// Evenly.
     Linear,
-    /// By their logarithm; there are none from 0 down.
+    /// Logarithmic; values of 0 and less are not drawn.
     Logarithmic,
 }
 
 /// An axis of a chart.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What is along it, with its unit: `time, s`.
+    /// Its quantity and unit, such as `time, s`.
     pub label: String,
     /// How values lie.
     pub scale: Scale,
@@ -60,7 +60,7 @@ impl Axis {
     }
 }
 
-/// From least to greatest along an axis; of a logarithmic one the exponents.
+/// The range of an axis; of a logarithmic one the exponents.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
     scale: Scale,
@@ -110,7 +110,7 @@ impl Range {
         }
     }
 
-    /// Where `value` lies, 0 at the low end, 1 at the high one; NaN for what is no place.
+    /// The place of `value`: 0 at the low end, 1 at the high one; NaN if it has none.
     pub(super) fn part(&self, value: f64) -> f64 {
         let part = (scaled(self.scale, value) - self.low) / (self.high - self.low);
         if part.is_finite() {
@@ -128,7 +128,7 @@ impl Range {
         }
     }
 
-    /// Where ticks are, and what is written there.
+    /// Places and labels of the ticks.
     fn ticks(&self) -> Vec<(f64, String)> {
         let digits = (-self.step.log10().floor()).clamp(0.0, 9.0) as usize;
         let first = (self.low / self.step - 1e-6).ceil();
@@ -200,7 +200,7 @@ impl Plot {
         }
     }
 
-    /// Where the parts of both ranges meet.
+    /// The point on the sheet at these shares of both ranges.
     pub(super) fn place(&self, x: f64, y: f64) -> DVec2 {
         DVec2::new(
             self.left + x * (RIGHT - self.left),

@@ -1,8 +1,7 @@
-//! What a picture of a run shows.
+//! The content of a picture of a run.
 
 use common::{grid::GridFrame, kinematics::Pose2, mission::Mission, samples::FieldCell};
 
-/// What there is to draw.
 pub struct Scene<'a> {
     /// The mission: target, world, body, perimeter.
     pub mission: &'a Mission,
@@ -10,11 +9,11 @@ pub struct Scene<'a> {
     pub grid: Option<(GridFrame, &'a [u8])>,
     /// The field of that belief, row-major.
     pub field: Option<(GridFrame, &'a [FieldCell])>,
-    /// Where dead reckoning put the robot, at equal steps of mission time from its beginning.
+    /// The poses of dead reckoning, at equal steps of mission time from its beginning.
     pub believed: &'a [Pose2],
     /// Covariance of its position at the end, xx, xy, yy, m^2; none if nobody knows.
     pub covariance: Option<[f64; 3]>,
-    /// Where the robot really was, likewise; empty with a real robot.
+    /// The true poses at the same times; empty with a real robot.
     pub truth: &'a [Pose2],
     /// How the run went.
     pub facts: Facts<'a>,
@@ -33,7 +32,7 @@ pub struct Facts<'a> {
     pub mission_time_s: f64,
     /// Length of the way driven, metres.
     pub path_length_m: f64,
-    /// From start to target in a straight line, metres.
+    /// Straight distance from start to target, metres.
     pub straight_m: f64,
     /// Range samples that put a hazard on the map.
     pub safety_events: u64,

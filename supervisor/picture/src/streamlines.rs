@@ -37,7 +37,7 @@ pub(super) const MISSION: Style = Style {
 const MERGED: f64 = 0.5;
 /// Shorter lines are left out, in spacings.
 const SHORTEST: f64 = 1.4;
-/// From one arrowhead to the next along a line, in spacings.
+/// Distance between arrowheads along a line, in spacings.
 const ARROWS_APART: f64 = 6.0;
 /// A line is straight while it turns by less than this (its cosine).
 const STRAIGHT: f64 = 0.9985;
@@ -209,7 +209,7 @@ impl Tracer<'_> {
         Some(line)
     }
 
-    /// From `seed` on along E, or against it, until there is no guidance or another line is near.
+    /// Follow E, or its reverse, from `seed` until there is no guidance or another line is near.
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
         // Not longer than a cell, so that a wall of one cell is not stepped over.
         let step = (0.2 * self.spacing).min(0.9) * sense;

@@ -13,7 +13,7 @@ use glam::DVec2;
 
 use super::{Facts, Scene, svg};
 
-/// What a run leaves, owned.
+/// The owned data of a run.
 struct Run {
     mission: Mission,
     grid: Vec<u8>,
@@ -390,7 +390,7 @@ fn the_region_of_the_believed_end_is_the_covariances_ellipse_of_95_percent() {
         along_x.contains(&axes) && along_x.contains("rotate(0)"),
         "{axes}"
     );
-    // Up the sheet is against its y.
+    // The sheet's y axis points down.
     scene.covariance = Some([0.025, 0.015, 0.025]);
     let diagonal = svg(&scene);
     assert!(diagonal.contains(&axes) && diagonal.contains("rotate(-45)"));

@@ -17,7 +17,7 @@ const MOST: usize = 500;
 /// Lanes that are drawn at most.
 const MOST_LANES: usize = 24;
 
-/// What a mark says.
+/// The symbol of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Symbol {
     /// A process ended: a cross.
@@ -74,7 +74,7 @@ impl Symbol {
 pub struct Lane {
     /// Whose.
     pub name: String,
-    /// From when to when it was down or standing, seconds.
+    /// Intervals in which it was down or standing, seconds.
     pub spans: Vec<[f64; 2]>,
     /// When something happened, seconds.
     pub marks: Vec<(f64, Symbol)>,
@@ -85,13 +85,13 @@ pub struct Lane {
 pub struct Timeline {
     /// Above it.
     pub title: String,
-    /// What it shows, in a sentence.
+    /// A description in a sentence.
     pub description: String,
-    /// Where it ends, seconds.
+    /// End of the time axis, seconds.
     pub duration_s: f64,
-    /// What a span says: `no process; the robot is kept standing`.
+    /// The meaning of a span, such as `no process; the robot is kept standing`.
     pub span: String,
-    /// From above.
+    /// The lanes from top to bottom.
     pub lanes: Vec<Lane>,
 }
 

@@ -1,6 +1,6 @@
-//! What is really there, over what was believed: dark outlines and a hatch, so that both show.
+//! The real shapes over the robot's map: dark outlines and a hatch, so that both are visible.
 //!
-//! What does not reach from the floor to above the robot has dashed outlines, what absorbs sound dotted ones.
+//! Shapes that do not reach from the floor to above the robot have dashed outlines, those that absorb sound dotted ones.
 
 use common::geometry::{Profile, Shapes};
 
@@ -18,7 +18,7 @@ pub(super) enum Outline {
     Full,
     /// Lower than that, or above the floor.
     Partial,
-    /// As high as the first, but it gives back less than all of a sound.
+    /// As high as the robot, but it absorbs sound.
     Soft,
 }
 

@@ -1,4 +1,4 @@
-//! The map at a few moments of a run, and the field of each, computed anew: recordings hold no field unless asked.
+//! The map at a few moments of a run, and the field of each. Fields are computed, because recordings contain none by default.
 
 use common::{
     clock::MissionTime,
@@ -11,14 +11,14 @@ use planner::step::{Input, Planner};
 
 use crate::downsampled::drop_every_second;
 
-/// At most so many maps are kept. When there are more, every second one is dropped, and from then on half as many are taken.
+/// Most maps. When there are more, every second one is dropped, and from then on half as many are taken.
 const MOST: usize = 8;
-/// From one to the next at first, seconds of mission time.
+/// First period of maps, seconds of mission time.
 const FIRST_APART_S: f64 = 2.0;
-/// Larger maps are drawn at the end alone, and without their field, cells.
+/// Cells of a map beyond which it is drawn only at the end, without its field.
 const LARGEST: usize = 1024 * 1024;
 
-/// A map as it was believed at one moment.
+/// The robot's map at one moment.
 #[derive(Clone, Debug)]
 pub(crate) struct Belief {
     pub(crate) time_s: f64,
@@ -29,7 +29,7 @@ pub(crate) struct Belief {
 }
 
 impl Belief {
-    /// `grid` as `header` told of it last; none before its first keyframe.
+    /// The map of `grid` with its newest `header`; none before the first keyframe.
     pub(crate) fn of(header: &GridHeader, grid: &Replica<u8>) -> Option<Self> {
         let frame = grid.frame()?;
         let part = Part::whole(frame, grid.version());
@@ -41,7 +41,7 @@ impl Belief {
         })
     }
 
-    /// Its field, row-major, as the planner computes it; none where the map has none, and of a map too large.
+    /// Its field, row-major, as the planner computes it; none if there is none, or if the map is too large.
     pub(crate) fn field(&self, mission: &Mission) -> Option<Vec<FieldCell>> {
         if self.cells.len() > LARGEST {
             return None;
@@ -56,7 +56,7 @@ impl Belief {
     }
 }
 
-/// Maps about equally far apart in time.
+/// Maps at about equal intervals.
 #[derive(Clone, Debug)]
 pub(crate) struct Beliefs {
     kept: Vec<Belief>,
@@ -90,7 +90,7 @@ impl Beliefs {
         self.kept.extend(Belief::of(header, grid));
     }
 
-    /// Those nearest to a quarter, half and three quarters of a run that ended at `end_s`.
+    /// The maps nearest to a quarter, half and three quarters of a run that ended at `end_s`.
     pub(crate) fn on_the_way(&self, end_s: f64) -> Vec<&Belief> {
         let mut chosen: Vec<&Belief> = Vec::new();
         for share in [0.25, 0.5, 0.75] {
@@ -99,7 +99,7 @@ impl Beliefs {
                 .kept
                 .iter()
                 .min_by(|one, other| off(one).total_cmp(&off(other)));
-            // Of a short run one map may be nearest twice.
+            // In a short run one map may be nearest twice.
             chosen.extend(nearest.filter(|nearest| {
                 chosen
                     .last()

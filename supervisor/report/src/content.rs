@@ -1,4 +1,4 @@
-//! What is read of the recordings.
+//! The data that a report takes from the recordings.
 
 use common::{
     bus::{Layout, decode_sample, decode_slice},
@@ -19,22 +19,22 @@ use crate::{
     source::{self, Source},
 };
 
-/// What is read of the recordings.
+/// The data that a report takes from the recordings.
 pub(crate) struct Content {
     pub(crate) mission: Mission,
     pub(crate) simulated: bool,
-    /// Robot, build, machine and the like: what, and which.
+    /// Names and values: robot, build, machine and others.
     pub(crate) about: Vec<(&'static str, String)>,
-    /// What is missing in the recordings.
+    /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
-    /// What the run ended with, where that is known.
+    /// The run's summary, if it is known.
     pub(crate) summary: Map<String, Value>,
     pub(crate) poses: Downsampled<PoseSample>,
     pub(crate) ranges: Downsampled<RangeSample>,
     pub(crate) commands: Downsampled<CommandSample>,
     pub(crate) wheels: Downsampled<WheelSample>,
     pub(crate) grid: Replica<u8>,
-    /// What the mapper said of it last.
+    /// The header of the newest grid.
     pub(crate) grid_header: GridHeader,
     pub(crate) beliefs: Beliefs,
     pub(crate) events: Events,
@@ -109,7 +109,7 @@ impl Content {
         Ok(())
     }
 
-    /// None if it is not what its topic carries.
+    /// None if the message does not match its topic.
     fn take(&mut self, message: &Message) -> Option<()> {
         fn sample<P: Layout>(message: &Message) -> Option<P> {
             decode_sample(&message.data)
@@ -178,7 +178,6 @@ impl Content {
     }
 }
 
-/// What a report is made of.
 const TOPICS: [&dyn AnyTopic; 13] = [
     &topics::POSE,
     &topics::RANGE,

@@ -1,9 +1,9 @@
-//! Samples of a bounded number.
+//! A bounded number of samples of a longer sequence.
 
-/// At most so many samples of a kind are kept.
+/// Most samples of a kind.
 const MOST: usize = 20_000;
 
-/// Of those from the first on every second one is left.
+/// Drop every second sample, from the second one on.
 pub(crate) fn drop_every_second<T>(items: &mut Vec<T>) {
     let mut nth = 0;
     items.retain(|_| {
@@ -12,8 +12,7 @@ pub(crate) fn drop_every_second<T>(items: &mut Vec<T>) {
     });
 }
 
-/// Samples in the order in which they came. When there are too many, every second one is dropped, and from then on every
-/// second one is taken.
+/// Samples in order. When there are too many, every second one is dropped, and from then on only every second one is taken.
 #[derive(Clone, Debug)]
 pub(crate) struct Downsampled<T> {
     items: Vec<T>,
@@ -32,7 +31,6 @@ impl<T> Default for Downsampled<T> {
 }
 
 impl<T> Downsampled<T> {
-    /// One came.
     pub(crate) fn push(&mut self, item: T) {
         if self.items.len() == MOST {
             drop_every_second(&mut self.items);
@@ -44,12 +42,11 @@ impl<T> Downsampled<T> {
         self.seen = self.seen.saturating_add(1);
     }
 
-    /// Those that are kept.
     pub(crate) fn items(&self) -> &[T] {
         &self.items
     }
 
-    /// Of how many samples one is kept.
+    /// Samples of the sequence for each stored one.
     pub(crate) const fn stride(&self) -> usize {
         self.stride
     }

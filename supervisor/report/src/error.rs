@@ -1,4 +1,4 @@
-//! What can go wrong with a report.
+//! Errors of reports.
 
 use std::{
     io,
@@ -8,19 +8,15 @@ use std::{
 use recording::RecordingError;
 use thiserror::Error;
 
-/// What can go wrong with a report.
+/// Errors of reports.
 #[derive(Debug, Error)]
 pub enum ReportError {
-    /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The file system refused.
     #[error("cannot {action} {file}: {source}")]
     File {
-        /// What was tried.
         action: &'static str,
         file: PathBuf,
-        /// What the system reports.
         source: io::Error,
     },
 }

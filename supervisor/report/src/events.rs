@@ -1,46 +1,46 @@
-//! Deaths, recoveries, and what else happened, on one time line.
+//! Deaths, recoveries and other events on one time line.
 
 use std::{collections::BTreeMap, fmt::Debug};
 
 use common::{
     samples::{
-        Action, Cause, CommandSample, CommandState, DeathCause, DeathSample, DirectiveSample,
-        FaultKind, FaultSample, GuidanceSample, HealthSample, HealthState, HoldReason, LinkSample,
-        Order, PoseSample, RequestKind, RequestSample, StallSample, Stamp, name_str,
+        Action, Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind,
+        FaultSample, GuidanceSample, HealthSample, HealthState, HoldReason, LinkSample, Order,
+        PoseSample, RequestKind, RequestSample, StallSample, Stamp, name_str,
     },
     topics::{EVERY_STAGE, OPERATOR, SUPERVISOR, TABLE},
 };
 use picture::{Lane, Symbol};
+use supervisor::process::ExitCause;
 
-/// Events that are kept of a run at most; of later ones only their number.
+/// Most events of a run. Later ones are only counted.
 const MOST: usize = 2000;
-/// Of the failsafe, which may stop the robot for moments throughout a run; the others are not to be lost for it.
+/// Most events of the failsafe. It may stop the robot for moments throughout a run; other events must not be lost for it.
 const MOST_OF_FAILSAFE: usize = 500;
 
-/// Lanes that are no stages.
+/// Lanes besides those of the stages.
 pub(crate) const FAILSAFE: &str = "failsafe";
 const MAP: &str = "map";
 const STALLS: &str = "stalls";
 
-/// What happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Event {
     /// Mission time, seconds.
     pub(crate) time_s: f64,
-    /// Where it stands on the time line.
+    /// Its lane on the time line.
     pub(crate) lane: String,
-    /// How it is drawn.
     pub(crate) symbol: Symbol,
-    /// What it was; empty for what is only drawn.
+    /// Its description; empty if it is only drawn.
     pub(crate) text: String,
 }
 
-/// All of a run.
+/// All events of a run.
 #[derive(Default)]
 pub(crate) struct Events {
-    /// In the order in which they were recorded.
+    /// In the order of the recording.
     pub(crate) all: Vec<Event>,
-    /// Those that were too many.
+    /// Number of events beyond the limits.
     pub(crate) left_out: u64,
     spans: Vec<(String, [f64; 2])>,
     /// Since when a stage is down, and the generation that died.
@@ -51,7 +51,7 @@ pub(crate) struct Events {
     arrived: bool,
     safety_events: u64,
     of_failsafe: usize,
-    /// Mission time of the newest pose, seconds: a process that has just started knows none.
+    /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
     now_s: f64,
 }
 
@@ -93,7 +93,7 @@ impl Events {
         stamp.time().seconds().max(self.now_s)
     }
 
-    /// Time goes on.
+    /// Advance the time.
     pub(crate) fn pose(&mut self, pose: &PoseSample) {
         self.now_s = self.now_s.max(pose.stamp.time().seconds());
     }
@@ -106,28 +106,15 @@ impl Events {
 
     pub(crate) fn death(&mut self, death: &DeathSample) {
         let stage = name_str(&death.stage);
-        let how = match DeathCause::from_byte(death.cause) {
-            DeathCause::Exited => format!("exited with code {}", death.code),
-            DeathCause::Signalled => format!("ended by signal {}", death.code),
-            DeathCause::SignalledWithCore => format!("ended by signal {}, with a core", death.code),
-            DeathCause::Unknown => "ended".to_owned(),
+        let hung = if death.hung == 1 { "hung, " } else { "" };
+        let log_tail = match death.log_tail.text().trim() {
+            "" => String::new(),
+            tail => format!("; its log ends: {tail}"),
         };
-        let hung = if death.hung == 1 {
-            ", because it hung"
-        } else {
-            ""
-        };
-        let words = death.log_tail.text();
-        let words = words.trim();
-        let words = if words.is_empty() {
-            String::new()
-        } else {
-            format!("; its log ends: {words}")
-        };
-        let generation = death.generation;
-        let text = format!("generation {generation} {how}{hung}{words}");
+        let (generation, cause) = (death.generation, ExitCause::from(death));
+        let text = format!("generation {generation} died ({hung}{cause}){log_tail}");
         self.add(&death.stamp, stage, Symbol::Death, text);
-        // The name may be anything: no more are held than there are stages.
+        // The recording may contain any name; only the stages' names are stored.
         if stages().contains(&stage) {
             let time = self.time_s(&death.stamp);
             self.down
@@ -215,7 +202,7 @@ impl Events {
     pub(crate) fn guidance(&mut self, guidance: &GuidanceSample) {
         if guidance.safety_events > self.safety_events {
             self.safety_events = guidance.safety_events;
-            // What is on the map is seen there; a list of it would be long.
+            // The map shows these events; a list would be long.
             self.add(&guidance.stamp, MAP, Symbol::Event, String::new());
         }
     }
@@ -251,7 +238,7 @@ impl Events {
                         .map(|(_, since)| [**since, duration_s.max(**since)]),
                 )
                 .collect(),
-            // Those of the failsafe are where its spans begin and end.
+            // The failsafe's events are the ends of its spans.
             marks: self
                 .all
                 .iter()
@@ -281,7 +268,7 @@ fn words(of: impl Debug) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::samples::name;
+    use common::samples::{DeathCause, name};
 
     fn stamp(seconds: u64, generation: u32) -> Stamp {
         Stamp {
@@ -324,7 +311,7 @@ mod tests {
         let planner = lanes.iter().find(|lane| lane.name == "planner").unwrap();
         assert_eq!(planner.spans, [[3.0, 5.0]]);
         assert_eq!(planner.marks, [(3.0, Symbol::Death), (5.0, Symbol::Ready)]);
-        assert_eq!(events.all[0].text, "generation 1 ended by signal 9");
+        assert_eq!(events.all[0].text, "generation 1 died (signal 9)");
     }
 
     #[test]

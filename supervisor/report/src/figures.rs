@@ -1,4 +1,4 @@
-//! Each figure of a report.
+//! The figures of a report.
 
 use common::{
     bus::Stamp,
@@ -16,7 +16,6 @@ const PER_OCTAVE: f64 = 8.0;
 pub(crate) struct Figure {
     /// Name of its file, without ending.
     pub(crate) name: &'static str,
-    /// Below it.
     pub(crate) caption: String,
     /// The file.
     pub(crate) svg: String,
@@ -76,7 +75,7 @@ fn over_time(
     }
 }
 
-/// What a picture shows of `belief`, its `field` and the `poses` until then.
+/// The scene of `belief`, its `field` and the `poses` until then.
 fn scene<'a>(
     content: &'a Content,
     belief: Option<&'a Belief>,
@@ -109,7 +108,7 @@ fn path(poses: &[PoseSample]) -> Vec<Pose2> {
     poses.iter().map(PoseSample::pose).collect()
 }
 
-/// With the map at the `end`, and its `field`.
+/// The trajectory on the map at the `end` and its `field`.
 fn trajectory(content: &Content, end: Option<&Belief>, field: Option<&Vec<FieldCell>>) -> Figure {
     let poses = path(content.poses.items());
     let mut scene = scene(content, end, field, &poses);
@@ -132,7 +131,7 @@ fn trajectory(content: &Content, end: Option<&Belief>, field: Option<&Vec<FieldC
     }
 }
 
-/// Map and field on the way and at the `end`; none of a run in which no map was recorded on the way.
+/// Map and field during the run and at the `end`; none if no earlier map was recorded.
 fn map_and_field(
     content: &Content,
     end: Option<&Belief>,
@@ -270,7 +269,7 @@ fn measured(content: &Content, value: impl Fn(&WheelSample) -> f64) -> Series {
     series("by the encoder", Mark::Dashed, points.collect())
 }
 
-/// What is commanded of both wheels; of a car, of the driven one and of the steering.
+/// Commands of both wheels; of a car, of the drive and of the steering.
 fn wheels(content: &Content) -> [Figure; 2] {
     let body = content.mission.body();
     let per_count = std::f64::consts::TAU / body.counts_per_turn;

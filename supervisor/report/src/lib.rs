@@ -6,21 +6,21 @@
 //! # Ok::<(), report::ReportError>(())
 //! ```
 //!
-//! A recording is read once, whatever its length, and what is kept of it is bounded: of very many samples every second one is
-//! dropped, again and again; metrics count all. Text that comes from the file is escaped wherever it goes.
+//! A recording is read once, and memory is bounded: whenever there are too many samples, every second one is dropped; metrics
+//! count all. Text from the file is escaped.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `source` | which recordings are of the run, and the summary beside them |
-//! | `kept` | samples of a bounded number |
-//! | `content` | what is read of the recordings |
-//! | `events` | deaths, recoveries, and what else happened |
+//! | `source` | the recordings of the run, and its summary |
+//! | `downsampled` | a bounded number of samples |
+//! | `content` | the data that a report takes from the recordings |
+//! | `events` | deaths, recoveries and other events |
 //! | `measured` | metrics of the recording itself |
 //! | `beliefs` | the map at a few moments, and the field of each |
 //! | `metrics` | the table of metrics, under their field names |
-//! | `figures` | each figure |
+//! | `figures` | the figures |
 //! | `page` | the page |
-//! | `error` | what can go wrong |
+//! | `error` | errors |
 
 mod beliefs;
 mod content;
@@ -48,7 +48,7 @@ use self::{content::Content, error::failed, source::Source};
 pub const PAGE: &str = "report.html";
 
 /// Write the report of `run`, a run's directory or a recording, into `out`: by default `report` in the run's directory, or
-/// `F-report` beside the recording `F.mcap`. The page.
+/// `F-report` beside the recording `F.mcap`. Returns the path of the page.
 pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
     let source = Source::find(run)?;
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);
@@ -63,7 +63,7 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
     Ok(page)
 }
 
-/// Half a file is none.
+/// An incomplete file is removed.
 fn save(file: &Path, text: &str) -> Result<(), ReportError> {
     fs::write(file, text).map_err(|error| {
         let _ = fs::remove_file(file);

@@ -1,4 +1,4 @@
-//! Metrics of the recording itself: of all samples, not of those that are drawn.
+//! Metrics of all samples of the recording, not only of those that are drawn.
 
 use common::{
     latency::Histogram,
@@ -6,17 +6,16 @@ use common::{
     samples::{CommandSample, GuidanceSample, LinkSample, PoseSample, RangeSample, RangeStatus},
 };
 
-/// What was counted so far.
 #[derive(Default)]
 pub(crate) struct Measured {
     /// Poses.
     pub(crate) ticks: u64,
     /// Mission time of the newest pose, seconds.
     pub(crate) time_s: f64,
-    /// Length of the believed way, metres.
+    /// Length of the estimated path, metres.
     pub(crate) path_m: f64,
     last_pose: Option<PoseSample>,
-    /// v of the newest pose whose speeds could be told.
+    /// v of the newest pose whose speeds are valid.
     last_speed: Option<f64>,
     speed_change: f64,
     changes: u64,
@@ -33,8 +32,8 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Whether its speeds can be told: of ticks that were heard together, since the machine was late, a speed is a
-    /// way by next to no time.
+    /// Take a pose. Returns whether its speeds are valid: if a late machine receives two ticks together, a speed is a distance divided
+    /// by almost no time.
     pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) -> bool {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.time().seconds());
@@ -75,7 +74,7 @@ impl Measured {
         }
     }
 
-    /// A process counts from 0.
+    /// Each process counts from 0.
     pub(crate) fn link(&mut self, link: &LinkSample) {
         let last = self.link.replace(*link);
         if let Some(last) = last.filter(|last| last.stamp.generation != link.stamp.generation) {
@@ -92,7 +91,7 @@ impl Measured {
         }
     }
 
-    /// Of all generations of the link.
+    /// Latencies of all generations of the link.
     pub(crate) fn latency(&self) -> Histogram {
         let mut latency = self.latency.clone();
         if let Some(last) = &self.link {
@@ -123,7 +122,7 @@ impl Measured {
         share(self.unavailable as f64, self.ranges)
     }
 
-    /// Share of the ticks in which it measured less than hits are mapped within.
+    /// Share of the ticks with a reading below the range in which hits are mapped.
     pub(crate) fn near(&self) -> Option<f64> {
         share(self.near as f64, self.ranges)
     }

@@ -1,5 +1,5 @@
-//! The table of metrics, under their field names. What the run's summary says comes from there: of a simulated robot it
-//! knows the true way; else it comes from the recording, which knows what was believed.
+//! The table of metrics, under their field names. A value comes from the run's summary, which knows the ground truth of a
+//! simulated robot; or else from the recording, which knows the robot's estimate.
 
 use evaluation::shortest_path::{ShortestPath, shortest_path};
 
@@ -7,11 +7,11 @@ use crate::content::Content;
 
 /// A row of the table.
 pub(crate) struct Metric {
-    /// What it is called in the literature.
+    /// Its name in the literature.
     pub(crate) name: &'static str,
-    /// Its field in `summary.json`, or how it is computed.
+    /// Its field in `summary.json`, or its formula.
     pub(crate) field: &'static str,
-    /// With its unit; a dash for what is not known.
+    /// With its unit; a dash if it is unknown.
     pub(crate) value: String,
 }
 
@@ -23,7 +23,7 @@ fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
     }
 }
 
-/// Success weighted by path length: of 1 where the way is the shortest one, 0 where the target was not reached.
+/// Success weighted by path length: 1 for the shortest path, 0 if the target was not reached.
 fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     if content.outcome()? != "reached" {
         return Some(0.0);
@@ -37,7 +37,6 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     }
 }
 
-/// All of the run.
 pub(crate) fn table(content: &Content) -> Vec<Metric> {
     let measured = &content.measured;
     let of = |field: &str, measured: Option<f64>| content.summed(field).or(measured);
@@ -175,7 +174,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
     ]
 }
 
-/// Of a car one of the two is a steering angle.
+/// Of a car only one of the two is a wheel speed; the other is a steering angle.
 fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;

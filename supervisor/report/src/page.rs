@@ -1,8 +1,9 @@
-//! The page: figures in it, not beside it, so that it is one file.
+//! The page. It contains its figures, so that it is one file.
 
 use std::fmt::Write as _;
 
-use evaluation::page::{END, escaped, styled_head};
+use evaluation::page::{END, styled_head};
+use picture::escape;
 
 use crate::{
     content::Content,
@@ -11,9 +12,9 @@ use crate::{
     metrics,
 };
 
-/// Rows of the list of events; the time line shows more.
+/// Most rows of the list of events. The time line shows more.
 const MOST_EVENTS: usize = 100;
-/// Characters of a text that comes from the recording.
+/// Most characters of a text from the recording.
 const LONGEST: usize = 500;
 
 /// Nothing is wider than the page, and nothing is cut by the end of a sheet.
@@ -81,7 +82,7 @@ fn outcome(content: &Content) -> String {
 }
 
 fn events(page: &mut String, content: &Content) {
-    // What is too much is left out of the failsafe's first: it may stop the robot for moments throughout a run.
+    // Surplus events of the failsafe are left out first: it may stop the robot for moments throughout a run.
     let told = content.events.all.iter();
     let told = told.filter(|event| !event.text.is_empty());
     let (failsafe, others): (Vec<&Event>, Vec<_>) = told.partition(|event| event.lane == FAILSAFE);
@@ -112,16 +113,12 @@ fn events(page: &mut String, content: &Content) {
     }
 }
 
-/// Text from anywhere, where markup is read.
+/// `of` escaped, at most [`LONGEST`] characters.
 fn text(of: &str) -> String {
-    let mut short: String = of.chars().take(LONGEST).collect();
-    if short.len() < of.len() {
-        short.push('…');
-    }
-    escaped(&short)
+    escape(of, LONGEST)
 }
 
-/// A file as part of a page, where its namespace is known.
+/// An SVG file as part of a page, where its namespace is known.
 fn inline(svg: &str) -> String {
     svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
 }

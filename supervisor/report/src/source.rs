@@ -1,4 +1,4 @@
-//! Which recordings are of the run, and the summary beside them.
+//! The recordings of a run, and its summary.
 
 use std::{
     fs,
@@ -14,7 +14,7 @@ use crate::error::ReportError;
 /// A summary takes 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-/// What a report is made of.
+/// The recordings of a report.
 pub(crate) struct Source {
     /// Parts of the run, the first one first; never none.
     pub(crate) files: Vec<PathBuf>,
@@ -40,7 +40,7 @@ impl Source {
         })
     }
 
-    /// Where the report goes unless told otherwise.
+    /// The default directory of the report.
     pub(crate) fn default_out(&self) -> PathBuf {
         let file = &self.files[0];
         if self.is_run {
@@ -52,7 +52,7 @@ impl Source {
     }
 }
 
-/// The summary of the run of `recording`, if it lies beside it.
+/// The summary of the run of `recording`, if it is beside it.
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
     let directory = recording.path().parent()?;
     // The directory may be of another run, or of none.

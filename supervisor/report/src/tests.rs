@@ -1,4 +1,4 @@
-//! What a report promises, of recordings made up here.
+//! The promises of a report, on recordings made by the tests.
 
 use std::path::Path;
 
@@ -138,7 +138,7 @@ fn metrics_count_every_generation_and_every_sample() {
             ..CommandSample::default()
         });
     }
-    // Heard a microsecond after the last one.
+    // This pose came a microsecond after the last one.
     let mut late = PoseSample {
         stamp: stamp(2, 1),
         v_m_s: 900.0,

@@ -1,9 +1,10 @@
 //! States and ages in words.
 
 use common::samples::{
-    DeathCause, DeathSample, GuidanceStatus, HoldReason, Order, RecoveryStep, StageState,
-    StallCause, StallSample, name_str,
+    DeathSample, GuidanceStatus, HoldReason, Order, RecoveryStep, StageState, StallCause,
+    StallSample, name_str,
 };
+use supervisor::process::ExitCause;
 
 /// What the supervisor orders, and why.
 pub(crate) const fn order(order: Order, reason: HoldReason) -> &'static str {
@@ -45,12 +46,7 @@ pub(crate) const fn guidance(status: u8) -> &'static str {
 /// How a stage's process ended.
 pub(crate) fn death(death: &DeathSample) -> String {
     let (stage, generation) = (name_str(&death.stage), death.generation);
-    let how = match DeathCause::from_byte(death.cause) {
-        DeathCause::Exited => format!("exit code {}", death.code),
-        DeathCause::Signalled => format!("signal {}", death.code),
-        DeathCause::SignalledWithCore => format!("signal {}, core dumped", death.code),
-        DeathCause::Unknown => "ended".to_owned(),
-    };
+    let how = ExitCause::from(death);
     let hung = if death.hung == 1 { "hung, " } else { "" };
     let at = death.stamp.time().seconds();
     format!("{at:.1} s {stage} {generation}: {hung}{how}")
