@@ -17,8 +17,8 @@ const LEAST_TURN_RAD_S: f64 = 0.25;
 /// Turn rate on the spot per angle that is left, 1/s.
 const TURN_GAIN: f64 = 3.0;
 
-/// No farther from its target than this a robot has arrived beside it, whatever the planner says, metres.
-const BESIDE_M: f64 = 0.5;
+/// A robot farther than this from its target has not arrived beside it, whatever the planner says, metres.
+const MOST_OFF_TARGET_M: f64 = 0.5;
 
 /// How the robot stands to the guidance: (14), with the heading in place of the measured velocity, which
 /// is undefined at rest, where every mission starts.
@@ -138,7 +138,7 @@ impl Step for Controller {
         // So does one beside a target that is not free, where the planner says that it is as near as it can be.
         let status = GuidanceStatus::from_byte(guidance.status);
         self.arrived |= distance <= self.tolerance
-            || status == GuidanceStatus::AtTarget && distance <= BESIDE_M;
+            || status == GuidanceStatus::AtTarget && distance <= MOST_OFF_TARGET_M;
         let command = CommandSample {
             distance_m: distance,
             pose_ns: guidance.pose_ns,

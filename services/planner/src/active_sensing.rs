@@ -1,39 +1,33 @@
-//! Active sensing: what the evidential method makes of a direction before the robot goes there.
+//! Active sensing: what the evidential method does about a direction before the robot goes there.
 //!
-//! The one sonar looks ahead, the body is wider than its cone where it matters, and faces at a slant do not answer. So
-//! before the robot drives over ground, the sonar must have been pointed there, and square to every face that could be
-//! touched there; and it drives no faster than it could stop before the next thing it believes in, or the next ground
-//! it has not seen.
+//! The one sonar looks ahead, the body is wider than its cone where it matters, and a surface at a slant does not answer. So
+//! before the robot drives over ground, the sonar must have been pointed there, and square to every surface that could be
+//! touched there. The robot drives no faster than it could stop before the next thing it believes in, or the next ground
+//! it has not scanned.
 //!
-//! All of it is computed from the belief and the pose alone: a scan is nothing but looking, tick by tick,
-//! at ground that was not swept yet, so the next process of a planner that was killed goes on with it.
+//! All of it is computed from the belief and the pose alone: a scan only turns the sonar, tick by tick, to ground that is not
+//! scanned yet, so a planner that is restarted goes on with it.
 
 use common::{
-    grid::{Cell, CellState, GridFrame},
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
     mission::Mission,
     samples::GridHeader,
 };
 use glam::DVec2;
-use harmonic::{Field, Guidance};
 
 use crate::{
     near_echoes::{STANDS_BEFORE_M, clear_ahead_m},
     undetected_surfaces::UndetectedSurfaces,
+    view::{STEP_M, View},
 };
 
-/// From point to point along a way, metres.
-const STEP_M: f64 = 0.05;
-/// The ground under so much of the way ahead must have been swept, and no face could be touched there undetected, metres.
-const SWEPT_AHEAD_M: f64 = 0.25;
-/// So far ahead it is looked at at all, metres.
+/// The ground under so much of the way ahead must have been scanned, and no surface could be touched there undetected, metres.
+const SCANNED_AHEAD_M: f64 = 0.25;
+/// How far ahead the way is followed, metres.
 const AHEAD_M: f64 = 0.6;
 /// In this time the robot must be able to stop: the sonar's period, the radio's, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// Cells of a fine grid are looked at no closer than this, metres.
-const GRAIN_M: f64 = 0.025;
 
-/// What to do about a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Advice {
     /// Go, no faster than this, m/s.
@@ -42,18 +36,6 @@ pub(crate) enum Advice {
     Look(DVec2),
 }
 
-/// The belief the advice is given on.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct View<'a> {
-    /// How the cells lie.
-    pub(crate) frame: GridFrame,
-    /// One [`CellState`] byte a cell, row-major.
-    pub(crate) cells: &'a [u8],
-    /// The field over them.
-    pub(crate) field: &'a Field,
-}
-
-/// The robot as the advice sees it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
@@ -64,7 +46,6 @@ pub(crate) struct ActiveSensing {
 }
 
 impl ActiveSensing {
-    /// For a mission's robot.
     pub(crate) fn new(mission: &Mission) -> Self {
         Self {
             radius: mission.body().radius_m,
@@ -83,27 +64,27 @@ impl ActiveSensing {
         direction: DVec2,
     ) -> Advice {
         let undetected = UndetectedSurfaces::new(belief, self.radius);
-        let way = view.way(pose.position, direction);
-        let steps = (SWEPT_AHEAD_M / STEP_M) as usize;
+        let way = view.way(pose.position, direction, AHEAD_M);
+        let steps = (SCANNED_AHEAD_M / STEP_M) as usize;
         let ahead = &way[..steps.min(way.len())];
         let ground = ahead
             .iter()
             .flat_map(|&at| view.unscanned(at, self.radius))
             .filter_map(|at| (at - pose.position).try_normalize());
         let before = std::iter::once(&pose.position).chain(ahead);
-        let faces = before.zip(ahead).flat_map(|(&from, &to)| {
+        let surfaces = before.zip(ahead).flat_map(|(&from, &to)| {
             let along = (to - from).normalize_or(direction);
             undetected.normals(to, along)
         });
-        let unseen = ground.chain(faces);
+        let unseen = ground.chain(surfaces);
         match scan(self.bearing.rotate(pose.axis()), unseen) {
-            // The robot turns until its sonar faces it.
+            // The robot turns until its sonar faces there.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }
     }
 
-    /// The most speed that the newest readings allow along the robot's axis, m/s: none towards what is right before the body.
+    /// The most speed that the newest readings allow along the robot's axis, m/s: none towards an echo right before the body.
     pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
         let clear_m = clear_ahead_m(belief, pose, self.radius);
         if clear_m < STANDS_BEFORE_M {
@@ -112,10 +93,10 @@ impl ActiveSensing {
         clear_m / STOPS_WITHIN_S
     }
 
-    /// The speed that the readings, and the arc on which the controller brings the robot into `direction`, allow, m/s.
+    /// The speed allowed by the readings and by the arc on which the controller brings the robot into `direction`, m/s.
     ///
-    /// A robot that faces a way which the belief does not forbid would stall for ever where the arc allows no speed: it
-    /// goes as slowly as it can, as long as the readings allow that.
+    /// A robot that faces a way which the belief does not forbid would stand for ever where the arc allows no speed. It
+    /// goes as slowly as it can instead, as long as the readings allow that.
     fn limit(
         &self,
         view: &View<'_>,
@@ -144,10 +125,10 @@ impl ActiveSensing {
     }
 }
 
-/// Where to turn from `axis` to see everything in the directions `unseen`: first to the side where less
-/// turning brings something new, and there to the far end without a stop.
+/// Where to turn from `axis` to scan all directions in `unseen`: first to the side whose nearest one is nearer, and there to
+/// the far end without a stop.
 fn scan(axis: DVec2, unseen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
-    // Per side: the least and the greatest angle, and where that one is.
+    // For each side: the least angle, the greatest one, and the direction of the greatest.
     let mut sides = [None::<(f64, f64, DVec2)>; 2];
     for there in unseen {
         let angle = axis.angle_to(there);
@@ -162,56 +143,6 @@ fn scan(axis: DVec2, unseen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
     let nearer = sides.into_iter().flatten();
     let nearer = nearer.min_by(|a, b| a.0.total_cmp(&b.0));
     nearer.map(|(_, _, end)| end)
-}
-
-impl View<'_> {
-    /// Points of the field's own way from `from`, which it leaves along `direction`.
-    fn way(&self, from: DVec2, direction: DVec2) -> Vec<DVec2> {
-        let mut way = Vec::with_capacity((AHEAD_M / STEP_M) as usize);
-        let (mut at, mut direction) = (from, direction);
-        while way.len() < way.capacity() {
-            at += direction * STEP_M;
-            way.push(at);
-            let cells = self.frame.to_cells(at);
-            match self.field.guidance(cells.x, cells.y) {
-                Guidance::Along(next) => direction = next.into(),
-                _ => break,
-            }
-        }
-        way
-    }
-
-    fn state(&self, cell: Cell) -> CellState {
-        let byte = self.cells.get(self.frame.index(cell)).copied();
-        byte.map_or(CellState::Perimeter, CellState::from_byte)
-    }
-
-    pub(crate) fn is_hazard(&self, at: DVec2) -> bool {
-        self.frame
-            .cell_at(at)
-            .is_none_or(|cell| self.state(cell).is_hazard())
-    }
-
-    /// Middles of the cells within `radius` of `at` that nobody looked at and nobody knows.
-    fn unscanned(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
-        let frame = self.frame;
-        let last = f64::from(frame.cells) - 1.0;
-        let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
-        let from = inside(frame.to_cells(at - radius).ceil());
-        let to = inside(frame.to_cells(at + radius).floor());
-        let grain = (GRAIN_M / frame.resolution_m).max(1.0) as usize;
-        (from.y as u32..=to.y as u32)
-            .step_by(grain)
-            .flat_map(move |row| {
-                let columns = (from.x as u32..=to.x as u32).step_by(grain);
-                columns.map(move |col| Cell { col, row })
-            })
-            .filter(move |&cell| {
-                let unknown = matches!(self.state(cell), CellState::Free | CellState::Sensed);
-                unknown && frame.centre_of(cell).distance(at) <= radius
-            })
-            .map(move |cell| frame.centre_of(cell))
-    }
 }
 
 #[cfg(test)]

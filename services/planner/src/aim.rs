@@ -1,9 +1,9 @@
-//! Which cell the field leads to.
+//! The cell that the field leads to.
 //!
-//! The target is a point in the world, and the robot's pose drifts against the world: by the time it comes near, the
-//! target may be believed to lie where the body cannot be. Then the field leads to the free cell next to it, and there
-//! the robot has arrived: no nearer place is free. By the paper's method the target's own cell is never marked, but margins
-//! may fall on all cells around it; then the field leads to a free cell from which the target counts as reached.
+//! The target is a point in the world, and the robot's pose drifts against the world. By the time the robot comes near, the
+//! target may be in a cell where the body cannot be. Then the field leads to the free cell next to it, and the robot has
+//! arrived there: no nearer place is free. By the paper's method the target's own cell is never marked, but margins
+//! may cover all cells around it; then the field leads to a free cell from which the target counts as reached.
 
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
@@ -52,7 +52,7 @@ pub(crate) fn cell_with_a_way_in(
     nearest.or(Some(own))
 }
 
-/// The cells at most `reach` away from `middle` in column and row, as far as they lie on the map.
+/// The cells of the map at most `reach` away from `middle` in column and row.
 fn around(frame: &GridFrame, middle: Cell, reach: u32) -> impl Iterator<Item = Cell> + use<> {
     let last = frame.cells - 1;
     let span = move |at: u32| at.saturating_sub(reach)..=(at + reach).min(last);

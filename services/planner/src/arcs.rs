@@ -1,10 +1,10 @@
-//! What the evidential method makes of a direction for a car: the arc that it can drive and that gets farthest along the
-//! field.
+//! The direction that the evidential method gives a car: that of the arc which the car can drive and which gets farthest
+//! along the field.
 //!
 //! The field turns sharper than a car does. So arcs of several curvatures are followed over the belief, as far as the
-//! car looks ahead. Those that a hazard cuts off before the car would stand are out; of the others the one with the greatest
-//! progress is given, that is the line integral of the field's direction along it. Where all are out the car has to
-//! stand: there is no way on that it can steer.
+//! car looks ahead. An arc that a hazard cuts off before the car could stop is out. Of the others, the one with the greatest
+//! progress is given; progress is the line integral of the field's direction along the arc. Where all arcs are out, the car
+//! stands: it can steer no way on.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,30 +12,28 @@ use common::{kinematics::Pose2, mission::Mission};
 use glam::DVec2;
 use harmonic::Guidance;
 
-use crate::active_sensing::View;
+use crate::view::View;
 
 /// Arcs to either side of straight ahead.
 const ARCS_A_SIDE: i32 = 8;
-/// From point to point along an arc, metres.
+/// Distance between the points of an arc that are looked at, metres.
 const STEP_M: f64 = 0.05;
-/// So far an arc is followed, metres.
+/// How far an arc is followed, metres.
 const AHEAD_M: f64 = 0.8;
 /// In this time the car must be able to stop: the sonar's period, the radio's, the wheels' lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// No arc that is cut off before this is driven, metres.
+/// An arc that is cut off before this is not driven, metres.
 const LEAST_FREE_M: f64 = 0.1;
 
-/// The car as the arcs see it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arcs {
-    /// Of the tightest circle, 1/m.
+    /// Curvature of the tightest circle, 1/m.
     most_curvature: f64,
     speed: f64,
     turn: f64,
     slow_radius: f64,
 }
 
-/// An arc that was followed.
 #[derive(Clone, Copy, Debug)]
 struct Followed {
     curvature: f64,
@@ -115,8 +113,7 @@ impl Arcs {
 impl View<'_> {
     /// The field's direction at `at`, a unit vector; zero where it gives none.
     fn along(&self, at: DVec2) -> DVec2 {
-        let cells = self.frame.to_cells(at);
-        match self.field.guidance(cells.x, cells.y) {
+        match self.guidance(at) {
             Guidance::Along(direction) | Guidance::WayOut(direction) => direction.into(),
             _ => DVec2::ZERO,
         }

@@ -1,4 +1,4 @@
-//! A thread that does one job after the other while the process goes on.
+//! A thread that does one job after the other beside the tick.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -16,7 +16,7 @@ pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,
     done: UnixStream,
-    /// Jobs of which the thread has not said yet, in `done`, that they are done.
+    /// Jobs whose end has not been read from `done` yet.
     unread: u64,
     thread: Option<JoinHandle<()>>,
 }
@@ -64,7 +64,6 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         }
     }
 
-    /// The next result, if there is one.
     pub(crate) fn take(&mut self) -> Option<Done> {
         self.drain();
         self.results.try_recv().ok()
@@ -79,7 +78,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
 
     fn drain(&mut self) {
         let mut wakeups = [0; 64];
-        // Without a job it is not worth a call.
+        // Without a job the system call is saved.
         while self.unread > 0 {
             match self.done.read(&mut wakeups) {
                 Ok(read @ 1..) => self.unread = self.unread.saturating_sub(read as u64),

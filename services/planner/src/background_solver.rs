@@ -1,8 +1,9 @@
-//! The background solver: a thread on which full solves run while the live field stays in use.
+//! The background solver: a thread that solves the newest map while the robot follows the field before.
 
 use std::{
     io,
     os::fd::{AsFd, BorrowedFd},
+    sync::Arc,
     time::Instant,
 };
 
@@ -14,22 +15,11 @@ use crate::{
     step::{Job, Solved},
 };
 
-/// What the thread is given.
-#[derive(Debug)]
-pub(crate) struct Order {
-    pub(crate) job: Job,
-    pub(crate) cancellation: Cancellation,
-    /// Do not start from the field before: whether that was finished is a matter of timing.
-    pub(crate) afresh: bool,
-}
-
-/// A solver on a thread of its own. Dropping it cancels what runs and waits for the thread.
+/// A solver on a thread of its own. Dropping it cancels the solve that runs and waits for the thread.
 #[derive(Debug)]
 pub struct BackgroundSolver {
-    running: Cancellation,
-    /// The job whose result was not taken yet.
-    untaken: Option<u64>,
-    thread: Background<Order, Solved>,
+    cancellation: Cancellation,
+    thread: Background<Job, Solved>,
 }
 
 impl BackgroundSolver {
@@ -39,72 +29,50 @@ impl BackgroundSolver {
     /// When the system has no thread or descriptor left.
     pub fn start() -> io::Result<Self> {
         let mut worker = Worker::default();
-        let solve = move |order| worker.solve(order);
+        let cancellation = worker.cancellation.clone();
+        let solve = move |job| worker.solve(job);
         Ok(Self {
-            running: Cancellation::new(),
-            untaken: None,
+            cancellation,
             thread: Background::start("full-solve", scheduling::behind_stages, solve)?,
         })
     }
 
-    /// Begin `job`; one that still runs is stale and cancelled.
+    /// Begin `job`, after those before it.
     pub fn begin(&mut self, job: Job) {
-        self.running.cancel();
-        self.running = Cancellation::new();
-        let afresh = self.untaken.replace(job.number).is_some();
-        self.thread.begin(Order {
-            job,
-            cancellation: self.running.clone(),
-            afresh,
-        });
+        self.thread.begin(job);
     }
 
     /// The next result, if there is one.
     pub fn take(&mut self) -> Option<Solved> {
-        let solved = self.thread.take();
-        self.taken(solved)
+        self.thread.take()
     }
 
     /// The next result; waits for it. None when the thread has ended.
     pub fn wait(&mut self) -> Option<Solved> {
-        let solved = self.thread.wait();
-        self.taken(solved)
-    }
-
-    fn taken(&mut self, solved: Option<Solved>) -> Option<Solved> {
-        if let Some(solved) = &solved {
-            self.untaken.take_if(|untaken| *untaken == solved.number);
-        }
-        solved
+        self.thread.wait()
     }
 }
 
-/// The thread's own: a solver with its set-up, and the field solved last, where the next one starts.
+/// The solver of the thread, and the field it solved last, from which the next solve starts.
 #[derive(Default)]
 pub(crate) struct Worker {
     solver: Solver,
-    last: Option<Field>,
+    cancellation: Cancellation,
+    last: Option<Arc<Field>>,
 }
 
 impl Worker {
-    pub(crate) fn solve(&mut self, order: Order) -> Solved {
-        let Order {
-            job: Job { number, domain, .. },
-            cancellation,
-            afresh,
-        } = order;
+    pub(crate) fn solve(&mut self, Job { number, domain }: Job) -> Solved {
         let began = Instant::now();
-        let last = self.last.take().filter(|_| !afresh);
-        let solved = match &last {
-            Some(near) => self.solver.solve_near(&domain, near, &cancellation),
-            None => self.solver.solve(&domain, &cancellation),
+        let field = match &self.last {
+            Some(near) => self.solver.solve_near(&domain, near, &self.cancellation),
+            None => self.solver.solve(&domain, &self.cancellation),
         };
-        if let Ok(field) = &solved {
-            self.last = Some(field.clone());
-        }
+        let field = field.map(Arc::new);
+        self.last = field.as_ref().ok().cloned();
         Solved {
             number,
-            result: solved.map(|field| Box::new((domain, field))),
+            field,
             took_ns: began.elapsed().as_nanos() as u64,
         }
     }
@@ -119,6 +87,6 @@ impl AsFd for BackgroundSolver {
 
 impl Drop for BackgroundSolver {
     fn drop(&mut self) {
-        self.running.cancel();
+        self.cancellation.cancel();
     }
 }

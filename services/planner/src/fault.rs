@@ -1,9 +1,9 @@
-//! A live field broken on purpose, to see what the rest makes of it.
+//! A fault of the planner: a wrong field.
 
 use harmonic::{Cell, Field, Scaled};
 
 /// Overwrites u wherever the target can be reached so that every way leads to `summit`, in cell units: u halves with each
-/// cell away from there, straight through walls. The verification stays: it speaks of what was solved.
+/// cell away from there, through walls too. The field's verification is not changed.
 pub(crate) fn lead_astray(field: &mut Field, summit: [f64; 2]) {
     for row in 0..field.height() {
         for col in 0..field.width() {
@@ -23,7 +23,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_field_led_astray_leads_to_the_summit_from_everywhere_until_it_is_solved_anew() {
+    fn a_field_led_astray_leads_to_the_summit_from_everywhere_until_it_is_solved_again() {
         let domain = Domain::new(30, 20, vec![false; 600], Cell::new(25, 10)).unwrap();
         let mut solver = Solver::default();
         let mut field = solver.solve(&domain, &Cancellation::new()).unwrap();

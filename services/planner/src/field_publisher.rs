@@ -1,4 +1,4 @@
-//! Topic `field`: what every cell's policy is. It is computed on a thread of its own, from the field as it was at the end of
+//! Topic `field`: the policy of every cell. It is computed on a thread of its own, from the field as it was at the end of
 //! a tick, so that no later tick waits for it.
 
 use std::{
@@ -23,18 +23,17 @@ use crate::{background::Background, scheduling, step::Snapshot};
 struct Policy {
     header: FieldHeader,
     frame: GridFrame,
-    /// The tick it is of.
+    /// The tick whose field it is computed from.
     at: Progress,
     cells: Arc<Vec<FieldCell>>,
-    /// Outside of this window it is that before it.
+    /// The window in which it differs from the policy before.
     changed: Window,
 }
 
-/// How often the thread offers the processor to others in the course of a policy. Each time it may wait for its turn among all
-/// that want it.
+/// How often the thread offers the processor to others while it computes a policy. Each time it may have to wait for its turn.
 const YIELDS: usize = 8;
 
-/// Computes policies, and keeps the last one to compare with.
+/// Computes policies, and holds the last one for comparison.
 #[derive(Default)]
 struct Worker {
     before: Arc<Vec<FieldCell>>,
@@ -69,19 +68,19 @@ impl Worker {
     }
 }
 
-/// Publishes what changed, or all of it when it was not published for long or there is a new reader.
+/// Publishes the window that changed, or the whole policy when that is due again or there is a new reader.
 #[derive(Debug)]
 pub(crate) struct FieldPublisher {
     writer: SliceWriter<FieldHeader, FieldCell>,
     thread: Background<(Snapshot, Progress), Policy>,
-    /// The thread computes one.
+    /// The thread computes a policy.
     busy: bool,
-    /// What consumers hold.
+    /// The policy that was published last.
     published: Option<Policy>,
     version: u64,
     change_published: Option<MissionTime>,
     keyframe_published: Option<MissionTime>,
-    /// All of it is to be published.
+    /// The whole policy is to be published.
     keyframe: bool,
 }
 
@@ -123,8 +122,8 @@ impl FieldPublisher {
         self.busy
     }
 
-    /// What is to be published `now`, if anything, and as of which tick: the policy that is ready, as of its own, or the one
-    /// that was published before, as of now.
+    /// The part to publish `now`, if any, and its tick: a policy that is ready has its own tick, one that is published again
+    /// has that of `now`.
     pub(crate) fn next(&mut self, now: Progress) -> Option<(Part, Progress)> {
         let (mut changed, mut at) = (Window::default(), now);
         if self.busy {

@@ -1,10 +1,10 @@
 //! The planner stage: hazard cells in, guidance out, equation (11).
 //!
-//! The field itself is the library `harmonic`; here is the stage around it.
+//! The library `harmonic` solves the field; this crate is the stage around it.
 //!
-//! - [`step`]: follows the `grid`, keeps the field up to date, answers for a pose; pure.
+//! - [`step`]: follows the `grid`, has a field of it solved, answers a pose; pure.
 //! - [`shell`]: wires it to the topics.
-//! - [`background_solver`]: the thread of full solves beside the live field.
+//! - [`background_solver`]: the thread that solves large maps.
 
 mod active_sensing;
 mod aim;
@@ -19,3 +19,4 @@ mod scheduling;
 pub mod shell;
 pub mod step;
 mod undetected_surfaces;
+mod view;

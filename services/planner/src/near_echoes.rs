@@ -1,21 +1,21 @@
-//! What the newest readings heard right ahead of the body.
+//! The echoes of the newest readings right ahead of the body.
 //!
-//! The belief weighs echoes against silences, so that an echo that comes and goes, or one that lies where the map has no
-//! room for it, may leave the way open. Right before the body that is not enough: there what is nearest counts.
+//! The belief weighs echoes against silences, so an echo that comes and goes, or one where the map has no room for it, may
+//! leave the way open. Right before the body that is not enough: there the nearest echo counts.
 
 use common::{kinematics::Pose2, samples::GridHeader};
 use glam::DVec2;
 
-/// So many of the newest readings count: about a second of them. One false echo holds the robot no longer than that.
+/// How many of the newest readings count: about a second of them. One false echo stops the robot no longer than that.
 const NEWEST: usize = 8;
-/// A reading is of what lies ahead when it was taken within this of the robot's axis: the cone, and a little more.
+/// A reading taken within this angle of the robot's axis looked ahead: the cone, and a little more.
 const AHEAD_DEG: f64 = 20.0;
-/// With less free ground than this right ahead the body does not go there, metres. Readings are free only up to 0.05 m before their
-/// echo: 0.13 m.
+/// With less free ground than this right ahead, the body does not go there, metres. A reading counts as free only up to 0.05 m
+/// before its echo, so the echo is then 0.13 m away.
 pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
 
-/// Free ground ahead of a body of `radius` metres at `pose`, by the least of the newest readings in `belief`, metres; infinite
-/// without one that looked there.
+/// Free ground ahead of a body of `radius` metres at `pose`, metres: the least of the newest readings in `belief`; infinite
+/// where none of them looked ahead.
 pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64) -> f64 {
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
     let newest = belief.clear_beams().iter().rev().take(NEWEST);

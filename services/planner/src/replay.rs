@@ -1,5 +1,5 @@
-//! The planner without its process: the same step, fed with what it took. The jobs of the background solver are solved
-//! again: where each starts from follows from the order of the entries.
+//! Replay of the planner: the step, fed with the recorded inputs. The jobs of the background solver are solved again, in the
+//! recorded order.
 
 use std::collections::VecDeque;
 
@@ -14,61 +14,61 @@ use common::{
     topics,
 };
 use glam::DVec2;
-use harmonic::{Cancellation, SolveError};
+use harmonic::SolveError;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    background_solver::{Order, Worker},
-    step::{Input, Outcome, Planner, Solved},
+    background_solver::Worker,
+    step::{Input, Job, Outcome, Planner, Solved},
 };
 
-/// What the planner does, and at which tick.
+/// An action of the planner, and its tick.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Entry<'a> {
-    /// What.
+    /// The action.
     #[serde(borrow)]
     pub taken: Taken<'a>,
-    /// The tick that it is at.
+    /// The tick.
     pub at: Progress,
 }
 
-/// What the planner does.
+/// An action of the planner.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Taken<'a> {
-    /// The step takes a sample of `grid`, a message of its own here.
+    /// The step takes a sample of `grid`, encoded.
     Grid(#[serde(with = "serde_bytes")] &'a [u8]),
     /// The step takes the pose of the tick.
     Pose {
         /// The pose.
         #[serde(with = "inputs::sample")]
         pose: PoseSample,
-        /// What `guidance` says besides what the step gives: wall-clock of the last full solve, nanoseconds.
+        /// Wall-clock of the last full solve, nanoseconds, which the shell adds to the guidance.
         full_solve_ns: u64,
-        /// Likewise of the last local update.
+        /// 0; recordings have it.
         local_update_ns: u64,
     },
     /// The step is asked for a job.
     Idle,
-    /// The step takes the result of the job with this number; whether that was cancelled.
-    Solved(u64, bool),
+    /// The step takes the result of the job with this number.
+    Solved(u64),
     /// The step takes a fault for the robot here, metres.
     Fault(FaultKind, DVec2),
     /// This part of the policy is published.
     Field(#[serde(with = "inputs::sample")] Part),
-    /// The policy is computed of the field as it is here.
+    /// The policy is computed from the field as it is here.
     Policy,
 }
 
 struct Generation {
     planner: Planner,
     worker: Worker,
-    /// Begun, and their results not taken yet, oldest first.
-    jobs: VecDeque<Order>,
+    /// Jobs whose results are not taken yet, oldest first.
+    jobs: VecDeque<Job>,
     fields: bool,
     policy: Option<Policy>,
 }
 
-/// What was computed last.
+/// The policy computed last.
 struct Policy {
     header: FieldHeader,
     frame: GridFrame,
@@ -76,9 +76,6 @@ struct Policy {
 }
 
 /// Begin the replay of a generation.
-///
-/// # Errors
-/// Those of [`common::replay::Begin`].
 pub fn begin(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
     Ok(Box::new(Generation {
         planner: Planner::new(&beginning.run.mission),
@@ -90,23 +87,19 @@ pub fn begin(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
 }
 
 impl Generation {
-    /// The result of job `number`, as the background solver gave it.
-    fn solved(&mut self, number: u64, cancelled: bool) -> Solved {
-        let none = Solved {
-            number,
-            result: Err(SolveError::Cancelled),
-            took_ns: 0,
-        };
-        // Results come in the order of the jobs.
-        while let Some(order) = self.jobs.pop_front() {
-            if order.job.number == number {
-                if cancelled {
-                    order.cancellation.cancel();
-                }
-                return self.worker.solve(order);
+    /// The result of job `number`, as the background solver gave it: results come in the order of the jobs.
+    fn solved(&mut self, number: u64) -> Solved {
+        while let Some(job) = self.jobs.pop_front() {
+            let solved = self.worker.solve(job);
+            if solved.number == number {
+                return solved;
             }
         }
-        none
+        Solved {
+            number,
+            field: Err(SolveError::Cancelled),
+            took_ns: 0,
+        }
     }
 
     fn policy(&self) -> Option<Policy> {
@@ -162,8 +155,8 @@ impl Replay for Generation {
                 return Ok(published.into_iter().collect());
             }
             Taken::Idle => self.planner.step(Input::Idle, time),
-            Taken::Solved(number, cancelled) => {
-                let solved = self.solved(number, cancelled);
+            Taken::Solved(number) => {
+                let solved = self.solved(number);
                 self.planner.step(Input::Solved(solved), time)
             }
             Taken::Fault(fault, robot) => self.planner.step(Input::Fault { fault, robot }, time),
@@ -173,13 +166,9 @@ impl Replay for Generation {
                 return Ok(Vec::new());
             }
         };
-        // Where there is no field the process ended.
+        // On an error the process ended.
         if let Ok(Outcome { job: Some(job), .. }) = outcome {
-            self.jobs.push_back(Order {
-                job,
-                cancellation: Cancellation::new(),
-                afresh: !self.jobs.is_empty(),
-            });
+            self.jobs.push_back(job);
         }
         Ok(Vec::new())
     }

@@ -1,5 +1,4 @@
-//! When a thread of the process gets the processor, whatever the process itself was granted: a real-time priority is for
-//! ticks alone.
+//! The priority of threads beside the tick. Only the tick's own thread keeps a real-time priority that the process was given.
 
 use thread_priority::{
     NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
@@ -9,17 +8,17 @@ use thread_priority::{
 /// Niceness 10 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
 const NICENESS_10: u8 = 22;
 
-/// Let this thread run with a tenth of what a stage gets of a processor that both want.
+/// Give this thread a tenth of the share that a stage gets of a processor that both want.
 ///
-/// Not less, though nobody waits for it: a process that is killed ends only once each of its threads has run, and what a
-/// thread holds in the kernel the others wait for. With SCHED_IDLE both took seconds on a busy machine.
+/// It gets no less, though nobody waits for it: a killed process ends only once each of its threads has run, and other
+/// threads wait for what it holds in the kernel. With SCHED_IDLE both took seconds on a busy machine.
 pub(crate) fn behind_stages() {
     let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
         return;
     };
     let policy = ThreadSchedulePolicy::Normal(Normal::Other);
     let priority = ThreadPriority::Crossplatform(value);
-    // Where that is refused they share the processor.
+    // Where the system refuses, they share the processor equally.
     let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
 }
 

@@ -1,4 +1,4 @@
-//! `grid` and `pose` in; `guidance` each tick, `field` at every change and now and then.
+//! The planner's process: reads `grid` and `pose`, publishes `guidance` each tick and `field` when it changes.
 
 use std::time::Instant;
 
@@ -34,14 +34,13 @@ pub struct Shell {
     inputs: InputLog,
     /// A grid sample, encoded.
     encoded: Vec<u8>,
-    /// in lockstep, the tick at which the job that runs is swapped in.
-    swap_at: Option<u64>,
-    in_ticks: bool,
+    lockstep: bool,
+    /// In lockstep: the job begun last and the tick at which it began, until its result is taken.
+    job: Option<(u64, u64)>,
     latest_pose: Option<PoseSample>,
-    /// The tick last answered.
+    /// The last tick that was answered.
     answered: Option<u64>,
     full_solve_ns: u64,
-    local_update_ns: u64,
     field_changed: bool,
     progress: Progress,
     budget: LatencyBudget,
@@ -73,12 +72,11 @@ impl Process for Shell {
             background,
             inputs: InputLog::begin(context, &())?,
             encoded: Vec::new(),
-            swap_at: None,
-            in_ticks: matches!(context.run.clock, MissionClock::Ticks { .. }),
+            lockstep: matches!(context.run.clock, MissionClock::Ticks { .. }),
+            job: None,
             latest_pose: None,
             answered: None,
             full_solve_ns: 0,
-            local_update_ns: 0,
             field_changed: false,
             progress: Progress::default(),
             budget: context.budget.clone(),
@@ -87,8 +85,8 @@ impl Process for Shell {
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         let asked = self.follow_grid()?;
-        let swapped = self.swap_in_what_is_due()?;
-        if asked || swapped && !self.in_ticks {
+        let swapped = self.take_solved()?;
+        if asked || swapped && !self.lockstep {
             self.answer()?;
         }
         if self.field.is_busy() {
@@ -103,7 +101,7 @@ impl Process for Shell {
         Ok(self.work(Input::Fault { fault, robot })?.changed())
     }
 
-    /// Whether there is a new reader of the field is not known before.
+    /// A new reader of the field may be waiting for it; that is not known before.
     fn has_idle_work(&self) -> bool {
         true
     }
@@ -120,26 +118,27 @@ fn no_field(error: SolveError) -> StageError {
 }
 
 impl Shell {
-    /// Swap in what the background solver gave. Says whether there was anything.
-    fn swap_in_what_is_due(&mut self) -> Result<bool, StageError> {
-        let tick = self.progress.tick;
+    /// Take the results of the background solver. Says whether the field is another now.
+    ///
+    /// In lockstep the result of a job is taken one tick after the job began, no sooner and no later, so that a run can be
+    /// repeated.
+    fn take_solved(&mut self) -> Result<bool, StageError> {
         let mut swapped = false;
-        if self.planner.running_job().is_none() {
-            self.swap_at = None;
-        }
-        if !self.in_ticks {
+        if !self.lockstep {
             while let Some(solved) = self.background.take() {
                 swapped |= self.swap_in(solved)?;
             }
-        } else if self.swap_at.is_some_and(|at| tick >= at) {
-            self.swap_at = None;
-            let number = self.planner.running_job();
-            while let Some(solved) = self.background.wait() {
-                let awaited = Some(solved.number) == number;
-                swapped |= self.swap_in(solved)?;
-                if awaited {
-                    break;
-                }
+            return Ok(swapped);
+        }
+        let due = self.job.take_if(|(_, began)| self.progress.tick > *began);
+        let Some((number, _)) = due else {
+            return Ok(false);
+        };
+        while let Some(solved) = self.background.wait() {
+            let last = solved.number == number;
+            swapped |= self.swap_in(solved)?;
+            if last {
+                break;
             }
         }
         Ok(swapped)
@@ -158,14 +157,13 @@ impl Shell {
         Ok(work)
     }
 
-    /// Begin the full solve that is called for, if one is.
+    /// Begin the background solve that is due, if any.
     fn begin_background_solve(&mut self) -> Result<(), StageError> {
         self.note(Taken::Idle)?;
         let outcome = self.planner.step(Input::Idle, self.progress.time);
         if let Some(job) = outcome.map_err(no_field)?.job {
-            let (number, urgent) = (job.number, job.urgent);
-            tracing::debug!(number, urgent, "full solve begins");
-            self.swap_at = Some(self.progress.tick + job.swap_after_ticks());
+            tracing::debug!(number = job.number, "background solve begins");
+            self.job = Some((job.number, self.progress.tick));
             self.background.begin(job);
         }
         Ok(())
@@ -173,11 +171,11 @@ impl Shell {
 
     fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
         let took_ns = solved.took_ns;
-        let cancelled = matches!(solved.result, Err(SolveError::Cancelled));
-        self.note(Taken::Solved(solved.number, cancelled))?;
+        self.note(Taken::Solved(solved.number))?;
         let swapped = self.work(Input::Solved(solved))? == Work::SwappedIn;
         if swapped {
             self.full_solve_ns = took_ns;
+            tracing::debug!(took_us = took_ns / 1000, "background solve swapped in");
         }
         Ok(swapped)
     }
@@ -206,15 +204,13 @@ impl Shell {
                     tracing::warn!(version = part.version, "missed a grid version");
                     continue;
                 }
-                Work::FullSolve => {
+                Work::Solved => {
                     self.full_solve_ns = took_ns;
                     tracing::debug!(took_us = took_ns / 1000, "full solve");
                 }
-                Work::LocalUpdate => self.local_update_ns = took_ns,
-                Work::None | Work::SwappedIn | Work::Broken => {}
+                Work::None | Work::Stale | Work::SwappedIn | Work::Broken => {}
             }
-            // The whole map, published again behind the tick it belongs to, asks for nothing; a tick that is
-            // given again was not answered to the end.
+            // A keyframe published again after its tick was answered needs no answer, unless it changes the field.
             asked |= part.keyframe == 0 || self.answered != Some(stamp.tick) || work != Work::None;
             self.progress = Progress {
                 tick: stamp.tick,
@@ -229,18 +225,18 @@ impl Shell {
         if let Some(pose) = self.pose.newest()? {
             self.latest_pose = Some(pose);
         }
-        // A grid for new readers may be of a tick that is over.
+        // A keyframe for new readers may belong to a tick that is over.
         let tick = self.progress.tick;
         let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) else {
             return Ok(());
         };
         let Progress { tick, time } = self.progress;
-        let (full_solve_ns, local_update_ns) = (self.full_solve_ns, self.local_update_ns);
+        let full_solve_ns = self.full_solve_ns;
         self.budget.end(Item::Read);
         self.note(Taken::Pose {
             pose,
             full_solve_ns,
-            local_update_ns,
+            local_update_ns: 0,
         })?;
         self.budget.end(Item::Persist);
         let outcome = self.planner.step(Input::Pose(&pose), time);
@@ -248,7 +244,6 @@ impl Shell {
         if let Some(guidance) = outcome.map_err(no_field)?.guidance {
             let guidance = GuidanceSample {
                 full_solve_ns,
-                local_update_ns,
                 ..guidance
             };
             self.inputs.publish(self.progress)?;
@@ -261,7 +256,7 @@ impl Shell {
         Ok(())
     }
 
-    /// The field for consumers, after the robot has its guidance.
+    /// Publish the field for consumers, after the robot has its guidance.
     fn publish_field(&mut self) -> Result<(), StageError> {
         if let Some((part, at)) = self.field.next(self.progress) {
             let taken = Taken::Field(part);

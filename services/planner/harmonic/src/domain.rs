@@ -53,7 +53,7 @@ impl Domain {
         Ok(domain)
     }
 
-    /// The same map with another screening.
+    /// Replaces the screening.
     ///
     /// # Errors
     /// [`SolveError::WrongLength`] and [`SolveError::ScreeningLength`].
@@ -155,7 +155,7 @@ impl Domain {
         &self.screening
     }
 
-    /// Row-major index of a cell known to lie inside the map.
+    /// Row-major index of a cell of the map.
     pub(crate) fn index(&self, cell: Cell) -> usize {
         cell.row * self.width + cell.col
     }

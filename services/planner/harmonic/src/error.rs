@@ -1,4 +1,4 @@
-//! What can be wrong with a map or a solve, and what to do about it.
+//! Errors of maps and solves, each with its remedy.
 
 use thiserror::Error;
 
@@ -32,7 +32,7 @@ pub enum SolveError {
         "{what} has {found} values, the map {expected} cells: give one value a cell, row by row"
     )]
     WrongLength {
-        /// Which input.
+        /// The input.
         what: &'static str,
         /// Values it has.
         found: usize,
@@ -42,7 +42,7 @@ pub enum SolveError {
     /// A cell was named that the map does not have.
     #[error("{what} (column {}, row {}) lies outside the map of {width} x {height} cells", cell.col, cell.row)]
     Outside {
-        /// What the cell was given as.
+        /// The cell's role.
         what: &'static str,
         /// The cell.
         cell: Cell,
@@ -51,7 +51,7 @@ pub enum SolveError {
         /// Rows of the map.
         height: usize,
     },
-    /// The target lies on a blocked cell.
+    /// The target is on a blocked cell.
     #[error("the target (column {}, row {}) is blocked: choose a free cell or free that one", target.col, target.row)]
     TargetBlocked {
         /// The target's cell.
@@ -68,9 +68,6 @@ pub enum SolveError {
         /// The length found, in cells.
         cells: f64,
     },
-    /// A field was given to be updated that belongs to another map or target.
-    #[error("the field does not belong to this domain (sizes or targets differ): solve it first")]
-    ForeignField,
     /// The [`Cancellation`](crate::Cancellation) was used.
     #[error("the solve was cancelled")]
     Cancelled,

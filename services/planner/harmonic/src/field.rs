@@ -2,7 +2,6 @@
 
 use crate::cell::Cell;
 use crate::domain::Domain;
-use crate::patch::Patch;
 use crate::scaled::Scaled;
 use crate::store::Store;
 use crate::verification::Verification;
@@ -17,8 +16,6 @@ pub struct Field {
     target: Cell,
     store: Store,
     verification: Verification,
-    /// Local updates since the field was solved.
-    patches: Vec<Patch>,
 }
 
 impl Field {
@@ -34,7 +31,6 @@ impl Field {
             target,
             store,
             verification,
-            patches: Vec::new(),
         }
     }
 
@@ -53,7 +49,7 @@ impl Field {
         self.target
     }
 
-    /// What was verified when the field was last solved in full.
+    /// The result of its verification.
     pub fn verification(&self) -> &Verification {
         &self.verification
     }
@@ -117,52 +113,12 @@ impl Field {
     pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
         let mut best = (Scaled::ZERO, [0; 2]);
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let u = self.seen((col, row), (col + dc, row + dr));
+            let u = self.u_at(col + dc, row + dr);
             if u > best.0 {
                 best = (u, [dc, dr]);
             }
         }
         best.1
-    }
-
-    /// u of the cell `there` relative to its neighbour `here`: u(there) such that its ratio to u(here) is right.
-    ///
-    /// A local update changes u in a window and nowhere else, though u of all cells downstream should be scaled by what u
-    /// at the window's rim changed by. That is done here, rather than in every cell: across an outflow edge of a patch the
-    /// ratio is that before the update.
-    pub(crate) fn seen(&self, here: (i64, i64), there: (i64, i64)) -> Scaled {
-        let u = self.u_at(there.0, there.1);
-        if self.patches.is_empty() {
-            return u;
-        }
-        let patch_of = |cell| self.patches.iter().position(|patch| patch.contains(cell));
-        let (from, to) = (patch_of(here), patch_of(there));
-        if from == to {
-            return u;
-        }
-        let before = |cell: (i64, i64), patch: Option<usize>| {
-            patch.map_or_else(
-                || self.u_at(cell.0, cell.1),
-                |patch| self.patches[patch].before(cell),
-            )
-        };
-        let (from_before, to_before) = (before(here, from), before(there, to));
-        // Patches keep a distance, so exactly one of the two lies in one.
-        let (outside, inside) = if from.is_none() {
-            (from_before, to_before)
-        } else {
-            (to_before, from_before)
-        };
-        // In single precision, as the window was solved.
-        let rounded = |u: Scaled| Scaled::new(f64::from(u.mantissa as f32), u.exponent);
-        if outside.is_zero() || inside.is_zero() || rounded(outside) > rounded(inside) {
-            return u;
-        }
-        let own = self.u_at(here.0, here.1);
-        Scaled::new(
-            own.mantissa * to_before.mantissa / from_before.mantissa,
-            own.exponent + to_before.exponent - from_before.exponent,
-        )
     }
 
     /// Whether this is a field of a map of the same size and the same target.
@@ -172,18 +128,6 @@ impl Field {
 
     pub(crate) fn store(&self) -> &Store {
         &self.store
-    }
-
-    pub(crate) fn store_mut(&mut self) -> &mut Store {
-        &mut self.store
-    }
-
-    pub(crate) fn patches(&self) -> &[Patch] {
-        &self.patches
-    }
-
-    pub(crate) fn patches_mut(&mut self) -> &mut Vec<Patch> {
-        &mut self.patches
     }
 
     /// u at a signed column and row: zero outside the map.

@@ -4,12 +4,12 @@
 //! interpolated bilinearly between the free cells among the four centres around, which keeps it continuous; cells that
 //! meet only across a blocked corner are left out. Near a wall its component into the wall decreases with the distance to
 //! 0, so that it never leads into a blocked cell. Only ratios of neighbouring u enter: the common
-//! exponent is removed out first.
+//! exponent is taken out first.
 
 use crate::cell::Cell;
 use crate::field::Field;
 
-/// What the field answers at a position. Directions are unit vectors (along columns, along rows).
+/// The field's answer at a position. Directions are unit vectors (along columns, along rows).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Guidance {
     /// Free space: follow this direction.
@@ -127,8 +127,8 @@ impl Field {
     fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
         let own = self.u_at(there.0, there.1);
         let u = |dc: i64, dr: i64| {
-            let seen = self.seen(there, (there.0 + dc, there.1 + dr));
-            seen.relative_to(own.exponent) / own.mantissa
+            let beside = self.u_at(there.0 + dc, there.1 + dr);
+            beside.relative_to(own.exponent) / own.mantissa
         };
         let relative = [0.5 * (u(1, 0) - u(-1, 0)), 0.5 * (u(0, 1) - u(0, -1))];
         let weight = self.ratio(here, there);
@@ -139,7 +139,7 @@ impl Field {
     fn ratio(&self, here: (i64, i64), there: (i64, i64)) -> f64 {
         let step = |from: (i64, i64), to: (i64, i64)| {
             let own = self.u_at(from.0, from.1);
-            self.seen(from, to).relative_to(own.exponent) / own.mantissa
+            self.u_at(to.0, to.1).relative_to(own.exponent) / own.mantissa
         };
         if here == there {
             1.0

@@ -13,7 +13,7 @@
 //! - [`gauss_seidel`]: corrects the cells that `f64` factors cannot reach.
 //! - [`breadth_first`]: the order of the cells.
 //! - [`budget`]: the memory all this may take.
-//! - [`workspace`]: the factors, and memory kept between solves.
+//! - [`workspace`]: the factors, and memory reused between solves.
 
 mod back_substitution;
 mod breadth_first;
@@ -68,7 +68,7 @@ fn factor(
     factors.lengths.reserve(pass.len());
     slot.clear();
     slot.resize(pass.len(), NOWHERE);
-    // What each front leaves on its boundary, until its parent takes it in; spent buffers are used again.
+    // The update that each front leaves on its boundary until its parent takes it in; spent buffers are reused.
     let mut left: Vec<Vec<f64>> = vec![Vec::new(); tree.fronts.len()];
     let mut spent: Vec<Vec<f64>> = Vec::new();
     let mut slots = Vec::new();

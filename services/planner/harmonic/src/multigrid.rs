@@ -44,7 +44,7 @@ const SMOOTHING: usize = 2;
 /// quarter of that, second visits are cheap, and save up to every other cycle.
 const VISITED_TWICE: Range<usize> = 1..3;
 
-/// What coarse corrections are multiplied by, on the finest level and between coarse ones. Interpolation bends u more than a
+/// The factors of coarse corrections, on the finest level and between coarse ones. Interpolation bends u more than a
 /// solution is bent, at doors above all, so the correction that is best by energy is too small (Braess, "Towards algebraic
 /// multigrid for elliptic problems of second order", 1995). Measured: 1.2 and 1.07 save a quarter of the cycles, 1.3 or 1.2
 /// cost some on some maps. On small maps the second is one: their levels are visited once, and its powers would add up.
@@ -291,16 +291,6 @@ impl<R: Real> Multigrid<R> {
         progress
     }
 
-    /// As [`cycle`](Self::cycle), but without the coarser levels if all cells had converged; says whether they had. For small
-    /// maps, whose coarser levels cost more than the finest. End with [`smooth`](Self::smooth), not [`finish`](Self::finish).
-    pub(crate) fn cycle_unless_converged(&mut self, tolerance: f64) -> bool {
-        let converged = self.pass(1, true, Some(tolerance)).unsettled == 0;
-        if !converged {
-            self.correct();
-        }
-        converged
-    }
-
     /// Solves the residual equation of the finest level on the coarser ones.
     fn correct(&mut self) {
         self.solve_level(0);
@@ -356,12 +346,6 @@ impl<R: Real> Multigrid<R> {
     pub(crate) fn finish(&mut self) {
         self.pass(1 + SMOOTHING, false, None);
         self.clear_correction();
-    }
-
-    /// Relaxes without a correction.
-    pub(crate) fn smooth(&mut self) {
-        self.clear_correction();
-        self.pass(SMOOTHING, false, None);
     }
 
     fn clear_correction(&mut self) {

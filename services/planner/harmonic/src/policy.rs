@@ -7,10 +7,10 @@ use crate::guidance::SADDLE;
 use crate::scaled::Scaled;
 use crate::store::Store;
 
-/// What the field answers at a cell's centre.
+/// The field's answer at a cell's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Policy {
-    /// As [`Field::direction`]; zero where it has none to give.
+    /// The [direction](Field::direction); zero where there is none.
     pub direction: [f64; 2],
     /// log2 u; negative infinity where u is zero.
     pub log2_u: f64,
@@ -28,14 +28,14 @@ impl Field {
             (row + 1) * width,
         );
         match self.store() {
-            Store::Single { values, exponent } if inside && self.patches().is_empty() => {
+            Store::Single { values, exponent } if inside => {
                 let row_at = |start: usize| &values[start..start + width];
                 let [above, own, below] = [rows.0, rows.1, rows.2].map(row_at);
                 for col in 0..width {
                     each(self.of_cell([above, own, below], *exponent, Cell::new(col, row)));
                 }
             }
-            Store::Double { values, exponent } if inside && self.patches().is_empty() => {
+            Store::Double { values, exponent } if inside => {
                 let row_at = |start: usize| &values[start..start + width];
                 let [above, own, below] = [rows.0, rows.1, rows.2].map(row_at);
                 for col in 0..width {
@@ -84,7 +84,7 @@ impl Field {
     }
 }
 
-/// Of a cell that is blocked or cut off.
+/// The policy of a cell that is blocked or cut off.
 const NONE: Policy = Policy {
     direction: [0.0; 2],
     log2_u: f64::NEG_INFINITY,

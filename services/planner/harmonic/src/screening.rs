@@ -13,7 +13,7 @@ pub enum Screening {
     /// None: Laplace's equation.
     #[default]
     None,
-    /// The same screening length in every cell.
+    /// One screening length for all cells.
     Uniform {
         /// The screening length, in the unit of `cell`.
         length: f64,
@@ -25,7 +25,7 @@ pub enum Screening {
 }
 
 impl Screening {
-    /// The same screening length in every cell, in cells; infinite for none.
+    /// One screening length for all cells, in cells; infinite for none.
     pub const fn cells(length: f64) -> Self {
         Self::Uniform { length, cell: 1.0 }
     }
@@ -34,7 +34,7 @@ impl Screening {
 /// The screening coefficients k of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Coefficients {
-    /// The same k in every cell.
+    /// One k for all cells.
     Uniform(f64),
     /// One k a cell, row-major.
     PerCell(Vec<f32>),

@@ -100,44 +100,6 @@ impl Store {
         Scaled::new(value, exponent)
     }
 
-    /// u of a run of cells in units of 2^`reference`, clamped to what an `f32` holds; 0 where u is.
-    pub(crate) fn read_row(&self, cells: Range<usize>, reference: i32, into: &mut [f32]) {
-        let clamp = |u: f64| {
-            if u > 0.0 {
-                u.clamp(LEAST_READ, MOST_READ) as f32
-            } else {
-                0.0
-            }
-        };
-        match self {
-            Self::Single { values, exponent } => {
-                let scale = pow2(exponent.saturating_sub(reference));
-                for (to, &u) in into.iter_mut().zip(&values[cells]) {
-                    *to = clamp(f64::from(u) * scale);
-                }
-            }
-            Self::Double { values, exponent } => {
-                // In two steps: the whole factor may be out of range where the product is not.
-                let shift = exponent.saturating_sub(reference);
-                let (half, rest) = (pow2(shift / 2), pow2(shift - shift / 2));
-                for (to, &u) in into.iter_mut().zip(&values[cells]) {
-                    *to = clamp(u * half * rest);
-                }
-            }
-            Self::Extended {
-                mantissas,
-                exponents,
-            } => {
-                for (to, index) in into.iter_mut().zip(cells) {
-                    let shift = exponents[index]
-                        .saturating_sub(reference)
-                        .clamp(-1000, 1000);
-                    *to = clamp(mantissas[index] * pow2(shift));
-                }
-            }
-        }
-    }
-
     /// u of a run of cells in units of 2^`reference`, 0 where that is below what an `R` holds.
     pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
         if let Self::Single { values, exponent } = self
@@ -156,64 +118,6 @@ impl Store {
         }
     }
 
-    /// Sets the cells from `first` on for which `wanted` holds to u in units of 2^`reference`; negative is blocked.
-    pub(crate) fn set_row(&mut self, first: usize, u: &[f32], reference: i32, wanted: &[bool]) {
-        if let Self::Single { values, exponent } = self {
-            // 0 and blocked cells have no exponent; a power of two rounds nothing while the numbers stay normal.
-            let scale = pow2(reference.saturating_sub(*exponent));
-            let scaled = |u: f32| {
-                if u > 0.0 {
-                    f64::from(u) * scale
-                } else {
-                    f64::from(u)
-                }
-            };
-            let normal = f64::from(f32::MIN_POSITIVE)..=f64::from(f32::MAX);
-            let fits = |u: f32| u <= 0.0 || normal.contains(&scaled(u));
-            if u.iter().zip(wanted).all(|(&u, &wanted)| !wanted | fits(u)) {
-                for ((to, &u), &wanted) in values[first..].iter_mut().zip(u).zip(wanted) {
-                    *to = if wanted { scaled(u) as f32 } else { *to };
-                }
-                return;
-            }
-        }
-        for (at, (&u, _)) in u
-            .iter()
-            .zip(wanted)
-            .enumerate()
-            .filter(|(_, (_, wanted))| **wanted)
-        {
-            self.set(first + at, f64::from(u), reference);
-        }
-    }
-
-    /// Appends a run of cells to `into`, each as [`raw`](Self::raw) gives it.
-    pub(crate) fn read_raw(&self, cells: Range<usize>, into: &mut Vec<(f64, i32)>) {
-        match self {
-            // A local update reads thousands of cells, mostly from a single-precision store.
-            Self::Single { values, exponent } => {
-                into.extend(values[cells].iter().map(|&u| (f64::from(u), *exponent)));
-            }
-            _ => into.extend(cells.map(|index| self.raw(index))),
-        }
-    }
-
-    /// Writes a run of cells from `first` on, as [`read_raw`](Self::read_raw) gave them.
-    pub(crate) fn write_raw(&mut self, first: usize, cells: &[(f64, i32)]) {
-        if let Self::Single { values, exponent } = self
-            && cells.iter().all(|cell| cell.1 == *exponent)
-        {
-            for (to, cell) in values[first..].iter_mut().zip(cells) {
-                *to = cell.0 as f32;
-            }
-            return;
-        }
-        // The store may have become extended in between.
-        for (at, &(value, exponent)) in cells.iter().enumerate() {
-            self.set(first + at, value, exponent);
-        }
-    }
-
     fn extend(&mut self) {
         let len = match self {
             Self::Single { values, .. } => values.len(),
@@ -227,10 +131,6 @@ impl Store {
         };
     }
 }
-
-/// What [`Store::read_row`] clamps to: normal numbers, with room for a sum of a few.
-const LEAST_READ: f64 = 2e-38;
-const MOST_READ: f64 = 1e36;
 
 /// Whether a plain value is 0 or [`BLOCKED`], or lies in a range of normal numbers.
 fn fits(value: f64, least: f64, largest: f64) -> bool {

@@ -1,6 +1,6 @@
 //! The verification every field passes before it is handed out.
 //!
-//! Of every cell two things are checked: the residual of its equation is small relative to its own u (a norm over the map
+//! Two things are checked of every cell: the residual of its equation is small relative to its own u (a norm over the map
 //! says nothing about cells where u is 1e-50), and one of its neighbours has a larger u, so steepest ascent from it ends at
 //! the target. A free cell of u = 0 beside one of u > 0 fails too. So the cells of u > 0 are connected components without a
 //! local maximum but the target, hence one component: exactly the cells that can reach the target. No search is needed.
@@ -28,7 +28,7 @@ pub(crate) use cells::Check;
 use rows::{Rows, ScaledRows, Window};
 use tiles::{TILE, Tiles};
 
-/// What was verified of a field, cell by cell.
+/// The result of a field's verification, cell by cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verification {
     /// The largest |u - mean / (1 + k)| / u over the reachable cells but the target.
@@ -147,31 +147,6 @@ fn check_strip<'f, R: Real, W: Window<R>>(
                 tiles.add_row(row, &cells.residuals, &cells.slopes);
             }
             found.worst_tile = tiles.finish();
-            found
-        },
-    )
-}
-
-/// Checks a field given with one row or column of u around it, `width` cells wide without; `weights`, framed too, are
-/// 0.25 / (1 + k), 0 where no equation holds.
-pub(crate) fn check_framed(width: usize, values: &[f32], weights: &[f32]) -> Check {
-    Simd::default().run(
-        #[inline(always)]
-        || {
-            let framed = width + 2;
-            let height = values.len() / framed - 2;
-            let mut found = Check::default();
-            let (mut rows, mut cells) = (Rows::new(framed), Cells::new(framed));
-            rows.take(values.get(..framed));
-            rows.take(values.get(framed..2 * framed));
-            for row in 0..height {
-                rows.take(values.get((row + 2) * framed..(row + 3) * framed));
-                cells
-                    .weights
-                    .copy_from_slice(&weights[(row + 1) * framed..(row + 2) * framed]);
-                let raw = &values[(row + 1) * framed..(row + 2) * framed];
-                cells.check(raw, rows.around(), 1..framed - 1, &mut found);
-            }
             found
         },
     )

@@ -1,15 +1,12 @@
-//! What goes into the planner's step and what comes out.
+//! Inputs and outputs of the planner's step.
+
+use std::sync::Arc;
 
 use common::samples::{FaultKind, GridHeader, GuidanceSample, PoseSample};
 use glam::DVec2;
-
 use harmonic::{Domain, Field, SolveError};
 
-/// in lockstep the result of a background solve is an input so many ticks after it began, no sooner and no
-/// later, so that a run can be repeated. At 7 Hz the largest map is solved by then on a wall clock, too.
-const SWAP_AFTER_TICKS: u64 = 2;
-
-/// What the planner takes.
+/// An input of the planner.
 #[derive(Debug)]
 pub enum Input<'a> {
     /// A sample of `grid`.
@@ -23,25 +20,25 @@ pub enum Input<'a> {
     Pose(&'a PoseSample),
     /// The tick has its guidance: a background solve may begin.
     Idle,
-    /// What became of a job.
+    /// The result of a job.
     Solved(Solved),
-    /// Break like this, on purpose.
+    /// A fault is injected.
     Fault {
-        /// How.
+        /// Which fault.
         fault: FaultKind,
         /// Where the robot is, metres.
         robot: DVec2,
     },
 }
 
-/// What follows from an input.
+/// The consequences of an input.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// What became of the field.
+    /// The effect of the input on the field.
     pub work: Work,
     /// The answer to a pose.
     pub guidance: Option<GuidanceSample>,
-    /// What the background solver has to begin.
+    /// The job that the background solver has to begin.
     pub job: Option<Job>,
 }
 
@@ -54,59 +51,47 @@ impl From<Work> for Outcome {
     }
 }
 
-/// What an input did to the field.
+/// The effect of an input on the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Work {
     /// Nothing.
     #[default]
     None,
-    /// It was computed anew.
-    FullSolve,
-    /// It was brought up to date around what changed.
-    LocalUpdate,
+    /// It was solved.
+    Solved,
+    /// It is of an older map now; the newest is solved in the background.
+    Stale,
     /// The result of a background solve took its place.
     SwappedIn,
-    /// It was broken on purpose.
+    /// A fault was injected into it.
     Broken,
-    /// Nothing, for a version of the grid is missing: the field is as it was until a keyframe comes.
+    /// A version of the grid is missing: the field stays as it is until a keyframe comes.
     Missed,
 }
 
 impl Work {
     /// Whether the field is another now.
-    #[must_use]
     pub const fn changed(self) -> bool {
-        !matches!(self, Self::None | Self::Missed)
+        matches!(self, Self::Solved | Self::SwappedIn | Self::Broken)
     }
 }
 
-/// A full solve for the background solver.
+/// A solve for the background solver.
 #[derive(Debug)]
 pub struct Job {
-    /// Names it.
+    /// Counted from 1.
     pub number: u64,
-    /// Whether the live field waits for it.
-    pub urgent: bool,
     /// The map to solve.
     pub domain: Domain,
 }
 
-impl Job {
-    /// in lockstep, how many ticks after it began its result is an input.
-    #[must_use]
-    pub const fn swap_after_ticks(&self) -> u64 {
-        // A robot that waits for it waits no longer than it must.
-        if self.urgent { 1 } else { SWAP_AFTER_TICKS }
-    }
-}
-
-/// What became of a job.
+/// The result of a job.
 #[derive(Debug)]
 pub struct Solved {
     /// The job's number.
     pub number: u64,
-    /// Its map, and the field of it.
-    pub result: Result<Box<(Domain, Field)>, SolveError>,
+    /// The field of the job's map.
+    pub field: Result<Arc<Field>, SolveError>,
     /// How long it took, nanoseconds of wall-clock; nothing is decided by it.
     pub took_ns: u64,
 }

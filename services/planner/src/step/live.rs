@@ -1,72 +1,226 @@
-//! The live field, and cells of the grid as the field library names them.
+//! The newest map, its field, and how the field follows the map.
+//!
+//! | event | [`Current`](State::Current) | [`Stale`](State::Stale) | [`Solving`](State::Solving) |
+//! |---|---|---|---|
+//! | the map changes, and is small | solved at once: `Current` | - | - |
+//! | the map changes, and is large | `Stale` | `Stale` | `Solving`, `changed` |
+//! | a job may begin | `Current` | `Solving` | `Solving` |
+//! | the job's result comes | ignored | ignored | `Current`, or `Stale` if the map `changed` meanwhile |
+//!
+//! While the field is not that of the newest map, a robot follows it only where nothing changed on its way ahead. Elsewhere
+//! it waits. Each tick looks at the way again, with the newest map.
 
 use std::sync::Arc;
 
-use common::grid::{self, CellState, GridFrame, Window};
+use common::{
+    grid::{self, CellState, GridFrame, Window},
+    kinematics::Pose2,
+    mission::Mission,
+    samples::GuidanceStatus,
+};
 use glam::DVec2;
 use harmonic::{Cell, Change, Domain, Field, Guidance};
 
-/// The live field and the domain it is of.
+use super::input::Job;
+use crate::view::{View, field_cell};
+
+/// Maps of at most this many cells (512 a side) are solved within the tick that changes them: a period of 143 ms has room
+/// for such a solve many times over. Larger maps are solved in the background.
+const SOLVED_AT_ONCE_CELLS: usize = 1 << 18;
+
+/// How far ahead of the robot nothing may have changed, as the time it takes to drive there, seconds: until the next tick
+/// looks at the way again, and then to stop.
+const AHEAD_S: f64 = 0.8;
+
+/// A robot this near to the centre of the cell that the field leads to beside the target has arrived, metres.
+const AT_CELL_M: f64 = 0.12;
+
+/// The relation of the field to the newest map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// It is of the newest map.
+    Current,
+    /// The map changed since, and no solve of it has begun.
+    Stale,
+    /// The map changed since, and the background solver runs `job`, which has the map of version `version`. `changed` tells
+    /// whether the map changed again since then.
+    Solving {
+        job: u64,
+        version: u64,
+        changed: bool,
+    },
+}
+
+/// The newest map and a field.
 #[derive(Debug)]
 pub(super) struct Live {
     pub(super) frame: GridFrame,
-    pub(super) domain: Domain,
-    /// Shared with the snapshots of it.
+    pub(super) map: Domain,
+    /// The field of `map` or of one before it; shared with its snapshots.
     pub(super) field: Arc<Field>,
+    /// The version of the grid that `field` was solved for, unless it is current.
+    field_version: u64,
+    state: State,
 }
 
-/// As near as this to the middle of the cell that is aimed at beside the target, the robot has arrived, metres.
-const BESIDE_M: f64 = 0.12;
-
 impl Live {
-    /// Whether the field's direction for a robot at `position` is one to follow; where it gives none, there is nothing to
-    /// trust.
-    pub(super) fn is_trusted(&self, position: DVec2) -> bool {
-        let at = self.frame.to_cells(position);
-        let cell = self.frame.cell_at(position).map(field_cell);
-        !matches!(self.field.guidance(at.x, at.y), Guidance::Along(_))
-            || cell.is_some_and(|cell| self.field.is_trusted(cell))
+    pub(super) fn new(frame: GridFrame, map: Domain, field: Field) -> Self {
+        Self {
+            frame,
+            map,
+            field: Arc::new(field),
+            field_version: 0,
+            state: State::Current,
+        }
+    }
+
+    pub(super) fn is_solved_at_once(&self) -> bool {
+        self.frame.area() <= SOLVED_AT_ONCE_CELLS
+    }
+
+    /// The map changed; that before it had version `before`.
+    pub(super) fn map_changed(&mut self, before: u64) {
+        match &mut self.state {
+            State::Current => {
+                self.field_version = before;
+                self.state = State::Stale;
+            }
+            State::Stale => {}
+            State::Solving { changed, .. } => *changed = true,
+        }
+    }
+
+    /// The job to begin, named `number`, if the field is stale and no job runs; the newest map has version `version`.
+    pub(super) fn begin_job(&mut self, number: u64, version: u64) -> Option<Job> {
+        if self.state != State::Stale {
+            return None;
+        }
+        self.state = State::Solving {
+            job: number,
+            version,
+            changed: false,
+        };
+        let domain = self.map.clone();
+        Some(Job { number, domain })
+    }
+
+    pub(super) fn awaits(&self, number: u64) -> bool {
+        matches!(self.state, State::Solving { job, .. } if job == number)
+    }
+
+    /// Take the field of the job that runs.
+    pub(super) fn solved(&mut self, field: Arc<Field>) {
+        let State::Solving {
+            version, changed, ..
+        } = self.state
+        else {
+            return;
+        };
+        self.field = field;
+        self.field_version = version;
+        self.state = if changed {
+            State::Stale
+        } else {
+            State::Current
+        };
+    }
+
+    /// The version of the grid that the field is of, where the newest is `newest`.
+    pub(super) fn field_version(&self, newest: u64) -> u64 {
+        match self.state {
+            State::Current => newest,
+            State::Stale | State::Solving { .. } => self.field_version,
+        }
+    }
+
+    /// Status and direction for a robot at `pose` that is to go to `target`; `cells` are those of the newest map.
+    pub(super) fn guide(
+        &self,
+        robot: &Robot,
+        pose: &Pose2,
+        target: DVec2,
+        cells: &[u8],
+    ) -> (GuidanceStatus, DVec2) {
+        if self.is_beside(target, pose.position) {
+            return (GuidanceStatus::AtTarget, pose.axis());
+        }
+        let view = self.view(cells);
+        let (status, direction) = match view.guidance(pose.position) {
+            Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
+            Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
+            // Within the target's cell the field says nothing more; the rest is straight.
+            Guidance::AtTarget => {
+                let to_target = target - pose.position;
+                (GuidanceStatus::Along, to_target.normalize_or(DVec2::X))
+            }
+            Guidance::Unreachable => (GuidanceStatus::Unreachable, DVec2::ZERO),
+        };
+        let follow = match (self.state, status) {
+            (State::Current, _) => true,
+            // There may be a way by now.
+            (_, GuidanceStatus::Unreachable) => false,
+            _ => {
+                let way = view.way(pose.position, direction, robot.ahead_m);
+                let mut points = std::iter::once(pose.position).chain(way);
+                !points.any(|at| view.has_changed(at, robot.radius_m))
+            }
+        };
+        if follow {
+            (status, direction)
+        } else {
+            (GuidanceStatus::Waiting, DVec2::ZERO)
+        }
+    }
+
+    pub(super) fn view<'a>(&'a self, cells: &'a [u8]) -> View<'a> {
+        View {
+            frame: self.frame,
+            cells,
+            field: &self.field,
+        }
     }
 
     /// Whether the field leads to a cell beside `target`, and the robot has come there.
-    pub(super) fn is_beside_the_target(&self, target: DVec2, robot: DVec2) -> bool {
-        let aim = grid_cell(self.domain.target());
+    fn is_beside(&self, target: DVec2, robot: DVec2) -> bool {
+        let Cell { col, row } = self.field.target();
+        let aim = grid::Cell {
+            col: col as u32,
+            row: row as u32,
+        };
         let own = self.frame.cell_at(target) == Some(aim);
-        !own && self.frame.centre_of(aim).distance(robot) <= BESIDE_M
+        !own && self.frame.centre_of(aim).distance(robot) <= AT_CELL_M
     }
-}
 
-/// Cells of `window` that are hazard now and were not when `domain` was solved, and the other way round.
-pub(super) fn changes_in(
-    domain: &Domain,
-    frame: &GridFrame,
-    window: Window,
-    cells: &[u8],
-) -> Vec<Change> {
-    let mut changes = Vec::new();
-    for row in window.row..window.row + window.height {
-        for col in window.col..window.col + window.width {
-            let cell = grid::Cell { col, row };
-            let blocked = is_hazard(cells[frame.index(cell)]);
-            let cell = field_cell(cell);
-            if blocked != domain.is_blocked(cell) {
-                changes.push(Change { cell, blocked });
+    /// Cells of `window` that are hazard in `cells` and not in the map, and the other way round.
+    pub(super) fn changes_in(&self, window: Window, cells: &[u8]) -> Vec<Change> {
+        let mut changes = Vec::new();
+        for row in window.row..window.row + window.height {
+            for col in window.col..window.col + window.width {
+                let cell = grid::Cell { col, row };
+                let blocked = is_hazard(cells[self.frame.index(cell)]);
+                let cell = field_cell(cell);
+                if blocked != self.map.is_blocked(cell) {
+                    changes.push(Change { cell, blocked });
+                }
             }
         }
+        changes
     }
-    changes
 }
 
-/// A cell of the grid as the field library names it: the one place where one becomes the other.
-pub(super) const fn field_cell(cell: grid::Cell) -> Cell {
-    Cell::new(cell.col as usize, cell.row as usize)
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Robot {
+    radius_m: f64,
+    /// The way ahead on which nothing may have changed.
+    ahead_m: f64,
 }
 
-/// The reverse of [`field_cell`].
-const fn grid_cell(cell: Cell) -> grid::Cell {
-    grid::Cell {
-        col: cell.col as u32,
-        row: cell.row as u32,
+impl Robot {
+    pub(super) fn new(mission: &Mission) -> Self {
+        Self {
+            radius_m: mission.body().radius_m,
+            ahead_m: mission.speed_m_s() * AHEAD_S,
+        }
     }
 }
 

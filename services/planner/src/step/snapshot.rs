@@ -1,4 +1,4 @@
-//! The field at one moment, from which the policy of every cell is computed, at once or later, while the planner goes on.
+//! The field at one moment, from which the policy of every cell is computed while the planner goes on.
 
 use std::sync::Arc;
 
@@ -11,16 +11,15 @@ use harmonic::Field;
 /// The field at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// What the `field` topic says of it besides stamp and part.
+    /// The header of a `field` sample; stamp and part are still to be set.
     pub header: FieldHeader,
-    /// How its cells lie.
+    /// Where its cells are.
     pub frame: GridFrame,
     pub(super) field: Arc<Field>,
 }
 
 impl Snapshot {
     /// The policy of every cell, row-major.
-    #[must_use]
     pub fn cells(&self) -> Vec<FieldCell> {
         let mut cells = Vec::with_capacity(self.frame.area());
         for row in 0..self.frame.cells as usize {

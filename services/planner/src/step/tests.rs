@@ -1,6 +1,6 @@
 use super::*;
 use common::{
-    grid::{CellState, Part},
+    grid::{self, CellState, Part},
     samples::ClearBeam,
 };
 use std::path::Path;
@@ -53,20 +53,12 @@ fn at(x_m: f64, y_m: f64) -> PoseSample {
     }
 }
 
-/// What the planner answers to a pose.
-fn answer(planner: &mut Planner, pose: &PoseSample) -> GuidanceSample {
-    let outcome = planner.step(Input::Pose(pose), MissionTime::default());
-    outcome.unwrap().guidance.unwrap()
-}
-
-/// The field of a job.
-fn solve(number: u64, domain: Domain) -> Solved {
-    let field = Solver::default()
-        .solve(&domain, &Cancellation::default())
-        .unwrap();
+/// The result of a job.
+fn solve(job: Job) -> Solved {
+    let field = Solver::default().solve(&job.domain, &Cancellation::default());
     Solved {
-        number,
-        result: Ok(Box::new((domain, field))),
+        number: job.number,
+        field: field.map(Arc::new),
         took_ns: 0,
     }
 }
@@ -96,7 +88,7 @@ fn before_the_first_keyframe_there_is_no_guidance() {
 fn an_empty_room_is_crossed_straight() {
     let mut planner = Planner::new(&mission());
     let (header, cells) = keyframe(1, |_| false);
-    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::FullSolve);
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     let guidance = planner.guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
     assert!(
@@ -114,10 +106,10 @@ fn a_wall_that_appears_turns_the_guidance_aside() {
     // Open only above y = 1.
     let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
     let (header, cells) = keyframe(2, wall);
-    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::FullSolve);
+    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     let guidance = planner.guide(&at(0.3, 0.0));
     assert!(guidance.ey > 0.7, "{guidance:?}");
-    assert_eq!((guidance.full_solves, guidance.local_updates), (2, 0));
+    assert_eq!(guidance.full_solves, 2);
 }
 
 #[test]
@@ -155,14 +147,14 @@ fn in_the_targets_cell_the_rest_is_straight() {
     assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
 }
 
-/// An evidential planner in a room where only what `swept` says was looked at.
-fn evidential(swept: impl Fn(DVec2) -> bool) -> Planner {
+/// An evidential planner in a room where only the cells for which `scanned` says so were scanned.
+fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
     let mission = Mission {
         method: Method::Evidential,
         ..mission()
     };
     let (mut header, mut cells) = keyframe(1, |_| false);
-    // A scan to both sides heard nothing.
+    // A scan to both sides had no echo.
     header.clear_beam_count = 11;
     for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
         let bearing = (index as f32 - 5.0) * 15.0_f32.to_radians();
@@ -182,7 +174,7 @@ fn evidential(swept: impl Fn(DVec2) -> bool) -> Planner {
             col: index as u32 % frame.cells,
             row: index as u32 / frame.cells,
         };
-        if *state == CellState::Free as u8 && swept(frame.centre_of(cell)) {
+        if *state == CellState::Free as u8 && scanned(frame.centre_of(cell)) {
             *state = CellState::Scanned as u8;
         }
     }
@@ -193,7 +185,7 @@ fn evidential(swept: impl Fn(DVec2) -> bool) -> Planner {
 
 #[test]
 fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
-    // All but what lies to the left of the way ahead.
+    // All is scanned but the ground to the left of the way ahead.
     let planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
     let guidance = planner.guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
@@ -217,8 +209,8 @@ fn an_evidential_robot_without_sensing_does_not_look_first() {
 }
 
 #[test]
-fn an_evidential_robot_looks_square_to_the_faces_it_could_touch_unheard() {
-    // All ground swept, by a sonar that looked ahead only.
+fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() {
+    // All ground is scanned, by a sonar that looked ahead only.
     let mut planner = evidential(|_| true);
     planner.belief.clear_beam_count = 1;
     let guidance = planner.guide(&at(0.0, 0.0));
@@ -257,9 +249,9 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
 }
 
 #[test]
-fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
-    let swept = |at: DVec2| at.x < 0.2 || at.y < 0.1;
-    let (one, other) = (evidential(swept), evidential(swept));
+fn a_scan_goes_on_in_a_planner_that_was_restarted() {
+    let scanned = |at: DVec2| at.x < 0.2 || at.y < 0.1;
+    let (one, other) = (evidential(scanned), evidential(scanned));
     for heading in [0.0, 0.2, 0.4] {
         let pose = PoseSample {
             heading_rad: heading,
@@ -269,113 +261,143 @@ fn a_scan_goes_on_in_a_planner_that_was_started_anew() {
     }
 }
 
-/// A room with a wall across it and a gap in the wall, of more cells than are solved at once.
-fn large_room(version: u64, gap_closed: bool) -> (Mission, GridHeader, Vec<u8>) {
-    let mission = mission_of(LARGE);
-    let hazard = |at: DVec2| {
-        let wall = (at.x - 0.8).abs() < 0.03;
-        let far_gap = (1.0..1.4).contains(&at.y);
-        let near_gap = !gap_closed && at.y.abs() < 0.2;
-        wall && !far_gap && !near_gap
-    };
-    let (header, cells) = keyframe_of(mission.grid_frame(), version, hazard);
-    (mission, header, cells)
+/// Cells a side of a map that the background solver solves.
+const LARGE: u32 = 600;
+
+/// A planner in a large room with a wall across it at x = 0.8, and two gaps in the wall.
+struct LargeRoom {
+    planner: Planner,
+    header: GridHeader,
+    cells: Vec<u8>,
 }
 
-/// Cells a side of a map that the background solver solves.
-const LARGE: u32 = 1100;
+const FAR_GAP: [f64; 2] = [1.0, 1.4];
+const NEAR_GAP: [f64; 2] = [-0.2, 0.2];
 
-#[test]
-fn an_update_in_a_window_calls_for_a_full_solve_and_a_robot_that_cannot_trust_it_waits() {
-    let (mission, header, cells) = large_room(1, false);
-    let mut planner = Planner::new(&mission);
-    planner.take_grid(&header, &cells).unwrap();
-    let before = answer(&mut planner, &at(0.0, 0.0));
-    assert_eq!(status(&before), GuidanceStatus::Along);
-    // A post on the way, far ahead.
-    let frame = mission.grid_frame();
-    let mut part = header;
-    part.part.version = 2;
-    let mut with_post = cells.clone();
-    for col in 0..8 {
-        for row in 0..8 {
-            let corner = frame.cell_at(DVec2::new(0.5, 0.0)).unwrap();
-            let cell = grid::Cell {
-                col: corner.col + col,
-                row: corner.row + row,
-            };
-            with_post[frame.index(cell)] = 1;
+impl LargeRoom {
+    fn new() -> Self {
+        let mission = mission_of(LARGE);
+        let in_gap = |y: f64| {
+            [FAR_GAP, NEAR_GAP]
+                .iter()
+                .any(|[from, to]| (*from..*to).contains(&y))
+        };
+        let hazard = |at: DVec2| (at.x - 0.8).abs() < 0.03 && !in_gap(at.y);
+        let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
+        let mut planner = Planner::new(&mission);
+        assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
+        assert!(planner.begin_job().is_none(), "the field is current");
+        Self {
+            planner,
+            header,
+            cells,
         }
     }
-    let work = planner.take_grid(&part, &with_post).unwrap();
-    assert_eq!(work, Work::LocalUpdate);
-    let behind = answer(&mut planner, &at(0.0, 0.0));
-    assert_eq!(status(&behind), GuidanceStatus::Waiting);
-    let job = planner.begin_job().unwrap();
-    assert!(job.urgent);
-    planner.swap_in(solve(job.number, job.domain)).unwrap();
-    let after = answer(&mut planner, &at(0.0, 0.0));
-    assert_eq!(status(&after), GuidanceStatus::Along);
+
+    /// The cells for whose centres `becomes` says so become hazard.
+    fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
+        let frame = self.header.part.frame();
+        for (index, cell) in (0..).zip(&mut self.cells) {
+            let (col, row) = (index % LARGE, index / LARGE);
+            if becomes(frame.centre_of(grid::Cell { col, row })) {
+                *cell = CellState::Sensed as u8;
+            }
+        }
+        self.header.part.version += 1;
+        let work = self.planner.take_grid(&self.header, &self.cells);
+        assert_eq!(work.unwrap(), Work::Stale);
+    }
+
+    fn block_post(&mut self, x: f64, y: f64) {
+        self.block(|at| at.distance(DVec2::new(x, y)) < 0.03);
+    }
+
+    fn close_near_gap(&mut self) {
+        self.block(|at| (at.x - 0.8).abs() < 0.03 && at.y < 1.0);
+    }
+
+    /// The background solver runs the job that is due.
+    fn solve(&mut self) {
+        let job = self.planner.begin_job().unwrap();
+        assert_eq!(self.planner.swap_in(solve(job)).unwrap(), Work::SwappedIn);
+    }
+
+    fn status_at(&self, x: f64, y: f64) -> GuidanceStatus {
+        status(&self.planner.guide(&at(x, y)))
+    }
 }
 
 #[test]
-fn a_gap_that_closes_halts_the_robot_until_the_background_solve_is_swapped_in() {
-    let (mission, header, cells) = large_room(1, false);
-    let mut planner = Planner::new(&mission);
-    planner.take_grid(&header, &cells).unwrap();
-    assert!(planner.begin_job().is_none(), "nothing calls for a solve");
-    let (_, header, cells) = large_room(2, true);
-    planner.take_grid(&header, &cells).unwrap();
-    let job = planner.begin_job().unwrap();
-    assert!(job.urgent);
+fn on_a_large_map_a_change_on_the_way_ahead_makes_the_robot_wait_until_the_field_is_solved() {
+    let mut room = LargeRoom::new();
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Along);
+    room.block_post(0.2, 0.1);
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    room.solve();
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Along);
+    assert_eq!(room.status_at(0.2, 0.1), GuidanceStatus::WayOut);
+}
+
+#[test]
+fn on_a_large_map_a_robot_goes_on_where_nothing_changed_on_its_way_ahead() {
+    let mut room = LargeRoom::new();
+    let before = room.planner.guide(&at(0.0, 0.0));
+    room.close_near_gap();
+    let after = room.planner.guide(&at(0.0, 0.0));
     assert_eq!(
-        status(&planner.guide(&at(0.0, 0.0))),
-        GuidanceStatus::Waiting
+        (after.ex, after.ey),
+        (before.ex, before.ey),
+        "far from the gap"
     );
-    assert!(planner.begin_job().is_none(), "one at a time");
-    let solved = solve(job.number, job.domain);
-    assert_eq!(planner.swap_in(solved).unwrap(), Work::SwappedIn);
-    let guidance = planner.guide(&at(0.5, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(
+        room.status_at(0.5, 0.0),
+        GuidanceStatus::Waiting,
+        "at the gap"
+    );
+    room.solve();
+    let guidance = room.planner.guide(&at(0.5, 0.0));
     assert!(guidance.ey > 0.4, "to the other gap: {guidance:?}");
 }
 
 #[test]
-fn the_result_of_a_stale_job_changes_nothing() {
-    let (mission, header, cells) = large_room(1, false);
-    let mut planner = Planner::new(&mission);
-    planner.take_grid(&header, &cells).unwrap();
-    let (_, header, closed) = large_room(2, true);
-    planner.take_grid(&header, &closed).unwrap();
-    let job = planner.begin_job().unwrap();
-    let solved = solve(job.number + 1, job.domain);
-    assert_eq!(planner.swap_in(solved).unwrap(), Work::None);
-    assert_eq!(
-        status(&planner.guide(&at(0.0, 0.0))),
-        GuidanceStatus::Waiting
-    );
+fn a_result_that_no_field_waits_for_changes_nothing() {
+    let mut room = LargeRoom::new();
+    room.close_near_gap();
+    let mut solved = solve(room.planner.begin_job().unwrap());
+    solved.number += 1;
+    assert_eq!(room.planner.swap_in(solved).unwrap(), Work::None);
+    assert_eq!(room.status_at(0.6, 0.0), GuidanceStatus::Waiting);
 }
 
 #[test]
-fn what_changes_while_a_job_runs_is_in_the_field_it_brings() {
-    let (mission, header, cells) = large_room(1, false);
-    let mut planner = Planner::new(&mission);
-    planner.take_grid(&header, &cells).unwrap();
-    let (_, header, mut cells) = large_room(2, true);
-    planner.take_grid(&header, &cells).unwrap();
-    let job = planner.begin_job().unwrap();
-    // A post between the robot and the other gap.
-    let frame = mission.grid_frame();
-    let post = frame.cell_at(DVec2::new(0.4, 0.6)).unwrap();
-    cells[frame.index(post)] = 1;
-    let mut later = header;
-    later.part.version = 3;
-    planner.take_grid(&later, &cells).unwrap();
-    planner.swap_in(solve(job.number, job.domain)).unwrap();
-    assert_eq!(
-        status(&planner.guide(&at(0.4, 0.6))),
-        GuidanceStatus::WayOut
-    );
+fn a_change_while_a_job_runs_is_in_the_field_of_the_job_after() {
+    let mut room = LargeRoom::new();
+    room.close_near_gap();
+    let first = room.planner.begin_job().unwrap();
+    assert!(room.planner.begin_job().is_none(), "one at a time");
+    room.block_post(0.4, 0.6);
+    let version = |room: &LargeRoom| room.planner.snapshot().unwrap().header.grid_version;
+    assert_eq!(version(&room), 1);
+    room.planner.swap_in(solve(first)).unwrap();
+    assert_eq!(version(&room), 2);
+    assert_eq!(room.status_at(0.4, 0.4), GuidanceStatus::Waiting);
+    room.solve();
+    assert_eq!(version(&room), 3);
+    assert_eq!(room.status_at(0.4, 0.4), GuidanceStatus::Along);
+    assert_eq!(room.status_at(0.4, 0.6), GuidanceStatus::WayOut);
+    assert!(room.planner.begin_job().is_none(), "the field is current");
+}
+
+#[test]
+fn a_robot_cut_off_on_a_large_map_hears_so_only_from_a_field_of_the_newest_map() {
+    let mut room = LargeRoom::new();
+    room.block(|at| (at.x - 0.8).abs() < 0.03);
+    room.solve();
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Unreachable);
+    room.block_post(-1.0, -1.0);
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    room.solve();
+    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Unreachable);
 }
 
 #[test]

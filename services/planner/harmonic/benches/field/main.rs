@@ -87,7 +87,7 @@ fn sequence_maps() -> Vec<(String, Domain)> {
     generated.into_iter().chain(largest).collect()
 }
 
-/// What `--maps` names.
+/// The directory that `--maps` names.
 fn maps_directory() -> Option<String> {
     std::env::args().skip_while(|it| it != "--maps").nth(1)
 }
@@ -162,8 +162,8 @@ fn full_table(quick: bool) {
     }
 }
 
-/// Maps of the same size to solve before one that is timed: the memory is then kept, the set-up is not. Upside down it takes the
-/// same precision, and drums take the other.
+/// Maps of the same size to solve before one that is timed: their memory is reused, their set-up is not. The map upside down
+/// takes the same precision, and drums take the other.
 fn others_than(domain: &Domain) -> [Domain; 2] {
     let (width, height) = (domain.width(), domain.height());
     let rows = domain.blocked().chunks_exact(width).rev();
@@ -174,7 +174,7 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
     [upside_down, drums].map(|it| it.expect("a valid map"))
 }
 
-/// One map: times from scratch and with the set-up kept, beside those of other algorithms.
+/// One map: times from scratch and with the set-up reused, beside those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let cells = domain.blocked().len();
     let cancellation = Cancellation::new();

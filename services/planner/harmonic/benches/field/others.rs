@@ -33,7 +33,7 @@ pub(crate) fn dijkstra(domain: &Domain) -> f64 {
     })
 }
 
-/// The same equations by `faer`'s sparse Cholesky factorisation on one core, in `f64`: what is below its range is unreached.
+/// The same equations by `faer`'s sparse Cholesky factorisation on one core, in `f64`; cells whose u is below its range are unreached.
 pub(crate) fn sparse_cholesky(domain: &Domain) -> f64 {
     use faer::linalg::solvers::Solve;
     use faer::sparse::{SparseColMat, Triplet};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use harmonic::{Cell, Domain};
 
-/// As the ROS map_server reads them: darker than this is not free.
+/// The ROS map_server's threshold: a darker cell is not free.
 const FREE_FROM: u8 = 206;
 
 /// The maps in the PGMs of a directory, by name.

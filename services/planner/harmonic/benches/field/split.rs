@@ -166,7 +166,7 @@ pub(crate) fn print_bytes() {
     }
 }
 
-/// What the resident memory of this process grows by at most during a solve by a new solver; `None` where the system does not
+/// The most that the resident memory of this process grows by during a solve by a new solver; `None` where the system does not
 /// tell.
 fn most_bytes(domain: &Domain) -> Option<f64> {
     // Makes the peak the present size.

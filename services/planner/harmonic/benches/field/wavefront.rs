@@ -12,7 +12,7 @@ const STEP: f32 = 2.0;
 /// Far enough that a neighbour's distance is not taken up again for rounding.
 const LEAST_GAIN: f32 = 1e-3;
 
-/// The wavefront's arrays, kept between runs, with a frame of blocked cells.
+/// The wavefront's arrays, reused between runs, with a frame of blocked cells.
 pub(crate) struct Wavefront {
     stride: usize,
     distance: Vec<f32>,

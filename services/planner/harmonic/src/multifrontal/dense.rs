@@ -5,7 +5,7 @@ use crate::simd::Simd;
 /// Columns that are computed together: a wide vector.
 const BLOCK: usize = 4;
 
-/// A square symmetric matrix of which only the upper triangle is kept, and whose first rows are to be eliminated.
+/// A square symmetric matrix of which only the upper triangle is stored, and whose first rows are to be eliminated.
 #[derive(Default)]
 pub(super) struct Matrix {
     entries: Vec<f64>,
@@ -104,7 +104,7 @@ impl Matrix {
 fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
     let mut start = 0;
     while start < ends.len() {
-        // As many pivots at once as there are, in powers of two.
+        // A panel has as many pivots as are left, rounded down to a power of two.
         start += match ends.len() - start {
             8.. => panel::<8>(entries, stride, start, ends),
             4.. => panel::<4>(entries, stride, start, ends),

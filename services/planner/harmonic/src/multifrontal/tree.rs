@@ -43,7 +43,7 @@ const NONE: u32 = u32::MAX;
 pub(crate) struct Cost {
     /// Multiplications.
     pub operations: f64,
-    /// Weights kept for the substitution, at most.
+    /// Most weights stored for the substitution.
     pub weights: usize,
     /// Bytes, of all that is allocated.
     pub bytes: u64,
@@ -187,7 +187,7 @@ impl Cost {
     }
 }
 
-/// What comes inwards of a stage.
+/// The inward neighbour of a stage.
 #[derive(Clone, Copy, Eq, PartialEq)]
 enum Next {
     /// Another stage of the same slab.
@@ -316,7 +316,7 @@ impl<'a> Builder<'a> {
         stage: &Range<u32>,
         outer: Option<&Range<u32>>,
     ) -> (u32, bool) {
-        // Of a separator's own neighbours none remains.
+        // None of a separator's own neighbours remains.
         let (inwards, outer) = outer.map_or((0, 0..0), |outer| (stage.start, outer.clone()));
         let tree = &mut self.tree;
         let index = tree.fronts.len() as u32;
@@ -327,7 +327,7 @@ impl<'a> Builder<'a> {
         let own = members.len();
         for at in first..first + own {
             for neighbour in self.pass.neighbours(tree.places[at]) {
-                // What else lies farther out is eliminated.
+                // Other cells farther out are eliminated already.
                 let remains = neighbour < inwards || outer.contains(&neighbour);
                 if remains && self.seen[neighbour as usize] != index {
                     self.seen[neighbour as usize] = index;
@@ -368,7 +368,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Connected pieces of one stage, by union and find; kept between stages for its memory.
+/// Connected pieces of one stage, by union and find; reused between stages for its memory.
 #[derive(Default)]
 struct Pieces {
     parent: Vec<u32>,

@@ -2,7 +2,7 @@
 
 use crate::scaled::Scaled;
 
-/// Memory kept between solves: fresh pages from the system cost as much as filling them.
+/// Memory reused between solves: fresh pages from the system cost as much as filling them.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) factors: Factors,
@@ -12,17 +12,17 @@ pub(crate) struct Workspace {
     pub(super) u: Vec<Scaled>,
 }
 
-/// Most memory kept, in bytes: what a maze of half a million cells takes. A map that needs more takes so long that fresh
+/// Most memory held between solves, in bytes: a maze of half a million cells takes this. A map that needs more takes so long that fresh
 /// pages no longer count.
-const KEPT: usize = 64 << 20;
+const MOST_HELD_BYTES: usize = 64 << 20;
 
 impl Workspace {
-    /// Frees the memory if it is more than is kept between solves.
+    /// Frees the memory if it is more than that.
     pub(super) fn trim(&mut self) {
         let bytes = size_of::<f64>() * self.factors.rows.capacity()
             + size_of::<u32>() * (self.factors.lengths.capacity() + self.slot.capacity())
             + size_of::<Scaled>() * self.u.capacity();
-        if bytes > KEPT {
+        if bytes > MOST_HELD_BYTES {
             *self = Self::default();
         }
     }

@@ -43,16 +43,16 @@ pub(super) struct Finest<R> {
     /// Weight of the coarse cell to the north in each even-odd cell.
     pub north: Vec<R>,
     pub south: Vec<R>,
-    /// By plane and row.
+    /// Sorted by plane and row.
     pub sources: Vec<Source<R>>,
     scratch: Scratch<R>,
     whole: Whole<R>,
 }
 
-/// What a pass does.
+/// The work of a pass.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Work<R> {
-    /// What the correction from the next level is multiplied by.
+    /// The factor of the correction from the next level.
     pub share: R,
     /// Full sweeps after the correction.
     pub sweeps: usize,
@@ -62,7 +62,7 @@ pub(super) struct Work<R> {
     pub tolerance: Option<R>,
 }
 
-/// What a pass tells of the convergence.
+/// The convergence that a pass found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
     /// Even-even cells whose direction the coarse correction turned by more than the tolerance, or whose u it changed

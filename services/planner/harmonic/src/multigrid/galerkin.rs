@@ -24,7 +24,7 @@ const BELOW_EAST: usize = 5;
 
 type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 
-/// Rows under way from a fine level to the next, kept between set-ups.
+/// Rows under way from a fine level to the next, reused between set-ups.
 #[derive(Debug)]
 pub(super) struct Products<R> {
     n: usize,

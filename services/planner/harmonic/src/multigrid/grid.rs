@@ -1,7 +1,7 @@
 //! A level's cells, split by the parity of column and row into four planes.
 //!
-//! The cells of one colour lie side by side in a plane, so every kernel runs over whole rows with plain loads and no
-//! masks; the even-even plane is the next coarser grid. Around each plane lies a margin of zeros, so that no kernel asks
+//! The cells of one colour are side by side in a plane, so every kernel runs over whole rows with plain loads and no
+//! masks; the even-even plane is the next coarser grid. Around each plane is a margin of zeros, so that no kernel asks
 //! whether a neighbour exists.
 
 use crate::real::Real;
@@ -94,14 +94,14 @@ impl Grid {
     }
 }
 
-/// Row buffers of a pass over a level, kept between passes.
+/// Row buffers of a pass over a level, reused between passes.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<R> {
     /// Rows of the next level in column order.
     pub upper: Vec<R>,
     pub lower: Vec<R>,
     pub restricted: Vec<R>,
-    /// What even-even and odd-odd cells changed by in the last two rows.
+    /// Changes of even-even and odd-odd cells in the last two rows.
     pub change_ee: [Vec<R>; 2],
     pub change_oo: [Vec<R>; 2],
     /// Residuals of even-odd cells in the last two rows, of odd-even and of even-even cells in one.
@@ -110,12 +110,12 @@ pub(super) struct Scratch<R> {
     pub residual_ee: Vec<R>,
 }
 
-/// Planes of a pass over a small level, margins included, kept between passes.
+/// Planes of a pass over a small level, margins included, reused between passes.
 #[derive(Debug, Default)]
 pub(super) struct Whole<R> {
-    /// What the even-even cells are corrected by on the way up, their residual on the way down.
+    /// The correction of the even-even cells on the way up, their residual on the way down.
     pub transfer: Vec<R>,
-    /// What even-even and odd-odd cells changed by, on the finest level.
+    /// Changes of even-even and odd-odd cells, on the finest level.
     pub change_ee: Vec<R>,
     pub change_oo: Vec<R>,
     pub residual_oe: Vec<R>,

@@ -1,5 +1,5 @@
-//! What a coarser level does with rows of values. Functions of their own, because only an argument tells the compiler that
-//! the output overlaps no input.
+//! The work of a coarser level on rows of values. These are functions of their own because only an argument tells the
+//! compiler that the output overlaps no input.
 
 use crate::real::Real;
 

@@ -25,25 +25,27 @@ const TOLERANCE: f64 = 0.02;
 /// as unsettled.
 const FIRST_CHECK: usize = 3;
 
-/// The same for a solve that starts from the field of a similar map: the first cycle has no correction to judge by.
+/// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to
+/// judge by.
 const FIRST_CHECK_NEAR: usize = 2;
 
-/// Most cycles from the field of a similar map; then it is solved from scratch. Those that need more are mostly maps in which cells
-/// were cut off: u of theirs falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
+/// Most cycles from the field of a similar map; then it is solved from scratch. Maps that need more are mostly those in which cells
+/// were cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
 const NEAR_CYCLES: usize = 20;
 
 /// Cycles after which a cell still at zero is one whose u is below what the precision holds.
 const REACHED: usize = 6;
 
-/// What a cycle divides residuals by, or more, and most cycles between a check that failed and the next.
+/// A cycle divides residuals by at least this.
 const PER_CYCLE: f64 = 3.0;
+/// Most cycles between a check that failed and the next.
 const BETWEEN_CHECKS: f64 = 4.0;
 
 /// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
 const SINGLE_CYCLES: usize = 60;
 const DOUBLE_CYCLES: usize = 450;
 
-/// What is asked of a full solve.
+/// The inputs of a full solve.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub settings: &'a Settings,
@@ -53,7 +55,7 @@ pub(super) struct Task<'a> {
     pub cancellation: &'a Cancellation,
 }
 
-/// What full solves keep between them.
+/// The set-up that full solves share.
 #[derive(Debug, Default)]
 pub(super) struct Full {
     single: Prepared<f32>,
@@ -82,7 +84,7 @@ impl<R> Default for Prepared<R> {
 }
 
 impl Full {
-    /// As [`Solver::solve_observed`](super::Solver::solve_observed).
+    /// See [`Solver::solve_observed`](super::Solver::solve_observed).
     pub(super) fn solve(
         &mut self,
         task: Task<'_>,
@@ -106,7 +108,7 @@ impl Full {
                 Method::MultigridDouble => {
                     Some(self.double.solve(task, Some(near), NEAR_CYCLES, observe)?)
                 }
-                // Of these the cost is in the shape of the map.
+                // The cost of these follows from the shape of the map alone.
                 Method::MultigridBands | Method::Multifrontal => None,
             };
             if let Some((store, check)) = solved

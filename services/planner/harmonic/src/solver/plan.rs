@@ -17,7 +17,7 @@ const WIDE: f64 = 32.0;
 /// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
 const SINGLE_DECADES: f64 = 62.0;
 
-/// The same of double precision.
+/// Orders of magnitude of u that fit double precision.
 const DOUBLE_DECADES: f64 = 570.0;
 const TWICE_DOUBLE_DECADES: f64 = 2.0 * DOUBLE_DECADES;
 
@@ -33,7 +33,7 @@ fn cycles(decades: f64) -> f64 {
     6.0 + decades / 3.5
 }
 
-/// What to try, and what was computed to decide it.
+/// The methods to try, and the results that the choice needed.
 pub(super) struct Plan {
     /// Methods in the order in which to try them; the multifrontal factorisation is the last resort in any case.
     pub methods: Vec<Method>,

@@ -11,21 +11,14 @@ pub struct Settings {
     /// Bytes the multifrontal factorisation may take; a solve that needs more ends in
     /// [`SolveError::TooCostly`](crate::SolveError::TooCostly).
     pub memory_limit: u64,
-    /// Maps of at most this many cells are solved whole by every [`Solver::update`](crate::Solver::update); larger ones in a
-    /// window around what changed.
-    pub whole_up_to: usize,
 }
 
-/// 512 a side: a control period of 143 ms has room for such a solve many times over.
-const WHOLE_UP_TO: usize = 1 << 18;
-
 impl Default for Settings {
-    /// One thread, 2 GiB, maps of up to 512 x 512 cells solved whole.
+    /// One thread, 2 GiB.
     fn default() -> Self {
         Self {
             threads: NonZeroUsize::MIN,
             memory_limit: 2 << 30,
-            whole_up_to: WHOLE_UP_TO,
         }
     }
 }
@@ -34,7 +27,7 @@ impl Default for Settings {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub enum Phase {
-    /// What does not depend on the target is ready.
+    /// The part that does not depend on the target is ready.
     SetUp,
     /// One cycle of multigrid has ended.
     Cycled,

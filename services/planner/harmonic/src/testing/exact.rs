@@ -15,7 +15,7 @@ use crate::verification::{self, Verification};
 /// The field of `domain` by multifrontal factorisation: exact but for the rounding of `f64`, on maps of any shape.
 ///
 /// # Errors
-/// Those of a solve.
+/// See [`Solver::solve`](crate::Solver::solve).
 pub fn exact(domain: &Domain) -> Result<Field, SolveError> {
     let cancellation = Cancellation::new();
     let budget = Budget::of(domain, u64::MAX);

@@ -88,7 +88,7 @@ impl Map {
     /// The domain of this map.
     ///
     /// # Errors
-    /// As [`Domain::new`].
+    /// See [`Domain::new`].
     pub fn domain(&self) -> Result<Domain, SolveError> {
         Domain::new(self.width, self.height, self.blocked.clone(), self.target)
     }

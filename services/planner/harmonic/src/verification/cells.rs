@@ -17,7 +17,7 @@ pub(super) const TILE_LIMIT: f64 = 0.01;
 pub(crate) struct Check {
     /// Largest relative residual of the cells with u > 0 but the target.
     pub worst_residual: f64,
-    /// As in [`Verification`](super::Verification).
+    /// See [`Verification`](super::Verification).
     pub worst_tile: f64,
     /// Cells with u > 0, other than the target, that no neighbour exceeds.
     pub local_maxima: usize,

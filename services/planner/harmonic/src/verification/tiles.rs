@@ -7,7 +7,7 @@ pub(super) const TILE: usize = 64;
 
 /// Sums over tiles of the map, one row of tiles at a time.
 pub(super) struct Tiles {
-    /// Of the relative residuals with their signs, and of (|grad u| / u)^2.
+    /// Sums of the relative residuals with their signs, and of (|grad u| / u)^2.
     sums: Vec<[f64; 2]>,
     worst: f64,
 }
@@ -38,7 +38,7 @@ impl Tiles {
         for sums in &mut self.sums {
             let [residual, slope] = std::mem::take(sums);
             if residual != 0.0 {
-                // What is no number is not small.
+                // A share that is no number counts as large.
                 let share = 4.0 * residual.abs() / slope;
                 self.worst = if share <= self.worst {
                     self.worst

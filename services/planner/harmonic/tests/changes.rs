@@ -1,0 +1,103 @@
+//! Directions after cells changed, where each solve starts from the field before: those of a solve from scratch.
+#![allow(
+    clippy::expect_used,
+    reason = "helpers of tests may stop at the first broken promise"
+)]
+
+use harmonic::testing::{Angles, Kind, Map, Random, exact, follow};
+use harmonic::{Cancellation, Cell, Change, Domain, Field, Solver};
+
+/// A map, and a field that is solved again after every change.
+struct Case {
+    solver: Solver,
+    domain: Domain,
+    field: Field,
+}
+
+impl Case {
+    fn new(map: &Map) -> Self {
+        let domain = map.domain().expect("a valid map");
+        let mut solver = Solver::default();
+        let field = solver
+            .solve(&domain, &Cancellation::new())
+            .expect("the map has a field");
+        Self {
+            solver,
+            domain,
+            field,
+        }
+    }
+
+    fn change(&mut self, changes: &[Change]) {
+        self.domain.apply(changes).expect("valid changes");
+        self.field = self
+            .solver
+            .solve_near(&self.domain, &self.field, &Cancellation::new())
+            .expect("the map has a field");
+    }
+
+    /// The free cells but the target of a rectangle, as far as it lies inside the map's rim, to become blocked.
+    fn block(&self, (col, row): (usize, usize), (width, height): (usize, usize)) -> Vec<Change> {
+        let (right, bottom) = (self.domain.width() - 1, self.domain.height() - 1);
+        (row.max(1)..(row + height).min(bottom))
+            .flat_map(|row| {
+                (col.max(1)..(col + width).min(right)).map(move |col| Cell::new(col, row))
+            })
+            .filter(|&cell| cell != self.domain.target() && !self.domain.is_blocked(cell))
+            .map(|cell| Change {
+                cell,
+                blocked: true,
+            })
+            .collect()
+    }
+
+    /// The angles between the field and the exact directions.
+    fn angles(&self) -> Angles {
+        let exact = exact(&self.domain).expect("a field");
+        Angles::between(&self.field, &exact, |_| true)
+    }
+}
+
+/// A block in one corridor turns all of the hall.
+#[test]
+fn after_a_block_in_one_of_two_corridors_the_directions_in_the_hall_that_they_feed_are_right() {
+    for (wide, size) in [(8, (3, 3)), (12, (3, 8))] {
+        let mut map = Map::generate(Kind::Empty, 500, 256, 0);
+        map.fill(80..240, 0..256, true);
+        for row in [70, 180] {
+            map.fill(80..240, row..row + wide, false);
+        }
+        map.aim((20, 128));
+        let mut case = Case::new(&map);
+        case.change(&case.block((160, 70 + (wide - size.1) / 2), size));
+        let angles = case.angles();
+        assert!(angles.clear_max < 1.0, "{angles:?}");
+    }
+}
+
+#[test]
+fn after_many_changes_every_cell_leads_to_the_target_and_all_directions_are_right() {
+    for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
+        let side = 120;
+        let mut case = Case::new(&Map::generate(kind, side, side, 3));
+        let mut random = Random::new(7);
+        let mut there: Vec<Vec<Change>> = Vec::new();
+        for step in 0..150 {
+            if there.len() > 8 && random.unit() < 0.5 {
+                let mut gone = there.swap_remove(random.below(there.len()));
+                gone.iter_mut().for_each(|change| change.blocked = false);
+                case.change(&gone);
+            } else {
+                let at = (random.below(side), random.below(side));
+                let side = 1 + random.below(5);
+                let square = case.block(at, (side, side));
+                case.change(&square);
+                there.push(square);
+            }
+            assert_eq!(follow(&case.field), 1.0, "{kind:?}, change {step}");
+        }
+        let angles = case.angles();
+        assert!(angles.p99 < 0.1, "{kind:?}: {angles:?}");
+        assert!(angles.clear_max < 1.0, "{kind:?}: {angles:?}");
+    }
+}

@@ -1,0 +1,89 @@
+//! The belief and a field over it.
+
+use common::grid::{Cell, CellState, GridFrame};
+use glam::DVec2;
+use harmonic::{Field, Guidance};
+
+/// Distance between the points of a way, metres.
+pub(crate) const STEP_M: f64 = 0.05;
+/// On a fine grid, unscanned cells are looked for in steps of this, metres.
+const GRAIN_M: f64 = 0.025;
+
+/// The belief, and a field over it or over an earlier belief.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View<'a> {
+    /// Where the cells are.
+    pub(crate) frame: GridFrame,
+    /// One [`CellState`] byte a cell, row-major.
+    pub(crate) cells: &'a [u8],
+    pub(crate) field: &'a Field,
+}
+
+impl View<'_> {
+    pub(crate) fn guidance(&self, at: DVec2) -> Guidance {
+        let cells = self.frame.to_cells(at);
+        self.field.guidance(cells.x, cells.y)
+    }
+
+    /// Points of the way that follows the field for `length_m` metres from `from`, which it leaves along `direction`.
+    pub(crate) fn way(&self, from: DVec2, direction: DVec2, length_m: f64) -> Vec<DVec2> {
+        let steps = (length_m / STEP_M) as usize;
+        let mut way = Vec::with_capacity(steps);
+        let (mut at, mut direction) = (from, direction);
+        while way.len() < steps {
+            at += direction * STEP_M;
+            way.push(at);
+            match self.guidance(at) {
+                Guidance::Along(next) => direction = next.into(),
+                _ => break,
+            }
+        }
+        way
+    }
+
+    pub(crate) fn is_hazard(&self, at: DVec2) -> bool {
+        self.frame
+            .cell_at(at)
+            .is_none_or(|cell| self.state(cell).is_hazard())
+    }
+
+    /// Whether a cell within `radius` of `at` became a hazard, or free, after the field's map was taken.
+    pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
+        self.cells_within(at, radius, 1)
+            .any(|cell| self.state(cell).is_hazard() != self.field.is_blocked(field_cell(cell)))
+    }
+
+    /// Centres of the free and sensed cells within `radius` of `at` that the sonar has not scanned.
+    pub(crate) fn unscanned(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
+        let step = (GRAIN_M / self.frame.resolution_m).max(1.0) as usize;
+        self.cells_within(at, radius, step)
+            .filter(|&cell| matches!(self.state(cell), CellState::Free | CellState::Sensed))
+            .map(|cell| self.frame.centre_of(cell))
+    }
+
+    /// Cells in every `step`th column and row whose centres lie within `radius` of `at`.
+    fn cells_within(&self, at: DVec2, radius: f64, step: usize) -> impl Iterator<Item = Cell> {
+        let frame = self.frame;
+        let last = f64::from(frame.cells) - 1.0;
+        let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));
+        let from = inside(frame.to_cells(at - radius).ceil());
+        let to = inside(frame.to_cells(at + radius).floor());
+        (from.y as u32..=to.y as u32)
+            .step_by(step)
+            .flat_map(move |row| {
+                let columns = (from.x as u32..=to.x as u32).step_by(step);
+                columns.map(move |col| Cell { col, row })
+            })
+            .filter(move |&cell| frame.centre_of(cell).distance(at) <= radius)
+    }
+
+    fn state(&self, cell: Cell) -> CellState {
+        let byte = self.cells.get(self.frame.index(cell)).copied();
+        byte.map_or(CellState::Perimeter, CellState::from_byte)
+    }
+}
+
+/// A cell of the grid as the field library names it.
+pub(crate) const fn field_cell(cell: Cell) -> harmonic::Cell {
+    harmonic::Cell::new(cell.col as usize, cell.row as usize)
+}
