@@ -1,87 +1,58 @@
-//! One clear sentence with cause and remedy, a non-zero exit, nothing left running.
+//! Bad input is answered with the code of the error, the input's name and a remedy, a non-zero exit, and nothing left running.
 
 use std::net::UdpSocket;
 
-use crate::support::{Run, assert_nothing_left, firsthand, output};
-use rustix::process::Signal;
-
-/// The sentence on standard error of a command that must fail.
-fn refusal(arguments: &[&str]) -> String {
-    let output = output(arguments);
-    assert!(!output.status.success(), "{arguments:?} succeeded");
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert!(!text.contains("panicked"), "{text}");
-    text
-}
-
-fn refused_mission(content: &str) -> String {
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("bad.toml");
-    std::fs::write(&file, content).unwrap();
-    let text = refusal(&["check", file.to_str().unwrap()]);
-    let run = refusal(&["run", file.to_str().unwrap(), "--robot", "bad"]);
-    assert_eq!(text, run, "check and run disagree");
-    assert_nothing_left("bad");
-    text
-}
+use crate::support::{Run, assert_nothing_left, assert_refused, output, refused};
 
 #[test]
-fn a_bad_mission_is_refused_with_line_key_and_remedy() {
+fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike() {
     let cases = [
-        (
-            "target = [99, 0]",
-            "bad.toml:1: target: ",
-            "widen perimeter.width_m",
-        ),
+        ("target = [99, 0]", "1: target: ", "perimeter.width_m"),
         (
             "target = [3, 0]\n[perimeter]\ncells = 3",
-            "bad.toml:3: perimeter.cells: ",
-            "give 10 to 4096",
+            "3: perimeter.cells: ",
+            "10 to 4096",
         ),
         (
             "target = [3, 0]\n[perimeter]\ncells = 99999",
-            "bad.toml:3: perimeter.cells: ",
-            "give 10 to 4096",
+            "3: perimeter.cells: ",
+            "10 to 4096",
         ),
-        ("target = [3, nan]", "bad.toml:1: target: ", "finite"),
-        (
-            "target = [3, 0]\nspeed = 1",
-            "bad.toml:2: ",
-            "unknown field `speed`",
-        ),
+        ("target = [3, nan]", "1: target: ", "finite"),
+        ("target = [3, 0]\nspeed = 1", "2: ", "`speed`"),
         (
             "target = [3, 0]\n[[world.drum]]\nat = [0, 0.1]\nradius_m = 0.3",
-            "bad.toml:2: world: ",
-            "move it away",
+            "2: world: ",
+            "move it",
         ),
     ];
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("bad.toml");
+    let path = file.to_str().unwrap();
     for (content, place, remedy) in cases {
-        let text = refused_mission(content);
-        assert!(
-            text.contains(place) && text.contains(remedy),
-            "{content:?} gave {text:?}"
-        );
+        std::fs::write(&file, content).unwrap();
+        let place = format!("{path}:{place}");
+        let check = output(&["check", path]);
+        let exit = assert_refused(&check, "mission", &[&place, remedy]);
+        assert_eq!(exit, Some(78), "{content:?}");
+        let run = output(&["run", path, "--robot", "bad"]);
+        assert_eq!(check, run, "{content:?}");
     }
+    assert_nothing_left("bad");
 }
 
 #[test]
 fn an_unknown_mission_is_answered_with_those_there_are() {
-    let text = refusal(&["run", "moon"]);
-    assert!(
-        text.contains("moon") && text.contains("obstacle-course"),
-        "{text}"
-    );
-    let text = refusal(&["check", "/no/such/file.toml"]);
-    assert!(text.contains("/no/such/file.toml"), "{text}");
+    let names = ["moon", "obstacle-course"];
+    refused(&["run", "moon"], "unknown-mission", &names);
+    let missing = "/no/such/file.toml";
+    refused(&["check", missing], "mission", &[missing]);
 }
 
 #[test]
 fn an_unknown_stage_is_answered_with_those_there_are() {
-    let text = refusal(&["stage", "warp", "--run", "/tmp", "--supervisor", "1"]);
-    assert!(
-        text.contains("warp") && text.contains("dead-reckoning"),
-        "{text}"
-    );
+    let stage = ["stage", "warp", "--run", "/tmp", "--supervisor", "1"];
+    refused(&stage, "unknown-stage", &["warp", "dead-reckoning"]);
 }
 
 #[test]
@@ -90,67 +61,49 @@ fn a_second_supervisor_of_a_robot_is_refused_and_the_first_goes_on() {
     first.wait_until_under_way(0.3);
     let runs = tempfile::tempdir().unwrap();
     let runs = runs.path().to_str().unwrap();
-    let text = refusal(&["run", "--robot", "second", "--runs", runs]);
     let pid = first.pid().to_string();
-    assert!(text.contains(&pid) && text.contains("--robot"), "{text}");
+    let second = ["run", "--robot", "second", "--runs", runs];
+    refused(&second, "supervised", &[&pid, "--robot"]);
     assert!(first.status().is_some());
-    first.signal(Signal::TERM);
-    first.finish();
-    assert_nothing_left("second");
+    first.stop();
 }
 
 #[test]
 fn a_port_in_use_is_named() {
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    let text = refusal(&["sim", "open-room", "--listen", &address]);
-    assert!(text.contains(&address), "{text}");
+    let sim = ["sim", "open-room", "--listen", &address];
+    refused(&sim, "address-in-use", &[&address]);
 }
 
 #[test]
-fn a_robot_address_that_is_none_is_named() {
+fn a_malformed_robot_address_is_named() {
     let runs = tempfile::tempdir().unwrap();
     let runs = runs.path().to_str().unwrap();
-    let text = refusal(&[
-        "run",
-        "--robot",
-        "nowhere",
-        "--runs",
-        runs,
-        "--set",
-        "robot.address='not an address'",
-    ]);
-    assert!(
-        text.contains("not an address") && text.contains("robot.address"),
-        "{text}"
-    );
+    let set = "robot.address='not an address'";
+    let run = ["run", "--robot", "nowhere", "--runs", runs, "--set", set];
+    let names = ["not an address", "robot.address"];
+    assert_eq!(refused(&run, "mission", &names), Some(78));
     assert_nothing_left("nowhere");
 }
 
 #[test]
-fn status_of_a_robot_that_does_not_run_says_so() {
-    let text = refusal(&["status", "--robot", "ghost"]);
-    assert!(
-        text.contains("ghost") && text.contains("firsthand run"),
-        "{text}"
-    );
+fn a_robot_that_does_not_run_is_named_with_how_to_start_it() {
+    let status = ["status", "--robot", "ghost"];
+    refused(&status, "not-running", &["ghost", "firsthand run"]);
 }
 
 #[test]
 fn a_bad_pace_or_robot_name_is_refused_by_the_command_line() {
-    assert!(refusal(&["run", "--pace", "warp"]).contains("warp"));
-    assert!(refusal(&["run", "--robot", "../x"]).contains("../x"));
+    refused(&["run", "--pace", "warp"], "usage", &["warp"]);
+    refused(&["run", "--robot", "../x"], "usage", &["../x"]);
 }
 
 #[test]
 fn results_of_an_earlier_run_are_not_overwritten() {
-    let directory = tempfile::tempdir().unwrap();
-    let out = directory.path().join("out");
+    let (_, directory) = Run::start("bi-again", "open-room", &[]).arrives_in();
+    let out = directory.path().join("run");
     let out = out.to_str().unwrap();
-    let first = firsthand(&["run", "open-room", "--robot", "again", "--out", out])
-        .output()
-        .unwrap();
-    assert!(first.status.success());
-    let text = refusal(&["run", "open-room", "--robot", "again", "--out", out]);
-    assert!(text.contains(out), "{text}");
+    let second = ["run", "open-room", "--robot", "bi-again", "--out", out];
+    refused(&second, "results-there", &[out]);
 }

@@ -8,10 +8,14 @@ use std::{
 };
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_nothing_left, find, half_make, in_own_process, making, pid,
+    PATIENCE, Run, STAGES, bus_instance, find, half_make, in_own_process, pid, shared_memory,
     signal_process,
 };
-use common::{bus::Bus, bus_instance::BusInstance, topics};
+use common::{
+    bus::{Bus, BusError},
+    bus_instance::BusInstance,
+    topics,
+};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -24,8 +28,8 @@ fn process_of(number: u128) -> u32 {
 }
 
 /// The directories of the node files of process `pid`.
-fn nodes_of(making: &BusInstance, pid: u32) -> Vec<PathBuf> {
-    let nodes = fs::read_dir(making.root().join("nodes")).unwrap();
+fn nodes_of(bus: &BusInstance, pid: u32) -> Vec<PathBuf> {
+    let nodes = fs::read_dir(bus.root().join("nodes")).unwrap();
     let nodes = nodes.map(|entry| entry.unwrap().path()).filter(|path| {
         let name = path.file_name().unwrap().to_str().unwrap();
         name.parse().is_ok_and(|id| process_of(id) == pid)
@@ -33,18 +37,16 @@ fn nodes_of(making: &BusInstance, pid: u32) -> Vec<PathBuf> {
     nodes.collect()
 }
 
-/// The files in shared memory of `domain` that end so.
-fn shared(making: &BusInstance, suffix: &str) -> Vec<String> {
-    let names = fs::read_dir("/dev/shm").unwrap().flatten();
-    let names = names.filter_map(|entry| entry.file_name().into_string().ok());
-    names
-        .filter(|name| name.starts_with(&making.shared_memory_prefix()) && name.ends_with(suffix))
-        .collect()
+/// The files in shared memory of a bus instance that end so.
+fn shared(bus: &BusInstance, suffix: &str) -> Vec<String> {
+    let paths = shared_memory(&bus.shared_memory_prefix()).into_iter();
+    let names = paths.map(|path| path.file_name().unwrap().to_str().unwrap().to_owned());
+    names.filter(|name| name.ends_with(suffix)).collect()
 }
 
 /// A connection of port `port` to another, half made.
-fn half_make_connection(making: &BusInstance, port: u128) {
-    let made = shared(making, ".connection");
+fn half_make_connection(bus: &BusInstance, port: u128) {
+    let made = shared(bus, ".connection");
     // Prefix and hash of the type: up to the first port's number.
     let start = made[0].rsplitn(3, '_').last().unwrap();
     half_make(Path::new(&format!(
@@ -53,18 +55,10 @@ fn half_make_connection(making: &BusInstance, port: u128) {
 }
 
 /// The mission is finished as if nothing had happened, and leaves nothing.
-fn assert_arrives(robot: &str, run: Run) -> Value {
-    let (code, summary) = run.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_eq!(summary["collisions"], 0, "{summary}");
+fn assert_arrives(run: Run) -> Value {
+    let summary = run.arrives();
     // A lost pose is metres.
-    let error = summary["pose_error_m"].as_f64().unwrap();
-    assert!(error < 0.05, "{summary}");
-    assert_nothing_left(robot);
+    assert!(summary["pose_error_m"].as_f64() < Some(0.05), "{summary}");
     summary
 }
 
@@ -80,19 +74,19 @@ fn assert_bus_was_recreated(summary: &Value) {
 fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
     let mut run = Run::start("block-own", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let making = making("block-own");
+    let bus = bus_instance("block-own");
     let mapper = pid(&status, "mapper");
-    let ports = shared(&making, ".data");
+    let ports = shared(&bus, ".data");
     let port = ports.iter().find_map(|name| {
         let id = name.strip_suffix(".data")?.rsplit('_').next()?;
         id.parse().ok().filter(|id| process_of(*id) == mapper)
     });
-    half_make_connection(&making, port.unwrap());
+    half_make_connection(&bus, port.unwrap());
     let began = Instant::now();
     run.kill_and_await_successor("mapper", Signal::KILL);
     // Not after a start-up that was too late.
     assert!(began.elapsed().as_secs() < 3, "{:?}", began.elapsed());
-    let summary = assert_arrives("block-own", run);
+    let summary = assert_arrives(run);
     assert_eq!(summary["restarts"]["mapper"], 1, "{summary}");
     assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
 }
@@ -101,20 +95,20 @@ fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
 fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
     let mut run = Run::start("block-other", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let making = making("block-other");
+    let bus = bus_instance("block-other");
     // Of the killed mapper, by its tags, but with a number that is not its own.
     let port = 7;
-    let node = nodes_of(&making, pid(&status, "mapper")).remove(0);
-    let tag = format!("{}{port}.port_tag", making.shared_memory_prefix());
+    let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
+    let tag = format!("{}{port}.port_tag", bus.shared_memory_prefix());
     fs::write(node.join(tag), "").unwrap();
-    half_make_connection(&making, port);
+    half_make_connection(&bus, port);
     run.kill_and_await_successor("mapper", Signal::KILL);
     let began = Instant::now();
-    while !shared(&making, "_7.connection").is_empty() {
+    while !shared(&bus, "_7.connection").is_empty() {
         assert!(began.elapsed() < PATIENCE, "it stays");
         run.status();
     }
-    let summary = assert_arrives("block-other", run);
+    let summary = assert_arrives(run);
     let restarts = summary["restarts"]["mapper"].as_u64().unwrap();
     assert!((1..=2).contains(&restarts), "{summary}");
     assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
@@ -124,12 +118,12 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
 fn a_half_made_service_blocks_starts_until_the_bus_is_recreated() {
     let mut run = Run::start("block-service", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let services = making("block-service").root().join("services");
+    let services = bus_instance("block-service").root().join("services");
     for service in fs::read_dir(services).unwrap() {
         half_make(&service.unwrap().path());
     }
     run.kill_and_await("planner", Signal::KILL, &status);
-    assert_bus_was_recreated(&assert_arrives("block-service", run));
+    assert_bus_was_recreated(&assert_arrives(run));
 }
 
 #[test]
@@ -137,13 +131,13 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
     in_own_process(|| {
         let mut run = Run::start("block-places", "open-room", &PACE);
         let status = run.wait_until_under_way(1.0);
-        let bus = Bus::join(making("block-places").domain(), "greedy").unwrap();
+        let joined = Bus::join(bus_instance("block-places").domain(), "greedy").unwrap();
         let mut places = Vec::new();
         let mut take_all = || {
             loop {
-                match bus.writer(&topics::POSE, 0) {
+                match joined.writer(&topics::POSE, 0) {
                     Ok(place) => places.push(place),
-                    Err(error) if error.to_string().contains("ExceedsMax") => {
+                    Err(BusError::Refused { detail, .. }) if detail.contains("ExceedsMax") => {
                         return Some(places.len());
                     }
                     // Two starts were refused already, and this bus is being removed.
@@ -169,8 +163,8 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
             });
         }
         // Never given back: as when their owners were killed while they held them.
-        std::mem::forget((places, bus));
-        assert_bus_was_recreated(&assert_arrives("block-places", run));
+        std::mem::forget((places, joined));
+        assert_bus_was_recreated(&assert_arrives(run));
     });
 }
 
@@ -178,25 +172,49 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
 fn node_files_of_processes_that_ended_are_removed() {
     let mut run = Run::start("block-nodes", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
-    let making = making("block-nodes");
+    let bus = bus_instance("block-nodes");
     let mapper = pid(&status, "mapper");
-    let nodes = making.root().join("nodes");
+    let nodes = bus.root().join("nodes");
     // As left by hundreds of processes killed while they joined; of the number, the process alone counts.
     for counter in 1_000..1_300_u128 {
         let id = (counter << 96) | (u128::from(mapper) << 64);
         fs::create_dir(nodes.join(id.to_string())).unwrap();
-        let monitor = format!("{}{id}.node_monitor_context", making.shared_memory_prefix());
+        let monitor = format!("{}{id}.node_monitor_context", bus.shared_memory_prefix());
         fs::write(nodes.join(monitor), [0; 16]).unwrap();
     }
     let status = run.kill_and_await_successor("mapper", Signal::KILL);
     let running: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
     let began = Instant::now();
-    while !nodes_of(&making, mapper).is_empty() {
+    while !nodes_of(&bus, mapper).is_empty() {
         assert!(began.elapsed() < PATIENCE, "node files stay");
         run.status();
     }
     for pid in running {
-        assert_eq!(nodes_of(&making, pid).len(), 1, "of a running process");
+        assert_eq!(nodes_of(&bus, pid).len(), 1, "of a running process");
     }
-    assert_arrives("block-nodes", run);
+    assert_arrives(run);
+}
+
+#[test]
+fn what_a_stage_killed_in_its_start_left_on_the_bus_is_removed() {
+    let mut run = Run::start("block-cut-off", "open-room", &PACE);
+    let status = run.wait_until_under_way(1.0);
+    let bus = bus_instance("block-cut-off");
+    let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
+    let id: u128 = node.file_name().unwrap().to_str().unwrap().parse().unwrap();
+    // A generation that was killed between making its node's directory and registering the node.
+    let cut_off = bus.root().join("nodes").join((id + (1 << 96)).to_string());
+    fs::create_dir(&cut_off).unwrap();
+    let details = format!("{}node.details", bus.shared_memory_prefix());
+    fs::write(cut_off.join(details), "").unwrap();
+    run.kill_and_await_successor("mapper", Signal::KILL);
+    let is_left = |entry: fs::DirEntry| {
+        let name = entry.file_name().into_string().unwrap();
+        name.contains(&id.to_string()) || entry.path() == cut_off
+    };
+    run.wait_until("the nodes are removed", |_| {
+        let left = fs::read_dir(bus.root().join("nodes")).unwrap().flatten();
+        !left.into_iter().any(is_left)
+    });
+    run.stop();
 }

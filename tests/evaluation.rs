@@ -2,19 +2,17 @@
 
 use serde_json::Value;
 
-use crate::support::output;
+use crate::support::{printed, refused};
 
-/// The object that the evaluation of two rooms in `out` ends with.
-fn evaluate(out: &str, more: &[&str]) -> Result<Value, String> {
-    let common = [
-        "evaluate", "--worlds", "rooms", "--count", "2", "--out", out, "--json",
-    ];
-    let output = output(&[&common[..], more].concat());
-    if output.status.success() {
-        Ok(serde_json::from_slice(&output.stdout).unwrap())
-    } else {
-        Err(String::from_utf8(output.stderr).unwrap())
-    }
+/// The command that evaluates two rooms in `out`.
+fn two_rooms<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let rooms = ["evaluate", "--worlds", "rooms", "--count", "2", "--out"];
+    [&rooms[..], &[out, "--json"], more].concat()
+}
+
+/// The object that it ends with.
+fn evaluate(out: &str, more: &[&str]) -> Value {
+    serde_json::from_str(&printed(&two_rooms(out, more))).unwrap()
 }
 
 #[test]
@@ -22,7 +20,7 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("rooms");
     let name = out.to_str().unwrap();
-    let whole = evaluate(name, &["--seed", "5"]).unwrap();
+    let whole = evaluate(name, &["--seed", "5"]);
     assert_eq!(whole["count"], 2, "{whole}");
     let shares = [
         "success",
@@ -50,7 +48,7 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
         format!("{first}\nrooms-5-0001,6,evid"),
     )
     .unwrap();
-    let resumed = evaluate(name, &["--seed", "5", "--resume"]).unwrap();
+    let resumed = evaluate(name, &["--seed", "5", "--resume"]);
     assert_eq!(resumed["count"], 2, "{resumed}");
     assert_eq!(resumed["success"], whole["success"]);
     let again = std::fs::read_to_string(out.join("rows.csv")).unwrap();
@@ -58,10 +56,10 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let latencies = std::fs::read_to_string(out.join("latencies.csv")).unwrap();
     assert_eq!(latencies.lines().count(), 3, "{latencies}");
 
-    let refused = evaluate(name, &["--seed", "5"]).unwrap_err();
-    assert!(refused.contains("--resume"), "{refused}");
-    let refused = evaluate(name, &["--seed", "6", "--resume"]).unwrap_err();
-    assert!(refused.contains("was another"), "{refused}");
+    let again = two_rooms(name, &["--seed", "5"]);
+    refused(&again, "results-there", &["--resume"]);
+    let other = two_rooms(name, &["--seed", "6", "--resume"]);
+    refused(&other, "other-results", &[name]);
 }
 
 #[test]
@@ -70,7 +68,7 @@ fn with_infrared_the_same_seed_gives_the_same_rows_twice_and_their_setting_names
     let rows = |name: &str| {
         let out = directory.path().join(name);
         let sensors = ["--seed", "5", "--sensors", "front+infrared"];
-        evaluate(out.to_str().unwrap(), &sensors).unwrap();
+        evaluate(out.to_str().unwrap(), &sensors);
         std::fs::read_to_string(out.join("rows.csv")).unwrap()
     };
     let first = rows("first");
@@ -103,8 +101,8 @@ fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
     let common = ["evaluate", "--worlds", map, "--out", out, "--json"];
     let ends = ["--start", "-9,21,0", "--target", "-5,21"];
     let more = ["--realism", "laboratory"];
-    let ended = output(&[&common[..], &ends, &more].concat());
-    let found: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    let found = printed(&[&common[..], &ends, &more].concat());
+    let found: Value = serde_json::from_str(&found).unwrap();
     assert_eq!(
         (&found["count"], &found["success"]),
         (&1.into(), &1.0.into()),
@@ -115,17 +113,14 @@ fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
         "around the wall: {found}"
     );
 
-    let refused = |arguments: &[&str]| {
-        let refused = output(&[&["evaluate"], arguments].concat());
-        assert!(!refused.status.success());
-        String::from_utf8(refused.stderr).unwrap()
+    let refused = |arguments: &[&str], code, name| {
+        refused(&[&["evaluate"], arguments].concat(), code, &[name]);
     };
     let other = folder.path().join("other");
     let other = ["--out", other.to_str().unwrap()];
-    let drawn = refused(&[&ends[..], &["--worlds", "rooms"], &other].concat());
-    assert!(drawn.contains("--start"), "{drawn}");
-    let alone = refused(&["--worlds", map, "--start", "1,2,3"]);
-    assert!(alone.contains("--target"), "{alone}");
-    let words = refused(&["--worlds", map, "--start", "here", "--target", "1,2"]);
-    assert!(words.contains("3 numbers"), "{words}");
+    let drawn = [&ends[..], &["--worlds", "rooms"], &other].concat();
+    refused(&drawn, "", "--start");
+    refused(&["--worlds", map, "--start", "1,2,3"], "usage", "--target");
+    let words = ["--worlds", map, "--start", "here", "--target", "1,2"];
+    refused(&words, "usage", "here");
 }

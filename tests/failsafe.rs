@@ -13,7 +13,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::{self, PATIENCE, Run, STAGES, assert_nothing_left, firsthand, operate};
+use crate::support::{
+    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, firsthand,
+    operate,
+};
 use common::wire::{Command, Decoder};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -56,7 +59,7 @@ impl Drop for Robot {
     }
 }
 
-/// A motion command on its way to the robot.
+/// A motion command that the link has sent to the robot.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     at: Instant,
@@ -65,22 +68,22 @@ struct Heard {
 }
 
 impl Heard {
-    /// Of a tick, and not a repetition: those have less time left.
+    /// Whether it is the command of a tick: a repetition has less time left.
     fn valid(&self) -> bool {
         self.moving && self.limit == LIMIT
     }
 }
 
 /// Stands between link and robot.
-struct Tap {
-    address: SocketAddr,
+pub(crate) struct Tap {
+    pub(crate) address: SocketAddr,
     heard: Receiver<Heard>,
     over: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Tap {
-    fn before(robot: &Robot) -> Self {
+    pub(crate) fn before(robot: &Robot) -> Self {
         let host = UdpSocket::bind("127.0.0.1:0").unwrap();
         let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
         wire.connect(&robot.listening).unwrap();
@@ -132,6 +135,13 @@ impl Tap {
             }
             assert!(began.elapsed() < PATIENCE, "no such command");
         }
+    }
+
+    /// Once nobody sends any more: the last command that was sent does not move the robot.
+    #[track_caller]
+    pub(crate) fn assert_last_is_zero(&self) {
+        let last = self.heard.try_iter().last().unwrap();
+        assert!(!last.moving, "{last:?}");
     }
 
     /// The longest that the robot was left with a valid command, among all that was heard by now: until the next
@@ -233,9 +243,7 @@ fn whatever_is_killed_or_frozen_the_wheels_have_zero_within_250_ms_and_a_period_
             assert!(longest <= LIMIT + PERIOD, "{stage} {signal:?}: {longest:?}");
         }
     }
-    run.signal(Signal::TERM);
-    assert_eq!(run.finish().0, Some(0));
-    assert_nothing_left("tap-kill");
+    run.stop();
 }
 
 #[test]
@@ -256,17 +264,48 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
     }
     run.signal(Signal::CONT);
     tap.next_that(|heard| heard.moving);
-    let directory = run.directory();
-    run.signal(Signal::TERM);
-    let (code, summary, kept) = run.finish_in();
-    assert_eq!(code, Some(0), "{summary}");
-    let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
-    assert!(log.contains("supervisor silent"), "{log}");
+    assert!(run.link_logged(&["cause=\"supervisor silent\""]));
+    let summary = run.stop();
     for stage in STAGES {
         assert_eq!(summary["restarts"][stage], 0, "{summary}");
     }
-    drop(kept);
-    assert_nothing_left("tap-watch");
+}
+
+/// Whether this process ignores `signal`, and so do the processes that it starts: under `nohup` they ignore SIGHUP.
+fn ignores(signal: Signal) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = u64::from_str_radix(mask.unwrap().trim(), 16).unwrap();
+    mask >> (signal.as_raw() - 1) & 1 == 1
+}
+
+#[test]
+fn ctrl_c_sigterm_and_a_closed_terminal_end_a_run_in_order_and_its_last_command_is_zero() {
+    for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
+        if ignores(signal) {
+            support::not_run("ctrl_c_sigterm_and_a_closed_terminal", "nohup: no SIGHUP");
+            continue;
+        }
+        let (_body, tap, mut run) = tapped("tap-end");
+        tap.next_that(|heard| heard.moving);
+        run.wait_until_under_way(0.3);
+        run.signal(signal);
+        let (code, summary) = run.finish();
+        assert_ended(code, &summary, 0, "aborted");
+        tap.assert_last_is_zero();
+        assert_nothing_left("tap-end");
+    }
+}
+
+#[test]
+fn stages_end_with_their_supervisor_that_is_killed_and_the_last_command_is_zero() {
+    let (_body, tap, mut run) = tapped("tap-orphan");
+    tap.next_that(|heard| heard.moving);
+    run.kill();
+    support::wait_until_all_ended("tap-orphan");
+    tap.assert_last_is_zero();
+    // The files that it left do not hinder the next run, and are removed with it.
+    Run::start("tap-orphan", "open-room", &[]).arrives();
 }
 
 #[test]
@@ -281,9 +320,7 @@ fn an_operators_stop_is_named_by_the_link() {
     run.wait_until("the robot goes on", |status| {
         status["link"]["cause"].is_null() && status["link"]["robot"] == "goes"
     });
-    run.signal(Signal::TERM);
-    assert_eq!(run.finish().0, Some(0));
-    assert_nothing_left("named");
+    run.stop();
 }
 
 #[test]
@@ -295,20 +332,11 @@ fn on_a_low_battery_the_mission_takes_longer_and_arrives_on_an_empty_one_it_ends
     let time = |summary: &Value| summary["mission_time_s"].as_f64().unwrap();
     let (_, full) = with("7.8");
     let (code, low) = with("6.5");
-    assert_eq!(
-        (code, &low["outcome"]),
-        (Some(0), &"reached".into()),
-        "{low}"
-    );
+    assert_reached(code, &low);
     assert!(time(&low) > 1.5 * time(&full), "{low} against {full}");
     let (code, empty) = with("5.9");
-    assert_eq!(
-        (code, &empty["outcome"]),
-        (Some(6), &"aborted".into()),
-        "{empty}"
-    );
-    let reason = empty["reason"].as_str().unwrap();
-    assert!(reason.contains("battery empty"), "{reason}");
+    assert_ended(code, &empty, 6, "aborted");
+    assert_eq!(empty["cause"], "battery empty", "{empty}");
     assert!((1.9..3.0).contains(&time(&empty)), "{empty}");
     assert_nothing_left("charge");
 }

@@ -1,8 +1,8 @@
-//! `firsthand field`: what comes out of a map, and what is said of one that is none.
+//! `firsthand field`: the field of a map, and refusals of files that are no maps.
 
 use std::path::{Path, PathBuf};
 
-use crate::support::output;
+use crate::support::{printed, refused};
 use serde_json::Value;
 
 /// A room of 24 x 16 cells in its rim, a wall across it with one doorway, and a closet nobody can leave.
@@ -47,24 +47,15 @@ fn write_image(directory: &Path) -> PathBuf {
 
 /// The JSON of a solve that must succeed.
 fn report(map: &Path, arguments: &[&str]) -> Value {
-    let mut all = vec!["field", map.to_str().unwrap(), "--json"];
-    all.extend(arguments);
-    let output = output(&all);
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {stderr}");
-    let text = String::from_utf8(output.stdout).unwrap();
-    serde_json::from_str(text.lines().last().unwrap()).unwrap()
+    let field = ["field", map.to_str().unwrap(), "--json"];
+    serde_json::from_str(&printed(&[&field, arguments].concat())).unwrap()
 }
 
-/// The sentence on standard error of a solve that must fail.
-fn refusal(map: &Path, arguments: &[&str]) -> String {
-    let mut all = vec!["field", map.to_str().unwrap()];
-    all.extend(arguments);
-    let output = output(&all);
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success(), "{arguments:?} succeeded");
-    assert!(!text.contains("panicked"), "{text}");
-    text
+/// A solve must fail with `code`, and name each of `names`.
+#[track_caller]
+fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
+    let field = ["field", map.to_str().unwrap()];
+    refused(&[&field, arguments].concat(), code, names);
 }
 
 /// The bytes of an array in an .npz whose members are stored: after its name, its own header and 20 x 24 x 16 bytes.
@@ -223,23 +214,13 @@ fn a_target_that_is_none_is_answered_with_the_nearest_that_is() {
     let directory = tempfile::tempdir().unwrap();
     let map = write_map(directory.path());
     for (target, nearest) in [("12,12", "11,12"), ("99999,3", "22,3"), ("0,0", "1,1")] {
-        let text = refusal(&map, &["--target-cell", target]);
-        assert!(
-            text.contains("rooms.map") && text.contains(&format!("--target-cell {nearest}")),
-            "{target} gave {text}"
-        );
+        let names = ["rooms.map", &format!("--target-cell {nearest}")];
+        assert_refuses(&map, &["--target-cell", target], "target", &names);
     }
-    assert!(refusal(&map, &["--target-cell", "3;4"]).contains("column"));
-    for (length, named) in [
-        ("-1", "-1 cells"),
-        ("0", "screening length"),
-        ("nan", "NaN"),
-    ] {
-        let text = refusal(
-            &map,
-            &["--target-cell", "3,12", "--screening-cells", length],
-        );
-        assert!(text.contains(named), "{length} gave {text}");
+    assert_refuses(&map, &["--target-cell", "3;4"], "usage", &["3;4"]);
+    for (length, named) in [("-1", "-1"), ("0", "0"), ("nan", "NaN")] {
+        let screened = ["--target-cell", "3,12", "--screening-cells", length];
+        assert_refuses(&map, &screened, "", &[named]);
     }
 }
 
@@ -257,14 +238,10 @@ fn a_file_that_is_no_map_or_cannot_be_written_is_named() {
     ] {
         let file = directory.path().join(name);
         std::fs::write(&file, bytes).unwrap();
-        let text = refusal(&file, &["--target-cell", "1,1"]);
-        assert!(text.contains(name) && text.lines().count() == 1, "{text}");
+        assert_refuses(&file, &["--target-cell", "1,1"], "", &[name]);
     }
     let map = write_map(directory.path());
     let out = directory.path().join("no/such/folder.npz");
-    let text = refusal(
-        &map,
-        &["--target-cell", "3,12", "--out", out.to_str().unwrap()],
-    );
-    assert!(text.contains("folder.npz"), "{text}");
+    let out = ["--target-cell", "3,12", "--out", out.to_str().unwrap()];
+    assert_refuses(&map, &out, "", &["folder.npz"]);
 }

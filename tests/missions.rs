@@ -1,16 +1,31 @@
 //! Whole missions through real processes.
 
-use crate::support::{self, assert_nothing_left, run};
+use serde_json::Value;
 
-/// Reached, and nothing touched.
-fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) {
-    let (code, summary) = run(robot, mission, arguments);
-    assert_eq!(summary["outcome"], "reached", "{arguments:?}: {summary}");
-    assert_eq!(
-        (code, summary["collisions"].as_u64()),
-        (Some(0), Some(0)),
-        "{arguments:?}"
-    );
+use crate::support::{self, Run, assert_ended, assert_nothing_left, printed, run};
+
+/// The robot reaches its target and touches nothing.
+#[track_caller]
+fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
+    println!("{arguments:?}");
+    let summary = Run::start(robot, mission, arguments).arrives();
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    summary
+}
+
+/// Its way, in lengths of the straight line.
+fn detour(summary: &Value) -> f64 {
+    let metres = |key: &str| summary[key].as_f64().unwrap();
+    metres("path_length_m") / metres("straight_m")
+}
+
+/// A whole run that must end with that exit code and outcome.
+#[track_caller]
+fn ends(robot: &str, mission: &str, arguments: &[&str], code: i32, outcome: &str) -> Value {
+    let (found, summary) = run(robot, mission, arguments);
+    assert_ended(found, &summary, code, outcome);
+    assert_nothing_left(robot);
+    summary
 }
 
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
@@ -21,7 +36,6 @@ fn the_default_mission_reaches_its_target_untouched_for_seeds_1_to_10() {
     for seed in 1..=10 {
         arrives_untouched("seeds", "obstacle-course", &["--seed", &seed.to_string()]);
     }
-    assert_nothing_left("seeds");
 }
 
 #[test]
@@ -31,7 +45,6 @@ fn by_the_papers_method_it_does_for_seeds_1_to_8() {
         let arguments = [&PAPER[..], &["--seed", &seed]].concat();
         arrives_untouched("paper", "obstacle-course", &arguments);
     }
-    assert_nothing_left("paper");
 }
 
 #[test]
@@ -119,7 +132,6 @@ fn a_car_crosses_the_course_untouched_for_seeds_1_to_5() {
             &[&CAR[..], &["--seed", &seed]].concat(),
         );
     }
-    assert_nothing_left("car");
 }
 
 #[test]
@@ -129,37 +141,26 @@ fn a_car_that_faces_a_wall_too_near_to_turn_ends_with_its_turning_radius() {
                 {points=[[0.5,-0.6],[-0.3,-0.6]]}]";
     let arguments = ["--set", wall, "--timeout", "600"];
     arrives_untouched("pocket", "open-room", &arguments);
-    let (code, summary) = run("pocket", "open-room", &[&CAR[..], &arguments].concat());
-    assert_eq!(
-        (code, &summary["outcome"], &summary["collisions"]),
-        (Some(3), &"unreachable".into(), &0.into()),
-        "{summary}"
-    );
+    let car = [&CAR[..], &arguments].concat();
+    let summary = ends("pocket", "open-room", &car, 3, "unreachable");
+    assert_eq!(summary["collisions"], 0, "{summary}");
     let reason = summary["reason"].as_str().unwrap();
-    assert!(reason.contains("turns in no less than 0.31 m"), "{reason}");
-    assert_nothing_left("pocket");
+    assert!(reason.contains("0.31 m"), "{reason}");
 }
 
 #[test]
 fn an_empty_room_is_crossed_without_a_safety_event() {
-    let (_, summary) = run("room", "open-room", &[]);
-    assert_eq!(summary["outcome"], "reached", "{summary}");
-    assert_eq!(
-        (&summary["safety_events"], &summary["local_updates"]),
-        (&0.into(), &0.into())
-    );
-    let ratio =
-        summary["path_length_m"].as_f64().unwrap() / summary["straight_m"].as_f64().unwrap();
-    assert!(ratio < 1.01, "the way was {ratio} times the straight line");
+    let summary = arrives_untouched("room", "open-room", &[]);
+    assert_eq!(summary["safety_events"], 0, "{summary}");
+    assert_eq!(summary["local_updates"], 0, "{summary}");
+    assert!(detour(&summary) < 1.01, "{summary}");
 }
 
 #[test]
 fn a_turn_of_a_quarter_at_the_start_costs_little() {
-    let (_, summary) = run("quarter", "open-room", &["--set", "start.heading_deg=90"]);
-    assert_eq!(summary["outcome"], "reached", "{summary}");
-    let ratio =
-        summary["path_length_m"].as_f64().unwrap() / summary["straight_m"].as_f64().unwrap();
-    assert!(ratio < 1.1, "the way was {ratio} times the straight line");
+    let turned = ["--set", "start.heading_deg=90"];
+    let summary = arrives_untouched("quarter", "open-room", &turned);
+    assert!(detour(&summary) < 1.1, "{summary}");
 }
 
 #[test]
@@ -170,7 +171,7 @@ fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
     let knows = [&PAPER[..], &["--set", known]].concat();
     let (_, knowing) = run("knowing", "obstacle-course", &knows);
     assert_eq!(knowing["outcome"], "reached", "{knowing}");
-    let time = |summary: &serde_json::Value| summary["mission_time_s"].as_f64().unwrap();
+    let time = |summary: &Value| summary["mission_time_s"].as_f64().unwrap();
     assert!(
         time(&knowing) < time(&sensing),
         "{knowing} against {sensing}"
@@ -184,77 +185,41 @@ fn a_target_behind_closed_walls_is_called_unreachable() {
     let evidential = ["--set", walls, "--set", "timeout_s=900"];
     let paper = [&evidential[..], &PAPER, &["--set", "mapper.margin_m=0.35"]].concat();
     for arguments in [&evidential[..], &paper] {
-        let (code, summary) = run("walled", "open-room", arguments);
-        assert_eq!(
-            (code, &summary["outcome"]),
-            (Some(3), &"unreachable".into()),
-            "{summary}"
-        );
+        ends("walled", "open-room", arguments, 3, "unreachable");
     }
-    assert_nothing_left("walled");
 }
 
 #[test]
 fn a_mission_that_takes_too_long_ends_in_time() {
-    let (code, summary) = run("late", "obstacle-course", &["--timeout", "5"]);
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(4), &"timeout".into()),
-        "{summary}"
-    );
+    ends("late", "obstacle-course", &["--timeout", "5"], 4, "timeout");
 }
 
 #[test]
 fn a_touch_ends_the_mission_as_a_collision() {
     // Blind: hits beyond 5 cm are not mapped.
-    let (code, summary) = run(
-        "blind",
-        "obstacle-course",
-        &[&PAPER[..], &["--set", "mapper.map_within_m=0.05"]].concat(),
-    );
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(5), &"collision".into()),
-        "{summary}"
-    );
+    let blind = [&PAPER[..], &["--set", "mapper.map_within_m=0.05"]].concat();
+    let summary = ends("blind", "obstacle-course", &blind, 5, "collision");
     assert!(summary["collisions"].as_u64() > Some(0));
 }
 
 #[test]
 fn every_run_leaves_a_picture_a_summary_and_logs() {
-    let run = support::Run::start("picture", "obstacle-course", &[]);
-    let (_, summary, kept) = run.finish_in();
-    let directory = kept.path().join("run");
+    let (summary, directory) = Run::start("picture", "open-room", &[]).arrives_in();
+    let directory = directory.path().join("run");
     let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
-    assert!(
-        picture.starts_with("<svg") || picture.starts_with("<?xml"),
-        "{}",
-        &picture[..80]
-    );
-    let written = std::fs::read_to_string(directory.join("summary.json")).unwrap();
-    assert_eq!(
-        serde_json::from_str::<serde_json::Value>(&written).unwrap(),
-        summary
-    );
-    for stage in [
-        "x80-link",
-        "dead-reckoning",
-        "mapper",
-        "planner",
-        "controller",
-        "x80-sim",
-    ] {
-        let log = std::fs::read_to_string(directory.join(format!("{stage}.log"))).unwrap();
-        assert!(!log.is_empty(), "{stage} logged nothing");
+    // It is parsed for that.
+    picture::png(&picture).unwrap();
+    let written = support::records(&directory.join("summary.json"));
+    assert_eq!(written, [summary]);
+    for process in support::STAGES.iter().copied().chain(["x80-sim"]) {
+        assert!(support::logged(&directory, process, &[]) > 0, "{process}");
     }
 }
 
 #[test]
 fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
     let arguments = ["latency", "--rounds", "1", "--json", "--robot", "hops"];
-    let output = support::output(&arguments);
-    assert!(output.status.success(), "{output:?}");
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
     for key in [
         "tick_p50_us",
         "tick_p99_us",
@@ -271,17 +236,11 @@ fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
 fn latency_at_a_rate_prints_ticks_and_bare_hops_at_that_rate_and_their_ratio() {
     let mut arguments = vec!["latency", "--rate", "7", "--rounds", "1"];
     arguments.extend(["--set", "timeout_s=5", "--robot", "hops-7hz"]);
-    let output = support::output(&arguments);
-    assert!(output.status.success(), "{output:?}");
-    let printed = String::from_utf8(output.stdout).unwrap();
-    for line in [
-        "at 7 Hz ",
-        "five bare hops between processes ",
-        "a tick, datagram in to datagram out ",
-        "ratio of the medians ",
-    ] {
-        let lines = printed.lines().filter(|printed| printed.starts_with(line));
-        assert_eq!(lines.count(), 1, "{line}: {printed}");
+    arguments.push("--json");
+    let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
+    assert_eq!(report["regime"], "at 7 Hz", "{report}");
+    for key in ["tick_p50_us", "hops_p50_us", "ratio"] {
+        assert!(report[key].as_f64() > Some(0.0), "{key}: {report}");
     }
     assert_nothing_left("hops-7hz");
 }
@@ -290,9 +249,7 @@ fn latency_at_a_rate_prints_ticks_and_bare_hops_at_that_rate_and_their_ratio() {
 fn a_latency_budget_has_every_item_of_every_stage() {
     let mut arguments = vec!["latency", "--rounds", "1", "--budget", "--json"];
     arguments.extend(["--robot", "tick-budget"]);
-    let output = support::output(&arguments);
-    assert!(output.status.success(), "{output:?}");
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
     assert_eq!(report["regime"], "back to back", "{report}");
     let rows = report["budget"].as_array().unwrap();
     for stage in support::STAGES {

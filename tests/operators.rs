@@ -1,9 +1,6 @@
-//! What an operator does to a robot that runs: stop and resume, kill and freeze, hold and release.
+//! What an operator does to a robot that runs: stop and resume, kill, hold and release.
 
-use rustix::process::Signal;
-use serde_json::Value;
-
-use crate::support::{self, Run, assert_nothing_left, find, operate, output, pid};
+use crate::support::{Run, find, operate, refused};
 
 /// Mission time runs so many times as fast as the wall's.
 const PACE: [&str; 2] = ["--pace", "4"];
@@ -23,13 +20,7 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
     });
     assert_eq!(later["link"]["stopped"], true, "{later}");
     operate("halt", &["resume"]);
-    let (code, summary) = run.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_nothing_left("halt");
+    run.arrives();
 }
 
 #[test]
@@ -45,10 +36,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
         stopped.elapsed().as_secs_f64() * pace > timeout_s
     });
     operate("stop-time", &["resume"]);
-    let (code, summary) = run.finish();
-    let ended = (code, &summary["outcome"], &summary["replans"]);
-    assert_eq!(ended, (Some(0), &"reached".into(), &0.into()), "{summary}");
-    assert_nothing_left("stop-time");
+    assert_eq!(run.arrives()["replans"], 0);
 }
 
 #[test]
@@ -81,81 +69,15 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
         (&last["cause"]["exited"], &last["next"]),
         (&1.into(), &"hold".into())
     );
-    let words = last["log_tail"].as_str().unwrap();
-    assert!(words.contains("mapper.checkpoint"), "{words}");
+    let log_tail = last["log_tail"].as_str().unwrap();
+    assert!(log_tail.contains("mapper.checkpoint"), "{log_tail}");
     std::fs::remove_dir(&checkpoint).unwrap();
     operate("held", &["restart", "mapper"]);
-    let (code, summary) = run.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_nothing_left("held");
-}
-
-#[test]
-fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
-    // At this speed the mission outlasts as many freezes as it takes.
-    let slow = [
-        &PACE[..],
-        &["--set", "controller.speed_m_s=0.02", "--timeout", "2000"],
-    ]
-    .concat();
-    let mut run = Run::start("thawed", "open-room", &slow);
-    run.wait_until_under_way(1.0);
-    let beats = |status: &Value| {
-        let controller = find(status, "controller");
-        controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)
-    };
-    // On a busy machine the second command may come after the controller was replaced: then again.
-    let goes_on = || {
-        let before = run.wait_until("the controller beats", beats);
-        operate("thawed", &["freeze", "controller"]);
-        let thaw = output(&["thaw", "controller", "--robot", "thawed"]);
-        let after = run.wait_until("the controller beats again", beats);
-        let same = pid(&before, "controller") == pid(&after, "controller");
-        assert!(!same || thaw.status.success(), "{thaw:?}");
-        same.then_some(after)
-    };
-    let thawed = std::iter::repeat_with(goes_on)
-        .take(20)
-        .flatten()
-        .next()
-        .unwrap();
-    operate("thawed", &["freeze", "mapper"]);
-    let status = run.wait_until("it is replaced", |status| {
-        find(status, "mapper")["generation"] == 2 && find(status, "mapper")["state"] == "running"
-    });
-    assert_eq!(
-        pid(&status, "controller"),
-        pid(&thawed, "controller"),
-        "{status}"
-    );
-    let mut deaths = run.records("deaths.jsonl");
-    deaths.retain(|death| death["stage"] == "mapper");
-    assert_eq!(deaths.len(), 1, "{deaths:?}");
-    assert_eq!(deaths[0]["hung"], true, "{deaths:?}");
-    assert!(
-        deaths[0]["beat_age_s"].as_f64().unwrap() >= 0.5,
-        "{deaths:?}"
-    );
-    assert!(
-        deaths[0]["log_tail"].as_str().unwrap().contains("ready"),
-        "{deaths:?}"
-    );
-    run.signal(Signal::TERM);
-    assert_eq!(run.finish().0, Some(0));
-    assert_nothing_left("thawed");
+    run.arrives();
 }
 
 #[test]
 fn a_command_for_a_robot_or_stage_that_is_not_there_is_refused_with_the_reason() {
-    let output = output(&["stop", "--robot", "nobody"]);
-    assert!(!output.status.success());
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("nobody"), "{said}");
-    let output = support::output(&["restart", "wheel"]);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("dead-reckoning"), "{said}");
+    refused(&["stop", "--robot", "nobody"], "not-running", &["nobody"]);
+    refused(&["restart", "wheel"], "unknown-stage", &["dead-reckoning"]);
 }

@@ -5,7 +5,8 @@ use std::{fs, process::Stdio};
 use rustix::process::Signal;
 
 use crate::support::{
-    self, Run, assert_nothing_left, directory_of, find, firsthand, output, signal_process,
+    self, Run, assert_nothing_left, assert_reached, directory_of, find, firsthand, json_of,
+    printed, refused, start_quietly,
 };
 
 /// The planners to compare with.
@@ -37,20 +38,10 @@ fn a_mission_with_a_planner_of_its_own_arrives_though_the_planner_is_killed_on_t
         // At 0.25 m/s it goes around the drum by then.
         run.wait_until_under_way(6.0);
         run.kill_and_await_successor("planner", Signal::KILL);
-        let deaths = run.directory().join("deaths.jsonl");
-        let (code, summary, _kept) = run.finish_in();
-        assert_eq!(
-            (code, &summary["outcome"]),
-            (Some(0), &"reached".into()),
-            "{name}: {summary}"
-        );
-        assert_eq!(summary["collisions"], 0, "{name}: {summary}");
+        let summary = run.arrives();
         assert_eq!(summary["restarts"]["planner"], 1, "{name}: {summary}");
         // The harmonic planner would have solved its field.
         assert_eq!(summary["full_solves"], 0, "{name}: {summary}");
-        let deaths = support::records(&deaths);
-        assert!(deaths.iter().any(|death| death["stage"] == "planner"));
-        assert_nothing_left(name);
     }
 }
 
@@ -60,26 +51,22 @@ fn a_run_with_a_planner_named_by_a_relative_path_is_resumed_from_elsewhere() {
     let directory = directory_of(robot);
     let folder = directory.path();
     std::os::unix::fs::symlink(YARDSTICKS[0].1, folder.join("planner")).unwrap();
-    let mut first = firsthand(&["run", "open-room", "--robot", robot, "--pace", "4"])
-        .args(["--out", "run", "--set", &planner("./planner")])
-        .current_dir(folder)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut first = firsthand(&["run", "open-room", "--robot", robot, "--pace", "4"]);
+    first.args(["--out", "run", "--set", &planner("./planner")]);
+    let mut first = start_quietly(first.current_dir(folder));
     support::wait_for_status(robot, |status| {
         status["order"] == "driving" && find(status, "planner")["state"] == "running"
     });
-    signal_process(first.id(), Signal::KILL);
+    first.kill().unwrap();
     first.wait().unwrap();
     let resumed = firsthand(&["run", "--json", "--resume"])
         .arg(folder.join("run"))
         .current_dir("/")
         .output()
         .unwrap();
-    let summary: serde_json::Value = serde_json::from_slice(&resumed.stdout).unwrap();
-    assert_eq!(summary["outcome"], "reached", "{summary}");
-    assert_eq!(summary["full_solves"], 0, "{summary}");
+    let (exit, summary) = json_of(&resumed);
+    assert_reached(exit.code(), &summary[0]);
+    assert_eq!(summary[0]["full_solves"], 0, "{summary:?}");
     assert_nothing_left(robot);
 }
 
@@ -95,7 +82,7 @@ fn a_stage_started_by_another_becomes_the_planner_that_the_mission_names() {
         command.stderr(Stdio::null()).spawn().unwrap()
     };
     let stages: Vec<_> = support::STAGES.iter().map(start).collect();
-    let status = run.wait_until("it drives", |status| status["order"] == "driving");
+    let status = run.wait_until_driving();
     let pid = support::pid(&status, "planner");
     let executable = fs::read_link(format!("/proc/{pid}/exe")).unwrap();
     assert!(
@@ -118,15 +105,13 @@ fn a_planner_that_cannot_be_started_is_refused_by_name_before_anything_starts() 
     let plain = directory.path().join("plain");
     fs::write(&plain, "").unwrap();
     let plain = plain.to_str().unwrap();
-    for (named, problem) in [("./no-such-planner", "No such file"), (plain, "chmod +x")] {
+    for named in ["./no-such-planner", plain] {
         let set = planner(named);
         let run = ["run", "--robot", "no-plan", "--runs", runs, "--set", &set];
         let evaluate = ["evaluate", "--planner", named, "--out", runs];
         for arguments in [&run[..], &evaluate] {
-            let output = output(arguments);
-            let said = String::from_utf8(output.stderr).unwrap();
-            assert_eq!(output.status.code(), Some(78), "{said}");
-            assert!(said.contains(named) && said.contains(problem), "{said}");
+            let exit = refused(arguments, "planner-executable", &[named]);
+            assert_eq!(exit, Some(78), "{arguments:?}");
         }
     }
     let left = fs::read_dir(directory.path()).unwrap();
@@ -140,8 +125,8 @@ fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
     let out = directory.path().join("out");
     let out = out.to_str().unwrap();
     let planners = ["--planner", "harmonic,bug", "--count", "1", "--out", out];
-    let compared = output(&[&["evaluate", "--json"], &planners[..]].concat());
-    let object: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
+    let compared = printed(&[&["evaluate", "--json"], &planners[..]].concat());
+    let object: serde_json::Value = serde_json::from_str(&compared).unwrap();
     assert_eq!(object["setting"], "harmonic", "{object}");
     assert_eq!(object["versus"][0]["totals"]["setting"], "bug", "{object}");
     assert_eq!(object["versus"][0]["pairs"], 1, "{object}");
@@ -160,6 +145,5 @@ fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
         out,
         "--resume",
     ];
-    let said = String::from_utf8(output(&other).stderr).unwrap();
-    assert!(said.contains("was another"), "{said}");
+    refused(&other, "other-results", &[out]);
 }

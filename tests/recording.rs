@@ -7,14 +7,16 @@ use std::{
     process::Stdio,
 };
 
-use common::{poll, samples::name_str, topics};
+use common::{poll, topics};
 use recording::{
     End, Recording,
     replay::{Options, Report, diff::diff, replay},
 };
-use rustix::process::Signal;
 
-use crate::support::{PATIENCE, Run, STAGES, assert_nothing_left, firsthand, golden, output};
+use crate::support::{
+    PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, json_of, output,
+    refused,
+};
 
 fn open(directory: &Path) -> Recording {
     Recording::open(&directory.join("run/recording.mcap")).unwrap()
@@ -65,26 +67,6 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     assert_eq!(parting.first, None);
     assert_eq!(parting.ticks, ticks.len() as u64);
     assert_nothing_left("rec-whole");
-}
-
-#[test]
-fn every_generation_replays_to_the_bit_when_each_stage_is_killed_in_mid_mission() {
-    let mut run = Run::start("rec-kills", "obstacle-course", &["--pace", "4"]);
-    run.wait_until_under_way(2.0);
-    for stage in STAGES {
-        run.kill_and_await_successor(stage, Signal::KILL);
-    }
-    let (_, summary, directory) = run.finish_in();
-    assert_eq!(summary["outcome"], "reached", "{summary}");
-    let recording = open(directory.path());
-    let deaths = recording.samples(&topics::DEATHS).unwrap();
-    let killed: Vec<String> = deaths
-        .map(|death| name_str(&death.unwrap().sample.stage).to_owned())
-        .collect();
-    assert_eq!(killed[..5], STAGES);
-    let report = replayed(&recording);
-    assert!(assert_all_equal(&report) >= 10, "{report}");
-    assert_nothing_left("rec-kills");
 }
 
 /// Kill a recorder of `robot` that has written for so many answers of `status`; its file.
@@ -200,22 +182,22 @@ fn replay_and_diff_print_what_they_found_and_exit_with_1_on_a_difference() {
     let other = ["--seed", "9", "--timeout", "8"];
     let (_, _, directory) = Run::start("rec-other", "open-room", &other).finish_in();
     let other = directory.path().join("run/recording.mcap");
-    let parted = output(&["diff", file, other.to_str().unwrap()]);
+    let parted = output(&["diff", file, other.to_str().unwrap(), "--json"]);
     assert_eq!(parted.status.code(), Some(1), "{parted:?}");
-    let said = String::from_utf8(parted.stdout).unwrap();
-    assert!(
-        said.contains("they part at tick") && said.contains("run: + "),
-        "{said}"
-    );
+    let (_, found) = json_of(&parted);
+    assert!(!found[0]["first"].is_null(), "{found:?}");
 
-    let nothing = output(&["replay", "Cargo.toml"]);
-    let said = String::from_utf8(nothing.stderr).unwrap();
-    assert!(
-        said.contains("no recording of firsthand") || said.contains("cannot read"),
-        "{said}"
+    let no_recording = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    refused(
+        &["replay", no_recording],
+        "not-a-recording",
+        &[no_recording],
     );
-    let unknown = output(&["replay", file, "--stage", "wheel"]);
-    assert_eq!(unknown.status.code(), Some(1));
+    refused(
+        &["replay", file, "--stage", "wheel"],
+        "unknown-stage",
+        &["wheel"],
+    );
 }
 
 #[test]
@@ -223,16 +205,10 @@ fn a_runs_directory_stands_for_its_recording_unless_it_holds_none_or_several() {
     let directory = tempfile::tempdir().unwrap();
     let run = directory.path().to_str().unwrap();
     let replay = || output(&["replay", run, "--stage", "mapper"]);
-    let told = |words: &str| {
-        let replayed = replay();
-        let said = String::from_utf8_lossy(&replayed.stderr).into_owned();
-        assert_eq!(replayed.status.code(), Some(1), "{said}");
-        assert!(said.contains(words) && said.contains(run), "{said}");
-    };
-    told("holds no recording.mcap");
+    assert_refused(&replay(), "no-recording", &[run]);
     let copy = |name: &str| fs::copy(golden().path(), directory.path().join(name)).unwrap();
     copy("recording.mcap");
     assert_eq!(replay().status.code(), Some(0));
     copy("recording-2.mcap");
-    told("recording-2.mcap");
+    assert_refused(&replay(), "several-recordings", &[run, "recording-2.mcap"]);
 }

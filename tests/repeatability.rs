@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Debug, time::Duration};
 
-use common::{bus::Bus, domain::Domain, grid::Replica, samples::Stamped, topics, waiter::Waiter};
+use common::{bus::Bus, grid::Replica, samples::Stamped, topics, waiter::Waiter};
 use serde_json::Value;
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
@@ -45,7 +45,7 @@ impl Recording {
 
 /// Run the default mission, and receive all of it.
 fn record(robot: &str) -> Recording {
-    let domain = Domain::of(robot.parse().unwrap());
+    let domain = support::domain(robot);
     let mut run = Run::start(robot, "obstacle-course", &["--seed", "7"]);
     let bus = loop {
         match Bus::join(&domain, "recorder") {

@@ -3,10 +3,10 @@
 use std::time::{Duration, Instant};
 
 use crate::support::{
-    PATIENCE, Run, assert_nothing_left, find, half_make, in_own_process, making, pid,
+    self, PATIENCE, Run, assert_nothing_left, bus_instance, find, half_make, in_own_process, pid,
     signal_process,
 };
-use common::{bus::Bus, domain::Domain, samples::PoseSample, topics, waiter::Waiter};
+use common::{bus::Bus, samples::PoseSample, topics, waiter::Waiter};
 use rustix::process::Signal;
 
 const ROBOT: &str = "recreated";
@@ -31,13 +31,13 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
     in_own_process(|| {
         let mut run = Run::start(ROBOT, "open-room", &["--pace", "4"]);
         let status = run.wait_until_under_way(1.0);
-        let domain = Domain::of(ROBOT.parse().unwrap());
+        let domain = support::domain(ROBOT);
         let old = Bus::join(&domain, "logger").unwrap();
         let old_poses = old.reader(&topics::POSE).unwrap();
         let heard = next_pose(&old);
         assert!(!old.is_replaced());
 
-        let services = making(ROBOT).root().join("services");
+        let services = bus_instance(ROBOT).root().join("services");
         for service in std::fs::read_dir(services).unwrap() {
             half_make(&service.unwrap().path());
         }

@@ -4,7 +4,7 @@ use std::fs;
 
 use rustix::process::Signal;
 
-use crate::support::{Run, assert_nothing_left, output};
+use crate::support::{Run, assert_nothing_left, printed, refused};
 
 /// The figures of a robot with two driven wheels.
 const FIGURES: [&str; 8] = [
@@ -47,9 +47,7 @@ fn a_run_ends_with_a_report_of_every_figure_and_of_a_planner_that_was_killed() {
     let alone = tempfile::tempdir().unwrap();
     let file = alone.path().join("drive.mcap");
     fs::copy(directory.path().join("run/recording.mcap"), &file).unwrap();
-    let written = output(&["report", file.to_str().unwrap()]);
-    assert!(written.status.success());
-    let page = String::from_utf8(written.stdout).unwrap();
+    let page = printed(&["report", file.to_str().unwrap()]);
     let page = fs::read_to_string(page.trim_end()).unwrap();
     assert!(page.contains("generation 1 died (signal 9)"));
     assert!(page.contains("how it ended is not known here"));
@@ -63,10 +61,7 @@ fn a_run_that_was_not_recorded_has_no_report_and_the_command_says_why() {
     assert_eq!(code, Some(0), "{summary}");
     let run = directory.path().join("run");
     assert!(!run.join("report").exists());
-    let refused = output(&["report", run.to_str().unwrap()]);
-    assert_eq!(refused.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&refused.stderr);
-    assert!(said.contains("holds no recording.mcap"), "{said}");
+    refused(&["report", run.to_str().unwrap()], "no-recording", &[]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::{
     fs::File,
     io::{Read as _, Write as _},
     os::fd::OwnedFd,
-    process::{Child, Command},
+    process::Child,
     time::Instant,
 };
 
@@ -14,7 +14,7 @@ use rustix::{
     termios::{Winsize, tcsetwinsize},
 };
 
-use crate::support::{PATIENCE, Run, assert_nothing_left, find, output, signal_process};
+use crate::support::{PATIENCE, Run, find, firsthand_under, refused, signal_process};
 
 /// Lines and columns of the terminal.
 const SIZE: (usize, usize) = (24, 80);
@@ -81,14 +81,7 @@ impl Screen {
             .unwrap();
         let its = || File::options().read(true).write(true).open(&name).unwrap();
         // With the terminal as the one that controls it, as from a shell.
-        let child = Command::new("setsid")
-            .args([
-                "--ctty",
-                env!("CARGO_BIN_EXE_firsthand"),
-                "top",
-                "--robot",
-                robot,
-            ])
+        let child = firsthand_under(&["setsid", "--ctty"], &["top", "--robot", robot])
             .stdin(its())
             .stdout(its())
             .stderr(its())
@@ -184,13 +177,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     for restored in ["\x1b[?1049l", "\x1b[?25h"] {
         assert!(written.contains(restored), "{written:?}");
     }
-    let (code, summary) = run.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_nothing_left(robot);
+    run.arrives();
 }
 
 #[test]
@@ -208,13 +195,10 @@ fn top_ends_when_its_terminal_is_closed_and_on_a_signal_and_needs_one() {
     let (code, written) = signalled.end();
     assert_eq!(code, Some(0), "{written:?}");
     assert!(written.contains("\x1b[?1049l"), "{written:?}");
-    let none = output(&["top", "--robot", robot]);
-    let said = String::from_utf8(none.stderr).unwrap();
-    assert!(
-        none.status.code() == Some(1) && said.contains("firsthand status"),
-        "{said}"
+    refused(
+        &["top", "--robot", robot],
+        "no-terminal",
+        &["firsthand status"],
     );
-    let (code, summary) = run.finish();
-    assert_eq!(code, Some(0), "{summary}");
-    assert_nothing_left(robot);
+    run.arrives();
 }

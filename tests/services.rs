@@ -1,10 +1,7 @@
-//! Runs under a service manager: this test in the place of systemd.
+//! Runs under a service manager, whose part these tests play.
 
 use std::{
-    os::{
-        fd::AsFd,
-        unix::{fs::MetadataExt, net::UnixDatagram},
-    },
+    os::unix::{fs::MetadataExt, net::UnixDatagram},
     path::Path,
     process::{Command, Stdio},
     sync::{
@@ -15,7 +12,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::{self, PATIENCE, Run, assert_nothing_left, find, firsthand, signal_process};
+use crate::{
+    failsafe::{Robot, Tap},
+    support::{
+        self, PATIENCE, Run, assert_nothing_left, assert_reached, find, firsthand, signal_process,
+    },
+};
 use rustix::process::Signal;
 use tempfile::TempDir;
 
@@ -69,10 +71,8 @@ impl Manager {
 
 fn mission(robot: &str, directory: &TempDir) -> Command {
     let mut command = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--out"]);
-    command
-        .arg(directory.path().join("run"))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
+    command.arg(directory.path().join("run"));
+    command.stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
 
@@ -92,7 +92,7 @@ fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
         fed = Instant::now();
     }
     let heard = manager.hear_until_status();
-    assert!(heard.contains("5/5 stages alive"), "{heard}");
+    assert!(heard.contains("5/5"), "{heard}");
     signal_process(run.id(), Signal::TERM);
     manager.hear_until("STOPPING=1");
     assert_eq!(run.wait().unwrap().code(), Some(0));
@@ -130,22 +130,17 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
     manager.socket.set_nonblocking(false).unwrap();
     manager.socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     assert!(manager.socket.recv(&mut message).is_err(), "it speaks");
-    // As systemd would, after which the stages go with it and the next run finds nothing in its way.
+    // Systemd would do so; then the stages end, too, and nothing hinders the next run.
     signal_process(run.id(), Signal::KILL);
     run.wait().unwrap();
-    assert_eq!(support::run("hang", "open-room", &[]).0, Some(0));
-    assert_nothing_left("hang");
+    Run::start("hang", "open-room", &[]).arrives();
 }
 
 #[test]
 fn in_a_journal_a_stages_death_has_its_priority() {
     let directory = support::directory_of("journal");
     let journal = std::fs::File::create(directory.path().join("journal")).unwrap();
-    let found = journal
-        .as_fd()
-        .try_clone_to_owned()
-        .map(std::fs::File::from);
-    let found = found.unwrap().metadata().unwrap();
+    let found = journal.metadata().unwrap();
     let mut run = mission("journal", &directory)
         .env("JOURNAL_STREAM", format!("{}:{}", found.dev(), found.ino()))
         .stderr(journal)
@@ -160,24 +155,17 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     signal_process(run.id(), Signal::TERM);
     run.wait().unwrap();
     let text = std::fs::read_to_string(directory.path().join("journal")).unwrap();
-    let death = text
-        .lines()
-        .find(|line| line.contains("stage died"))
-        .unwrap();
-    assert!(
-        death.starts_with("<4>") && death.contains("mapper"),
-        "{text}"
-    );
-    let mut said = text.lines().filter(|line| !line.starts_with('<'));
-    assert!(
-        said.all(|line| line.starts_with("mission ")),
-        "only the mission's title has no priority: {text}"
-    );
-    // The same is in the run directory, and stages, which log to files, put no priorities there.
-    let log =
-        |name: &str| std::fs::read_to_string(directory.path().join("run").join(name)).unwrap();
-    assert!(log("supervisor.log").contains("stage died"));
-    assert!(!log("mapper.log").contains("<6>"));
+    let is_death = |line: &&str| line.contains("stage=\"mapper\"") && line.contains("cause=");
+    let death = text.lines().find(is_death).unwrap();
+    assert!(death.starts_with("<4>"), "{text}");
+    // Only the mission's title has no priority.
+    let bare = text.lines().filter(|line| !line.starts_with('<'));
+    assert_eq!(bare.count(), 1, "{text}");
+    // The death is in the run directory, too, and stages, which log to files, put no priorities there.
+    let run = directory.path().join("run");
+    let death = ["WARN", "stage=\"mapper\"", "cause="];
+    assert_eq!(support::logged(&run, "supervisor", &death), 1);
+    assert_eq!(support::logged(&run, "mapper", &["<6>"]), 0);
 }
 
 /// Stages that this test starts and starts again, as systemd would with `Restart=always`.
@@ -204,16 +192,12 @@ impl Units {
         }
     }
 
-    fn log(&self, stage: &str) -> String {
-        std::fs::read_to_string(self.directory.path().join(stage)).unwrap()
-    }
-
     /// Wait until all have ended of themselves, each in order.
     fn assert_all_leave(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for (stage, keeper) in std::mem::take(&mut self.keepers) {
             let code = keeper.join().unwrap();
-            assert_eq!(code, Some(0), "{stage}: {}", self.log(stage));
+            assert_eq!(code, Some(0), "{stage}: see {:?}", self.directory);
         }
     }
 }
@@ -240,7 +224,12 @@ impl Drop for Units {
 
 /// A supervisor that only watches, with a bus to join.
 fn watching(robot: &'static str) -> (Run, Units) {
-    let mut run = Run::start(robot, "obstacle-course", &["--pace", "4", "--watch-only"]);
+    watching_with(robot, &["--pace", "4"])
+}
+
+fn watching_with(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
+    let arguments = [&["--watch-only"], arguments].concat();
+    let mut run = Run::start(robot, "obstacle-course", &arguments);
     run.wait_until("there is a bus", |status| status["order"] == "starting");
     (run, Units::start(robot))
 }
@@ -253,12 +242,7 @@ fn external_stages_drive_and_survive_kills_under_a_supervisor_that_only_watches(
         run.kill_and_await_successor(stage, Signal::KILL);
     }
     let (code, summary) = run.finish();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
-    assert_eq!(summary["collisions"], 0, "{summary}");
+    assert_reached(code, &summary);
     for stage in support::STAGES {
         assert!(summary["restarts"][stage].as_u64() >= Some(1), "{summary}");
     }
@@ -301,38 +285,54 @@ fn external_stages_that_systemd_stops_before_their_supervisor_are_no_deaths() {
 #[test]
 fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
     let robot = "unit-orphan";
-    let (mut run, mut units) = watching(robot);
+    let body = Robot::start();
+    let tap = Tap::before(&body);
+    let address = format!("robot.address=\"{}\"", tap.address);
+    let (mut run, mut units) = watching_with(robot, &["--set", &address]);
     run.wait_until_under_way(1.0);
-    run.signal(Signal::KILL);
-    run.reap();
+    run.kill();
     units.assert_all_leave();
-    let log = units.log("x80-link");
-    assert!(log.contains("stop sent to the robot"), "{log}");
-    assert_eq!(support::run(robot, "open-room", &[]).0, Some(0));
-    assert_nothing_left(robot);
+    tap.assert_last_is_zero();
+    Run::start(robot, "open-room", &[]).arrives();
+}
+
+#[test]
+fn a_frozen_external_stage_that_outlives_its_supervisor_does_not_hinder_the_next() {
+    // A stage that the supervisor started is woken by the kernel when its parent ends; an external one stays frozen.
+    let robot = "frozen-orphan";
+    let mut watching = Run::start(robot, "obstacle-course", &["--watch-only"]);
+    watching.wait_until("there is a bus", |_| true);
+    let mut mapper = firsthand(&["stage", "mapper", "--robot", robot]);
+    let mut mapper = mapper.spawn().unwrap();
+    watching.wait_until("the mapper runs", |status| {
+        find(status, "mapper")["state"] == "running"
+    });
+    signal_process(mapper.id(), Signal::STOP);
+    watching.kill();
+    Run::start(robot, "open-room", &[]).arrives();
+    let ended = mapper.try_wait().unwrap();
+    mapper.kill().unwrap();
+    mapper.wait().unwrap();
+    assert!(ended.is_some(), "the frozen stage is still there");
 }
 
 #[test]
 fn a_stage_without_a_place_is_refused_with_the_remedy() {
-    let refused = |stage: &str, robot: &str| {
-        let output = support::output(&["stage", stage, "--robot", robot]);
-        assert_eq!(output.status.code(), Some(1));
-        String::from_utf8(output.stderr).unwrap()
+    let mapper_is_refused = |robot: &str, names: &[&str]| {
+        let mapper = ["stage", "mapper", "--robot", robot];
+        assert_eq!(support::refused(&mapper, "", names), Some(1));
     };
-    let none = refused("mapper", "nobody");
-    assert!(none.contains("--watch-only"), "{none}");
+    mapper_is_refused("nobody", &["nobody", "--watch-only"]);
 
     let mut own = Run::start("own", "open-room", &["--pace", "1"]);
-    own.wait_until("it drives", |status| status["order"] == "driving");
-    let child = refused("mapper", "own");
-    assert!(child.contains("starts its stages itself"), "{child}");
-    own.signal(Signal::TERM);
-    own.finish();
+    own.wait_until_driving();
+    mapper_is_refused("own", &["own", "--watch-only"]);
+    own.stop();
 
     let (mut run, units) = watching("taken");
-    run.wait_until_under_way(0.5);
-    let second = refused("mapper", "taken");
-    assert!(second.contains("runs already"), "{second}");
+    let status = run.wait_until_under_way(0.5);
+    let holder = support::pid(&status, "mapper").to_string();
+    mapper_is_refused("taken", &["mapper", &holder]);
     run.signal(Signal::TERM);
     run.finish();
     drop(units);
@@ -347,12 +347,7 @@ fn killed_service(robot: &'static str) -> (TempDir, impl Fn() -> Command) {
         command.arg("--resume-last").arg("--runs").arg(&runs);
         command
     };
-    let mut cut = service()
-        .args(["--pace", "1"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut cut = support::start_quietly(service().args(["--pace", "1"]));
     support::wait_for_status(robot, |status| {
         status["order"] == "driving" && status["mission_time_s"].as_f64().unwrap() > 0.5
     });
@@ -364,11 +359,9 @@ fn killed_service(robot: &'static str) -> (TempDir, impl Fn() -> Command) {
 #[test]
 fn a_service_goes_on_with_the_mission_of_a_supervisor_that_was_killed_just_now() {
     let (_runs, service) = killed_service("goes-on");
-    let again = service().output().unwrap();
-    assert_eq!(again.status.code(), Some(0), "{again:?}");
-    let summary: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
-    assert_eq!(summary["resumes"], 1, "{summary}");
-    assert_eq!(summary["outcome"], "reached", "{summary}");
+    let (exit, summary) = support::json_of(&service().output().unwrap());
+    assert_reached(exit.code(), &summary[0]);
+    assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
     assert_nothing_left("goes-on");
 }
 
@@ -378,10 +371,7 @@ fn a_service_does_not_begin_a_mission_anew_that_was_cut_off_long_ago_until_told_
     // As after a start of the machine: nothing says that it was a moment ago.
     let run = std::fs::read_dir(runs.path()).unwrap().next().unwrap();
     std::fs::remove_file(run.unwrap().path().join("supervisor.checkpoint")).unwrap();
-    let again = service().output().unwrap();
-    assert_eq!(again.status.code(), Some(7));
-    let reason = String::from_utf8(again.stderr).unwrap();
-    assert!(reason.contains("was cut off"), "{reason}");
+    assert_eq!(service().output().unwrap().status.code(), Some(7));
     assert_eq!(service().output().unwrap().status.code(), Some(0));
     assert_nothing_left("cut");
 }

@@ -1,10 +1,9 @@
-//! What the robot measures besides its wheels and its front sonar reaches a consumer.
+//! Infrared ranges, power and surroundings, which the robot measures besides wheels and front sonar, reach a consumer.
 
 use std::time::Instant;
 
-use crate::support::{self, Run, assert_nothing_left, in_own_process};
-use common::{bus::Bus, domain::Domain, topics, waiter::Waiter};
-use rustix::process::Signal;
+use crate::support::{self, Run, in_own_process};
+use common::{bus::Bus, topics, waiter::Waiter};
 
 #[test]
 fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_once() {
@@ -18,7 +17,7 @@ fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_on
         assert!((volts - 6.4).abs() < 0.01, "{status}");
         run.wait_until_under_way(2.0);
 
-        let bus = Bus::join(&Domain::of("telemetry".parse().unwrap()), "dashboard").unwrap();
+        let bus = Bus::join(&support::domain("telemetry"), "dashboard").unwrap();
         let mut infrareds = bus.reader(&topics::INFRARED).unwrap();
         let mut powers = bus.reader(&topics::POWER).unwrap();
         let mut surroundings = bus.reader(&topics::SURROUNDINGS).unwrap();
@@ -48,19 +47,11 @@ fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_on
         assert!((around.temperature_c - 22.8).abs() < 0.1, "{around:?}");
         drop((infrareds, powers, surroundings, waiter, bus));
 
-        run.signal(Signal::TERM);
-        let directory = run.directory();
-        let (code, summary, kept) = run.finish_in();
-        assert_eq!(code, Some(0), "{summary}");
-        let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
         for pack in ["board", "motor", "servo"] {
-            let told = log
-                .lines()
-                .filter(|line| line.contains("battery low") && line.contains(pack))
-                .count();
-            assert_eq!(told, 1, "{pack}: {log}");
+            let told = ["WARN", &format!("pack=\"{pack}\"")];
+            let told = support::logged(&run.directory(), "x80-link", &told);
+            assert_eq!(told, 1, "{pack}");
         }
-        drop(kept);
-        assert_nothing_left("telemetry");
+        run.stop();
     });
 }

@@ -176,11 +176,8 @@ mod tests {
     fn results_that_are_there_are_not_written_over() {
         let folder = tempfile::tempdir().unwrap();
         SignalsFile::create(folder.path()).unwrap();
-        let refused = SignalsFile::create(folder.path()).unwrap_err().to_string();
-        assert!(
-            refused.contains(FILE_NAME) && refused.contains("give another directory"),
-            "{refused}"
-        );
+        let refused = SignalsFile::create(folder.path()).unwrap_err();
+        assert_eq!(refused.file, folder.path().join(FILE_NAME));
     }
 
     #[test]

@@ -13,6 +13,8 @@ use rustix::{
 };
 use supervisor::recovery::SUMMARY;
 
+use crate::console::failure::Refused;
+
 /// Under this name it is written: one that is called [`SUMMARY`] is whole, and says that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";
 /// A summary takes 2 kB.
@@ -29,7 +31,7 @@ impl SummaryFile {
     ///
     /// # Errors
     /// When there is none.
-    pub(crate) fn reserve(directory: &Path) -> Result<Self, String> {
+    pub(crate) fn reserve(directory: &Path) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
         let reserved = File::create(&path).and_then(|file| {
             match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {
@@ -38,7 +40,11 @@ impl SummaryFile {
                 Err(errno) => Err(errno.into()),
             }
         });
-        let file = reserved.map_err(failed("reserve room for", &path))?;
+        let file = reserved.map_err(|error| {
+            let full = error.kind() == io::ErrorKind::StorageFull;
+            let code = if full { "disk-full" } else { "not-writable" };
+            Refused::new(code, failed("reserve room for", &path)(error))
+        })?;
         Ok(Self {
             file,
             directory: directory.to_path_buf(),

@@ -1,5 +1,5 @@
 //! Robots whose frames cannot be true, or do not come: every datagram between link and simulated robot passes through a
-//! proxy here that lies.
+//! fault injector here.
 
 use std::{
     net::{SocketAddr, UdpSocket},
@@ -13,19 +13,18 @@ use std::{
 
 use crate::{
     failsafe::{Robot, pass},
-    support::{Run, assert_nothing_left, operate, output},
+    support::{Run, assert_ended, assert_nothing_left, operate, refused},
 };
 use common::wire::{
     Addressing, Command, Decoder, Motion, MotorSensors, Quantity, Report, Request, Stream,
 };
-use rustix::process::Signal;
 use serde_json::Value;
 
-/// From the first motion that shows a lie until the last command that moves.
+/// From the first motion that shows a fault until the last command that moves.
 const BOUND: Duration = Duration::from_millis(1500);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Lie {
+enum Fault {
     None,
     /// Every motor frame the same.
     SameFrame,
@@ -43,16 +42,17 @@ enum Lie {
     IgnoresZero,
 }
 
-/// What the proxy does and has seen.
+/// The state of a fault injector: what it does, and what it has seen.
 #[derive(Debug)]
 struct Shared {
-    lie: Lie,
+    fault: Fault,
     frames: u16,
     first_motion: Option<Instant>,
     last_motion: Option<Instant>,
     /// Whether a command asked for more than a turn on the spot.
     drove: bool,
-    /// To send the robot as if the link had.
+    asked_for_streams: bool,
+    /// Commands to send to the robot as if the link had sent them.
     inject: Vec<Command>,
 }
 
@@ -64,17 +64,18 @@ struct FaultInjector {
 }
 
 impl FaultInjector {
-    fn before(robot: &Robot, lie: Lie) -> Self {
+    fn before(robot: &Robot, fault: Fault) -> Self {
         let host = UdpSocket::bind("127.0.0.1:0").unwrap();
         let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
         wire.connect(&robot.listening).unwrap();
         let address = host.local_addr().unwrap();
         let shared = Arc::new(Mutex::new(Shared {
-            lie,
+            fault,
             frames: 0,
             first_motion: None,
             last_motion: None,
             drove: false,
+            asked_for_streams: false,
             inject: Vec::new(),
         }));
         let over = Arc::new(AtomicBool::new(false));
@@ -113,8 +114,18 @@ impl FaultInjector {
         }
     }
 
-    fn lie(&self, lie: Lie) {
-        self.shared.lock().unwrap().lie = lie;
+    /// Stop the robot's streams as if the link had asked for that.
+    fn stop_streams(&self) {
+        let mut shared = self.shared.lock().unwrap();
+        shared.asked_for_streams = false;
+        shared.inject.push(Command::Stream {
+            stream: Stream::All,
+            request: Request::Stop,
+        });
+    }
+
+    fn set(&self, fault: Fault) {
+        self.shared.lock().unwrap().fault = fault;
     }
 
     /// Wait until the robot has been told to move for `span`.
@@ -160,13 +171,14 @@ impl Shared {
                     // One motor is mounted the other way round.
                     self.drove |= motion.targets.of(0) != motion.targets.of(1);
                 }
-                if self.lie == Lie::IgnoresZero && motion.quantity == Quantity::Velocity {
+                if self.fault == Fault::IgnoresZero && motion.quantity == Quantity::Velocity {
                     motion.limit_ms = None;
                     if !moves {
                         continue;
                     }
                 }
             }
+            self.asked_for_streams |= matches!(command, Command::Stream { .. });
             command.encode(Addressing::default(), &mut bytes);
         }
         bytes
@@ -180,7 +192,7 @@ impl Shared {
             };
             match &mut report {
                 Report::Motor(sensors) => self.distort(sensors),
-                Report::Standard(sensors) if self.lie == Lie::NoSonar => {
+                Report::Standard(sensors) if self.fault == Fault::NoSonar => {
                     sensors.ultrasonic[1] = 0;
                 }
                 _ => {}
@@ -194,21 +206,21 @@ impl Shared {
         self.frames = self.frames.wrapping_add(1);
         let frames = self.frames;
         let [left, right] = &mut sensors.encoders;
-        match self.lie {
-            Lie::None | Lie::NoSonar | Lie::IgnoresZero => {}
-            Lie::SameFrame => *sensors = MotorSensors::default(),
-            Lie::DeadEncoder => right.position = 0,
-            Lie::Reversed => {
+        match self.fault {
+            Fault::None | Fault::NoSonar | Fault::IgnoresZero => {}
+            Fault::SameFrame => *sensors = MotorSensors::default(),
+            Fault::DeadEncoder => right.position = 0,
+            Fault::Reversed => {
                 for encoder in [left, right] {
                     encoder.position = (32_768 - encoder.position) % 32_768;
                 }
             }
-            Lie::Random => {
+            Fault::Random => {
                 left.position = frames.wrapping_mul(9973) % 32_768;
                 right.position = frames.wrapping_mul(20_011) % 32_768;
             }
             // 7 frames a second.
-            Lie::RollsOn => right.position = frames.wrapping_mul(80) % 32_768,
+            Fault::RollsOn => right.position = frames.wrapping_mul(80) % 32_768,
         }
     }
 }
@@ -218,13 +230,13 @@ fn moves(motion: &Motion) -> bool {
     motion.quantity == Quantity::Velocity && (turns(0) || turns(1))
 }
 
-/// A run of the default mission on the wall clock whose robot lies from the beginning.
-fn lying(robot: &str, lie: Lie) -> (Robot, FaultInjector, Run) {
+/// A run of the default mission on the wall clock with that fault from the beginning.
+fn faulty(robot: &str, fault: Fault) -> (Robot, FaultInjector, Run) {
     let body = Robot::start();
-    let liar = FaultInjector::before(&body, lie);
-    let address = format!("robot.address=\"udp://{}\"", liar.address);
+    let faults = FaultInjector::before(&body, fault);
+    let address = format!("robot.address=\"udp://{}\"", faults.address);
     let run = Run::start(robot, "obstacle-course", &["--set", &address]);
-    (body, liar, run)
+    (body, faults, run)
 }
 
 fn cause_is(cause: &'static str) -> impl Fn(&Value) -> bool {
@@ -234,102 +246,78 @@ fn cause_is(cause: &'static str) -> impl Fn(&Value) -> bool {
 #[test]
 fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_mission_ends_with_the_reason()
  {
-    for lie in [Lie::SameFrame, Lie::DeadEncoder, Lie::Reversed, Lie::Random] {
-        let (_body, liar, mut run) = lying("liar", lie);
-        run.wait_until("it is doubted", cause_is("odometry implausible"));
-        let moved = liar.moved_for();
-        println!("{lie:?}: told to move for {} ms", moved.as_millis());
+    for fault in [
+        Fault::SameFrame,
+        Fault::DeadEncoder,
+        Fault::Reversed,
+        Fault::Random,
+    ] {
+        let (_body, faults, mut run) = faulty("fi-encoders", fault);
+        run.wait_until("it is suspected", cause_is("odometry implausible"));
+        let moved = faults.moved_for();
+        println!("{fault:?}: told to move for {} ms", moved.as_millis());
         // Where both wheels count the other way, the look around can change sides with every tick: what is told then holds too
         // briefly to be judged. The robot trembles where it stands.
-        let trembles = matches!(lie, Lie::Reversed) && !liar.shared.lock().unwrap().drove;
-        assert!(moved < BOUND || trembles, "{lie:?}: {moved:?}");
-        let directory = run.directory();
-        let (code, summary, kept) = run.finish_in();
-        assert_eq!(liar.moved_for(), moved, "{lie:?}: it never moved again");
-        assert_eq!(
-            (code, &summary["outcome"]),
-            (Some(6), &"aborted".into()),
-            "{summary}"
-        );
-        let reason = summary["reason"].as_str().unwrap();
-        assert!(reason.contains("odometry implausible"), "{reason}");
-        let log = std::fs::read_to_string(directory.join("x80-link.log")).unwrap();
-        assert!(log.contains("odometry implausible"), "{log}");
-        drop(kept);
-        assert_nothing_left("liar");
+        let trembles = matches!(fault, Fault::Reversed) && !faults.shared.lock().unwrap().drove;
+        assert!(moved < BOUND || trembles, "{fault:?}: {moved:?}");
+        let (code, summary) = run.finish();
+        assert_eq!(faults.moved_for(), moved, "{fault:?}: it never moved again");
+        assert_ended(code, &summary, 6, "aborted");
+        assert_eq!(summary["cause"], "odometry implausible", "{summary}");
+        assert_nothing_left("fi-encoders");
     }
 }
 
 #[test]
 fn an_operators_stop_fails_until_the_encoders_say_that_the_robot_rests() {
-    let (_body, liar, mut run) = lying("liar-stop", Lie::None);
-    liar.wait_until_moving(&mut run, Duration::from_millis(500));
-    liar.lie(Lie::RollsOn);
-    let refused = output(&["stop", "--robot", "liar-stop"]);
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(!refused.status.success(), "{refused:?}");
-    assert!(said.contains("robot does not obey: it moves"), "{said}");
+    let (_body, faults, mut run) = faulty("fi-stop", Fault::None);
+    faults.wait_until_moving(&mut run, Duration::from_millis(500));
+    faults.set(Fault::RollsOn);
+    refused(&["stop", "--robot", "fi-stop"], "not-at-rest", &["fi-stop"]);
     let status = run.wait_until("status says so", cause_is("robot does not obey"));
     assert_eq!(status["link"]["at_rest"], false, "{status}");
-    liar.lie(Lie::None);
+    faults.set(Fault::None);
     run.wait_until("it rests", |status| status["link"]["at_rest"] == true);
-    operate("liar-stop", &["stop"]);
-    run.signal(Signal::TERM);
-    run.finish();
-    assert_nothing_left("liar-stop");
+    operate("fi-stop", &["stop"]);
+    run.stop();
 }
 
 #[test]
 fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
-    let (_body, liar, mut run) = lying("liar-zero", Lie::None);
-    liar.wait_until_moving(&mut run, Duration::from_millis(500));
-    liar.lie(Lie::IgnoresZero);
+    let (_body, faults, mut run) = faulty("fi-zero", Fault::None);
+    faults.wait_until_moving(&mut run, Duration::from_millis(500));
+    faults.set(Fault::IgnoresZero);
     // A command without its time limit has passed.
-    let moved = liar.moved_for();
-    liar.wait_until_moving(&mut run, moved + Duration::from_millis(200));
+    let moved = faults.moved_for();
+    faults.wait_until_moving(&mut run, moved + Duration::from_millis(200));
     // It fails unless the robot rests.
-    operate("liar-zero", &["stop"]);
-    let log = std::fs::read_to_string(run.directory().join("x80-link.log")).unwrap();
-    assert!(
-        log.contains("robot does not obey") && log.contains("disable"),
-        "{log}"
-    );
-    liar.lie(Lie::None);
-    operate("liar-zero", &["resume"]);
+    operate("fi-zero", &["stop"]);
+    assert!(run.link_logged(&["by=\"disable\""]));
+    faults.set(Fault::None);
+    operate("fi-zero", &["resume"]);
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
-    run.signal(Signal::TERM);
-    run.finish();
-    assert_nothing_left("liar-zero");
+    run.stop();
 }
 
 #[test]
 fn without_its_front_sonar_the_robot_stands_and_goes_on_when_it_is_back() {
-    let (_body, liar, mut run) = lying("liar-sonar", Lie::None);
+    let (_body, faults, mut run) = faulty("fi-sonar", Fault::None);
     run.wait_until_under_way(0.5);
-    liar.lie(Lie::NoSonar);
+    faults.set(Fault::NoSonar);
     run.wait_until("it stands", cause_is("front sonar silent"));
-    liar.lie(Lie::None);
+    faults.set(Fault::None);
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
-    run.signal(Signal::TERM);
-    run.finish();
-    assert_nothing_left("liar-sonar");
+    run.stop();
 }
 
 #[test]
 fn streams_that_stop_while_the_robot_answers_are_asked_for_again_and_the_mission_goes_on() {
-    let (_body, liar, mut run) = lying("liar-mute", Lie::None);
+    let (_body, faults, mut run) = faulty("fi-mute", Fault::None);
     run.wait_until_under_way(0.5);
-    liar.shared.lock().unwrap().inject.push(Command::Stream {
-        stream: Stream::All,
-        request: Request::Stop,
-    });
-    let log = run.directory().join("x80-link.log");
+    faults.stop_streams();
     run.wait_until("they are asked for", |_| {
-        let log = std::fs::read_to_string(&log).unwrap_or_default();
-        log.contains("asked for its streams again")
+        faults.shared.lock().unwrap().asked_for_streams
     });
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
-    run.signal(Signal::TERM);
-    run.finish();
-    assert_nothing_left("liar-mute");
+    run.stop();
 }
