@@ -34,3 +34,4 @@ mod structure;
 mod telemetry;
 mod transports;
 mod wire_faults;
+mod wiring;

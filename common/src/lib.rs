@@ -21,9 +21,11 @@
 //! | [`start`] | how a stage's process takes its place in a run |
 //! | [`external`] | the same for a stage that the supervisor did not start |
 //! | [`stage_command`] | the command line of a stage's process |
+//! | [`wiring`] | what a stage's process opens and persists, declared |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`inputs`], [`replay`] | what every step took, published; what a replay makes of it |
+//! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
 
 pub mod checkpoint;
 pub mod external;
@@ -35,17 +37,21 @@ pub mod inputs;
 pub mod journal;
 pub mod latency;
 pub mod latency_budget;
+pub mod outputs;
 pub mod process_status;
 pub mod replay;
 pub mod roster;
 pub mod run;
 pub mod samples;
+pub mod saved;
 pub mod shell;
 pub mod signals;
+pub mod stage;
 pub mod stage_command;
 pub mod start;
 pub mod step;
 pub mod topics;
+pub mod wiring;
 
 pub use bus::{self, bus_instance, clock, domain, lock_holders, poll, waiter};
 pub use mission::{self, address, geometry, infrared, kinematics, sonar};

@@ -77,6 +77,9 @@ pub enum ReplayError {
     /// It holds another sample than it should.
     #[error("an entry holds no sample of topic {0:?}; replay with the version that ran")]
     Sample(&'static str),
+    /// The stage could not take it.
+    #[error("the stage cannot take an entry: {0}")]
+    Stage(String),
 }
 
 /// One generation of a stage, replayed.

@@ -13,8 +13,36 @@
 
 pub use bus::{Stamp, Stamped};
 
+/// Payloads of topics, each a name for other languages and its fields. They are `repr(C)`, begin with a
+/// [`Stamp`](crate::bus::Stamp), and need nothing else to be written, read, shown and recorded; `ZeroCopySend` must be in scope.
+#[macro_export]
+macro_rules! payloads {
+    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, $crate::bus::ZeroCopySend)]
+        #[type_name($type_name)]
+        #[repr(C)]
+        pub struct $name {
+            /// Which sample.
+            pub stamp: $crate::bus::Stamp,
+            $($(#[$doc])* pub $field: $kind,)*
+        }
+
+        impl $crate::bus::Stamped for $name {
+            fn stamp(&self) -> &$crate::bus::Stamp {
+                &self.stamp
+            }
+            fn stamp_mut(&mut self) -> &mut $crate::bus::Stamp {
+                &mut self.stamp
+            }
+        }
+
+        $crate::bus::layouts! { $name { stamp $($field)* } }
+    )*};
+}
+
 macro_rules! stamped {
-    ($($payload:ty),* $(,)?) => {$(
+    ($($payload:ty),*) => {$(
         impl Stamped for $payload {
             fn stamp(&self) -> &Stamp {
                 &self.stamp
@@ -68,29 +96,8 @@ mod supervision;
 
 pub use self::{navigation::*, robot::*, supervision::*};
 
-stamped!(
-    RangeSample,
-    WheelSample,
-    PoseSample,
-    GridHeader,
-    GuidanceSample,
-    FieldHeader,
-    CommandSample,
-    HealthSample,
-    LinkSample,
-    InfraredSample,
-    PowerSample,
-    SurroundingsSample,
-    DirectiveSample,
-    TickLimitSample,
-    RosterHeader,
-    DeathSample,
-    StallSample,
-    RequestSample,
-    FaultSample,
-    WireHeader,
-    InputsHeader,
-);
+// Those whose defaults cannot be derived.
+stamped!(GridHeader, LinkSample);
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,7 @@
 //! The process shell every stage runs in: take the place in the run, open the topics, wait, take a turn, publish
 //! heartbeats, stop on a signal.
 //!
-//! A stage's own shell file implements [`Process`]: it wires topics to its pure step, and nothing else.
+//! A [`Process`] declares in its [`Wiring`] what it opens, and opens it through its [`Context`].
 
 use std::{
     env, fmt,
@@ -12,22 +12,29 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
-    bus::{Bus, Writer},
+    bus::{
+        AnyTopic, Bus, Layout, Payload, Reader, SliceReader, SliceTopic, SliceWriter, Stamp,
+        Stamped, Topic, Writer,
+    },
+    checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
     external,
     faults::{Asked, Requests},
+    journal::{Journal, Restored},
     latency_budget::{self, LatencyBudget},
     poll,
     run::{self, Run},
     samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
+    saved::Saved,
     signals::{SIGTERM, Signals},
     stage_command,
     start::{self, Generation, Joined, Start, system},
-    topics::{self, AnyTopic as _},
+    topics,
     waiter::Waiter,
+    wiring::{Access, Opened, Persists, Wiring},
 };
 
 pub use crate::start::StageError;
@@ -36,24 +43,95 @@ pub use crate::start::StageError;
 const TICK_OVER: Duration = Duration::from_millis(5);
 
 /// What a stage's process is opened with.
-#[derive(Debug)]
 pub struct Context {
     /// Which generation.
     pub generation: Generation,
     /// The run.
     pub run: Run,
-    /// The robot's bus.
-    pub bus: Bus,
-    /// What wakes the process; the stage adds its inputs.
+    /// What wakes the process besides the topics of its wiring.
     pub waiter: Waiter,
     /// The stage tells it when the items of a tick end.
     pub budget: LatencyBudget,
+    pub(crate) bus: Bus,
+    /// Opened, and not handed to the process's outputs yet.
+    pub(crate) saved: Saved,
+    pub(crate) opened: Opened,
 }
 
 impl Context {
+    /// Read a topic of the wiring.
+    pub fn reader<P>(&mut self, topic: &Topic<P>) -> Result<Reader<P>, StageError>
+    where
+        P: Payload + Stamped + Layout,
+    {
+        self.opened.add(Access::Read, topic.spec().name)?;
+        Ok(self.bus.reader(topic)?)
+    }
+
+    /// Read the slices of a topic of the wiring.
+    pub fn slice_reader<H, T>(
+        &mut self,
+        topic: &SliceTopic<H, T>,
+    ) -> Result<SliceReader<H, T>, StageError>
+    where
+        H: Payload + Stamped + Layout,
+        T: Payload + Layout,
+    {
+        self.opened.add(Access::Read, topic.spec().name)?;
+        Ok(self.bus.slice_reader(topic)?)
+    }
+
+    /// Write a topic of the wiring.
+    pub fn writer<P>(&mut self, topic: &Topic<P>) -> Result<Writer<P>, StageError>
+    where
+        P: Payload + Stamped + Layout,
+    {
+        self.opened.add(Access::Write, topic.spec().name)?;
+        Ok(self.bus.writer(topic, self.generation.number)?)
+    }
+
+    /// Write slices of at most `longest` elements on a topic of the wiring.
+    pub fn slice_writer<H, T>(
+        &mut self,
+        topic: &SliceTopic<H, T>,
+        longest: usize,
+    ) -> Result<SliceWriter<H, T>, StageError>
+    where
+        H: Payload + Stamped + Layout,
+        T: Payload + Layout,
+    {
+        self.opened.add(Access::Write, topic.spec().name)?;
+        let number = self.generation.number;
+        Ok(self.bus.slice_writer(topic, number, longest)?)
+    }
+
+    /// Open what the stage persists, and give the state that its last process saved.
+    pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>, StageError> {
+        let Persists::State(bytes) = self.opened.wiring.persists else {
+            return Ok(None);
+        };
+        let (checkpoint, state) = Checkpoint::open(&self.checkpoint_file(), bytes)?;
+        self.saved = Saved::State(checkpoint);
+        Ok(state)
+    }
+
+    /// The open file of what the stage persists, for a process without a [`Runner`](crate::stage::Runner).
+    pub fn take_saved(&mut self) -> Saved {
+        std::mem::take(&mut self.saved)
+    }
+
+    /// Open the journal of a state of at most `bytes`, and give what the stage's last process saved.
+    pub fn saved_journal<S: DeserializeOwned, E: DeserializeOwned>(
+        &mut self,
+        bytes: usize,
+    ) -> Result<Restored<S, E>, StageError> {
+        let (journal, restored) = Journal::open(&self.checkpoint_file(), bytes)?;
+        self.saved = Saved::Journal(journal);
+        Ok(restored)
+    }
+
     /// Where this stage's checkpoint lies.
-    #[must_use]
-    pub fn checkpoint_file(&self) -> PathBuf {
+    fn checkpoint_file(&self) -> PathBuf {
         run::checkpoint_file(&self.generation.directory, self.generation.stage)
     }
 }
@@ -67,8 +145,21 @@ pub struct Progress {
     pub time: MissionTime,
 }
 
+impl Progress {
+    /// The tick of a sample.
+    pub const fn of(stamp: &Stamp) -> Self {
+        Self {
+            tick: stamp.tick,
+            time: stamp.time(),
+        }
+    }
+}
+
 /// A stage wired to its topics.
 pub trait Process: Sized {
+    /// What it opens on the bus, and what it persists.
+    const WIRING: &'static Wiring;
+
     /// Open the topics, restore the checkpoint.
     ///
     /// # Errors
@@ -85,7 +176,7 @@ pub trait Process: Sized {
     ///
     /// # Errors
     /// When it cannot be opened.
-    fn after_ready(&mut self, context: &Context) -> Result<(), StageError> {
+    fn after_ready(&mut self, context: &mut Context) -> Result<(), StageError> {
         let _ = context;
         Ok(())
     }
@@ -130,9 +221,10 @@ pub trait Process: Sized {
     }
 }
 
-/// The `main` of an executable that has one stage, `stage`: takes its place in the run that the command line says, and
+/// The `main` of an executable that has one stage: takes its place in the run that the command line says, and
 /// runs it until it is asked to stop. An error goes to standard error, which the supervisor keeps as the stage's log.
-pub fn main<P: Process>(stage: &'static str) -> ExitCode {
+pub fn main<P: Process>() -> ExitCode {
+    let stage = P::WIRING.stage;
     let start = match stage_command::start(stage, env::args_os().skip(1)) {
         Ok(start) => start,
         Err(error) => {
@@ -194,10 +286,15 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
         bus,
         waiter,
         budget: LatencyBudget::from_environment(),
+        saved: Saved::default(),
+        opened: Opened::none_of(P::WIRING),
     };
+    for topic in P::WIRING.wakes {
+        context.waiter.on(context.bus.wakeup(*topic)?);
+    }
     let mut process = P::open(&mut context)?;
     tracing::info!(generation = number, "ready");
-    let worked = work(&mut process, &mut heartbeat, &context, &mut stop);
+    let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
     // Whatever went wrong, the stage is stopped in order: the link then stops the robot.
     let stopped = process.stop();
     let Generation {
@@ -230,7 +327,7 @@ impl StopRequest {
 fn work(
     process: &mut impl Process,
     heartbeat: &mut Heartbeat,
-    context: &Context,
+    context: &mut Context,
     stop: &mut StopRequest,
 ) -> Result<(), StageError> {
     let ticks_follow_at_once = matches!(context.run.clock, MissionClock::Ticks { .. });
@@ -241,6 +338,7 @@ fn work(
     }
     heartbeat.beat(HealthState::Ready, progress)?;
     process.after_ready(context)?;
+    context.opened.check_all()?;
     let simulated = context.run.mission.robot.address.is_none();
     let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
     let mut busy = true;

@@ -9,6 +9,7 @@ use crate::{
     checkpoint::CheckpointError,
     domain::{Domain, RobotName},
     run::{Run, RunError},
+    wiring::WiringError,
 };
 
 /// Which of a stage's processes in a run this is: each start of a stage is a generation.
@@ -65,6 +66,9 @@ pub enum StageError {
     /// The stage's checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// The process opens something else than its wiring lists.
+    #[error(transparent)]
+    Wiring(#[from] WiringError),
     /// An error of this stage alone, in words.
     #[error("{0}")]
     Other(String),

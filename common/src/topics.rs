@@ -6,16 +6,11 @@
 
 use std::time::Duration;
 
-use crate::samples::{
-    CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader, GridHeader,
-    GuidanceSample, HealthSample, InfraredSample, InputsHeader, LinkSample, PoseSample,
-    PowerSample, RangeSample, RequestSample, RosterEntry, RosterHeader, StallSample,
-    SurroundingsSample, TickLimitSample, WheelSample, WireHeader,
-};
+use crate::samples::*;
 
 pub use crate::bus::{
-    AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, Rate, ReadableTopic, SUPERVISOR,
-    SliceTopic, Spec, Topic,
+    AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, OpenTopic, Rate, ReadableTopic,
+    SUPERVISOR, SliceTopic, Spec, Topic,
 };
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
@@ -59,6 +54,8 @@ macro_rules! topics {
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
         /// The same, for consumers that read a topic by its name.
         pub static READABLE: &[&dyn ReadableTopic] = &[$(&$id),*];
+        /// Every topic, to be opened from a list.
+        pub static OPEN: &[&dyn OpenTopic] = &[$(&$id),*];
         /// The same, to be read without knowing what they carry.
         pub static ENCODED: &[&dyn EncodedTopic] = &[$(&$id),*];
     };

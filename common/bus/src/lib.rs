@@ -19,6 +19,7 @@
 //! | `ownership` | whose the files are, and who may write them |
 //! | `write`, `read` | writers; readers and wakeups |
 //! | `any` | readers of any topic |
+//! | `open` | writers of any topic, and who has opened it |
 //! | `error` | what can go wrong |
 //!
 //! Rules it follows, each found by experiment:
@@ -41,6 +42,7 @@ mod layout;
 mod leftovers;
 pub mod lock_holders;
 mod make;
+mod open;
 mod ownership;
 mod payload;
 pub mod poll;
@@ -59,6 +61,7 @@ pub use self::{
         encode_slice, kind_of,
     },
     make::{Bus, Services},
+    open::{OpenTopic, OpenedBy},
     payload::{Payload, Stamp, Stamped, ZeroCopySend},
     read::{Author, Ignored, Reader, Slice, SliceReader, Wakeup},
     spec::{EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec},

@@ -10,32 +10,30 @@ use crate::{
     kinematics::{Pose2, Twist},
 };
 
-/// Topic `pose`: where dead reckoning believes the robot is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
-#[type_name("firsthand.Pose")]
-#[repr(C)]
-pub struct PoseSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Metres in the mission frame.
-    pub x_m: f64,
-    /// Metres in the mission frame.
-    pub y_m: f64,
-    /// theta, radians counter-clockwise from x; not wrapped.
-    pub heading_rad: f64,
-    /// v over the last tick, m/s.
-    pub v_m_s: f64,
-    /// omega over the last tick, rad/s.
-    pub omega_rad_s: f64,
-    /// Length of the way so far, metres.
-    pub travelled_m: f64,
-    /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. As far as
-    /// the wheels go: `[dead_reckoning]` of the mission says how they are taken to err.
-    pub covariance: [f64; 6],
-    /// The encoder counts it was computed at.
-    pub left_counts: u16,
-    /// The encoder counts it was computed at.
-    pub right_counts: u16,
+payloads! {
+    /// Topic `pose`: where dead reckoning believes the robot is.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.Pose" PoseSample {
+        /// Metres in the mission frame.
+        x_m: f64,
+        /// Metres in the mission frame.
+        y_m: f64,
+        /// theta, radians counter-clockwise from x; not wrapped.
+        heading_rad: f64,
+        /// v over the last tick, m/s.
+        v_m_s: f64,
+        /// omega over the last tick, rad/s.
+        omega_rad_s: f64,
+        /// Length of the way so far, metres.
+        travelled_m: f64,
+        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. As far as
+        /// the wheels go: `[dead_reckoning]` of the mission says how they are taken to err.
+        covariance: [f64; 6],
+        /// The encoder counts it was computed at.
+        left_counts: u16,
+        /// The encoder counts it was computed at.
+        right_counts: u16,
+    }
 }
 
 impl PoseSample {
@@ -163,45 +161,42 @@ wire_enum! {
     }
 }
 
-/// Topic `guidance`: E of (11) at the robot's pose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Guidance")]
-#[repr(C)]
-pub struct GuidanceSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Ex: unit vector, 0 where there is none.
-    pub ex: f64,
-    /// Ey.
-    pub ey: f64,
-    /// dst of (14): straight to the target, metres.
-    pub distance_m: f64,
-    /// The most tangential speed that what is believed of the way ahead allows, m/s; infinite for no limit.
-    pub speed_limit_m_s: f64,
-    /// A [`GuidanceStatus`].
-    pub status: u8,
-    /// Mission time of the pose it was computed for, nanoseconds.
-    pub pose_ns: u64,
-    /// That pose, metres in the mission frame.
-    pub x_m: f64,
-    /// That pose, metres in the mission frame.
-    pub y_m: f64,
-    /// That pose, radians counter-clockwise from x; not wrapped.
-    pub heading_rad: f64,
-    /// The version of `grid` it was computed from.
-    pub grid_version: u64,
-    /// That version's safety events.
-    pub safety_events: u64,
-    /// That version's belief epoch.
-    pub epoch: u64,
-    /// Full solves in this generation of the planner.
-    pub full_solves: u64,
-    /// Local updates in this generation of the planner.
-    pub local_updates: u64,
-    /// Wall-clock of the last full solve, nanoseconds.
-    pub full_solve_ns: u64,
-    /// Wall-clock of the last local update, nanoseconds.
-    pub local_update_ns: u64,
+payloads! {
+    /// Topic `guidance`: E of (11) at the robot's pose.
+    "firsthand.Guidance" GuidanceSample {
+        /// Ex: unit vector, 0 where there is none.
+        ex: f64,
+        /// Ey.
+        ey: f64,
+        /// dst of (14): straight to the target, metres.
+        distance_m: f64,
+        /// The most tangential speed that what is believed of the way ahead allows, m/s; infinite for no limit.
+        speed_limit_m_s: f64,
+        /// A [`GuidanceStatus`].
+        status: u8,
+        /// Mission time of the pose it was computed for, nanoseconds.
+        pose_ns: u64,
+        /// That pose, metres in the mission frame.
+        x_m: f64,
+        /// That pose, metres in the mission frame.
+        y_m: f64,
+        /// That pose, radians counter-clockwise from x; not wrapped.
+        heading_rad: f64,
+        /// The version of `grid` it was computed from.
+        grid_version: u64,
+        /// That version's safety events.
+        safety_events: u64,
+        /// That version's belief epoch.
+        epoch: u64,
+        /// Full solves in this generation of the planner.
+        full_solves: u64,
+        /// Local updates in this generation of the planner.
+        local_updates: u64,
+        /// Wall-clock of the last full solve, nanoseconds.
+        full_solve_ns: u64,
+        /// Wall-clock of the last local update, nanoseconds.
+        local_update_ns: u64,
+    }
 }
 
 impl GuidanceSample {
@@ -229,25 +224,22 @@ impl GuidanceSample {
     }
 }
 
-/// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.FieldHeader")]
-#[repr(C)]
-pub struct FieldHeader {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Which part of which version.
-    pub part: Part,
-    /// The version of `grid` it was computed from.
-    pub grid_version: u64,
-    /// X_T, metres.
-    pub target_x_m: f64,
-    /// X_T, metres.
-    pub target_y_m: f64,
-    /// Verification: the worst componentwise relative residual of the last full solve.
-    pub worst_residual: f64,
-    /// Verification: free cells from which the target can be reached.
-    pub reachable: u64,
+payloads! {
+    /// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.
+    "firsthand.FieldHeader" FieldHeader {
+        /// Which part of which version.
+        part: Part,
+        /// The version of `grid` it was computed from.
+        grid_version: u64,
+        /// X_T, metres.
+        target_x_m: f64,
+        /// X_T, metres.
+        target_y_m: f64,
+        /// Verification: the worst componentwise relative residual of the last full solve.
+        worst_residual: f64,
+        /// Verification: free cells from which the target can be reached.
+        reachable: u64,
+    }
 }
 
 /// The policy at one cell.
@@ -275,38 +267,31 @@ wire_enum! {
     }
 }
 
-/// Topic `command`: U of (17).
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Command")]
-#[repr(C)]
-pub struct CommandSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// omega_L, rad/s; omega_h of a car's driven wheel.
-    pub left_rad_s: f64,
-    /// omega_R, rad/s; of a car the steering angle phi, radians, positive to the left: `robot.model` decides.
-    pub right_rad_s: f64,
-    /// vc of (16), m/s.
-    pub v_m_s: f64,
-    /// wc of (15), rad/s.
-    pub omega_rad_s: f64,
-    /// dst of (14), metres.
-    pub distance_m: f64,
-    /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds: the link
-    /// lets no old one move the robot, whatever the stamp says.
-    pub pose_ns: u64,
-    /// Mission time of the guidance it follows, nanoseconds; likewise.
-    pub guidance_ns: u64,
-    /// A [`CommandState`].
-    pub state: u8,
+payloads! {
+    /// Topic `command`: U of (17).
+    "firsthand.Command" CommandSample {
+        /// omega_L, rad/s; omega_h of a car's driven wheel.
+        left_rad_s: f64,
+        /// omega_R, rad/s; of a car the steering angle phi, radians, positive to the left: `robot.model` decides.
+        right_rad_s: f64,
+        /// vc of (16), m/s.
+        v_m_s: f64,
+        /// wc of (15), rad/s.
+        omega_rad_s: f64,
+        /// dst of (14), metres.
+        distance_m: f64,
+        /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds: the link
+        /// lets no old one move the robot, whatever the stamp says.
+        pose_ns: u64,
+        /// Mission time of the guidance it follows, nanoseconds; likewise.
+        guidance_ns: u64,
+        /// A [`CommandState`].
+        state: u8,
+    }
 }
 
 layouts! {
-    PoseSample { stamp x_m y_m heading_rad v_m_s omega_rad_s travelled_m covariance left_counts right_counts }
     ClearBeam { x_m y_m bearing_rad clear_m }
     GridHeader { stamp part safety_events epoch clear_beam_count clear_beams clear_ray_count clear_rays }
-    GuidanceSample { stamp ex ey distance_m speed_limit_m_s status pose_ns x_m y_m heading_rad grid_version safety_events epoch full_solves local_updates full_solve_ns local_update_ns }
-    FieldHeader { stamp part grid_version target_x_m target_y_m worst_residual reachable }
     FieldCell { ex ey log2_u }
-    CommandSample { stamp left_rad_s right_rad_s v_m_s omega_rad_s distance_m pose_ns guidance_ns state }
 }

@@ -23,43 +23,38 @@ wire_enum! {
     }
 }
 
-/// Topic `range`: the rangers of a tick: the front sonar, and the ring of infrared rangers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
-#[type_name("firsthand.Range")]
-#[repr(C)]
-pub struct RangeSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// S of (19): metres from the sensor, where the status says so; else 0.
-    pub range_m: f64,
-    /// A [`RangeStatus`].
-    pub status: u8,
-    /// The byte as the robot sent it, cm.
-    pub raw_cm: u8,
-    /// The infrared rangers in the order of [`infrared::rangers`], AD counts; all 0, as of rangers that are dead, where none
-    /// came since the last tick.
-    pub infrared_ad: [u16; infrared::RANGERS],
+payloads! {
+    /// Topic `range`: the rangers of a tick: the front sonar, and the ring of infrared rangers.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.Range" RangeSample {
+        /// S of (19): metres from the sensor, where the status says so; else 0.
+        range_m: f64,
+        /// A [`RangeStatus`].
+        status: u8,
+        /// The byte as the robot sent it, cm.
+        raw_cm: u8,
+        /// The infrared rangers in the order of [`infrared::rangers`], AD counts; all 0, as of rangers that are dead, where none
+        /// came since the last tick.
+        infrared_ad: [u16; infrared::RANGERS],
+    }
 }
 
-/// Topic `wheels`: the encoders. Of a car the left one is that of the driven wheel, the right one that of the steering, 0
-/// straight ahead and growing to the left.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Wheels")]
-#[repr(C)]
-pub struct WheelSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Left encoder, counts modulo 32768, growing forward.
-    pub left_counts: u16,
-    /// Right encoder, counts modulo 32768, growing forward.
-    pub right_counts: u16,
-    /// Left speed, counts a second, forward positive.
-    pub left_counts_per_s: i32,
-    /// Right speed, counts a second, forward positive.
-    pub right_counts_per_s: i32,
-    /// Times this process of the link noticed that the robot restarted its counts: the step from a sample with
-    /// a lower number is no motion.
-    pub restarts: u32,
+payloads! {
+    /// Topic `wheels`: the encoders. Of a car the left one is that of the driven wheel, the right one that of the steering, 0
+    /// straight ahead and growing to the left.
+    "firsthand.Wheels" WheelSample {
+        /// Left encoder, counts modulo 32768, growing forward.
+        left_counts: u16,
+        /// Right encoder, counts modulo 32768, growing forward.
+        right_counts: u16,
+        /// Left speed, counts a second, forward positive.
+        left_counts_per_s: i32,
+        /// Right speed, counts a second, forward positive.
+        right_counts_per_s: i32,
+        /// Times this process of the link noticed that the robot restarted its counts: the step from a sample with
+        /// a lower number is no motion.
+        restarts: u32,
+    }
 }
 
 wire_enum! {
@@ -224,42 +219,36 @@ impl LinkSample {
     }
 }
 
-/// Topic `infrared`: the seven infrared rangers, in the order of [`infrared::rangers`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Infrared")]
-#[repr(C)]
-pub struct InfraredSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
-    pub range_m: [f64; infrared::RANGERS],
-    /// As the robot sent them, AD counts.
-    pub raw_ad: [u16; infrared::RANGERS],
+payloads! {
+    /// Topic `infrared`: the seven infrared rangers, in the order of [`infrared::rangers`].
+    "firsthand.Infrared" InfraredSample {
+        /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
+        range_m: [f64; infrared::RANGERS],
+        /// As the robot sent them, AD counts.
+        raw_ad: [u16; infrared::RANGERS],
+    }
 }
 
-/// Topic `power`: voltages of the batteries, currents of the motors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Power")]
-#[repr(C)]
-pub struct PowerSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The boards' battery, volts.
-    pub board_v: f64,
-    /// The motors' battery, volts.
-    pub motor_v: f64,
-    /// The servos' battery, volts.
-    pub servo_v: f64,
-    /// The two motor drivers, degrees Celsius by the vendor's formula.
-    pub driver_c: [f64; 2],
-    /// Currents of the motors of the six channels, AD counts: no source says how many are an ampere.
-    pub current_ad: [u16; 6],
-    /// 1: the boards' battery is low by the mission's `robot.low_battery_v`.
-    pub board_low: u8,
-    /// 1: the motors' battery is low.
-    pub motor_low: u8,
-    /// 1: the servos' battery is low.
-    pub servo_low: u8,
+payloads! {
+    /// Topic `power`: voltages of the batteries, currents of the motors.
+    "firsthand.Power" PowerSample {
+        /// The boards' battery, volts.
+        board_v: f64,
+        /// The motors' battery, volts.
+        motor_v: f64,
+        /// The servos' battery, volts.
+        servo_v: f64,
+        /// The two motor drivers, degrees Celsius by the vendor's formula.
+        driver_c: [f64; 2],
+        /// Currents of the motors of the six channels, AD counts: no source says how many are an ampere.
+        current_ad: [u16; 6],
+        /// 1: the boards' battery is low by the mission's `robot.low_battery_v`.
+        board_low: u8,
+        /// 1: the motors' battery is low.
+        motor_low: u8,
+        /// 1: the servos' battery is low.
+        servo_low: u8,
+    }
 }
 
 impl PowerSample {
@@ -270,21 +259,18 @@ impl PowerSample {
     }
 }
 
-/// Topic `surroundings`: human sensors, tilt, temperature.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Surroundings")]
-#[repr(C)]
-pub struct SurroundingsSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// At the board, degrees Celsius by the vendor's formula.
-    pub temperature_c: f64,
-    /// The two human sensors: presence, AD counts.
-    pub human_alarm_ad: [u16; 2],
-    /// The two human sensors: motion, AD counts around the middle of their scale.
-    pub human_motion_ad: [u16; 2],
-    /// Tilt along x and y, AD counts.
-    pub tilt_ad: [u16; 2],
+payloads! {
+    /// Topic `surroundings`: human sensors, tilt, temperature.
+    "firsthand.Surroundings" SurroundingsSample {
+        /// At the board, degrees Celsius by the vendor's formula.
+        temperature_c: f64,
+        /// The two human sensors: presence, AD counts.
+        human_alarm_ad: [u16; 2],
+        /// The two human sensors: motion, AD counts around the middle of their scale.
+        human_motion_ad: [u16; 2],
+        /// Tilt along x and y, AD counts.
+        tilt_ad: [u16; 2],
+    }
 }
 
 wire_enum! {
@@ -297,25 +283,16 @@ wire_enum! {
     }
 }
 
-/// Topic `wire`, header; the slice is the bytes of one datagram, or of one read from a connection or serial line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.WireHeader")]
-#[repr(C)]
-pub struct WireHeader {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Reading of the machine's monotonic clock in the step that took or gave them, nanoseconds.
-    pub machine_ns: u64,
-    /// A [`Direction`].
-    pub direction: u8,
+payloads! {
+    /// Topic `wire`, header; the slice is the bytes of one datagram, or of one read from a connection or serial line.
+    "firsthand.WireHeader" WireHeader {
+        /// Reading of the machine's monotonic clock in the step that took or gave them, nanoseconds.
+        machine_ns: u64,
+        /// A [`Direction`].
+        direction: u8,
+    }
 }
 
 layouts! {
-    WireHeader { stamp machine_ns direction }
-    RangeSample { stamp range_m status raw_cm infrared_ad }
-    WheelSample { stamp left_counts right_counts left_counts_per_s right_counts_per_s restarts }
     LinkSample { stamp connected action cause at_rest frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
-    InfraredSample { stamp range_m raw_ad }
-    PowerSample { stamp board_v motor_v servo_v driver_c current_ad board_low motor_low servo_low }
-    SurroundingsSample { stamp temperature_c human_alarm_ad human_motion_ad tilt_ad }
 }

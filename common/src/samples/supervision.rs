@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
-use crate::bus::{Stamp, ZeroCopySend, layouts};
+use crate::bus::{ZeroCopySend, layouts};
 
 wire_enum! {
     /// How a stage is.
@@ -36,25 +36,22 @@ pub fn name_str(name: &Name) -> &str {
     std::str::from_utf8(text).unwrap_or_default()
 }
 
-/// Topic `health`: the heartbeat of every stage, published from inside its work loop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Health")]
-#[repr(C)]
-pub struct HealthSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The stage.
-    pub stage: Name,
-    /// Its process.
-    pub pid: u32,
-    /// A [`HealthState`].
-    pub state: u8,
-    /// Iterations of the work loop.
-    pub turns: u64,
-    /// The fault that this generation was asked for last; 0 for none.
-    pub last_fault: u64,
-    /// How it answered: a [`FaultAnswer`].
-    pub fault_answer: u8,
+payloads! {
+    /// Topic `health`: the heartbeat of every stage, published from inside its work loop.
+    "firsthand.Health" HealthSample {
+        /// The stage.
+        stage: Name,
+        /// Its process.
+        pid: u32,
+        /// A [`HealthState`].
+        state: u8,
+        /// Iterations of the work loop.
+        turns: u64,
+        /// The fault that this generation was asked for last; 0 for none.
+        last_fault: u64,
+        /// How it answered: a [`FaultAnswer`].
+        fault_answer: u8,
+    }
 }
 
 wire_enum! {
@@ -69,35 +66,29 @@ wire_enum! {
     }
 }
 
-/// Topic `directive`: the supervisor's order to all stages.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Directive")]
-#[repr(C)]
-pub struct DirectiveSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The belief's epoch: a mapper that holds a lower one resets the sensed belief.
-    pub epoch: u64,
-    /// An [`Order`].
-    pub order: u8,
-    /// Why it is not to drive: a [`HoldReason`].
-    pub reason: u8,
+payloads! {
+    /// Topic `directive`: the supervisor's order to all stages.
+    "firsthand.Directive" DirectiveSample {
+        /// The belief's epoch: a mapper that holds a lower one resets the sensed belief.
+        epoch: u64,
+        /// An [`Order`].
+        order: u8,
+        /// Why it is not to drive: a [`HoldReason`].
+        reason: u8,
+    }
 }
 
-/// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that what the supervisor
-/// does about a stall holds from a tick that does not depend on the machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.TickLimit")]
-#[repr(C)]
-pub struct TickLimitSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The last tick that the link may begin.
-    pub last_tick: u64,
-    /// The first tick in which the newest recovery step holds; 0 for none.
-    pub holds_from_tick: u64,
-    /// The belief's epoch since then.
-    pub epoch: u64,
+payloads! {
+    /// Topic `tick_limit`: in lockstep, how far the link may go ahead of the supervisor, so that what the supervisor
+    /// does about a stall holds from a tick that does not depend on the machine.
+    "firsthand.TickLimit" TickLimitSample {
+        /// The last tick that the link may begin.
+        last_tick: u64,
+        /// The first tick in which the newest recovery step holds; 0 for none.
+        holds_from_tick: u64,
+        /// The belief's epoch since then.
+        epoch: u64,
+    }
 }
 
 wire_enum! {
@@ -134,23 +125,20 @@ wire_enum! {
     }
 }
 
-/// Topic `roster`, header; the slice is one [`RosterEntry`] a stage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.RosterHeader")]
-#[repr(C)]
-pub struct RosterHeader {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The supervisor's process.
-    pub supervisor_pid: u32,
-    /// The current [`Order`].
-    pub order: u8,
-    /// A [`HoldReason`].
-    pub reason: u8,
-    /// 1: the robot is a simulated one.
-    pub simulated: u8,
-    /// The request that was taken last; 0 for none.
-    pub last_request: u64,
+payloads! {
+    /// Topic `roster`, header; the slice is one [`RosterEntry`] a stage.
+    "firsthand.RosterHeader" RosterHeader {
+        /// The supervisor's process.
+        supervisor_pid: u32,
+        /// The current [`Order`].
+        order: u8,
+        /// A [`HoldReason`].
+        reason: u8,
+        /// 1: the robot is a simulated one.
+        simulated: u8,
+        /// The request that was taken last; 0 for none.
+        last_request: u64,
+    }
 }
 
 /// One stage, as the supervisor sees it.
@@ -243,37 +231,34 @@ impl Words {
     }
 }
 
-/// Topic `deaths`: a stage's process ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Death")]
-#[repr(C)]
-pub struct DeathSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The stage.
-    pub stage: Name,
-    /// Its process.
-    pub pid: u32,
-    /// Its generation.
-    pub generation: u32,
-    /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
-    pub beat_age_ns: u64,
-    /// Age of its process, nanoseconds.
-    pub uptime_ns: u64,
-    /// Pause before its successor, nanoseconds.
-    pub next_after_ns: u64,
-    /// Exit code or signal number.
-    pub code: i32,
-    /// Deaths of this stage within the last ten seconds, this one among them.
-    pub deaths_in_window: u32,
-    /// A [`DeathCause`].
-    pub cause: u8,
-    /// A [`NextStep`].
-    pub next: u8,
-    /// 1: it hung, or was never ready, and the supervisor ended it.
-    pub hung: u8,
-    /// The end of its log.
-    pub log_tail: Words,
+payloads! {
+    /// Topic `deaths`: a stage's process ended.
+    "firsthand.Death" DeathSample {
+        /// The stage.
+        stage: Name,
+        /// Its process.
+        pid: u32,
+        /// Its generation.
+        generation: u32,
+        /// Age of its last heartbeat, nanoseconds; u64::MAX if it never beat.
+        beat_age_ns: u64,
+        /// Age of its process, nanoseconds.
+        uptime_ns: u64,
+        /// Pause before its successor, nanoseconds.
+        next_after_ns: u64,
+        /// Exit code or signal number.
+        code: i32,
+        /// Deaths of this stage within the last ten seconds, this one among them.
+        deaths_in_window: u32,
+        /// A [`DeathCause`].
+        cause: u8,
+        /// A [`NextStep`].
+        next: u8,
+        /// 1: it hung, or was never ready, and the supervisor ended it.
+        hung: u8,
+        /// The end of its log.
+        log_tail: Words,
+    }
 }
 
 wire_enum! {
@@ -306,27 +291,24 @@ wire_enum! {
     }
 }
 
-/// Topic `stalls`: the robot should get on and does not. Serialized it is a line of `stalls.jsonl`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Stall")]
-#[repr(C)]
-pub struct StallSample {
-    /// Which sample; its tick and time are those of the pose it was seen at.
-    pub stamp: Stamp,
-    /// Where the robot believes it is, metres.
-    pub x_m: f64,
-    /// Where the robot believes it is, metres.
-    pub y_m: f64,
-    /// The belief's epoch from now on.
-    pub epoch: u64,
-    /// Generations of the planner started for a stall so far in this mission, this one among them.
-    pub replans: u32,
-    /// Beliefs forgotten so far in this mission, this one among them.
-    pub resets: u64,
-    /// A [`StallCause`].
-    pub cause: u8,
-    /// A [`RecoveryStep`]: what is done about it.
-    pub recovery: u8,
+payloads! {
+    /// Topic `stalls`: the robot should get on and does not. Serialized it is a line of `stalls.jsonl`.
+    "firsthand.Stall" StallSample {
+        /// Where the robot believes it is, metres.
+        x_m: f64,
+        /// Where the robot believes it is, metres.
+        y_m: f64,
+        /// The belief's epoch from now on.
+        epoch: u64,
+        /// Generations of the planner started for a stall so far in this mission, this one among them.
+        replans: u32,
+        /// Beliefs forgotten so far in this mission, this one among them.
+        resets: u64,
+        /// A [`StallCause`].
+        cause: u8,
+        /// A [`RecoveryStep`]: what is done about it.
+        recovery: u8,
+    }
 }
 
 impl StallSample {
@@ -373,19 +355,16 @@ wire_enum! {
     }
 }
 
-/// Topic `requests`: what an operator asks of the supervisor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Request")]
-#[repr(C)]
-pub struct RequestSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Identifies the request: the roster's `last_request` says that it was taken. Never 0.
-    pub id: u64,
-    /// The stage it is about; empty for none.
-    pub stage: Name,
-    /// A [`RequestKind`].
-    pub kind: u8,
+payloads! {
+    /// Topic `requests`: what an operator asks of the supervisor.
+    "firsthand.Request" RequestSample {
+        /// Identifies the request: the roster's `last_request` says that it was taken. Never 0.
+        id: u64,
+        /// The stage it is about; empty for none.
+        stage: Name,
+        /// A [`RequestKind`].
+        kind: u8,
+    }
 }
 
 wire_enum! {
@@ -423,45 +402,30 @@ wire_enum! {
     }
 }
 
-/// Topic `faults`: break something in a stage, to see the rest cope.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Fault")]
-#[repr(C)]
-pub struct FaultSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Identifies the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
-    pub id: u64,
-    /// The stage it is for.
-    pub stage: Name,
-    /// A [`FaultKind`].
-    pub kind: u8,
-    /// 1: to be done although the robot is a real one.
-    pub although_real: u8,
+payloads! {
+    /// Topic `faults`: break something in a stage, to see the rest cope.
+    "firsthand.Fault" FaultSample {
+        /// Identifies the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
+        id: u64,
+        /// The stage it is for.
+        stage: Name,
+        /// A [`FaultKind`].
+        kind: u8,
+        /// 1: to be done although the robot is a real one.
+        although_real: u8,
+    }
 }
 
-/// Topic `inputs`, header; the slice is a piece of what [`crate::inputs`] describes. Pieces of a generation follow each other by
-/// their sequence.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.InputsHeader")]
-#[repr(C)]
-pub struct InputsHeader {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// The stage.
-    pub stage: Name,
+payloads! {
+    /// Topic `inputs`, header; the slice is a piece of what [`crate::inputs`] describes. Pieces of a generation follow each other by
+    /// their sequence.
+    "firsthand.InputsHeader" InputsHeader {
+        /// The stage.
+        stage: Name,
+    }
 }
 
 layouts! {
-    InputsHeader { stamp stage }
-    HealthSample { stamp stage pid state turns last_fault fault_answer }
-    DirectiveSample { stamp epoch order reason }
-    TickLimitSample { stamp last_tick holds_from_tick epoch }
-    RosterHeader { stamp supervisor_pid order reason simulated last_request }
     RosterEntry { stage pid generation state restarts uptime_ns beat_age_ns output_age_ns }
     Words { bytes }
-    DeathSample { stamp stage pid generation beat_age_ns uptime_ns next_after_ns code deaths_in_window cause next hung log_tail }
-    StallSample { stamp x_m y_m epoch replans resets cause recovery }
-    RequestSample { stamp id stage kind }
-    FaultSample { stamp id stage kind although_real }
 }

@@ -11,7 +11,8 @@
 //! | `inflation` | occupied cells grown by the robot's body |
 //! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
 //! | `fault` | hazard of injected faults |
-//! | [`shell`] | wires the step to the topics `pose`, `range`, `directive` and `grid`, saves its state |
+//! | [`stage`] | what a recording holds of it, what it publishes and persists |
+//! | [`shell`] | its process: reads the topics `pose`, `range` and `directive`, publishes keyframes |
 
 mod clear_beams;
 mod evidence_grid;
@@ -20,7 +21,7 @@ mod fault;
 mod inflation;
 mod infrared_model;
 mod reading;
-pub mod replay;
 pub mod shell;
 mod sonar_model;
+pub mod stage;
 pub mod step;

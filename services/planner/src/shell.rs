@@ -11,6 +11,7 @@ use common::{
     shell::{Context, Process, Progress, StageError},
     step::Step as _,
     topics,
+    wiring::Wiring,
 };
 
 use harmonic::SolveError;
@@ -47,28 +48,30 @@ pub struct Shell {
 }
 
 impl Process for Shell {
+    const WIRING: &'static Wiring = &Wiring {
+        inputs: &[&topics::POSE, &topics::GRID],
+        wakes: &[&topics::GRID],
+        outputs: &[&topics::GUIDANCE, &topics::FIELD],
+        ..Wiring::of("planner")
+    };
+
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        let generation = context.generation.number;
-        let mission = &context.run.mission;
-        let longest = mission.grid_frame().area();
-        context.waiter.on(context.bus.wakeup(&topics::GRID)?);
+        let longest = context.run.mission.grid_frame().area();
         let background = BackgroundSolver::start().map_err(|error| {
             StageError::Other(format!("cannot start the thread of full solves: {error}"))
         })?;
         context.waiter.on_readable(&background)?;
-        let field = context
-            .bus
-            .slice_writer(&topics::FIELD, generation, longest)?;
+        let field = context.slice_writer(&topics::FIELD, longest)?;
         let field = FieldPublisher::start(field).map_err(|error| {
             StageError::Other(format!("cannot start the thread of policies: {error}"))
         })?;
         context.waiter.on_readable(&field)?;
         Ok(Self {
-            grid: context.bus.slice_reader(&topics::GRID)?,
-            pose: context.bus.reader(&topics::POSE)?,
-            guidance: context.bus.writer(&topics::GUIDANCE, generation)?,
+            grid: context.slice_reader(&topics::GRID)?,
+            pose: context.reader(&topics::POSE)?,
+            guidance: context.writer(&topics::GUIDANCE)?,
             field,
-            planner: Planner::new(mission),
+            planner: Planner::new(&context.run.mission),
             background,
             inputs: InputLog::begin(context, &())?,
             encoded: Vec::new(),

@@ -9,13 +9,14 @@
 //! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
 //! | `writers` | whose commands and orders are obeyed |
-//! | [`shell`] | wires them to the topics |
+//! | [`stage`] | what a recording holds of it, and what it publishes |
+//! | [`shell`] | its process: the wire and the topics it reads |
 
 pub mod backoff;
 pub mod drive;
 pub mod failsafe;
-pub mod replay;
 pub mod shell;
+pub mod stage;
 pub mod step;
 pub mod telemetry;
 pub mod transport;

@@ -1,20 +1,20 @@
-//! The wire, `command`, `directive` and `tick_limit` in; `range`, `wheels`, `link`, telemetry and the wire out.
+//! The wire, `command`, `directive`, `tick_limit` and `roster` in; `range`, `wheels`, `link`, telemetry and the wire out.
 
 use std::time::Duration;
 
 use common::{
-    bus::{Reader, SliceWriter, Writer},
-    clock::{MissionClock, Pace, monotonic_ns},
-    inputs::InputLog,
+    bus::Reader,
+    clock::{MissionClock, monotonic_ns},
     latency::Histogram,
-    latency_budget::{Answers, Item, LatencyBudget},
+    latency_budget::{Answers, LatencyBudget},
     samples::{
-        Cause, CommandSample, DirectiveSample, HoldReason, InfraredSample, LinkSample, Order,
-        PowerSample, RangeSample, SurroundingsSample, TickLimitSample, WheelSample, WireHeader,
+        Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order, TickLimitSample,
     },
     shell::{Context, Process, Progress, StageError},
+    stage::Runner,
     step::Step as _,
     topics::{self, AnyTopic as _},
+    wiring::Wiring,
 };
 
 use crate::{
@@ -22,8 +22,8 @@ use crate::{
         Decision,
         battery::{BatteryChange, Charge},
     },
-    replay::{Carried, Entry, Taken, WIRE_PIECE},
-    step::{Effect, Event, Input, Link, State},
+    stage::{Entry, LinkStage, Taken, WIRE_PIECE},
+    step::{Effect, Event},
     transport::{Transport, TransportError},
     writers::Writers,
 };
@@ -31,33 +31,17 @@ use crate::{
 /// Without input the link looks at the clock so often: a fifth of the shortest time that it waits for anything.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
-/// Where it goes.
-#[derive(Debug)]
-struct Telemetry {
-    infrared: Writer<InfraredSample>,
-    power: Writer<PowerSample>,
-    surroundings: Writer<SurroundingsSample>,
-}
-
 /// The link process.
-#[derive(Debug)]
 pub struct Shell {
     transport: Transport,
     command: Reader<CommandSample>,
     writers: Writers,
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
-    range: Writer<RangeSample>,
-    wheels: Writer<WheelSample>,
-    state: Writer<LinkSample>,
-    wire: SliceWriter<WireHeader, u8>,
-    inputs: InputLog,
-    /// What nobody in the pipeline waits for: published when it has a lull.
-    carried: Carried,
-    /// Opened once the link works.
-    telemetry: Option<Telemetry>,
+    runner: Runner<LinkStage>,
+    /// The topics of telemetry are open.
+    has_telemetry: bool,
     clock: MissionClock,
-    link: Link,
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
@@ -65,44 +49,37 @@ pub struct Shell {
 }
 
 impl Process for Shell {
+    const WIRING: &'static Wiring = &Wiring {
+        inputs: &[&topics::DIRECTIVE, &topics::TICK_LIMIT, &topics::ROSTER],
+        feedback: &[&topics::COMMAND],
+        wakes: &[&topics::COMMAND, &topics::DIRECTIVE, &topics::TICK_LIMIT],
+        outputs: &[
+            &topics::RANGE,
+            &topics::WHEELS,
+            &topics::LINK,
+            &topics::INFRARED,
+            &topics::POWER,
+            &topics::SURROUNDINGS,
+            &topics::WIRE,
+        ],
+        ..Wiring::of("x80-link")
+    };
+
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let transport = Transport::open(&context.run.address).map_err(wire_broke)?;
         context.waiter.on_readable(&transport)?;
-        context.waiter.on(context.bus.wakeup(&topics::COMMAND)?);
-        context.waiter.on(context.bus.wakeup(&topics::DIRECTIVE)?);
-        context.waiter.on(context.bus.wakeup(&topics::TICK_LIMIT)?);
-        let generation = context.generation.number;
-        let run = &context.run;
-        let mut link = Link::new(&run.mission);
-        let state = State {
-            pace: match run.clock {
-                MissionClock::Ticks { .. } => Pace::Max,
-                MissionClock::Wall { rate, .. } => Pace::Rate(rate),
-            },
-            next_tick: context.generation.first_tick,
-        };
-        let inputs = InputLog::begin(context, &state)?;
-        link.restore(state)
-            .map_err(|foreign| StageError::Other(foreign.to_string()))?;
-        let mut command = context.bus.reader(&topics::COMMAND)?;
-        let writers = Writers::open(&context.bus, &mut command)?;
+        let runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
+        let mut command = context.reader(&topics::COMMAND)?;
+        let writers = Writers::open(context, &mut command)?;
         Ok(Self {
             transport,
             command,
             writers,
-            directive: context.bus.reader(&topics::DIRECTIVE)?,
-            tick_limit: context.bus.reader(&topics::TICK_LIMIT)?,
-            range: context.bus.writer(&topics::RANGE, generation)?,
-            wheels: context.bus.writer(&topics::WHEELS, generation)?,
-            state: context.bus.writer(&topics::LINK, generation)?,
-            wire: context
-                .bus
-                .slice_writer(&topics::WIRE, generation, WIRE_PIECE)?,
-            inputs,
-            carried: Carried::default(),
-            telemetry: None,
-            clock: run.clock,
-            link,
+            directive: context.reader(&topics::DIRECTIVE)?,
+            tick_limit: context.reader(&topics::TICK_LIMIT)?,
+            runner,
+            has_telemetry: false,
+            clock: context.run.clock,
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
@@ -132,43 +109,29 @@ impl Process for Shell {
             let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
                 break;
             };
-            let now = self.clock.at(self.link.state().next_tick, now_ns);
-            let at = self.carried.progress;
-            let taken = Taken::Datagram(bytes);
-            let entry = Entry::Step(taken, now_ns, now);
-            self.budget.end(Item::Read);
-            self.inputs.note(&entry, at)?;
-            self.carried.received(bytes, now_ns);
-            self.budget.end(Item::Persist);
-            let input = Input {
-                event: Event::Datagram(bytes),
-                machine_ns: now_ns,
-            };
-            let effects = self.link.step(input, now);
-            self.budget.end(Item::Step);
-            self.carry_out(effects, now_ns)?;
+            let now = self
+                .clock
+                .at(self.runner.stage.link.state().next_tick, now_ns);
+            let entry = Entry::Step(Taken::Datagram(bytes), now_ns, now);
+            let effects = self.runner.take(entry)?;
+            self.carry_out(effects)?;
         }
         self.maintain()?;
         self.take(Event::Quiet, monotonic_ns())?;
         if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
             self.state()?;
         }
-        self.publish_wire()?;
-        Ok(self.carried.progress)
+        self.runner.publish_rest()?;
+        Ok(self.runner.out.at)
     }
 
-    fn after_ready(&mut self, context: &Context) -> Result<(), StageError> {
-        let (bus, generation) = (&context.bus, context.generation.number);
-        self.telemetry = Some(Telemetry {
-            infrared: bus.writer(&topics::INFRARED, generation)?,
-            power: bus.writer(&topics::POWER, generation)?,
-            surroundings: bus.writer(&topics::SURROUNDINGS, generation)?,
-        });
-        Ok(())
+    fn after_ready(&mut self, context: &mut Context) -> Result<(), StageError> {
+        self.has_telemetry = true;
+        self.runner.open_late(context)
     }
 
     fn has_idle_work(&self) -> bool {
-        self.telemetry.is_some() && self.carried.has_telemetry()
+        self.has_telemetry && self.runner.stage.has_telemetry()
     }
 
     /// Commands are repeated, and the failsafe acts, when it is time.
@@ -177,38 +140,16 @@ impl Process for Shell {
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
-        let Some(telemetry) = &mut self.telemetry else {
-            return Ok(());
-        };
-        let carried = &mut self.carried;
-        if !carried.has_telemetry() {
-            return Ok(());
-        }
-        self.inputs.note(&Entry::Telemetry, carried.progress)?;
-        self.inputs.publish(carried.progress)?;
-        let Progress { tick, time } = carried.progress;
-        if let Some(infrared) = carried.infrared.take() {
-            telemetry.infrared.publish(tick, time, infrared)?;
-        }
-        if let Some(power) = carried.power.take() {
-            telemetry.power.publish(tick, time, power)?;
-        }
-        if let Some(surroundings) = carried.surroundings.take() {
-            telemetry.surroundings.publish(tick, time, surroundings)?;
+        if self.has_idle_work() {
+            self.runner.take(Entry::Telemetry)?;
         }
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), StageError> {
-        let machine_ns = monotonic_ns();
-        for bytes in self.link.final_stops() {
-            self.transport.send(&bytes).map_err(wire_broke)?;
-            self.carried.sent(&bytes, machine_ns);
-        }
-        let at = self.carried.progress;
-        self.inputs.note(&Entry::Stop(machine_ns), at)?;
-        self.inputs.publish(at)?;
-        self.publish_wire()?;
+        let effects = self.runner.take(Entry::Stop(monotonic_ns()))?;
+        self.carry_out(effects)?;
+        self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
         Ok(())
     }
@@ -264,57 +205,21 @@ impl Shell {
     }
 
     fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
-        let now = self.clock.at(self.link.state().next_tick, machine_ns);
+        let next_tick = self.runner.stage.link.state().next_tick;
+        let now = self.clock.at(next_tick, machine_ns);
         let entry = Entry::Step(Taken::of(&event), machine_ns, now);
-        self.budget.end(Item::Read);
-        self.inputs.note(&entry, self.carried.progress)?;
-        self.budget.end(Item::Persist);
-        let effects = self.link.step(Input { event, machine_ns }, now);
-        self.budget.end(Item::Step);
-        self.carry_out(effects, machine_ns)
+        let effects = self.runner.take(entry)?;
+        self.carry_out(effects)
     }
 
-    /// Publish the bytes that came and went, once nobody waits.
-    fn publish_wire(&mut self) -> Result<(), StageError> {
-        if self.carried.wire.is_empty() {
-            return Ok(());
-        }
-        self.inputs.publish(self.carried.progress)?;
-        for (at, header, bytes) in self.carried.wire.drain(..) {
-            for piece in bytes.chunks(WIRE_PIECE) {
-                self.wire
-                    .publish_slice_quietly(at.tick, at.time, header, piece)?;
-            }
-        }
-        Ok(())
-    }
-
-    fn carry_out(&mut self, effects: Vec<Effect>, machine_ns: u64) -> Result<(), StageError> {
-        if !effects.is_empty() {
-            self.inputs.publish(self.carried.progress)?;
-            self.budget.end(Item::Persist);
-        }
+    /// Do what the effects leave to the process.
+    fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
         for effect in effects {
             match effect {
-                Effect::Send(bytes) => {
-                    self.transport.send(&bytes).map_err(wire_broke)?;
-                    self.carried.sent(&bytes, machine_ns);
-                }
-                Effect::Tick {
-                    tick,
-                    time,
-                    range,
-                    wheels,
-                } => {
-                    self.carried.progress = Progress { tick, time };
-                    self.range.publish(tick, time, range)?;
-                    self.wheels.publish_quietly(tick, time, wheels)?;
-                    self.budget.published(tick, Answers::Inputs);
-                    self.wheels.wake()?;
-                }
+                Effect::Send(bytes) => self.transport.send(&bytes).map_err(wire_broke)?,
                 Effect::Answered { began_ns } => {
-                    self.budget
-                        .published(self.carried.progress.tick, Answers::Feedback);
+                    let tick = self.runner.out.at.tick;
+                    self.budget.published(tick, Answers::Feedback);
                     self.latency_ns = monotonic_ns().saturating_sub(began_ns);
                     self.latency.record(self.latency_ns);
                     self.state()?;
@@ -328,7 +233,8 @@ impl Shell {
                 Effect::Decided { before, now } => {
                     log_decision(before, now);
                     if now.action >= before.action
-                        && let Some(explanation) = self.link.explain(now.cause, monotonic_ns())
+                        && let Some(explanation) =
+                            self.runner.stage.link.explain(now.cause, monotonic_ns())
                     {
                         tracing::warn!("{explanation}");
                     }
@@ -343,7 +249,7 @@ impl Shell {
                     self.state()?;
                 }
                 Effect::Restarted => {
-                    let restarts = self.link.restarts();
+                    let restarts = self.runner.stage.link.restarts();
                     tracing::warn!(restarts, "the robot restarted: its counts begin anew");
                 }
                 Effect::CountsElsewhere => tracing::warn!(
@@ -355,10 +261,12 @@ impl Shell {
                 Effect::AskedForStreams => {
                     tracing::info!("the robot is asked for its streams again");
                 }
-                Effect::Infrared(sample) => self.carried.infrared = Some(sample),
-                Effect::Power(sample) => self.carried.power = Some(sample),
-                Effect::Surroundings(sample) => self.carried.surroundings = Some(sample),
                 Effect::Battery(change) => log_battery(&change),
+                // The stage has published them.
+                Effect::Tick { .. }
+                | Effect::Infrared(_)
+                | Effect::Power(_)
+                | Effect::Surroundings(_) => {}
             }
         }
         Ok(())
@@ -368,9 +276,10 @@ impl Shell {
     fn state(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         self.stated_ns = now_ns;
-        let wire = self.link.wire_tally();
-        let tally = self.link.tally();
-        let absence = self.link.absence(now_ns);
+        let link = &self.runner.stage.link;
+        let wire = link.wire_tally();
+        let tally = link.tally();
+        let absence = link.absence(now_ns);
         // Of a wire that is not open, the openings; else the pings.
         let (attempts, next_attempt_ns) = match self.transport.attempts(now_ns) {
             Some(openings) => (openings.made, openings.next_ns),
@@ -383,10 +292,10 @@ impl Shell {
             self.tick_limit.ignored(),
         ]);
         let sample = LinkSample {
-            connected: self.link.connected().into(),
-            action: self.link.decision().action.into(),
-            cause: self.link.decision().cause.into(),
-            at_rest: self.link.is_at_rest().into(),
+            connected: link.connected().into(),
+            action: link.decision().action.into(),
+            cause: link.decision().cause.into(),
+            at_rest: link.is_at_rest().into(),
             frames_in: wire.frames,
             bytes_dropped: wire.noise_bytes + wire.dropped_bytes,
             foreign_datagrams: carried.foreign_datagrams,
@@ -394,8 +303,8 @@ impl Shell {
             ignored_samples: ignored.samples,
             ignored_writer: ignored.process,
             other_port: carried.other_port.into(),
-            losses: self.link.losses(),
-            reboots: self.link.restarts().into(),
+            losses: link.losses(),
+            reboots: link.restarts().into(),
             lost_ns: absence.lost_ns,
             attempts,
             next_attempt_ns,
@@ -407,8 +316,6 @@ impl Shell {
             latency_histogram: *self.latency.counts(),
             ..LinkSample::default()
         };
-        let Progress { tick, time } = self.carried.progress;
-        self.state.publish(tick, time, sample)?;
-        Ok(())
+        self.runner.out.give(&topics::LINK, sample)
     }
 }

@@ -1,8 +1,9 @@
 //! The link obeys commands and orders only of processes that the supervisor started.
 
 use common::{
-    bus::{Author, Bus, BusError, Ignored, Reader, SliceReader},
+    bus::{Author, BusError, Ignored, Reader, SliceReader},
     samples::{CommandSample, RosterEntry, RosterHeader, name_str},
+    shell::{Context, StageError},
     topics::{self, AnyTopic as _},
 };
 
@@ -14,14 +15,17 @@ pub(crate) struct Writers {
 }
 
 impl Writers {
-    /// Follow the roster on `bus`. Until it names the controller, no command is obeyed.
-    pub(crate) fn open(bus: &Bus, command: &mut Reader<CommandSample>) -> Result<Self, BusError> {
+    /// Follow the roster. Until it names the controller, no command is obeyed.
+    pub(crate) fn open(
+        context: &mut Context,
+        command: &mut Reader<CommandSample>,
+    ) -> Result<Self, StageError> {
         command.follow(Author {
             process: 0,
             generation: 0,
         });
         Ok(Self {
-            roster: bus.slice_reader(&topics::ROSTER)?,
+            roster: context.slice_reader(&topics::ROSTER)?,
             ignored: Ignored::default(),
         })
     }

@@ -33,6 +33,7 @@ impl OutputWatchdog {
             stage,
             patience: stage.deadlines_on(cells).answers,
             reads: stage
+                .wiring
                 .inputs
                 .iter()
                 .filter(|input| input.spec().rate == Rate::EachTick)
@@ -122,7 +123,10 @@ mod tests {
 
     #[test]
     fn the_stage_where_a_tick_ends_is_blamed_and_nobody_behind_it() {
-        let tick = TABLE.each_ref().map(|stage| (stage.name, 7));
+        let tick = TABLE
+            .iter()
+            .map(|stage| (stage.name, 7))
+            .collect::<Vec<_>>();
         for (until, _) in tick.iter().enumerate().skip(1) {
             let outputs: Vec<_> = tick
                 .iter()
@@ -175,7 +179,7 @@ mod tests {
     fn a_stage_that_lags_but_answers_is_left_alone() {
         let mut watchdog = OutputWatchdog::new(0);
         for tick in 1..100 {
-            for stage in &TABLE {
+            for stage in TABLE {
                 let ahead = u64::from(stage.name == "x80-link");
                 watchdog.on_output(stage.name, tick + ahead);
             }
@@ -186,7 +190,12 @@ mod tests {
 
     #[test]
     fn a_new_generation_need_not_answer_ticks_from_before_it() {
-        let mut watchdog = published(&TABLE.each_ref().map(|stage| (stage.name, 6)));
+        let mut watchdog = published(
+            &TABLE
+                .iter()
+                .map(|stage| (stage.name, 6))
+                .collect::<Vec<_>>(),
+        );
         watchdog.on_output("x80-link", 7);
         watchdog.stale(Duration::ZERO);
         watchdog.on_start("dead-reckoning");

@@ -10,7 +10,7 @@ use common::{
     clock::{MissionClock, MissionTime, Pace, boot_ns, monotonic_ns},
     run::{self, Run, RunError},
 };
-use dead_reckoning::shell::saved_state;
+use dead_reckoning::saved_state;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

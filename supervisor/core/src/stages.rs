@@ -1,4 +1,4 @@
-//! THE table of stages: what runs for a robot, what each reads and writes, and its deadlines.
+//! THE table of stages: what runs for a robot, and its deadlines. What each opens and persists is declared where it is opened.
 //!
 //! Start order, deadlines, `firsthand stage`, `firsthand stages` and the tables of the documentation come from it.
 
@@ -7,24 +7,18 @@ use std::{path::Path, time::Duration};
 use common::{
     mission::Mission,
     replay::Begin,
-    shell::run_stage,
+    shell::{Process, run_stage},
+    stage::{Answering, Answers, replay},
     start::{StageError, Start},
-    topics::{
-        AnyTopic, COMMAND, DIRECTIVE, FIELD, GRID, GUIDANCE, INFRARED, LINK, POSE, POWER, RANGE,
-        SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
-    },
+    wiring::Wiring,
 };
 
 /// A row of the table.
 pub struct Stage {
-    /// Its name: of the process, of `firsthand stage NAME`, of the folder under `services/`.
+    /// Its name, as its wiring says.
     pub name: &'static str,
-    /// Topics it reads, whose writers start before it.
-    pub inputs: &'static [&'static dyn AnyTopic],
-    /// Topics it reads that close the loop: their writers start after it.
-    pub feedback: &'static [&'static dyn AnyTopic],
-    /// Topics it alone writes.
-    pub outputs: &'static [&'static dyn AnyTopic],
+    /// What its process opens on the bus, and what it persists.
+    pub wiring: &'static Wiring,
     /// Deadlines on a map without cells.
     pub deadlines: Deadlines,
     /// Added to each deadline for a million cells of the map.
@@ -48,6 +42,24 @@ pub struct Deadlines {
 }
 
 impl Stage {
+    /// A stage with the deadlines of most, whose process is `P`.
+    const fn new<P: Process>(replay: Begin, while_down: &'static str) -> Self {
+        Self {
+            name: P::WIRING.stage,
+            wiring: P::WIRING,
+            deadlines: DEADLINES,
+            per_million_cells: Duration::ZERO,
+            while_down,
+            run: run_stage::<P>,
+            replay,
+        }
+    }
+
+    /// A stage that answers one topic with another.
+    const fn answering<A: Answering>(while_down: &'static str) -> Self {
+        Self::new::<Answers<A>>(replay::<A>, while_down)
+    }
+
     /// The executable that `mission` names for this stage; none where the stage is `firsthand`'s own.
     pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
         let named = mission.planner.executable.as_deref();
@@ -95,71 +107,26 @@ const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 /// The name of the stage that gives guidance: a mission may name an executable for it.
 pub const PLANNER: &str = "planner";
 
+/// What the robot does while one of most stages is down.
+const STOPPED: &str = "stopped by the link when the command is stale";
+
 /// Every stage, in the order of the pipeline.
-pub static TABLE: [Stage; 5] = [
+pub static TABLE: &[Stage] = &[
+    Stage::new::<x80_link::shell::Shell>(
+        replay::<x80_link::stage::LinkStage>,
+        "stands when its timed command ends",
+    ),
+    Stage::answering::<dead_reckoning::DeadReckoning>(STOPPED),
     Stage {
-        name: "x80-link",
-        inputs: &[&DIRECTIVE, &TICK_LIMIT],
-        feedback: &[&COMMAND],
-        outputs: &[
-            &RANGE,
-            &WHEELS,
-            &LINK,
-            &INFRARED,
-            &POWER,
-            &SURROUNDINGS,
-            &WIRE,
-        ],
-        deadlines: DEADLINES,
-        per_million_cells: Duration::ZERO,
-        while_down: "stands when its timed command ends",
-        run: run_stage::<x80_link::shell::Shell>,
-        replay: x80_link::replay::begin,
-    },
-    Stage {
-        name: "dead-reckoning",
-        inputs: &[&WHEELS],
-        feedback: &[],
-        outputs: &[&POSE],
-        deadlines: DEADLINES,
-        per_million_cells: Duration::ZERO,
-        while_down: "stopped by the link when the command is stale",
-        run: run_stage::<dead_reckoning::shell::Shell>,
-        replay: dead_reckoning::replay::begin,
-    },
-    Stage {
-        name: "mapper",
-        inputs: &[&RANGE, &POSE, &DIRECTIVE],
-        feedback: &[],
-        outputs: &[&GRID],
-        deadlines: DEADLINES,
         per_million_cells: MAPPER_MILLION_CELLS,
-        while_down: "stopped by the link when the command is stale",
-        run: run_stage::<mapper::shell::Shell>,
-        replay: mapper::replay::begin,
+        ..Stage::new::<mapper::shell::Shell>(replay::<mapper::step::Mapper>, STOPPED)
     },
     Stage {
-        name: PLANNER,
-        inputs: &[&POSE, &GRID],
-        feedback: &[],
-        outputs: &[&GUIDANCE, &FIELD],
         deadlines: PLANNER_DEADLINES,
         per_million_cells: PLANNER_MILLION_CELLS,
-        while_down: "stopped by the link when the command is stale",
-        run: run_stage::<planner::shell::Shell>,
-        replay: planner::replay::begin,
+        ..Stage::new::<planner::shell::Shell>(planner::replay::begin, STOPPED)
     },
-    Stage {
-        name: "controller",
-        inputs: &[&POSE, &GUIDANCE],
-        feedback: &[],
-        outputs: &[&COMMAND],
-        deadlines: DEADLINES,
-        per_million_cells: Duration::ZERO,
-        while_down: "stopped by the link when the command is stale",
-        run: run_stage::<controller::shell::Shell>,
-        replay: controller::replay::begin,
-    },
+    Stage::answering::<controller::Controller>(STOPPED),
 ];
 
 pub fn find(name: &str) -> Option<&'static Stage> {
@@ -182,7 +149,7 @@ pub fn start_order() -> Vec<&'static Stage> {
             .filter(|stage| !order.iter().any(|placed| placed.name == stage.name))
             .collect();
         let next = waiting.iter().find(|stage| {
-            stage.inputs.iter().all(|input| {
+            stage.wiring.inputs.iter().all(|input| {
                 let writer = input.spec().writer;
                 !waiting.iter().any(|other| other.name == writer)
             })
@@ -200,8 +167,8 @@ mod tests {
 
     #[test]
     fn every_input_has_a_writer_and_every_output_names_its_stage() {
-        for stage in &TABLE {
-            for input in stage.inputs.iter().chain(stage.feedback) {
+        for stage in TABLE {
+            for input in stage.wiring.inputs.iter().chain(stage.wiring.feedback) {
                 let writer = input.spec().writer;
                 assert!(
                     writer == SUPERVISOR || find(writer).is_some(),
@@ -210,7 +177,7 @@ mod tests {
                     input.spec().name
                 );
             }
-            for output in stage.outputs {
+            for output in stage.wiring.outputs {
                 assert_eq!(output.spec().writer, stage.name, "{}", output.spec().name);
             }
         }
@@ -223,6 +190,7 @@ mod tests {
             if ![SUPERVISOR, EVERY_STAGE, OPERATOR].contains(&spec.writer) {
                 let writer = find(spec.writer).unwrap();
                 let writes = writer
+                    .wiring
                     .outputs
                     .iter()
                     .any(|output| output.spec().name == spec.name);
@@ -235,8 +203,8 @@ mod tests {
     fn a_stage_starts_after_the_writers_of_its_inputs() {
         let names: Vec<_> = start_order().iter().map(|stage| stage.name).collect();
         let place = |name: &str| names.iter().position(|placed| *placed == name);
-        for stage in &TABLE {
-            for input in stage.inputs {
+        for stage in TABLE {
+            for input in stage.wiring.inputs {
                 if let Some(writer) = place(input.spec().writer) {
                     assert!(Some(writer) < place(stage.name), "{names:?}");
                 }

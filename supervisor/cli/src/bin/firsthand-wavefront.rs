@@ -7,5 +7,5 @@ use evaluation::baselines::{shell::Shell, wavefront::Wavefront};
 fn main() -> ExitCode {
     let log = tracing_subscriber::fmt().with_ansi(false);
     log.with_writer(io::stderr).init();
-    common::shell::main::<Shell<Wavefront>>("planner")
+    common::shell::main::<Shell<Wavefront>>()
 }

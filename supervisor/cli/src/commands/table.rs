@@ -5,7 +5,8 @@ use std::{fmt::Write as _, process::ExitCode};
 use clap::{Args, Subcommand};
 use common::{
     faults,
-    topics::{self, AnyTopic, Logged, Rate},
+    topics::{self, Logged, Rate},
+    wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Persists, Topics},
 };
 use supervisor::stages;
 use x80_link::failsafe;
@@ -80,24 +81,29 @@ pub(super) fn topics() -> String {
 /// The stages as a Markdown table.
 pub(super) fn stages() -> String {
     let mut table = String::from(
-        "| stage | reads | writes | ready within | beats within | answers within | each, for a million cells more | while it is down the robot |\n|---|---|---|---|---|---|---|---|\n",
+        "| stage | reads | is woken by | writes | persists | ready within | beats within | answers within | each, for a million cells more | while it is down the robot |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for stage in &stages::TABLE {
-        let list = |topics: &[&dyn AnyTopic]| {
-            let names: Vec<_> = topics
-                .iter()
-                .map(|topic| format!("`{}`", topic.spec().name))
-                .collect();
-            names.join(", ")
-        };
-        let reads: Vec<&dyn AnyTopic> =
-            stage.inputs.iter().chain(stage.feedback).copied().collect();
+    let list = |topics: &[Topics]| {
+        let topics = topics.iter().copied().flatten();
+        let names: Vec<_> = topics
+            .map(|topic| format!("`{}`", topic.spec().name))
+            .collect();
+        names.join(", ")
+    };
+    for stage in stages::TABLE {
+        let wiring = stage.wiring;
         let _ = writeln!(
             table,
-            "| `{}` | {} | {} | {} ms | {} ms | {} ms | {} ms | {} |",
+            "| `{}` | {} | {} | {} | {} | {} ms | {} ms | {} ms | {} ms | {} |",
             stage.name,
-            list(&reads),
-            list(stage.outputs),
+            list(&[wiring.inputs, wiring.feedback]),
+            list(&[wiring.wakes]),
+            list(&[wiring.outputs]),
+            match wiring.persists {
+                Persists::Nothing => "nothing".to_owned(),
+                Persists::State(bytes) => format!("its state, {bytes} bytes"),
+                Persists::Journal => "its inputs since a snapshot".to_owned(),
+            },
             stage.deadlines.startup.as_millis(),
             stage.deadlines.heartbeat.as_millis(),
             stage.deadlines.answers.as_millis(),
@@ -105,6 +111,11 @@ pub(super) fn stages() -> String {
             stage.while_down
         );
     }
+    let (reads, writes) = (list(&[EVERY_STAGE_READS]), list(&[EVERY_STAGE_WRITES]));
+    let _ = writeln!(
+        table,
+        "\nEvery stage also reads {reads} and writes {writes}."
+    );
     table
 }
 

@@ -4,17 +4,18 @@ use std::fmt::Debug;
 
 use common::{
     bus::{Reader, SliceReader, Writer},
-    checkpoint::Checkpoint,
     samples::{GridHeader, GuidanceSample, PoseSample},
+    saved::Saved,
     shell::{Context, Process, Progress, StageError},
     step::Step,
     topics::{GRID, GUIDANCE, POSE},
+    wiring::{Persists, Wiring},
 };
 
 use crate::baselines::planner::{Input, Outcome};
 
 /// Room for the encoded state, bytes: Bug2's is under 150.
-const CHECKPOINT_CAPACITY: usize = 256;
+const STATE_BYTES: usize = 256;
 
 /// The process of a planner whose step is `P`.
 #[derive(Debug)]
@@ -22,7 +23,7 @@ pub struct Shell<P> {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
     guidance: Writer<GuidanceSample>,
-    checkpoint: Checkpoint,
+    saved: Saved,
     planner: P,
     latest_pose: Option<PoseSample>,
     /// The tick last answered.
@@ -35,23 +36,27 @@ where
     P: for<'a> Step<Input<'a> = Input<'a>, Output = Outcome>,
     P::State: Debug + Clone,
 {
+    const WIRING: &'static Wiring = &Wiring {
+        inputs: &[&POSE, &GRID],
+        wakes: &[&GRID],
+        outputs: &[&GUIDANCE],
+        persists: Persists::State(STATE_BYTES),
+        ..Wiring::of("planner")
+    };
+
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let mut planner = P::new(&context.run.mission);
-        let (checkpoint, saved) =
-            Checkpoint::open::<P::State>(&context.checkpoint_file(), CHECKPOINT_CAPACITY)?;
-        if let Some(state) = saved {
+        if let Some(state) = context.saved_state()? {
             match planner.restore(state) {
                 Ok(()) => tracing::info!(state = ?planner.state(), "restored"),
                 Err(foreign) => tracing::warn!("{foreign}"),
             }
         }
-        context.waiter.on(context.bus.wakeup(&GRID)?);
-        let generation = context.generation.number;
         Ok(Self {
-            grid: context.bus.slice_reader(&GRID)?,
-            pose: context.bus.reader(&POSE)?,
-            guidance: context.bus.writer(&GUIDANCE, generation)?,
-            checkpoint,
+            grid: context.slice_reader(&GRID)?,
+            pose: context.reader(&POSE)?,
+            guidance: context.writer(&GUIDANCE)?,
+            saved: context.take_saved(),
             planner,
             latest_pose: None,
             answered: None,
@@ -99,7 +104,7 @@ where
             return Ok(());
         };
         if let Outcome::Guidance(guidance) = self.planner.step(Input::Pose(&pose), time) {
-            self.checkpoint.save(self.planner.state())?;
+            self.saved.save(self.planner.state())?;
             self.guidance.publish(tick, time, guidance)?;
         }
         self.answered = Some(tick);

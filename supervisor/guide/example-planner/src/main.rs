@@ -8,6 +8,7 @@ use common::{
     samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
     shell::{self, Context, Process, Progress, StageError},
     topics::{GRID, GUIDANCE, POSE},
+    wiring::Wiring,
 };
 use glam::DVec2;
 
@@ -25,13 +26,18 @@ struct Planner {
 }
 
 impl Process for Planner {
+    const WIRING: &'static Wiring = &Wiring {
+        inputs: &[&POSE, &GRID],
+        wakes: &[&GRID],
+        outputs: &[&GUIDANCE],
+        ..Wiring::of("planner")
+    };
+
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        context.waiter.on(context.bus.wakeup(&GRID)?);
-        let generation = context.generation.number;
         Ok(Self {
-            grid: context.bus.slice_reader(&GRID)?,
-            pose: context.bus.reader(&POSE)?,
-            guidance: context.bus.writer(&GUIDANCE, generation)?,
+            grid: context.slice_reader(&GRID)?,
+            pose: context.reader(&POSE)?,
+            guidance: context.writer(&GUIDANCE)?,
             target: context.run.mission.target,
             map: Replica::default(),
             latest: None,
@@ -94,5 +100,5 @@ impl Planner {
 }
 
 fn main() -> ExitCode {
-    shell::main::<Planner>("planner")
+    shell::main::<Planner>()
 }

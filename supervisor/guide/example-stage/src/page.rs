@@ -9,34 +9,22 @@ fn block(caption: &str) -> &'static str {
 }
 
 #[test]
-fn the_page_shows_step_tests_replay_and_shell_as_they_are() {
-    let shown = |file: &str| block(&format!("New file `services/odometer/src/{file}`:"));
-    assert_eq!(shown("step.rs"), include_str!("step.rs"));
-    assert_eq!(shown("step/tests.rs"), include_str!("step/tests.rs"));
-    // The payload and the topic are in `common` there, and here beside the shell.
-    let shell = include_str!("shell.rs")
+fn the_page_shows_the_stage_as_it_is() {
+    // The payload and the topic are in `common` there, and here beside the stage.
+    let stage = include_str!("odometer.rs")
         .replace(
             "    samples::PoseSample,",
             "    samples::{DistanceSample, PoseSample},",
         )
         .replace("    topics::POSE,", "    topics::{DISTANCE, POSE},")
-        .replace("use crate::rows::{DISTANCE, DistanceSample};\n", "");
-    assert_eq!(shown("shell.rs"), shell);
-    let replay = include_str!("replay.rs")
-        .replace(
-            "    samples::PoseSample,",
-            "    samples::{DistanceSample, PoseSample},",
-        )
-        .replace(
-            "    step::Step as _,\n",
-            "    step::Step as _,\n    topics::DISTANCE,\n",
-        )
-        .replace("use crate::rows::{DISTANCE, DistanceSample};\n", "");
-    assert_eq!(shown("replay.rs"), replay);
+        .replace("\nuse crate::rows::{DISTANCE, DistanceSample};\n", "");
+    assert_eq!(block("New file `services/odometer/src/lib.rs`:"), stage);
 }
 
 #[test]
 fn the_page_shows_the_payload_as_it_is() {
-    let payload = block("At the end of `common/src/samples/navigation.rs`:");
+    let payload = block(
+        "In `common/src/samples/navigation.rs`, before the line with `    \"firsthand.Pose\" PoseSample {`:",
+    );
     assert!(include_str!("rows.rs").contains(payload.trim()));
 }

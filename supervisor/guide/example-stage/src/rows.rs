@@ -6,34 +6,17 @@
 
 use common::{
     bus::{Topic, ZeroCopySend},
-    samples::{Stamp, Stamped},
     topics::{Limits, Logged, Rate, Spec},
 };
 
-/// Topic `distance`: how far the robot has driven.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("firsthand.Distance")]
-#[repr(C)]
-pub struct DistanceSample {
-    /// Which sample.
-    pub stamp: Stamp,
-    /// Length of the path driven so far, metres.
-    pub driven_m: f64,
-    /// Mission time in which the robot moved, seconds.
-    pub moving_s: f64,
-}
-
-impl Stamped for DistanceSample {
-    fn stamp(&self) -> &Stamp {
-        &self.stamp
+common::payloads! {
+    /// Topic `distance`: how far the robot has driven.
+    "firsthand.Distance" DistanceSample {
+        /// Length of the path driven so far, metres.
+        driven_m: f64,
+        /// Mission time in which the robot moved, seconds.
+        moving_s: f64,
     }
-    fn stamp_mut(&mut self) -> &mut Stamp {
-        &mut self.stamp
-    }
-}
-
-common::bus::layouts! {
-    DistanceSample { stamp driven_m moving_s }
 }
 
 /// Metres driven and seconds in motion.

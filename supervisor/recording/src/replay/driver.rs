@@ -75,7 +75,7 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
         topics::DEATHS.spec().name,
     ];
     for stage in &chosen {
-        let outputs = stage.outputs.iter().map(|topic| topic.spec().name);
+        let outputs = stage.wiring.outputs.iter().map(|topic| topic.spec().name);
         wanted.extend(outputs.filter(|topic| !NOT_COMPUTED.contains(topic)));
     }
     let mut report = Report {

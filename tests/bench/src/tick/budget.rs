@@ -16,7 +16,9 @@ use super::error::TickError;
 /// The path of a tick: every stage of the table, then again those with feedback.
 fn way() -> impl Iterator<Item = (&'static str, Answers)> {
     let stages = stages::TABLE.iter();
-    let again = stages.clone().filter(|stage| !stage.feedback.is_empty());
+    let again = stages
+        .clone()
+        .filter(|stage| !stage.wiring.feedback.is_empty());
     let first = stages.map(|stage| (stage.name, Answers::Inputs));
     first.chain(again.map(|stage| (stage.name, Answers::Feedback)))
 }
@@ -171,9 +173,13 @@ mod tests {
     #[test]
     fn every_stage_of_the_table_has_a_row_and_every_item_a_column() {
         let rows = Budget::default().rows();
-        for stage in &stages::TABLE {
+        for stage in stages::TABLE {
             let ways = rows.iter().filter(|row| row.stage == stage.name).count();
-            let expected = if stage.feedback.is_empty() { 1 } else { 2 };
+            let expected = if stage.wiring.feedback.is_empty() {
+                1
+            } else {
+                2
+            };
             assert_eq!(ways, expected, "{}", stage.name);
         }
         for row in &rows {

@@ -48,7 +48,7 @@ impl Feed {
     pub(super) fn open(bus: &Bus) -> Result<Self, BusError> {
         let now = Instant::now();
         let first_outputs = stages::TABLE.iter().filter_map(|stage| {
-            let first = stage.outputs.first()?.spec().name;
+            let first = stage.wiring.outputs.first()?.spec().name;
             let mut all = topics::READABLE.iter();
             Some((stage.name, all.find(|topic| topic.spec().name == first)?))
         });

@@ -121,7 +121,7 @@ impl LiveStage {
             }
             return true;
         }
-        let outputs = self.stage.outputs.iter();
+        let outputs = self.stage.wiring.outputs.iter();
         outputs
             .map(|output| output.spec().name)
             .any(|name| name == topic)

@@ -1,0 +1,327 @@
+//! Where the outputs of a stage go: onto the bus and into files in its process, into a list in a replay.
+
+use std::any::Any;
+
+use serde::Serialize;
+
+use crate::{
+    bus::{AnyTopic, BusError, Layout, Payload, SliceTopic, SliceWriter, Stamped, Topic, Writer},
+    checkpoint::CheckpointError,
+    inputs::InputLog,
+    latency_budget::{Answers, Item, LatencyBudget},
+    replay::Output,
+    saved::Saved,
+    shell::{Context, Progress},
+    start::StageError,
+    topics::Rate,
+    wiring::{Access, WiringError},
+};
+
+/// Takes what a stage publishes and persists.
+pub struct Outputs {
+    /// The tick and mission time of what is published next.
+    pub at: Progress,
+    to: Destination,
+}
+
+enum Destination {
+    Process(Box<Process>),
+    Replay(Vec<Output>),
+}
+
+struct Process {
+    writers: Vec<(&'static str, Box<dyn Any>)>,
+    inputs: InputLog,
+    saved: Saved,
+    budget: LatencyBudget,
+    /// An input was noted, and nothing published since.
+    noted: bool,
+}
+
+/// How readers come to know of a sample.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wake {
+    /// They are woken, and the tick is answered.
+    Answer,
+    Yes,
+    /// Something else wakes them.
+    No,
+}
+
+impl Outputs {
+    /// Of the process of `context`, which starts from `start`; a slice has at most `longest` elements.
+    pub(crate) fn of_process(
+        context: &mut Context,
+        start: &impl Serialize,
+        longest: usize,
+    ) -> Result<Self, StageError> {
+        let inputs = InputLog::begin(context, start)?;
+        let mut process = Process {
+            writers: Vec::new(),
+            inputs,
+            saved: context.take_saved(),
+            budget: context.budget.clone(),
+            noted: false,
+        };
+        process.open(context, longest, false)?;
+        Ok(Self {
+            at: Progress::default(),
+            to: Destination::Process(Box::new(process)),
+        })
+    }
+
+    pub(crate) fn of_replay() -> Self {
+        Self {
+            at: Progress::default(),
+            to: Destination::Replay(Vec::new()),
+        }
+    }
+
+    /// Open the topics that follow each frame of the robot.
+    pub(crate) fn open_late(&mut self, context: &mut Context) -> Result<(), StageError> {
+        match &mut self.to {
+            Destination::Process(process) => process.open(context, 0, true),
+            Destination::Replay(_) => Ok(()),
+        }
+    }
+
+    /// What was published since this was last asked, in a replay.
+    pub(crate) fn drain(&mut self) -> Vec<Output> {
+        match &mut self.to {
+            Destination::Process(_) => Vec::new(),
+            Destination::Replay(published) => std::mem::take(published),
+        }
+    }
+
+    /// The step is about to take `input`.
+    pub(crate) fn note(&mut self, input: &impl Serialize) -> Result<(), StageError> {
+        if let Destination::Process(process) = &mut self.to {
+            process.budget.end(Item::Read);
+            process.inputs.note(input, self.at)?;
+            process.budget.end(Item::Persist);
+            process.noted = true;
+        }
+        Ok(())
+    }
+
+    /// The step has taken what was noted.
+    pub(crate) fn stepped(&mut self) {
+        if let Destination::Process(process) = &mut self.to
+            && process.noted
+        {
+            process.budget.end(Item::Step);
+        }
+    }
+
+    /// Publish the inputs that were noted: what follows from them is not a sample.
+    pub fn publish_inputs(&mut self) -> Result<(), StageError> {
+        match &mut self.to {
+            Destination::Process(process) => process.publish_inputs(self.at),
+            Destination::Replay(_) => Ok(()),
+        }
+    }
+
+    /// Publish the sample that answers the tick.
+    pub fn answer<P>(&mut self, topic: &'static Topic<P>, sample: P) -> Result<(), StageError>
+    where
+        P: Payload + Stamped + Layout,
+    {
+        self.put(topic, sample, Wake::Answer)
+    }
+
+    /// Publish a sample, and wake its readers.
+    pub fn give<P>(&mut self, topic: &'static Topic<P>, sample: P) -> Result<(), StageError>
+    where
+        P: Payload + Stamped + Layout,
+    {
+        self.put(topic, sample, Wake::Yes)
+    }
+
+    /// As [`Outputs::answer`], of a header with a slice.
+    pub fn answer_slice<H, T>(
+        &mut self,
+        topic: &'static SliceTopic<H, T>,
+        header: H,
+        slice: &[T],
+    ) -> Result<(), StageError>
+    where
+        H: Payload + Stamped + Layout,
+        T: Payload + Layout,
+    {
+        self.put_slice(topic, header, slice, Wake::Answer)
+    }
+
+    /// Publish a header with a slice, and wake nobody.
+    pub fn give_slice_quietly<H, T>(
+        &mut self,
+        topic: &'static SliceTopic<H, T>,
+        header: H,
+        slice: &[T],
+    ) -> Result<(), StageError>
+    where
+        H: Payload + Stamped + Layout,
+        T: Payload + Layout,
+    {
+        self.put_slice(topic, header, slice, Wake::No)
+    }
+
+    fn put<P: Payload + Stamped + Layout>(
+        &mut self,
+        topic: &'static Topic<P>,
+        sample: P,
+        wake: Wake,
+    ) -> Result<(), StageError> {
+        let Progress { tick, time } = self.at;
+        match &mut self.to {
+            Destination::Replay(published) => {
+                published.push(Output::of(topic, tick, time, sample));
+            }
+            Destination::Process(process) => {
+                let publish = |writer: &mut Writer<P>| writer.publish_quietly(tick, time, sample);
+                process.publish(topic.spec().name, self.at, wake, publish, Writer::wake)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn put_slice<H: Payload + Stamped + Layout, T: Payload + Layout>(
+        &mut self,
+        topic: &'static SliceTopic<H, T>,
+        header: H,
+        slice: &[T],
+        wake: Wake,
+    ) -> Result<(), StageError> {
+        let Progress { tick, time } = self.at;
+        match &mut self.to {
+            Destination::Replay(published) => {
+                published.push(Output::of_slice(topic, tick, time, header, slice));
+            }
+            Destination::Process(process) => {
+                let publish = |writer: &mut SliceWriter<H, T>| {
+                    writer.publish_slice_quietly(tick, time, header, slice)
+                };
+                process.publish(topic.spec().name, self.at, wake, publish, SliceWriter::wake)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a reader of `topic` came since this was last asked: it needs a keyframe.
+    pub fn has_new_reader<H: Payload + Stamped, T: Payload>(
+        &mut self,
+        topic: &'static SliceTopic<H, T>,
+    ) -> Result<bool, StageError>
+    where
+        SliceTopic<H, T>: AnyTopic,
+    {
+        match &mut self.to {
+            Destination::Process(process) => {
+                let writer: &mut SliceWriter<H, T> = process.writer(topic.spec().name)?;
+                Ok(writer.has_new_reader())
+            }
+            Destination::Replay(_) => Ok(false),
+        }
+    }
+
+    /// Save the stage's state.
+    pub fn save(&mut self, state: &impl Serialize) -> Result<(), StageError> {
+        self.persist(|saved| saved.save(state))
+    }
+
+    /// Append an entry to the stage's journal.
+    pub fn append(&mut self, entry: &impl Serialize) -> Result<(), StageError> {
+        self.persist(|saved| saved.append(entry))
+    }
+
+    fn persist(
+        &mut self,
+        save: impl FnOnce(&mut Saved) -> Result<(), CheckpointError>,
+    ) -> Result<(), StageError> {
+        let Destination::Process(process) = &mut self.to else {
+            return Ok(());
+        };
+        // No tick waits for what is saved after its answer.
+        if process.noted {
+            process.budget.end(Item::Step);
+        }
+        save(&mut process.saved)?;
+        if process.noted {
+            process.budget.end(Item::Persist);
+        }
+        Ok(())
+    }
+
+    /// Whether a snapshot is due, with which the stage's journal begins anew.
+    pub fn is_journal_long(&self) -> bool {
+        match &self.to {
+            Destination::Process(process) => process.saved.is_journal_long(),
+            Destination::Replay(_) => false,
+        }
+    }
+
+    /// Save a snapshot of `state` if one is due.
+    pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result<(), StageError> {
+        match &mut self.to {
+            Destination::Process(process) => Ok(process.saved.shorten_journal(state)?),
+            Destination::Replay(_) => Ok(()),
+        }
+    }
+}
+
+impl Process {
+    fn open(
+        &mut self,
+        context: &mut Context,
+        longest: usize,
+        late: bool,
+    ) -> Result<(), StageError> {
+        for topic in context.opened.wiring.outputs {
+            if (topic.spec().rate == Rate::EachFrame) == late {
+                context.opened.add(Access::Write, topic.spec().name)?;
+                let number = context.generation.number;
+                let writer = topic.open_writer(&context.bus, number, longest)?;
+                self.writers.push((topic.spec().name, writer));
+            }
+        }
+        Ok(())
+    }
+
+    fn writer<W: 'static>(&mut self, topic: &'static str) -> Result<&mut W, StageError> {
+        let mut writers = self.writers.iter_mut();
+        let writer = writers.find(|(name, _)| *name == topic);
+        let writer = writer.and_then(|(_, writer)| writer.downcast_mut());
+        writer.ok_or(WiringError::NotListed(Access::Write, topic).into())
+    }
+
+    /// Publish a sample on `topic`, and the inputs that it follows from before.
+    fn publish<W: 'static>(
+        &mut self,
+        topic: &'static str,
+        at: Progress,
+        wake: Wake,
+        publish: impl FnOnce(&mut W) -> Result<(), BusError>,
+        wake_readers: impl FnOnce(&W) -> Result<(), BusError>,
+    ) -> Result<(), StageError> {
+        self.publish_inputs(at)?;
+        let budget = self.budget.clone();
+        let writer = self.writer(topic)?;
+        publish(writer)?;
+        if wake == Wake::Answer {
+            budget.published(at.tick, Answers::Inputs);
+        }
+        if wake != Wake::No {
+            wake_readers(writer)?;
+        }
+        Ok(())
+    }
+
+    fn publish_inputs(&mut self, at: Progress) -> Result<(), StageError> {
+        if self.noted {
+            self.budget.end(Item::Step);
+            self.inputs.publish(at)?;
+            self.budget.end(Item::Persist);
+            self.noted = false;
+        }
+        Ok(())
+    }
+}

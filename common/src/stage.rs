@@ -1,0 +1,265 @@
+//! A stage and its runner: what is common to the process and the replay of every stage, once.
+//!
+//! A [`Stage`] takes entries and gives outputs. Its process reads topics and makes entries of what came; a replay reads the
+//! same entries from a recording. Both hand them to [`Stage::take`], so a replay computes what the process published.
+//!
+//! A stage that answers each sample of one topic with a sample of another is an [`Answering`] step, and nothing else.
+
+use std::fmt::Debug;
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::{
+    bus::{AnyTopic as _, Layout, Payload, Reader, Stamped, Topic},
+    clock::MissionTime,
+    inputs,
+    mission::Mission,
+    outputs::Outputs,
+    replay::{Beginning, Output, Replay, ReplayError, entry},
+    shell::{Context, Process, Progress},
+    start::StageError,
+    step::{ForeignState, Step},
+    wiring::{Persists, Wiring},
+};
+
+/// What runs a step: the same in a process and in a replay.
+pub trait Stage: Sized + 'static {
+    /// What a generation starts from.
+    type Start: Serialize + DeserializeOwned;
+    /// What one call of the step takes. A recording holds it in this encoding.
+    type Entry<'a>: Serialize + Deserialize<'a> + Debug;
+    /// What follows from an entry besides outputs, for the process.
+    type Outcome;
+
+    /// The stage at the start of `mission`.
+    fn new(mission: &Mission) -> Self;
+
+    /// Open what the stage persists, and give what its process starts from.
+    fn start(&self, context: &mut Context) -> Result<Self::Start, StageError>;
+
+    /// Go on from `start`.
+    fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState>;
+
+    /// Step, persist and publish: what follows from `entry`. Sets [`Outputs::at`] where the entry says of which tick it is.
+    fn take(
+        &mut self,
+        entry: Self::Entry<'_>,
+        out: &mut Outputs,
+    ) -> Result<Self::Outcome, StageError>;
+
+    /// Publish what no reader waits for: a process calls it in a pause, a replay after each entry.
+    fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
+        let _ = out;
+        Ok(())
+    }
+
+    /// The entry in words.
+    fn describe(entry: &Self::Entry<'_>) -> String {
+        format!("{entry:?}")
+    }
+}
+
+/// The stage in its process.
+pub struct Runner<S> {
+    /// The stage.
+    pub stage: S,
+    /// Its outputs.
+    pub out: Outputs,
+}
+
+impl<S: Stage> Runner<S> {
+    /// Open the topics that the stage writes and what it persists, and go on from there. A slice that it publishes has at most
+    /// `longest` elements.
+    pub fn open(
+        context: &mut Context,
+        longest: impl FnOnce(&S) -> usize,
+    ) -> Result<Self, StageError> {
+        let mut stage = S::new(&context.run.mission);
+        let start = stage.start(context)?;
+        let out = Outputs::of_process(context, &start, longest(&stage))?;
+        if let Err(foreign) = stage.begin(start) {
+            tracing::warn!("{foreign}");
+        }
+        Ok(Self { stage, out })
+    }
+
+    /// Open the topics that follow each frame of the robot: to be called after the first heartbeat that says ready.
+    pub fn open_late(&mut self, context: &mut Context) -> Result<(), StageError> {
+        self.out.open_late(context)
+    }
+
+    /// Note `entry` for a replay, and let the stage take it.
+    pub fn take(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome, StageError> {
+        self.out.note(&entry)?;
+        let outcome = self.stage.take(entry, &mut self.out)?;
+        self.out.stepped();
+        Ok(outcome)
+    }
+
+    /// Publish what no reader waits for.
+    pub fn publish_rest(&mut self) -> Result<(), StageError> {
+        self.stage.publish_rest(&mut self.out)
+    }
+}
+
+/// One generation, fed from a recording.
+struct Generation<S> {
+    stage: S,
+    out: Outputs,
+}
+
+/// Begin the replay of a generation.
+pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
+    let mut stage = S::new(&beginning.run.mission);
+    // A stage that persists nothing starts from an entry without bytes.
+    if !beginning.start.is_empty() {
+        // The process went on without a foreign state, too.
+        let _ = stage.begin(entry(beginning.start)?);
+    }
+    let out = Outputs::of_replay();
+    Ok(Box::new(Generation { stage, out }))
+}
+
+impl<S: Stage> Replay for Generation<S> {
+    fn take(&mut self, body: &[u8]) -> Result<Vec<Output>, ReplayError> {
+        let Self { stage, out } = self;
+        let taken = stage.take(entry(body)?, out);
+        taken
+            .and_then(|_| stage.publish_rest(out))
+            .map_err(|error| ReplayError::Stage(error.to_string()))?;
+        Ok(out.drain())
+    }
+
+    fn describe(&self, body: &[u8]) -> Result<String, ReplayError> {
+        Ok(S::describe(&entry(body)?))
+    }
+}
+
+/// A stage that answers each sample of one topic with a sample of another.
+pub trait Answering: Step<State: Clone + Debug> + 'static {
+    /// What it reads.
+    type In: Payload + Stamped + Layout;
+    /// What it writes.
+    type Out: Payload + Stamped + Layout;
+    /// Its name.
+    const NAME: &'static str;
+    /// The topic it reads.
+    const INPUT: &'static Topic<Self::In>;
+    /// The topic it writes.
+    const OUTPUT: &'static Topic<Self::Out>;
+    /// What it persists.
+    const PERSISTS: Persists = Persists::Nothing;
+    /// Whether it skips samples that are not the newest.
+    const NEWEST_ONLY: bool = false;
+
+    /// Take one sample.
+    fn answer(&mut self, input: &Self::In, now: MissionTime) -> Answer<Self::Out>;
+}
+
+/// What follows from one sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer<P> {
+    /// What is published.
+    pub sample: P,
+    /// Whether the state must be saved before that. Where it need not, no tick waits for the file.
+    pub saves_first: bool,
+    /// What the log of the process has to say.
+    pub warning: Option<&'static str>,
+}
+
+impl<P> From<P> for Answer<P> {
+    fn from(sample: P) -> Self {
+        Self {
+            sample,
+            saves_first: true,
+            warning: None,
+        }
+    }
+}
+
+/// The entry of an [`Answering`] stage.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(bound = "P: Layout")]
+pub struct Sample<P: Layout>(#[serde(with = "inputs::sample")] P);
+
+impl<A: Answering> Stage for A {
+    type Start = Option<A::State>;
+    type Entry<'a> = Sample<A::In>;
+    type Outcome = Option<&'static str>;
+
+    fn new(mission: &Mission) -> Self {
+        Step::new(mission)
+    }
+
+    fn start(&self, context: &mut Context) -> Result<Self::Start, StageError> {
+        let saved: Self::Start = context.saved_state()?;
+        if let Some(state) = &saved {
+            tracing::info!(?state, "state restored");
+        }
+        Ok(saved)
+    }
+
+    fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState> {
+        start.map_or(Ok(()), |state| self.restore(state))
+    }
+
+    fn take(
+        &mut self,
+        Sample(input): Sample<A::In>,
+        out: &mut Outputs,
+    ) -> Result<Self::Outcome, StageError> {
+        out.at = Progress::of(input.stamp());
+        let answer = self.answer(&input, out.at.time);
+        if answer.saves_first {
+            out.save(self.state())?;
+        }
+        out.answer(A::OUTPUT, answer.sample)?;
+        if !answer.saves_first {
+            out.save(self.state())?;
+        }
+        Ok(answer.warning)
+    }
+
+    fn describe(Sample(input): &Sample<A::In>) -> String {
+        format!("{} {input:?}", A::INPUT.spec().name)
+    }
+}
+
+/// The process of an [`Answering`] stage.
+pub struct Answers<A: Answering> {
+    runner: Runner<A>,
+    input: Reader<A::In>,
+}
+
+impl<A: Answering> Process for Answers<A> {
+    const WIRING: &'static Wiring = &Wiring {
+        inputs: &[A::INPUT],
+        wakes: &[A::INPUT],
+        outputs: &[A::OUTPUT],
+        persists: A::PERSISTS,
+        ..Wiring::of(A::NAME)
+    };
+
+    fn open(context: &mut Context) -> Result<Self, StageError> {
+        Ok(Self {
+            runner: Runner::open(context, |_| 0)?,
+            input: context.reader(A::INPUT)?,
+        })
+    }
+
+    fn turn(&mut self) -> Result<Progress, StageError> {
+        loop {
+            let next = match A::NEWEST_ONLY {
+                true => self.input.newest()?,
+                false => self.input.take()?,
+            };
+            let Some(input) = next else {
+                return Ok(self.runner.out.at);
+            };
+            self.runner.out.at = Progress::of(input.stamp());
+            if let Some(warning) = self.runner.take(Sample(input))? {
+                tracing::warn!(tick = input.stamp().tick, "{warning}");
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! The mapper as a stage: what a recording holds of it, what it publishes and persists.
+
+use common::{
+    grid::Part,
+    mission::Mission,
+    outputs::Outputs,
+    samples::GridHeader,
+    shell::{Context, Progress},
+    stage::Stage,
+    start::StageError,
+    step::{ForeignState, Step as _},
+    topics::GRID,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::step::{Belief, Change, Input, Mapper};
+
+/// What a generation starts from.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct Start {
+    /// The snapshot, if there was one.
+    belief: Option<Belief>,
+    /// The inputs since, oldest first.
+    inputs: Vec<Input>,
+}
+
+/// What the mapper does, and at which tick.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Entry {
+    /// The step takes this; what changed is published.
+    Step(Input, Progress),
+    /// The whole map is published although nothing changed.
+    Again(Progress),
+}
+
+impl Stage for Mapper {
+    type Start = Start;
+    type Entry<'a> = Entry;
+    /// What was published.
+    type Outcome = Option<Part>;
+
+    fn new(mission: &Mission) -> Self {
+        common::step::Step::new(mission)
+    }
+
+    fn start(&self, context: &mut Context) -> Result<Start, StageError> {
+        let saved = context.saved_journal(self.saved_bytes())?;
+        Ok(Start {
+            belief: saved.state,
+            inputs: saved.entries,
+        })
+    }
+
+    fn begin(&mut self, start: Start) -> Result<(), ForeignState> {
+        let restored = start.belief.map_or(Ok(()), |belief| self.restore(belief));
+        for input in start.inputs {
+            self.step(input, Progress::default().time);
+        }
+        restored
+    }
+
+    fn take(&mut self, entry: Entry, out: &mut Outputs) -> Result<Option<Part>, StageError> {
+        let change = match entry {
+            Entry::Step(input, at) => {
+                out.at = at;
+                let change = self.step(input, at.time);
+                // A belief that is wrong is wrong in its journal, too.
+                if change != Change::None || matches!(input, Input::Fault(_)) {
+                    out.append(&input)?;
+                }
+                change
+            }
+            Entry::Again(at) => {
+                out.at = at;
+                Change::Whole
+            }
+        };
+        let (frame, version) = (self.frame(), self.state().version());
+        let part = match change {
+            Change::None => return Ok(None),
+            Change::Window(window) => Part::of(frame, window, version),
+            Change::Whole => Part::whole(frame, version),
+        };
+        let (header, cells): (GridHeader, _) = (self.header(part), self.state().cells());
+        if part.is_keyframe() {
+            out.answer_slice(&GRID, header, cells)?;
+        } else {
+            let window: Vec<u8> = frame.cells_of(part.window(), cells).collect();
+            out.answer_slice(&GRID, header, &window)?;
+        }
+        Ok(Some(part))
+    }
+}

@@ -1,0 +1,220 @@
+//! The link as a stage: what a recording holds of it, and what it publishes, telemetry and the bytes of the wire included.
+
+use common::{
+    clock::{MissionClock, MissionTime, Pace},
+    inputs,
+    mission::Mission,
+    outputs::Outputs,
+    samples::{
+        CommandSample, Direction, HoldReason, InfraredSample, Order, PowerSample,
+        SurroundingsSample, WireHeader,
+    },
+    shell::{Context, Progress},
+    stage::Stage,
+    start::StageError,
+    step::{ForeignState, Step as _},
+    topics::{INFRARED, POWER, RANGE, SURROUNDINGS, WHEELS, WIRE},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::step::{Effect, Event, Input, Link, State};
+
+/// A sample of `wire` has at most so many bytes; what is longer takes several.
+pub(crate) const WIRE_PIECE: usize = 2048;
+
+/// What the link does. A generation starts from a [`State`].
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Entry<'a> {
+    /// The step takes this at this reading of the monotonic clock, nanoseconds, and this mission time.
+    Step(#[serde(borrow)] Taken<'a>, u64, MissionTime),
+    /// The newest telemetry is published.
+    Telemetry,
+    /// The stage stops, at this reading of the monotonic clock.
+    Stop(u64),
+}
+
+/// An [`Event`] in a recording.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Taken<'a> {
+    /// As [`Event::Datagram`].
+    Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
+    /// As [`Event::Wire`].
+    Wire(bool),
+    /// As [`Event::Command`].
+    Command(#[serde(with = "inputs::sample")] CommandSample),
+    /// As [`Event::Order`], a byte each.
+    Order(u8, u8),
+    /// As [`Event::TickLimit`].
+    TickLimit(u64),
+    /// As [`Event::Quiet`].
+    Quiet,
+}
+
+impl<'a> Taken<'a> {
+    /// Of `event`.
+    pub(crate) fn of(event: &Event<'a>) -> Self {
+        match *event {
+            Event::Datagram(bytes) => Self::Datagram(bytes),
+            Event::Wire(open) => Self::Wire(open),
+            Event::Command(command) => Self::Command(*command),
+            Event::Order(order, reason) => Self::Order(order.into(), reason.into()),
+            Event::TickLimit(last) => Self::TickLimit(last),
+            Event::Quiet => Self::Quiet,
+        }
+    }
+
+    fn event(&self) -> Event<'_> {
+        match self {
+            Self::Datagram(bytes) => Event::Datagram(bytes),
+            Self::Wire(open) => Event::Wire(*open),
+            Self::Command(command) => Event::Command(command),
+            Self::Order(order, reason) => {
+                Event::Order(Order::from_byte(*order), HoldReason::from_byte(*reason))
+            }
+            Self::TickLimit(last) => Event::TickLimit(*last),
+            Self::Quiet => Event::Quiet,
+        }
+    }
+}
+
+/// The step, and what its effects leave to be published when no stage of the pipeline waits.
+#[derive(Debug)]
+pub struct LinkStage {
+    pub(crate) link: Link,
+    infrared: Option<InfraredSample>,
+    power: Option<PowerSample>,
+    surroundings: Option<SurroundingsSample>,
+    /// Bytes received and sent, oldest first.
+    wire: Vec<(Progress, WireHeader, Vec<u8>)>,
+}
+
+impl LinkStage {
+    /// Whether telemetry waits to be published.
+    pub(crate) const fn has_telemetry(&self) -> bool {
+        self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
+    }
+
+    fn carry(&mut self, at: Progress, bytes: &[u8], machine_ns: u64, direction: Direction) {
+        let header = WireHeader {
+            machine_ns,
+            direction: direction.into(),
+            ..WireHeader::default()
+        };
+        self.wire.push((at, header, bytes.to_vec()));
+    }
+
+    /// Publish what an effect publishes. Gives it back where the process has to do something.
+    fn carry_out(
+        &mut self,
+        effect: Effect,
+        machine_ns: u64,
+        out: &mut Outputs,
+    ) -> Result<Option<Effect>, StageError> {
+        match effect {
+            Effect::Tick {
+                tick,
+                time,
+                range,
+                wheels,
+            } => {
+                out.at = Progress { tick, time };
+                out.give(&RANGE, range)?;
+                out.answer(&WHEELS, wheels)?;
+            }
+            Effect::Infrared(sample) => self.infrared = Some(sample),
+            Effect::Power(sample) => self.power = Some(sample),
+            Effect::Surroundings(sample) => self.surroundings = Some(sample),
+            Effect::Send(bytes) => {
+                self.carry(out.at, &bytes, machine_ns, Direction::Sent);
+                return Ok(Some(Effect::Send(bytes)));
+            }
+            other => return Ok(Some(other)),
+        }
+        Ok(None)
+    }
+
+    fn publish_telemetry(&mut self, out: &mut Outputs) -> Result<(), StageError> {
+        if let Some(infrared) = self.infrared.take() {
+            out.give(&INFRARED, infrared)?;
+        }
+        if let Some(power) = self.power.take() {
+            out.give(&POWER, power)?;
+        }
+        if let Some(surroundings) = self.surroundings.take() {
+            out.give(&SURROUNDINGS, surroundings)?;
+        }
+        Ok(())
+    }
+}
+
+impl Stage for LinkStage {
+    type Start = State;
+    type Entry<'a> = Entry<'a>;
+    /// What the process has to do, in order.
+    type Outcome = Vec<Effect>;
+
+    fn new(mission: &Mission) -> Self {
+        Self {
+            link: Link::new(mission),
+            infrared: None,
+            power: None,
+            surroundings: None,
+            wire: Vec::new(),
+        }
+    }
+
+    fn start(&self, context: &mut Context) -> Result<State, StageError> {
+        Ok(State {
+            pace: match context.run.clock {
+                MissionClock::Ticks { .. } => Pace::Max,
+                MissionClock::Wall { rate, .. } => Pace::Rate(rate),
+            },
+            next_tick: context.generation.first_tick,
+        })
+    }
+
+    fn begin(&mut self, start: State) -> Result<(), ForeignState> {
+        self.link.restore(start)
+    }
+
+    fn take(&mut self, entry: Entry<'_>, out: &mut Outputs) -> Result<Vec<Effect>, StageError> {
+        let (effects, machine_ns) = match entry {
+            Entry::Step(taken, machine_ns, now) => {
+                if let Taken::Datagram(bytes) = taken {
+                    self.carry(out.at, bytes, machine_ns, Direction::Received);
+                }
+                let event = taken.event();
+                (self.link.step(Input { event, machine_ns }, now), machine_ns)
+            }
+            Entry::Telemetry => {
+                self.publish_telemetry(out)?;
+                return Ok(Vec::new());
+            }
+            Entry::Stop(machine_ns) => {
+                let stops = self.link.final_stops().into_iter();
+                (stops.map(Effect::Send).collect(), machine_ns)
+            }
+        };
+        if !effects.is_empty() {
+            out.publish_inputs()?;
+        }
+        let mut left = Vec::new();
+        for effect in effects {
+            left.extend(self.carry_out(effect, machine_ns, out)?);
+        }
+        Ok(left)
+    }
+
+    /// Publish the bytes of the wire.
+    fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
+        let now = out.at;
+        for (at, header, bytes) in self.wire.drain(..) {
+            out.at = at;
+            for piece in bytes.chunks(WIRE_PIECE) {
+                out.give_slice_quietly(&WIRE, header, piece)?;
+            }
+        }
+        out.at = now;
+        Ok(())
+    }
+}
