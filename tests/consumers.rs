@@ -118,9 +118,10 @@ fn follow(robot: &str, runs: usize) -> Vec<usize> {
         Ok((bus.reader(&topics::POSE)?, bus.slice_reader(&topics::GRID)?))
     });
     let (mut heard, mut here) = (Vec::new(), false);
+    let patience = support::PATIENCE * runs as u32;
     let began = Instant::now();
     while heard.len() < runs || here {
-        assert!(began.elapsed() < support::PATIENCE, "{heard:?}");
+        assert!(began.elapsed() < patience, "{heard:?}");
         match follower.wait(Duration::from_secs(1)).unwrap() {
             Event::Connected => {
                 here = true;

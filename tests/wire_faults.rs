@@ -263,7 +263,10 @@ fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_missio
         let (code, summary) = run.finish();
         assert_eq!(faults.moved_for(), moved, "{fault:?}: it never moved again");
         assert_ended(code, &summary, 6, "aborted");
-        assert_eq!(summary["cause"], "odometry implausible", "{summary}");
+        assert_eq!(
+            summary["cause"], "odometry implausible for long",
+            "{summary}"
+        );
         assert_nothing_left("fi-encoders");
     }
 }
