@@ -6,7 +6,8 @@
 //! | [`drive`] | the two wheels on the wire: channels and signs, counts in, timed commands out |
 //! | [`failsafe`] | THE table of what slows, stops or ends, and why; in `failsafe/` a monitor for each row or several |
 //! | [`transport`] | datagrams, a connection or a serial line |
-//! | [`telemetry`] | batteries, infrared and the rest, in the units of the topics |
+//! | `rangers` | the readings of a tick that go into the map |
+//! | [`telemetry`] | batteries and the other sensors, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
 //! | `writers` | whose commands and orders are obeyed |
 //! | [`stage`] | what a recording holds of it, and what it publishes |
@@ -15,6 +16,7 @@
 pub mod backoff;
 pub mod drive;
 pub mod failsafe;
+mod rangers;
 pub mod shell;
 pub mod stage;
 pub mod step;

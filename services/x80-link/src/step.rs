@@ -13,14 +13,12 @@ use std::time::Duration;
 
 use common::{
     clock::{MissionTime, Pace},
-    infrared,
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, RangeStatus,
-        WheelSample,
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, WheelSample,
     },
     step::{ForeignState, Step},
-    wire::{Decoder, DecoderTally, Echo, MotorSensors},
+    wire::{Decoder, DecoderTally, MotorSensors},
 };
 
 use crate::{
@@ -31,6 +29,7 @@ use crate::{
         presence::Absence,
         restart::RestartWatch,
     },
+    rangers::Rangers,
     telemetry::Telemetry,
 };
 
@@ -78,16 +77,13 @@ pub struct Link {
     /// Mission time of the present input.
     now: MissionTime,
     drive: Drive,
-    sonar_index: usize,
     half_period_ns: u64,
     decoder: Decoder,
     failsafe: Failsafe,
     restart: RestartWatch,
     pinged_ns: Option<u64>,
     telemetry: Telemetry,
-    /// The front sonar's byte and the infrared rangers' counts, for the next tick.
-    sonar: Option<u8>,
-    infrared: Option<[u16; infrared::RANGERS]>,
+    rangers: Rangers,
     /// The encoders of the newest tick.
     wheels: WheelSample,
     /// Mission time of the newest tick.
@@ -115,15 +111,13 @@ impl Step for Link {
             state: State::default(),
             now: MissionTime::default(),
             drive: Drive::new(mission),
-            sonar_index: usize::from(mission.sonar.index),
             half_period_ns: (0.5e9 / mission.robot.rate_hz) as u64,
             decoder: Decoder::default(),
             failsafe: Failsafe::new(mission),
             restart: RestartWatch::new(mission),
             pinged_ns: None,
             telemetry: Telemetry::default(),
-            sonar: None,
-            infrared: None,
+            rangers: Rangers::new(mission),
             wheels: WheelSample::default(),
             time: MissionTime::default(),
             open: None,
@@ -291,10 +285,7 @@ impl Link {
         };
         self.wheels = wheels;
         self.open = Some(OpenTick {
-            range: RangeSample {
-                infrared_ad: self.infrared.take().unwrap_or_default(),
-                ..reading(self.sonar.take())
-            },
+            range: self.rangers.for_tick(),
             wheels,
             began_ns: now_ns,
             given_ns: None,
@@ -432,23 +423,6 @@ impl Link {
 /// Whether `span` has passed since; it has if there is no since.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
-}
-
-/// The sample of a sonar byte.
-fn reading(byte: Option<u8>) -> RangeSample {
-    let (status, range_m) = match byte.map(Echo::from_byte) {
-        None => (RangeStatus::Absent, None),
-        Some(None) => (RangeStatus::Invalid, None),
-        Some(Some(echo @ Echo::Touching)) => (RangeStatus::AtContact, echo.metres()),
-        Some(Some(echo @ Echo::At(_))) => (RangeStatus::Measured, echo.metres()),
-        Some(Some(Echo::Nothing)) => (RangeStatus::Nothing, None),
-    };
-    RangeSample {
-        range_m: range_m.unwrap_or_default(),
-        status: status.into(),
-        raw_cm: byte.unwrap_or_default(),
-        ..RangeSample::default()
-    }
 }
 
 #[cfg(test)]

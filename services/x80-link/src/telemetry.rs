@@ -1,10 +1,10 @@
-//! Batteries, infrared and the other sensors of the robot's frames, in the units of the topics.
+//! Batteries, motor currents and the other sensors that no tick needs, in the units of the topics.
 
 use common::{
-    samples::{InfraredSample, PowerSample, SurroundingsSample},
+    samples::{PowerSample, SurroundingsSample},
     wire::{
-        CustomSensors, LOGIC_SCALE_V, MOTOR_SCALE_V, MotorSensors, StandardSensors, board_celsius,
-        driver_celsius, infrared_m, volts,
+        LOGIC_SCALE_V, MOTOR_SCALE_V, MotorSensors, StandardSensors, board_celsius, driver_celsius,
+        volts,
     },
 };
 
@@ -12,8 +12,6 @@ use common::{
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
     currents: [u16; 6],
-    /// The first infrared ranger comes in the standard frame, the other six in the custom one.
-    first_infrared: Option<u16>,
 }
 
 impl Telemetry {
@@ -28,7 +26,6 @@ impl Telemetry {
         standard: &StandardSensors,
         low: [bool; 3],
     ) -> (PowerSample, SurroundingsSample) {
-        self.first_infrared = Some(standard.infrared);
         let [board_low, motor_low, servo_low] = low.map(u8::from);
         let power = PowerSample {
             board_v: volts(standard.board_battery, LOGIC_SCALE_V),
@@ -50,18 +47,6 @@ impl Telemetry {
             ..SurroundingsSample::default()
         };
         (power, surroundings)
-    }
-
-    /// Take a custom frame. There is no sample before a standard frame has brought the first ranger.
-    pub fn take_custom(&self, custom: &CustomSensors) -> Option<InfraredSample> {
-        let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
-        let first = self.first_infrared?;
-        let raw_ad = [first, second, third, fourth, fifth, sixth, seventh];
-        Some(InfraredSample {
-            range_m: raw_ad.map(infrared_m),
-            raw_ad,
-            ..InfraredSample::default()
-        })
     }
 }
 
@@ -100,26 +85,5 @@ mod tests {
         assert_eq!(surroundings.human_alarm_ad, [10, 30]);
         assert_eq!(surroundings.human_motion_ad, [20, 40]);
         assert_eq!(surroundings.tilt_ad, [50, 60]);
-    }
-
-    #[test]
-    fn the_seven_infrared_rangers_come_from_two_frames() {
-        let mut telemetry = Telemetry::default();
-        let custom = CustomSensors {
-            ad: [9, 9, 1000, 0, 4095, 0, 0, 0],
-            io: 0,
-        };
-        assert_eq!(telemetry.take_custom(&custom), None, "one is missing");
-        telemetry.take_standard(
-            &StandardSensors {
-                infrared: 1000,
-                ..StandardSensors::default()
-            },
-            [false; 3],
-        );
-        let infrared = telemetry.take_custom(&custom).unwrap();
-        assert_eq!(infrared.raw_ad, [1000, 1000, 0, 4095, 0, 0, 0]);
-        assert_eq!(infrared.range_m[2..4], [0.81, 0.09]);
-        assert!((infrared.range_m[0] - 0.375_79).abs() < 1e-5);
     }
 }

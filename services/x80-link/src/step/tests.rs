@@ -1,6 +1,6 @@
 use super::*;
 use common::{
-    samples::Stamp,
+    samples::{RangeStatus, Stamp},
     wire::{
         Addressing, Command, CustomSensors, Mode, Parameter, Report, StandardSensors, SystemSignal,
     },
@@ -272,17 +272,6 @@ fn a_command_that_no_longer_holds_is_not_sent_again() {
 }
 
 #[test]
-fn on_a_clock_of_ticks_no_command_is_sent_again() {
-    let mut link = driving(in_ticks());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 2);
-    for now in (0..90).step_by(10) {
-        assert_eq!(timed(&link.at(Event::Quiet, now * MS)), []);
-    }
-    assert_eq!(link.tally().repeated_commands, 0);
-}
-
-#[test]
 fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
     let mut link = on_the_wall();
     let mut bytes = datagram(255, 0, 0);
@@ -352,34 +341,6 @@ fn a_command_from_the_future_moves_nothing() {
 }
 
 #[test]
-fn on_a_clock_of_ticks_a_second_answer_to_a_ping_is_no_tick() {
-    let mut link = in_ticks();
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
-    // The robot is slow, so it is asked again; then both answers come.
-    link.at(Event::Order(Order::Hold, HoldReason::Operator), MS);
-    link.at(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
-    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
-    assert_eq!(ticks(&effects).len(), 1);
-}
-
-#[test]
-fn on_a_clock_of_ticks_nothing_follows_the_arrival() {
-    let mut link = driving(in_ticks());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    let arrived = CommandSample {
-        state: CommandState::Arrived.into(),
-        ..command(0, 0, 0.0, 0.0)
-    };
-    assert_eq!(
-        velocities(&link.at(Event::Command(&arrived), 2)),
-        [[Some(0), Some(0)]]
-    );
-    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
-}
-
-#[test]
 fn a_tick_carries_the_newest_sonar_and_forward_counts() {
     let mut link = driving(on_the_wall());
     // Channel 0 counts down when driving forward: 32768 - 100 there is 100 counts forward.
@@ -403,17 +364,6 @@ fn a_motor_frame_alone_makes_a_tick_without_a_reading() {
     link.at(Event::Datagram(&datagram(80, 0, 0)), MS);
     let effects = link.at(Event::Datagram(&bytes), 2 * MS);
     assert_eq!(ticks(&effects)[0].1.status, u8::from(RangeStatus::Absent));
-}
-
-#[test]
-fn every_sonar_byte_is_read_as_the_protocol_says() {
-    let status = |byte| RangeStatus::from_byte(reading(Some(byte)).status);
-    assert_eq!(status(0), RangeStatus::Invalid);
-    assert_eq!(status(4), RangeStatus::AtContact);
-    assert_eq!(status(5), RangeStatus::Measured);
-    assert_eq!(status(254), RangeStatus::Measured);
-    assert_eq!(status(255), RangeStatus::Nothing);
-    assert_eq!(reading(None).status, u8::from(RangeStatus::Absent));
 }
 
 #[test]
@@ -496,48 +446,6 @@ fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
 }
 
 #[test]
-fn on_a_clock_of_ticks_the_order_asks_for_tick_0_and_each_command_for_the_next() {
-    let mut link = in_ticks();
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    assert_eq!(ticks(&effects), [], "the greeting's frames start nothing");
-    let effects = link.at(Event::Order(Order::Drive, HoldReason::None), 1);
-    assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
-    for tick in 0..3 {
-        let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
-        assert_eq!(ticks(&effects)[0].0, tick);
-        let effects = link.at(
-            Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)),
-            3,
-        );
-        assert_eq!(velocities(&effects).len(), 1);
-    }
-}
-
-#[test]
-fn on_a_clock_of_ticks_a_robot_found_after_the_order_still_starts() {
-    let mut link = in_ticks();
-    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
-    assert_eq!(ticks(&effects)[0].0, 0);
-}
-
-#[test]
-fn on_a_clock_of_ticks_an_unanswered_tick_is_given_again_and_answered_once() {
-    let mut link = driving(in_ticks());
-    let first = ticks(&link.at(Event::Datagram(&datagram(80, 5, 6)), 0));
-    assert_eq!(ticks(&link.at(Event::Quiet, 99 * MS)), []);
-    let again = ticks(&link.at(Event::Quiet, 100 * MS));
-    assert_eq!(again, first, "the same tick, to the bit");
-    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 101 * MS);
-    assert_eq!(velocities(&effects).len(), 1);
-    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 102 * MS);
-    let second = velocities(&effects);
-    assert!(second.is_empty(), "a tick given twice is answered once");
-}
-
-#[test]
 fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
     let mut link = driving(on_the_wall());
     let first = link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
@@ -545,12 +453,6 @@ fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
     assert_eq!((ticks(&first)[0].0, ticks(&second)[0].0), (0, 1));
 }
 
-#[test]
-fn a_successor_numbers_its_ticks_after_its_predecessors() {
-    let mut link = driving(from_tick(41));
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    assert_eq!(ticks(&effects)[0].0, 41);
-}
-
 mod held;
+mod lockstep;
 mod robot_health;

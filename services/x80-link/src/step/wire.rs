@@ -25,10 +25,7 @@ impl Link {
         let (mut heard, mut ping) = (false, false);
         while let Some(frame) = self.decoder.next_frame() {
             match Report::parse(&frame) {
-                Ok(Report::Standard(sensors)) => {
-                    self.sonar = sensors.ultrasonic.get(self.sonar_index).copied();
-                    standard = Some(sensors);
-                }
+                Ok(Report::Standard(sensors)) => standard = Some(sensors),
                 Ok(Report::Custom(sensors)) => custom = Some(sensors),
                 Ok(Report::Motor(sensors)) => motor = Some(sensors),
                 Ok(Report::System(SystemSignal::Ping)) => ping = true,
@@ -112,14 +109,14 @@ impl Link {
             self.telemetry.take_motor(motor);
         }
         if let Some(standard) = standard {
+            self.rangers.take_standard(standard);
             let battery = &mut self.failsafe.monitors.battery;
             let (power, surroundings) = self.telemetry.take_standard(standard, battery.low());
             effects.push(Effect::Power(power));
             effects.push(Effect::Surroundings(surroundings));
             effects.extend(battery.take_changes().into_iter().map(Effect::Battery));
         }
-        if let Some(infrared) = custom.and_then(|custom| self.telemetry.take_custom(custom)) {
-            self.infrared = Some(infrared.raw_ad);
+        if let Some(infrared) = custom.and_then(|custom| self.rangers.take_custom(custom)) {
             effects.push(Effect::Infrared(infrared));
         }
     }

@@ -61,7 +61,7 @@ fn a_supervisor_that_says_nothing_stops_the_robot_and_its_next_directive_lets_it
 }
 
 #[test]
-fn on_a_clock_of_ticks_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
+fn in_lockstep_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
     let mut link = driving(in_ticks());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
     link.at(Event::Command(&command(0, 0, TURN, TURN)), 2);
@@ -183,7 +183,7 @@ fn the_cause_of_a_hold_is_the_supervisors() {
 }
 
 #[test]
-fn on_a_clock_of_ticks_none_begins_beyond_the_supervisors_limit_until_it_was_waited_for_too_long() {
+fn in_lockstep_none_begins_beyond_the_supervisors_limit_until_it_was_waited_for_too_long() {
     let given = |effects: &[Effect]| effects.iter().any(|it| matches!(it, Effect::Tick { .. }));
     let frames = datagram(255, 0, 0);
     let limited = || {

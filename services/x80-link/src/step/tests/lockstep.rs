@@ -1,0 +1,91 @@
+//! The link in lockstep, where the robot waits for each command.
+
+use super::*;
+
+#[test]
+fn in_lockstep_no_command_is_sent_again() {
+    let mut link = driving(in_ticks());
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
+    link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 2);
+    for now in (0..90).step_by(10) {
+        assert_eq!(timed(&link.at(Event::Quiet, now * MS)), []);
+    }
+    assert_eq!(link.tally().repeated_commands, 0);
+}
+
+#[test]
+fn in_lockstep_a_second_answer_to_a_ping_is_no_tick() {
+    let mut link = in_ticks();
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
+    // The robot is slow, so it is asked again; then both answers come.
+    link.at(Event::Order(Order::Hold, HoldReason::Operator), MS);
+    link.at(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
+    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
+    assert_eq!(ticks(&effects).len(), 1);
+}
+
+#[test]
+fn in_lockstep_nothing_follows_the_arrival() {
+    let mut link = driving(in_ticks());
+    link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
+    let arrived = CommandSample {
+        state: CommandState::Arrived.into(),
+        ..command(0, 0, 0.0, 0.0)
+    };
+    assert_eq!(
+        velocities(&link.at(Event::Command(&arrived), 2)),
+        [[Some(0), Some(0)]]
+    );
+    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
+}
+
+#[test]
+fn in_lockstep_the_order_asks_for_tick_0_and_each_command_for_the_next() {
+    let mut link = in_ticks();
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
+    assert_eq!(ticks(&effects), [], "the greeting's frames start nothing");
+    let effects = link.at(Event::Order(Order::Drive, HoldReason::None), 1);
+    assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
+    for tick in 0..3 {
+        let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
+        assert_eq!(ticks(&effects)[0].0, tick);
+        let effects = link.at(
+            Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)),
+            3,
+        );
+        assert_eq!(velocities(&effects).len(), 1);
+    }
+}
+
+#[test]
+fn in_lockstep_a_robot_found_after_the_order_still_starts() {
+    let mut link = in_ticks();
+    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
+    assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
+    assert_eq!(ticks(&effects)[0].0, 0);
+}
+
+#[test]
+fn in_lockstep_an_unanswered_tick_is_given_again_and_answered_once() {
+    let mut link = driving(in_ticks());
+    let first = ticks(&link.at(Event::Datagram(&datagram(80, 5, 6)), 0));
+    assert_eq!(ticks(&link.at(Event::Quiet, 99 * MS)), []);
+    let again = ticks(&link.at(Event::Quiet, 100 * MS));
+    assert_eq!(again, first, "the same tick, to the bit");
+    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 101 * MS);
+    assert_eq!(velocities(&effects).len(), 1);
+    let effects = link.at(Event::Command(&command(0, 0, 1.0, 1.0)), 102 * MS);
+    let second = velocities(&effects);
+    assert!(second.is_empty(), "a tick given twice is answered once");
+}
+
+#[test]
+fn a_successor_numbers_its_ticks_after_its_predecessors() {
+    let mut link = driving(from_tick(41));
+    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
+    assert_eq!(ticks(&effects)[0].0, 41);
+}
