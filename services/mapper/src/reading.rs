@@ -1,6 +1,6 @@
 //! Readings of the rangers in the mission's frame.
 
-use common::{infrared, kinematics::Pose2, samples::RangeSample};
+use common::{infrared, kinematics::Pose2, mission::Sensors, samples::RangeSample};
 use glam::DVec2;
 
 use crate::infrared_model::{self, Seen};
@@ -27,8 +27,16 @@ pub(crate) struct Ray {
 }
 
 impl Ray {
-    /// The readings of all live rangers of a robot at `pose` with a body of `radius` metres.
-    pub(crate) fn all(pose: Pose2, radius: f64, range: &RangeSample) -> Vec<Self> {
+    /// The readings of all live rangers among `sensors`, on a robot at `pose` with a body of `radius` metres.
+    pub(crate) fn all(
+        pose: Pose2,
+        radius: f64,
+        sensors: Sensors,
+        range: &RangeSample,
+    ) -> Vec<Self> {
+        if sensors != Sensors::FrontInfrared {
+            return Vec::new();
+        }
         let rangers = infrared::rangers(pose, radius).into_iter();
         let ray = |(ranger, ad): (Pose2, u16)| {
             infrared_model::seen(ad).map(|seen| Self {

@@ -115,7 +115,7 @@ pub struct Mapper {
     margin: u32,
     evidential: Evidential,
     sensing: bool,
-    infrared: bool,
+    sensors: Sensors,
     map_within: f64,
     mount: Mount,
     footprint: f64,
@@ -145,7 +145,7 @@ impl Step for Mapper {
             margin,
             evidential,
             sensing: mission.sensing,
-            infrared: mission.sensors == Sensors::FrontInfrared,
+            sensors: mission.sensors,
             map_within: mission.map_within_m(),
             mount: mission.sonar.mount(),
             footprint: mission.body().radius_m,
@@ -306,9 +306,9 @@ impl Mapper {
             axis: ranger.axis(),
             echo,
         });
-        let rays = range
-            .filter(|_| self.infrared)
-            .map_or_else(Vec::new, |range| Ray::all(robot, self.footprint, range));
+        let rays = range.map_or_else(Vec::new, |range| {
+            Ray::all(robot, self.footprint, self.sensors, range)
+        });
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
         let news = self
             .evidential
