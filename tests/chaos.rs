@@ -1,4 +1,4 @@
-//! `firsthand chaos` through real processes: its table of signals, and consumers that are hit.
+//! `firsthand bench chaos` through real processes: its table of signals, and consumers that are hit.
 
 use std::{fs, process::Stdio, time::Instant};
 

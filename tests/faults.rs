@@ -19,7 +19,7 @@ use serde_json::Value;
 const SLOW: [&str; 4] = ["--set", "controller.speed_m_s=0.004", "--timeout", "20000"];
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
 
-/// `firsthand fault`, which must succeed.
+/// `firsthand stage fault`, which must succeed.
 fn inject(robot: &str, stage: &str, fault: &str) {
     operate(robot, &["fault", stage, fault]);
 }

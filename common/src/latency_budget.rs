@@ -1,4 +1,4 @@
-//! What a stage's process does with its part of a tick, item by item: for `firsthand latency --budget`, and only where
+//! What a stage's process does with its part of a tick, item by item: for `firsthand bench tick --budget`, and only where
 //! [`ASKED_FOR`] is in its environment. Otherwise nothing is measured and no clock is read.
 //!
 //! The stage's shell says when each item ends. The times stay in memory, and go into a file of the run's directory when

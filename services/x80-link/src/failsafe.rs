@@ -112,7 +112,7 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::StageHeld,
-        when: "a stage died again and again, until `firsthand restart NAME`",
+        when: "a stage died again and again, until `firsthand stage restart NAME`",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.orders,

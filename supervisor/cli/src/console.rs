@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`output`] | text and JSON on standard output, messages on standard error |
 //! | [`failure`] | why a subcommand failed, and its exit code |
-//! | [`stream`] | standard output of a command that goes on until it is told to end |
+//! | [`stream`] | standard output of a command that goes on |
 //! | [`table`] | tables of text |
 //! | [`progress_line`] | progress on standard error |
 //! | [`waiting`] | sentences about a robot that is waited for |

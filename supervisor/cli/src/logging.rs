@@ -3,8 +3,8 @@
 //! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); it
 //! records the time itself. That needs no library, and a line is the same wherever it is read.
 //!
-//! A line that cannot be written, because the disk is full or the terminal closed, is lost without a word: tracing would report
-//! it on standard error and panic where that fails too.
+//! A line that cannot be written, because the disk is full or the terminal is closed, is dropped silently: tracing would report
+//! it on standard error and panic if that fails too.
 
 use std::{
     fs::File,
@@ -43,9 +43,6 @@ pub(crate) fn to_stderr(default: &str) {
 }
 
 /// Log to the end of `file`, and to the journal if there is one.
-///
-/// # Errors
-/// When the file cannot be made.
 pub(crate) fn to_file(file: &Path, default: &str) -> io::Result<()> {
     let log = Mutex::new(File::options().create(true).append(true).open(file)?);
     let mut layers: Vec<AnyLayer> = vec![
@@ -84,10 +81,10 @@ fn start(layers: Vec<AnyLayer>, default: &str) {
         .init();
 }
 
-/// Standard error, each event behind its priority.
+/// Standard error with a priority before each line.
 struct Journal;
 
-/// One event on its way there.
+/// The writer of one event.
 struct Entry {
     priority: &'static str,
 }
@@ -117,8 +114,8 @@ fn priority(level: Level) -> &'static str {
 }
 
 impl Write for Entry {
-    /// One event a call; each of its lines is an entry of the journal, so each gets the priority. Written at
-    /// once, or lines of two processes could mix.
+    /// Each call writes one event. Each of its lines is an entry of the journal and gets the priority. All lines are written at
+    /// once, so that lines of two processes do not mix.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
         let mut entry = Vec::with_capacity(event.len() + self.priority.len());
         for line in event.split_inclusive(|&byte| byte == b'\n') {

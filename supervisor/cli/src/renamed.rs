@@ -3,7 +3,7 @@
 use std::ffi::{OsStr, OsString};
 
 /// Old names, each with the words that replace it.
-static RENAMED: [(&str, &[&str]); 16] = [
+pub(crate) static RENAMED: [(&str, &[&str]); 16] = [
     ("chaos", &["bench", "chaos"]),
     ("consumer", &["bench", "consumer"]),
     ("diff", &["runs", "diff"]),

@@ -11,5 +11,5 @@ pub(crate) mod man;
 mod mission_progress;
 pub(crate) mod replay;
 pub(crate) mod report;
-pub(crate) mod run_picture;
+pub(crate) mod run_report;
 pub(crate) mod top;

@@ -1,6 +1,6 @@
 //! THE table of stages: what runs for a robot, and its deadlines. What each opens and persists is declared where it is opened.
 //!
-//! Start order, deadlines, `firsthand stage`, `firsthand stages` and the tables of the documentation come from it.
+//! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the tables of the documentation come from it.
 
 use std::{path::Path, time::Duration};
 

@@ -10,7 +10,7 @@ use crate::console::{
     output::{print_text, write_stderr},
 };
 
-/// Check a mission file: what is wrong is told with line, key and remedy.
+/// Check a mission file. An error is reported with its line, its key and the remedy.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A mission file.

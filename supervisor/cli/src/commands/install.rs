@@ -32,13 +32,13 @@ pub(crate) struct Arguments {
     root: PathBuf,
 }
 
-/// A file that is installed.
+/// A file to install.
 struct Part {
-    /// Where.
+    /// The path below the root.
     path: &'static str,
-    /// What is in it, as packaged.
+    /// The text, as packaged.
     text: &'static str,
-    /// Whether a user may have changed it: then it is not overwritten.
+    /// Whether users may change it; such a file is not overwritten.
     configuration: bool,
 }
 
@@ -74,16 +74,15 @@ static PARTS: [Part; 7] = [
     part!("etc/firsthand/mission.toml", "mission.toml", true),
 ];
 
-/// Where the package puts the executable.
+/// The path of the executable in the package.
 const PACKAGED: &str = "/usr/bin/firsthand";
 
-/// What remains to be done by hand.
+/// The commands that remain for the user.
 const THEN: &str = "systemd-sysusers && systemctl daemon-reload
 then, when /etc/firsthand/mission.toml is the robot's mission:
   systemctl enable --now firsthand          # the supervisor starts the stages, or
   systemctl enable --now firsthand-watch    # systemd does:";
 
-/// A file could not be written.
 #[derive(Debug, Error)]
 #[error("cannot write {file}: {source}; as root, or with --root?", file = file.display())]
 struct InstallError {

@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     /// Name of the robot: the logs of its present run, or else of its newest run below --runs.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Where the directories of runs are.
+    /// The directory in which the directories of runs are.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
     /// The directory of the run.

@@ -62,8 +62,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         fields: arguments.fields,
         run: arguments.run_directory.clone(),
     };
-    let tell = |happened: Happened<'_>| {
-        let said = match happened {
+    let mut tell = |happened: Happened<'_>| {
+        let printed = match happened {
             Happened::Attached(file) => print_text(&format!(
                 "recording {} into {}\n",
                 arguments.robot,
@@ -74,11 +74,10 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
                 file.display()
             )),
         };
-        if let Err(error) = said {
+        if let Err(error) = printed {
             write_stderr(&format!("firsthand: cannot say so: {error}\n"));
         }
     };
-    let mut tell = tell;
     recording::record(&options, &mut || signals.came(), &mut tell)?;
     Ok(ExitCode::SUCCESS)
 }

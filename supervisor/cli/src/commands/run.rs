@@ -17,7 +17,7 @@ use supervisor::{
 
 use self::{recorder::RunRecorder, summary::Summary, summary_file::SummaryFile};
 #[cfg(feature = "tools")]
-use crate::tools::run_picture;
+use crate::tools::run_report;
 use crate::{
     console::{
         failure::{Failure, Refused},
@@ -42,45 +42,45 @@ pub(crate) struct Arguments {
     /// Mission time of a simulated robot: `max`, or R times wall-clock.
     #[arg(long, default_value = "max")]
     pace: Pace,
-    /// Seed of everything random in the simulation, in place of the mission's.
+    /// Seed of everything random in the simulation, instead of the mission's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Where logs, checkpoints, summary and picture go; a new directory below --runs otherwise.
+    /// The directory of logs, checkpoints, summary and picture; by default a new one below --runs.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Where the directories of runs are made.
+    /// The directory in which the directories of runs are.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// Remove the oldest directories of this robot's ended runs below --runs, beyond N.
+    /// First remove all but the newest N runs of this robot below --runs that have ended.
     #[arg(long, value_name = "N", conflicts_with_all = ["resume", "out"])]
     keep: Option<usize>,
-    /// Go on with the run in DIR, whose supervisor was killed. The robot must stand where it came to rest.
+    /// Go on with the run in DIR, whose supervisor was killed. The robot must still stand where it came to rest.
     #[arg(
         long,
         value_name = "DIR",
         conflicts_with_all = ["mission", "robot", "pace", "seed", "out", "timeout", "set"]
     )]
     resume: Option<PathBuf>,
-    /// Go on with this robot's newest run below --runs if it was cut off within the last minute. If that was before, report it once
-    /// instead of starting: the robot is not where its mission starts. For services, which systemd starts again.
+    /// Go on with this robot's newest run below --runs if it was cut off within the last minute. If it was cut off earlier, report
+    /// that once instead of starting, because the robot is not where its mission starts. This is for services of systemd.
     #[arg(long, conflicts_with_all = ["resume", "out"])]
     resume_last: bool,
-    /// Mission seconds after which to give up, in place of the mission's.
+    /// Give up after S seconds of mission time, instead of the mission's timeout.
     #[arg(long, value_name = "S")]
     timeout: Option<f64>,
-    /// KEY=VALUE over the mission file, as often as needed: `--set start.heading_deg=90`.
+    /// Set a key of the mission, as often as needed: `--set start.heading_deg=90`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Start no stages: systemd does, or you do, with `firsthand stage NAME --robot R`.
     #[arg(long)]
     watch_only: bool,
-    /// Record nothing; else everything but fields goes into recording.mcap in the run's directory.
+    /// Record nothing; by default everything but fields goes into recording.mcap in the run's directory.
     #[arg(long)]
     no_record: bool,
-    /// End with one line of JSON on standard output, and nothing else there.
+    /// Print one line of JSON at the end, and nothing else on standard output.
     #[arg(long)]
     json: bool,
-    /// Stop in order when this process, the parent, ends.
+    /// Stop the robot and end when this process, the parent, ends.
     #[arg(long, hide = true)]
     parent: Option<u32>,
 }
@@ -88,7 +88,7 @@ pub(crate) struct Arguments {
 impl Default for Arguments {
     fn default() -> Self {
         use clap::Parser as _;
-        /// The defaults stand in one place: the attributes above.
+        /// The attributes above have the defaults.
         #[derive(clap::Parser)]
         struct Alone {
             #[command(flatten)]
@@ -98,7 +98,7 @@ impl Default for Arguments {
     }
 }
 
-/// A run to carry out; none when one was cut off too long ago, which is reported.
+/// The run to carry out; none if an earlier run was cut off too long ago, which is reported.
 fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
@@ -144,7 +144,7 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     }))
 }
 
-/// The run in `directory`, to go on with.
+/// The run in `directory`, which goes on.
 fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
     let recovered = RecoveredRun::load(&directory)?;
     let mut mission = recovered.run.mission.clone();
@@ -167,7 +167,7 @@ fn starter(arguments: &Arguments) -> Starter {
     }
 }
 
-/// The mission asked for, overrides and all.
+/// The mission with all that is set on the command line.
 fn mission(arguments: &Arguments) -> Result<Mission, Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     if let Some(seed) = arguments.seed {
@@ -192,7 +192,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let directory = &options.directory;
     let made_for_nothing = || {
-        // The directory was made for a run that did not begin.
+        // The run did not begin, so its new directory is removed.
         if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
             let _ = fs::remove_dir_all(directory);
         }
@@ -208,8 +208,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let ran = supervisor::run(&options, &mut attach, &mut |progress| {
         console.show(progress);
     });
-    #[cfg(feature = "tools")]
-    let was_recorded = recorder.is_some();
     if let Some(recorder) = recorder {
         recorder.end();
     }
@@ -233,21 +231,26 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let _ = fs::remove_dir_all(directory);
     } else {
         complain(summary_file.write(&format!("{json}\n")));
-        // Drawn last, and without effect on the result.
+        // Picture and report come last and have no effect on the result.
         #[cfg(feature = "tools")]
-        complain(draw(arguments, &options, &finished, &summary));
-        #[cfg(feature = "tools")]
-        if was_recorded {
-            complain(report_on(arguments, &options));
+        for written in run_report::write(&options, &finished, &summary, !arguments.no_record) {
+            complain(written.and_then(|(name, file)| {
+                let line = format!("{name}: {}\n", file.display());
+                let printed = if arguments.json {
+                    Ok(())
+                } else {
+                    print_text(&line)
+                };
+                printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
+            }));
         }
     }
     Ok(exit_code(&summary, &finished.ending))
 }
 
-/// Log into the run directory, reserve room for the summary, tell the mission's remarks.
+/// Start the log in the run directory, reserve room for the summary, and report the remarks of the mission.
 fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
     let directory = &options.directory;
-    // The supervisor's log goes where its stages' logs are.
     let log = directory.join(SUPERVISOR_LOG);
     logging::to_file(&log, "info")
         .map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
@@ -258,41 +261,7 @@ fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
     Ok(SummaryFile::reserve(directory)?)
 }
 
-/// Draw the picture of the run.
-#[cfg(feature = "tools")]
-fn draw(
-    arguments: &Arguments,
-    options: &Options,
-    finished: &Finished,
-    summary: &Summary,
-) -> Result<(), String> {
-    let picture = options.directory.join("picture.svg");
-    let svg = run_picture::svg(&options.mission, finished, summary);
-    let named = |error| format!("cannot write {}: {error}", picture.display());
-    if let Err(error) = fs::write(&picture, svg) {
-        // Half a picture is none.
-        let _ = fs::remove_file(&picture);
-        return Err(named(error));
-    }
-    if arguments.json {
-        return Ok(());
-    }
-    print_text(&format!("picture: {}\n", picture.display())).map_err(named)
-}
-
-/// Write the report of the run from its recording.
-#[cfg(feature = "tools")]
-fn report_on(arguments: &Arguments, options: &Options) -> Result<(), String> {
-    let page = report::write(&options.directory, None)
-        .map_err(|error| format!("no report of this run: {error}"))?;
-    if arguments.json {
-        return Ok(());
-    }
-    print_text(&format!("report: {}\n", page.display()))
-        .map_err(|error| format!("cannot say where the report is: {error}"))
-}
-
-/// What only reports has failed: the mission's exit code stays.
+/// Report a failure of summary, picture or report. The exit code of the mission stays.
 fn complain(reported: Result<(), String>) {
     if let Err(problem) = reported {
         tracing::error!("{problem}");
@@ -300,19 +269,19 @@ fn complain(reported: Result<(), String>) {
     }
 }
 
-/// Whether the directory was made for a start whose robot never drove, and holds no more than the reason says: a robot that
-/// is switched off would fill the disk with them, start by start.
+/// Whether the run directory may be removed: this start created it, its robot never drove, and no stage died. Otherwise a robot
+/// that is switched off would fill the disk, start by start.
 fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
     let made_here = arguments.out.is_none() && options.recovered.is_none();
     made_here && !finished.drove && finished.restarts.values().all(|&restarts| restarts == 0)
 }
 
-/// A robot that stands without a supervisor for longer may have been moved.
+/// After a longer time without supervisor the robot may have been moved.
 const RESUMED_WITHIN_S: f64 = 60.0;
-/// The exit code of `--resume-last` when it does not start.
+/// The exit code of `--resume-last` if it does not start.
 const CUT_OFF: u8 = 7;
 
-/// The documented code.
+/// The documented exit code.
 fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     if ending.asked_for && summary.outcome == ending.outcome {
         return ExitCode::SUCCESS;
@@ -327,7 +296,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     })
 }
 
-/// Progress on standard error; none in a journal, where it is the service's status.
+/// Progress on standard error; the journal gets none, because the status of the service has it.
 struct Console {
     line: ProgressLine,
     silent: bool,

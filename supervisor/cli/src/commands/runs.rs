@@ -45,7 +45,7 @@ enum Command {
 /// List the runs, the newest last, with outcome and size; or first remove the oldest.
 #[derive(Debug, Args)]
 struct List {
-    /// Where the directories of runs are.
+    /// The directory in which the directories of runs are.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
     /// Only the runs of this robot.

@@ -20,7 +20,7 @@ use crate::console::{
 pub(crate) struct Arguments {
     /// A shipped mission or a mission file.
     mission: String,
-    /// Where to listen; port 0 takes a free one.
+    /// Address to listen on; port 0 takes a free one.
     #[arg(long, default_value = "127.0.0.1:0")]
     listen: SocketAddr,
     /// How to listen: datagrams, one connection at a time, or a pseudo-terminal in place of a serial port.
@@ -29,13 +29,13 @@ pub(crate) struct Arguments {
     /// Mission time: `max` waits for a command each tick, R runs R times wall-clock.
     #[arg(long, default_value = "1")]
     pace: Pace,
-    /// Seed of everything random, over the mission's.
+    /// Seed of everything random, instead of the mission's.
     #[arg(long)]
     seed: Option<u64>,
-    /// KEY=VALUE over the mission file, as often as needed.
+    /// Set a key of the mission, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Checkpoint of the robot; if the file is there, go on from it.
+    /// Checkpoint of the robot; if the file exists, go on from it.
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
     /// Write the ground truth to standard output, a JSON object a line.
@@ -46,7 +46,6 @@ pub(crate) struct Arguments {
     supervisor: Option<u32>,
 }
 
-/// How the robot is reached.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum Transport {
     #[default]

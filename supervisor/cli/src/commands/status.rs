@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The whole of `status --json`.
+/// The object of `status --json`.
 #[derive(Serialize)]
 struct Status<'a> {
     robot: &'a RobotName,
@@ -52,9 +52,9 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// None while no link publishes.
+    /// None if no link publishes.
     link: Option<LinkStatus>,
-    /// None while the robot does not report it.
+    /// None if the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
 }
@@ -63,15 +63,15 @@ struct Status<'a> {
 #[derive(Serialize)]
 struct LinkStatus {
     connected: bool,
-    /// Whether the link holds the robot still.
+    /// Whether the link stops the robot.
     stopped: bool,
-    /// What the robot does by its failsafe: goes, stands and the like.
+    /// The effect of the failsafe: the robot goes, stands or the like.
     robot: &'static str,
-    /// Why; none while it goes.
+    /// The cause of the effect; none while the robot goes.
     cause: Option<&'static str>,
-    /// Whether its encoders say that no wheel turns.
+    /// Whether no wheel turns by the encoders.
     at_rest: bool,
-    /// For how long it has not answered; none while it does.
+    /// Time without an answer of the robot; none while it answers.
     lost_s: Option<f64>,
     attempts: u64,
     next_attempt_s: Option<f64>,
@@ -93,7 +93,7 @@ struct PowerStatus {
     low: bool,
 }
 
-/// One stage of it.
+/// A stage of the robot.
 #[derive(Serialize)]
 struct StageStatus<'a> {
     name: &'a str,

@@ -51,7 +51,7 @@ pub(crate) fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
     }
 }
 
-/// The code of `error`; none where no script could react in a way of its own.
+/// The code of `error`; none if no script could react to it in particular.
 pub(crate) fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     let code = error.downcast_ref().map(|refused: &Refused| refused.code);
     code.or_else(|| error.downcast_ref().and_then(of_supervisor))

@@ -50,7 +50,7 @@ pub(crate) fn shipped(name: &str) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
-/// The mission of that name or in that file, with `KEY=VALUE` assignments on top.
+/// The shipped mission `name`, or the one in the file `name`, with `KEY=VALUE` assignments on top.
 pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let file = Path::new(name);
     let (text, origin) = match shipped(name) {
@@ -65,16 +65,16 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
         }
     };
     let as_written = Mission::parse(&text, Path::new(&origin));
-    // Values are judged after all assignments: one may mend what is refused without it.
+    // Values are checked after all assignments, because one may correct what is refused without it.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
         return Ok(as_written?);
     };
     let assigned = assign(table, assignments)?;
     Mission::parse(&assigned, Path::new(&origin)).map_err(|error| match as_written {
-        // It knows the line.
+        // The error of the file names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
-        // No line of the file is at fault.
+        // The fault is in no line of the file.
         _ => LookupError::Assigned {
             name: name.to_owned(),
             assignments: assignments.join(" --set "),
@@ -83,7 +83,7 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
     })
 }
 
-/// `mission`, which was recorded, with `KEY=VALUE` assignments on top; none where nothing is assigned.
+/// The recorded `mission` with `KEY=VALUE` assignments on top; none if there are no assignments.
 #[cfg(feature = "tools")]
 pub(crate) fn with(
     mission: &Mission,
@@ -105,7 +105,7 @@ pub(crate) fn with(
         .map_err(|error| failed(error.without_place()))
 }
 
-/// `table` with every assignment made, as text.
+/// The text of `table` with all assignments.
 fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
     for assignment in assignments {
         let failed = |problem: &str| LookupError::Assignment {

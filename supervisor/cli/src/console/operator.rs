@@ -1,4 +1,4 @@
-//! What an operator does to a robot that runs: requests to its supervisor, signals to its processes.
+//! The operator's part: requests to the supervisor of a robot, signals to its processes.
 
 use std::{
     fs::File,
@@ -83,7 +83,7 @@ pub(crate) fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
 /// Send a request to the supervisor, and wait until the roster confirms it.
 pub(crate) fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<(), Failure> {
     let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
-    // Opened first: the confirmation must not be missed.
+    // The roster is opened first, so that the confirmation is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
     let id = new_id();

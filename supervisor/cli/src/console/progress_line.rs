@@ -7,7 +7,7 @@ use std::{
 
 use super::output::write_stderr;
 
-/// The line that is shown now.
+/// A line of progress.
 pub(crate) struct ProgressLine {
     rewrites: bool,
     /// Time between lines that cannot be rewritten.
@@ -16,7 +16,7 @@ pub(crate) struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// None shown yet; where lines cannot be rewritten, one comes after each `every`.
+    /// Nothing is shown yet. Lines that cannot be rewritten are shown once in each `every`.
     pub(crate) fn new(every: Duration) -> Self {
         Self {
             rewrites: io::stderr().is_terminal(),
@@ -36,7 +36,7 @@ impl ProgressLine {
         self.shown.replace(Instant::now()).is_none()
     }
 
-    /// Show `line`; where it would stay, only if it `may_stay`.
+    /// Show `line`. If it cannot be rewritten, it is shown only if it `may_stay`.
     pub(crate) fn show(&self, line: &str, may_stay: bool) {
         if self.rewrites {
             let line = cut(line, columns());
@@ -46,7 +46,6 @@ impl ProgressLine {
         }
     }
 
-    /// No line follows.
     pub(crate) fn end(&self) {
         if self.rewrites {
             write_stderr("\n");
@@ -54,14 +53,14 @@ impl ProgressLine {
     }
 }
 
-/// Columns of the terminal; 0 where it does not say.
+/// Columns of the terminal; 0 if it does not say.
 fn columns() -> usize {
     let size = rustix::termios::tcgetwinsize(io::stderr());
     size.map_or(0, |size| size.ws_col.into())
 }
 
-/// As much of `line` as `columns` show, of which the last stays free; all of it for 0. A line that is wrapped cannot be
-/// rewritten: each would stay.
+/// The beginning of `line` that fits into `columns`, of which the last stays free; all of it for 0 columns. A line that the
+/// terminal wraps cannot be rewritten.
 fn cut(line: &str, columns: usize) -> &str {
     let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
     let end = line.char_indices().nth(shown);

@@ -1,4 +1,4 @@
-//! How often topics are published, how long the gaps are, and whether that is what the table says.
+//! The rates and gaps of topics, compared with the table of topics.
 
 use std::{
     collections::BTreeMap,
@@ -11,21 +11,26 @@ use common::{
 };
 use serde::Serialize;
 
-use super::words::age;
+use super::{
+    table::{
+        Align::{Left, Right},
+        Table,
+    },
+    words::age,
+};
 
-/// A topic that is published again after a while may be so many times as late: its writer looks at the clock once in each
-/// turn of its work loop.
+/// A topic is late after this many of its intervals, because its writer looks at the clock only once in each turn of its loop.
 const LATE: u32 = 2;
 
-/// What came on one topic.
+/// The samples of one topic, counted.
 #[derive(Debug)]
 pub(crate) struct TopicRates {
     spec: &'static Spec,
-    /// By process: a topic may have many writers.
+    /// The newest sample of each process, because a topic may have many writers.
     writers: BTreeMap<u32, Newest>,
-    /// When the last sample came.
+    /// The arrival of the last sample.
     at: Option<Instant>,
-    /// Since when is counted.
+    /// The beginning of the counts.
     since: Instant,
     counts: Counts,
 }
@@ -37,7 +42,7 @@ struct Newest {
     stamp: Stamp,
 }
 
-/// What came since the last report.
+/// Counts since the last report.
 #[derive(Debug, Default)]
 struct Counts {
     samples: u64,
@@ -48,32 +53,31 @@ struct Counts {
     late: bool,
 }
 
-/// What came on a topic in a while.
+/// The rates of a topic between two reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Report {
-    /// The topic.
     pub(crate) topic: &'static str,
     /// Samples a second of the machine's clock.
     pub(crate) rate_hz: f64,
-    /// The longest time between two samples of one process, the time since the last one among them; none before two samples.
+    /// The longest time between two samples of one process, or since the last sample; none before the first.
     pub(crate) longest_gap_s: Option<f64>,
     /// Time since the last sample; none before the first.
     pub(crate) age_s: Option<f64>,
-    /// Samples that came too fast for this reader.
+    /// Samples that were overwritten before this reader took them.
     pub(crate) lost: u64,
-    /// Ticks that passed by the samples.
+    /// Ticks from the first sample to the last.
     pub(crate) ticks: u64,
-    /// Those of them without a sample; none where the table does not say that each has one.
+    /// Ticks without a sample; none if the table does not promise a sample in each tick.
     pub(crate) missing_ticks: Option<u64>,
-    /// Whether a gap was more than twice as long as the table says; none where it does not say.
+    /// Whether a gap was more than twice as long as the table promises; none if it promises nothing.
     pub(crate) late: Option<bool>,
-    /// What the table says.
+    /// The rate by the table.
     #[serde(skip)]
     rate: Rate,
 }
 
 impl TopicRates {
-    /// Nothing came yet at `now` on the topic of `spec`.
+    /// No sample has come yet on the topic of `spec`.
     pub(crate) fn new(spec: &'static Spec, now: Instant) -> Self {
         Self {
             spec,
@@ -84,7 +88,8 @@ impl TopicRates {
         }
     }
 
-    /// A sample of `author` came at `now`. The first of each process is what the topic keeps for new readers: it has no age.
+    /// A sample of `author` came at `now`. The first sample of each process may be old, because a topic keeps one for new readers: it
+    /// is not counted.
     pub(crate) fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
         self.at = Some(now);
         let newest = Newest { at: now, stamp };
@@ -101,20 +106,20 @@ impl TopicRates {
         counts.ticks += ticks;
         counts.missing_ticks += ticks.saturating_sub(1);
         let gap = now.saturating_duration_since(last.at);
-        // The rate may be meant in mission time, which may pass faster or slower.
+        // A rate may be in mission time, which may pass faster or slower than the clock.
         let mission = stamp.stamp_ns.saturating_sub(last.stamp.stamp_ns);
         counts.late |= is_late(self.spec.rate, gap.min(Duration::from_nanos(mission)));
         counts.longest_gap = counts.longest_gap.max(gap);
     }
 
-    /// What came since the last report, at `now`.
+    /// The report at `now`; counting begins again.
     pub(crate) fn report(&mut self, now: Instant) -> Report {
         let counts = std::mem::take(&mut self.counts);
         let over = now.saturating_duration_since(self.since).as_secs_f64();
         self.since = now;
         let age = self.at.map(|at| now.saturating_duration_since(at));
         let gap = (!counts.longest_gap.is_zero()).then_some(counts.longest_gap);
-        // A topic that has gone silent has no gap that ends.
+        // The gap of a topic that is silent now has no second sample yet.
         let gap = gap.max(age);
         let rate = self.spec.rate;
         Report {
@@ -136,50 +141,51 @@ impl TopicRates {
     }
 }
 
-/// Whether a topic of `rate` is published later than it says.
+/// Whether `gap` is longer than `rate` allows.
 fn is_late(rate: Rate, gap: Duration) -> bool {
     matches!(rate, Rate::OnChange { again_after, .. } if gap > LATE * again_after)
 }
 
-/// The first line of a table of reports.
-pub(crate) fn heading() -> String {
-    format!(
-        "{:<13}{:>11}{:>13}{:>10}{:>6}  by the table",
-        "topic", "samples/s", "longest gap", "age", "lost"
-    )
+/// `reports` as a table.
+pub(crate) fn table(reports: &[Report]) -> String {
+    let mut table = Table::new([
+        ("topic", Left),
+        ("samples/s", Right),
+        ("longest gap", Right),
+        ("age", Right),
+        ("lost", Right),
+        ("by the table", Left),
+    ]);
+    for report in reports {
+        let gap = report.longest_gap_s;
+        table.row([
+            report.topic.to_owned(),
+            format!("{:.1}", report.rate_hz),
+            gap.map_or("-".to_owned(), |gap| age(Some(gap))),
+            age(report.age_s),
+            report.lost.to_string(),
+            report.by_the_table(),
+        ]);
+    }
+    table.to_string()
 }
 
 impl Report {
-    /// A line of the table.
-    pub(crate) fn line(&self) -> String {
-        let rate = format!("{:.1}", self.rate_hz);
-        let gap = self
-            .longest_gap_s
-            .map_or("-".to_owned(), |gap| age(Some(gap)));
-        format!(
-            "{:<13}{rate:>11}{gap:>13}{:>10}{:>6}  {}",
-            self.topic,
-            age(self.age_s),
-            self.lost,
-            self.by_the_table()
-        )
-    }
-
     fn by_the_table(&self) -> String {
         match self.rate {
             Rate::EachTick => match self.missing_ticks.unwrap_or_default() {
-                0 => "each tick: kept".to_owned(),
+                0 => "each tick: ok".to_owned(),
                 missing => format!("each tick: MISSING {missing} of {}", self.ticks),
             },
             Rate::EachFrame => "each frame of the robot".to_owned(),
             Rate::WhenItHappens => "when it happens".to_owned(),
             Rate::OnChange { again_after, .. } => {
-                let kept = match (self.age_s, self.late) {
+                let seen = match (self.age_s, self.late) {
                     (None, _) => "never came",
                     (_, Some(true)) => "LATE",
-                    _ => "kept",
+                    _ => "ok",
                 };
-                format!("again after {} ms: {kept}", again_after.as_millis())
+                format!("again after {} ms: {seen}", again_after.as_millis())
             }
         }
     }
@@ -221,11 +227,6 @@ mod tests {
         assert_eq!((report.ticks, report.missing_ticks), (3, Some(1)));
         assert_eq!(report.age_s, Some(0.5));
         assert_eq!(report.longest_gap_s, Some(0.5), "the silence since");
-        assert!(
-            report.line().ends_with("each tick: MISSING 1 of 3"),
-            "{}",
-            report.line()
-        );
         let next = pose.report(began + 2000 * MS);
         assert_eq!((next.rate_hz, next.missing_ticks), (0.0, Some(0)));
     }
@@ -242,7 +243,7 @@ mod tests {
         let report = health.report(began + 1000 * MS);
         assert_eq!((report.rate_hz, report.late), (98.0, Some(false)));
         assert_eq!(report.longest_gap_s, Some(0.02));
-        // One of the two has stopped.
+        // One of the two writers has stopped.
         for number in 50..100 {
             health.add(of(1), stamp(number, 0), began + 20 * number * MS);
         }

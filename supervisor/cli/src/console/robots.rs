@@ -16,11 +16,10 @@ const USER_DIRECTORY: &str = "firsthand-";
 /// A robot of this user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Robot {
-    /// Its name.
     pub(crate) name: RobotName,
-    /// The process that supervises it; none of one whose supervisor was killed.
+    /// The process of its supervisor; none if that was killed.
     pub(crate) supervisor: Option<u32>,
-    /// The directory of its run; none where the system does not say.
+    /// The directory of its run; none if the system does not say.
     pub(crate) run: Option<PathBuf>,
 }
 
@@ -38,7 +37,7 @@ impl Robot {
 
 /// The robots of this user that run, or whose supervisor was killed, by name.
 pub(crate) fn own() -> Vec<Robot> {
-    // The name is of no matter: all robots of a user are in one directory.
+    // Any name will do, because all robots of a user are in one directory.
     let Ok(any) = "any".parse() else {
         return Vec::new();
     };
@@ -52,7 +51,7 @@ pub(crate) fn own() -> Vec<Robot> {
     robots
 }
 
-/// Numbers of other users who have, or had, robots on this machine: only they can see which.
+/// Numbers of other users who have, or had, robots on this machine. Only these users can list them.
 pub(crate) fn other_users() -> Vec<u32> {
     let own = rustix::process::geteuid().as_raw();
     users_in(Path::new("/tmp"), own)
@@ -63,7 +62,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
     let user = |entry: fs::DirEntry| {
         let name = entry.file_name();
         let user = name.to_str()?.strip_prefix(USER_DIRECTORY)?.parse().ok()?;
-        // Anybody may make a directory of any name there.
+        // Every user can create a directory of any name there.
         let its = entry.metadata().ok()?.uid() == user;
         (user != own && its).then_some(user)
     };
@@ -72,7 +71,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
     users
 }
 
-/// The directory of the run that process `supervisor` supervises: it has its log there open.
+/// The directory of the run of the process `supervisor`, which has its log open there.
 fn run_directory(supervisor: u32) -> Option<PathBuf> {
     let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
     let files = opened

@@ -1,4 +1,4 @@
-//! Where a run's files go: a directory of its own.
+//! The directory of a run: made, found, removed.
 
 use std::{
     fs, io,
@@ -12,7 +12,7 @@ use super::{
 };
 use common::domain::RobotName;
 
-/// The directory asked for; results of an earlier run are not mixed with this one's.
+/// The directory that was asked for. It is refused if it holds an earlier run.
 pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
     fs::create_dir_all(directory).map_err(|error| {
         format!(
@@ -30,8 +30,7 @@ pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
     Ok(fs::canonicalize(directory)?)
 }
 
-/// `NAME-NNN` below `runs`, the number after the highest there: a directory that was removed gives its number to no
-/// later run.
+/// `NAME-NNN` below `runs`, with the number after the highest one there.
 pub(crate) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     fs::create_dir_all(runs).map_err(|error| {
         format!(
@@ -62,8 +61,8 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
     entries.filter_map(number).max().unwrap_or_default()
 }
 
-/// Remove the oldest directories of `robot` below `runs` whose runs have ended, beyond `keep` of them. One that cannot be
-/// removed stays: no mission is given up for it.
+/// Remove the directories of all but the newest `keep` runs of `robot` that have ended. If one cannot be removed, it stays and
+/// the mission starts all the same.
 pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     let mut ended = runs_of(robot, runs);
     ended.retain(RunDirectory::has_ended);
@@ -79,13 +78,13 @@ pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
 
 /// The runs of `robot` in directories below `runs`.
 fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
-    let mut kept = runs::list(runs);
-    kept.retain(|run| run.robot == *robot);
-    kept
+    let mut runs = runs::list(runs);
+    runs.retain(|run| run.robot == *robot);
+    runs
 }
 
-/// The newest run of `robot` below `runs` without a summary whose cut was not reported yet: its supervisor was killed, or the
-/// machine was switched off.
+/// The newest run of `robot` below `runs` that was cut off and not reported yet: it has no summary, because its supervisor was
+/// killed or the machine was switched off.
 pub(crate) fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
     let runs = runs_of(robot, runs).into_iter();
     let newest = runs.filter(|run| !run.has_ended()).max();
@@ -94,7 +93,7 @@ pub(crate) fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathB
         .transpose()
 }
 
-/// Mark that a run was reported as cut off: the next start begins a new one.
+/// Mark that a run was reported as cut off, so that the next start begins a new one.
 pub(crate) fn mark_cut_off(directory: &Path) -> io::Result<()> {
     fs::write(directory.join(CUT_OFF), "")
 }

@@ -1,4 +1,4 @@
-//! The runs that are kept: directories below one, each with a run file.
+//! The runs of a directory: each is a directory with a run file.
 
 use std::{
     fs,
@@ -13,36 +13,31 @@ use supervisor::recovery::SUMMARY;
 
 use super::robots::Robot;
 
-/// Marks a run directory whose run was cut off, once that was reported.
+/// The file that marks a run that was cut off and reported.
 pub(crate) const CUT_OFF: &str = "cut-off";
-/// A summary takes 2 kB.
+/// A summary takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-/// A run that is kept.
+/// A run on the disk.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct RunDirectory {
-    /// When it began.
     pub(crate) began: SystemTime,
-    /// Where it is.
     pub(crate) directory: PathBuf,
-    /// Whose it is.
     pub(crate) robot: RobotName,
-    /// The mission's name; none where the run file is another version's.
+    /// The name of the mission; none if another version wrote the run file.
     pub(crate) mission: Option<String>,
 }
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Outcome {
-    /// It has not.
     Running,
-    /// Its supervisor was killed, or the machine was switched off.
+    /// The supervisor was killed, or the machine was switched off.
     CutOff,
-    /// It came to its end; what its summary says.
+    /// The run has a summary.
     Ended {
-        /// `reached` and the like.
+        /// Its outcome, such as `reached`.
         outcome: String,
-        /// Seconds of the robot's clock.
         mission_time_s: Option<f64>,
     },
 }
@@ -56,7 +51,7 @@ pub(crate) fn list(runs: &Path) -> Vec<RunDirectory> {
     #[derive(Deserialize)]
     struct Named {
         robot: RobotName,
-        // What else a run file says may be another version's.
+        // Another version may have other keys beside these.
         mission: Option<Mission>,
     }
     let read = |entry: fs::DirEntry| {
@@ -75,7 +70,7 @@ pub(crate) fn list(runs: &Path) -> Vec<RunDirectory> {
 }
 
 impl RunDirectory {
-    /// Whether it came to its end, or was reported as cut off: nobody goes on with it.
+    /// Whether nobody goes on with it: it has a summary, or it was reported as cut off.
     pub(crate) fn has_ended(&self) -> bool {
         self.has(SUMMARY) || self.has(CUT_OFF)
     }
@@ -113,26 +108,26 @@ impl RunDirectory {
         its.is_some() && its == fs::canonicalize(&self.directory).ok()
     }
 
-    /// What it takes on the disk, bytes.
+    /// Its size on the disk, bytes.
     pub(crate) fn size(&self) -> u64 {
         size(&self.directory, MOST_LEVELS)
     }
 }
 
-/// A run directory has one level.
+/// Deeper directories are not counted; a run directory has one level.
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let sizes = entries.filter_map(|entry| {
-        // Of a link its own: what it leads to is not the run's.
+        // A link counts by itself, without the file that it leads to.
         let file = entry.metadata().ok()?;
         let below = if file.is_dir() && levels > 0 {
             size(&entry.path(), levels - 1)
         } else {
             0
         };
-        // The kernel counts blocks of 512 bytes whatever the file system's are.
+        // The kernel counts blocks of 512 bytes on every file system.
         Some(file.blocks().saturating_mul(512).saturating_add(below))
     });
     sizes.fold(0, u64::saturating_add)
@@ -148,7 +143,7 @@ mod tests {
         let begun = |name: &str| {
             let directory = runs.path().join(name);
             fs::create_dir(&directory).unwrap();
-            let run = "robot = 'kept-runs'\n[mission]\nname = 'trap'";
+            let run = "robot = 'listed-runs'\n[mission]\nname = 'trap'";
             fs::write(directory.join(run::FILE_NAME), run).unwrap();
             directory
         };
@@ -157,9 +152,9 @@ mod tests {
         fs::write(begun("a-ended").join(SUMMARY), summary).unwrap();
         fs::write(begun("b-broken").join(SUMMARY), "{").unwrap();
         begun("c-cut");
-        let mut kept = list(runs.path());
-        kept.sort_by_key(|run| run.directory.clone());
-        let outcomes: Vec<_> = kept.iter().map(RunDirectory::outcome).collect();
+        let mut listed = list(runs.path());
+        listed.sort_by_key(|run| run.directory.clone());
+        let outcomes: Vec<_> = listed.iter().map(RunDirectory::outcome).collect();
         let ended = |outcome: &str, mission_time_s| Outcome::Ended {
             outcome: outcome.to_owned(),
             mission_time_s,
@@ -170,9 +165,9 @@ mod tests {
             Outcome::CutOff,
         ];
         assert_eq!(outcomes, expected);
-        assert_eq!(kept[0].mission.as_deref(), Some("trap"));
-        assert!(kept[0].size() >= 1024, "{}", kept[0].size());
-        let ended: Vec<_> = kept.iter().map(RunDirectory::has_ended).collect();
+        assert_eq!(listed[0].mission.as_deref(), Some("trap"));
+        assert!(listed[0].size() >= 1024, "{}", listed[0].size());
+        let ended: Vec<_> = listed.iter().map(RunDirectory::has_ended).collect();
         assert_eq!(ended, [true, true, false]);
     }
 }

@@ -1,4 +1,4 @@
-//! Standard output of a command that goes on until it is told to end: by a signal, or by its reader, who has read enough.
+//! Standard output of a command that goes on until a signal comes or its reader closes it.
 
 use std::{
     io::{self, Write as _},
@@ -12,17 +12,16 @@ use common::{
 
 use super::output::unless_closed;
 
-/// So much goes into a pipe that is writable without waiting for its reader (pipe(7)).
+/// A pipe that is writable takes this much at once (pipe(7)).
 const CHUNK: usize = 4096;
-/// How often a command that waits looks whether it is told to end.
+/// A command that waits looks after this time whether it must end.
 pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// Niceness of a command that watches.
 const NICE: i32 = 5;
 
-/// Stages that answer the robot get the processor before this process.
+/// Give the stages of robots the processor before this process.
 pub(crate) fn let_stages_go_first() {
-    // Where that is refused they share it.
+    // If the kernel refuses, they share it.
     let _ = rustix::process::nice(NICE);
 }
 
@@ -33,7 +32,7 @@ pub(crate) struct Stream {
 }
 
 impl Stream {
-    /// From now on signals end the command in order, so that it leaves the bus before it ends, and stages go first.
+    /// From now on a signal lets the command leave the bus before it ends, and stages get the processor first.
     pub(crate) fn open() -> io::Result<Self> {
         let_stages_go_first();
         Ok(Self {
@@ -42,13 +41,13 @@ impl Stream {
         })
     }
 
-    /// Whether the command is told to end.
+    /// Whether the command must end.
     pub(crate) fn has_ended(&mut self) -> bool {
         self.ended |= self.signals.came() || poll::is_closed(io::stdout()).unwrap_or(true);
         self.ended
     }
 
-    /// Write `text`, as far as a reader takes it before the command is told to end.
+    /// Write `text`; the rest of it is dropped if the command must end.
     pub(crate) fn write(&mut self, text: &str) -> io::Result<()> {
         let mut stdout = io::stdout();
         for chunk in text.as_bytes().chunks(CHUNK) {

@@ -1,4 +1,4 @@
-//! What standard error says of a robot that is waited for, once each time.
+//! Messages on standard error about a robot that a command waits for, one each time.
 
 use common::domain::RobotName;
 

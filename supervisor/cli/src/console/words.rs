@@ -6,7 +6,7 @@ use common::samples::{
 };
 use supervisor::process::ExitCause;
 
-/// What the supervisor orders, and why.
+/// The order of the supervisor, with its reason.
 pub(crate) const fn order(order: Order, reason: HoldReason) -> &'static str {
     match order {
         Order::Hold => match reason {
@@ -19,7 +19,6 @@ pub(crate) const fn order(order: Order, reason: HoldReason) -> &'static str {
     }
 }
 
-/// The state of a stage.
 pub(crate) const fn state(state: StageState) -> &'static str {
     match state {
         StageState::Down => "down",
@@ -31,7 +30,7 @@ pub(crate) const fn state(state: StageState) -> &'static str {
     }
 }
 
-/// What the planner says of the pose, of a [`GuidanceStatus`].
+/// The status of the planner, a [`GuidanceStatus`].
 pub(crate) const fn guidance(status: u8) -> &'static str {
     match GuidanceStatus::from_byte(status) {
         GuidanceStatus::Waiting => "waits for a field",
@@ -43,7 +42,7 @@ pub(crate) const fn guidance(status: u8) -> &'static str {
     }
 }
 
-/// How a stage's process ended.
+/// The end of a stage's process.
 pub(crate) fn death(death: &DeathSample) -> String {
     let (stage, generation) = (name_str(&death.stage), death.generation);
     let how = ExitCause::from(death);
@@ -52,7 +51,7 @@ pub(crate) fn death(death: &DeathSample) -> String {
     format!("{at:.1} s {stage} {generation}: {hung}{how}")
 }
 
-/// Why the robot does not get on, and what is done.
+/// The cause of a stall, and what is done about it.
 pub(crate) fn stall(stall: &StallSample) -> String {
     let cause = match stall.cause() {
         StallCause::Still => "stands still",
@@ -69,12 +68,12 @@ pub(crate) fn stall(stall: &StallSample) -> String {
     format!("{at:.1} s robot {cause}: {recovery}")
 }
 
-/// Seconds of so many nanoseconds; `u64::MAX` stands for never.
+/// Seconds; `u64::MAX` nanoseconds stand for never.
 pub(crate) fn seconds(nanoseconds: u64) -> Option<f64> {
     (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
 }
 
-/// An age for people, seconds; none is never.
+/// An age in the unit that fits; none is never.
 pub(crate) fn age(seconds: Option<f64>) -> String {
     match seconds {
         None => "never".to_owned(),
@@ -86,7 +85,7 @@ pub(crate) fn age(seconds: Option<f64>) -> String {
     }
 }
 
-/// A size for people, of so many bytes.
+/// A size in the unit that fits.
 pub(crate) fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     match bytes {

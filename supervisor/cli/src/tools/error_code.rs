@@ -8,7 +8,7 @@ use report::ReportError;
 
 use crate::console::failure;
 
-/// The code of `error`; none where no script could react in a way of its own.
+/// The code of `error`; none if no script could react to it in particular.
 pub(crate) fn of(error: &(dyn Error + 'static)) -> Option<&'static str> {
     if let Some(ExperimentError::Unknown { .. }) = error.downcast_ref() {
         return Some("unknown-experiment");

@@ -28,21 +28,21 @@ use crate::console::{
     output::{print_text, write_stderr},
 };
 
-/// Run missions on many worlds and count, by the ground truth, how many succeed: with 95 % intervals, every failure
-/// with its picture. Worlds and noise follow from the seed.
+/// Run missions on many worlds and count successes by the ground truth, with 95 % intervals and a picture of every failure.
+/// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// rooms, doors, traps, corridors, straight-corridors, furnished; a mission file, a ROS map (.yaml), a BARN .world or
     /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
     worlds: Worlds,
-    /// So many worlds; 100 if they are drawn, all if they are read, ten starts and targets on a map without any.
+    /// Number of worlds; by default 100 if they are drawn, all if they are read, ten starts and targets on a map without any.
     #[arg(long)]
     count: Option<usize>,
-    /// On a ROS map: where the robot starts and its heading, metres and degrees of the map.
+    /// On a ROS map: start and heading of the robot, metres and degrees of the map.
     #[arg(long, value_name = "X,Y,DEG", requires = "target", allow_hyphen_values = true, value_parser = numbers::<3>)]
     start: Option<[f64; 3]>,
-    /// On a ROS map: where it is to go, metres of the map.
+    /// On a ROS map: the target, metres of the map.
     #[arg(long, value_name = "X,Y", requires = "start", allow_hyphen_values = true, value_parser = numbers::<2>)]
     target: Option<[f64; 2]>,
     /// Seed of the worlds and of the noise in them.
@@ -68,33 +68,33 @@ pub(crate) struct Arguments {
     /// The robot's model.
     #[arg(long, default_value = "x80")]
     robot: String,
-    /// KEY=VALUE over every mission, as often as needed.
+    /// Set a key of every mission, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// A further setting to compare with the first on the same worlds: KEY=VALUE over it, several with commas.
     #[arg(long, value_name = "KEY=VALUE,...")]
     versus: Vec<String>,
-    /// Missions at once; one for each processor if unsaid.
+    /// Missions at once; by default one for each processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
-    /// Where rows, worlds, pictures and the page go.
+    /// The directory of rows, worlds, pictures and the page.
     #[arg(long, value_name = "DIR", default_value = "evaluation")]
     out: PathBuf,
-    /// Go on with the evaluation in the directory of --out, which must have been of the same command.
+    /// Go on with the evaluation in the directory of --out, which the same command must have begun.
     #[arg(long)]
     resume: bool,
-    /// End with one line of JSON on standard output, and nothing else there: of the first setting, the others under
-    /// `versus`.
+    /// Print one line of JSON at the end, and nothing else on standard output. It is about the first setting; `versus` has the
+    /// others.
     #[arg(long)]
     json: bool,
 }
 
-/// The other planners that come with it, and their executables beside this one.
-const YARDSTICKS: [(&str, &str); 2] = [
+/// The baselines, and their executables beside this one.
+const BASELINES: [(&str, &str); 2] = [
     ("wavefront", "firsthand-wavefront"),
     ("bug", "firsthand-bug"),
 ];
-/// Free ground that a world leaves the body on both sides of its narrowest way, metres.
+/// Free ground on both sides of the body in the narrowest way of a world, metres.
 const MARGIN_M: f64 = 0.05;
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -151,7 +151,7 @@ impl Arguments {
     }
 }
 
-/// `N` numbers between commas, none larger than a map is far from its origin.
+/// `N` numbers between commas, none beyond 1000 km.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parsed: Result<Vec<f64>, _> = text.split(',').map(|it| it.trim().parse()).collect();
     let numbers = parsed.ok().and_then(|it| <[f64; N]>::try_from(it).ok());
@@ -185,8 +185,8 @@ fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     )
 }
 
-/// A method with sensors, as a setting's name says it, and what is set for it: each method with each of the sensors, the
-/// paper's once, for it has the sonar alone.
+/// The methods to compare, each as a name and its assignments: each method with each of the sensors, but the paper's method
+/// once, because it has only the sonar.
 fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
     let methods = match &arguments.method[..] {
         [] => vec!["evidential".to_owned()],
@@ -245,14 +245,14 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>, Failure> {
     Ok(settings)
 }
 
-/// KEY=VALUE that makes a mission's planner the one called so; none for `firsthand`'s own.
+/// The assignment for the planner of that name; none for the planner of `firsthand`.
 fn executable(planner: &str) -> Result<Option<String>, Failure> {
     if planner == HARMONIC {
         return Ok(None);
     }
-    let baseline = YARDSTICKS.iter().find(|(name, _)| *name == planner);
+    let baseline = BASELINES.iter().find(|(name, _)| *name == planner);
     let named = baseline.map_or(planner, |(_, executable)| executable);
-    // Told before anything starts, rather than by each mission.
+    // A missing executable is reported before anything starts.
     planner_executable::find(Path::new(named))?;
     let value = toml::Value::from(named);
     Ok(Some(format!("planner.executable={value}")))

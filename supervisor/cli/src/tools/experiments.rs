@@ -19,8 +19,7 @@ use evaluation::{
 use super::mission_progress::{MissionProgress, jobs};
 use crate::console::{failure::Failure, output::print_text};
 
-/// Repeat the paper's experiments, by its method as printed and by the default one, and put what came of it beside what
-/// the paper reports.
+/// Repeat the paper's experiments with its method and with the default one, and compare the results with those of the paper.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Missions of each experiment and method, with noise seeds from 1 on.
@@ -32,21 +31,21 @@ pub(crate) struct Arguments {
     /// measured: wheels and sonar as measured, the radio out 20 % of the time; or laboratory.
     #[arg(long, default_value = "measured", value_parser = realism)]
     realism: Realism,
-    /// Missions at once; one for each processor if unsaid.
+    /// Missions at once; by default one for each processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
-    /// Where rows, missions, pictures and the page go.
+    /// The directory of rows, missions, pictures and the page.
     #[arg(long, value_name = "DIR", default_value = "experiments")]
     out: PathBuf,
-    /// Go on with the experiments in the directory of --out, which must have been of the same command.
+    /// Go on with the experiments in the directory of --out, which the same command must have begun.
     #[arg(long)]
     resume: bool,
-    /// Give one line of JSON for each experiment on standard output, and nothing else there.
+    /// Print one line of JSON for each experiment, and nothing else on standard output.
     #[arg(long)]
     json: bool,
 }
 
-/// The noise seed whose missions are pictured, and the first.
+/// The first noise seed, whose missions are drawn.
 const FIRST_SEED: u64 = 1;
 
 fn realism(text: &str) -> Result<Realism, String> {

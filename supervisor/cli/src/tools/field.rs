@@ -12,7 +12,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{process_status, samples::FieldCell};
+use common::samples::FieldCell;
 use evaluation::maps::{self, Map};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use npyz::WriterBuilder as _;
@@ -20,6 +20,7 @@ use picture::FieldOnMap;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::top::usage::memory_bytes;
 use crate::console::{
     failure::{Failure, Refused},
     output::print,
@@ -44,10 +45,10 @@ pub(crate) struct Arguments {
     /// Draw level sets of log u and lines of the guidance as a PNG.
     #[arg(long, value_name = "F.png")]
     picture: Option<PathBuf>,
-    /// End with one line of JSON on standard output, and nothing else there.
+    /// Print one line of JSON at the end, and nothing else on standard output.
     #[arg(long)]
     json: bool,
-    /// Solve so often, each time from scratch, and tell the least and the median time.
+    /// Solve K times, each time from scratch, and give the least and the median time.
     #[arg(long, value_name = "K", default_value = "1")]
     repeat: NonZeroUsize,
     /// Threads a solve may use; the field is the same.
@@ -201,7 +202,7 @@ struct Report {
     peak_memory_bytes: Option<u64>,
 }
 
-/// Told when there is more than one repeat.
+/// Medians, if there is more than one repeat.
 #[derive(Debug, Serialize)]
 struct Medians {
     setup_ms_median: f64,
@@ -249,7 +250,7 @@ impl Report {
             }),
             worst_residual: verification.worst_residual,
             log10_u_min: field.log10_u_min(),
-            peak_memory_bytes: peak_memory(),
+            peak_memory_bytes: memory_bytes("self", "VmHWM"),
         }
     }
 }
@@ -295,13 +296,6 @@ impl fmt::Display for Report {
         }
         Ok(())
     }
-}
-
-/// The most memory this process ever held, bytes; none where the kernel does not tell.
-fn peak_memory() -> Option<u64> {
-    let peak = process_status::field("self", "VmHWM")?;
-    let kibibytes: u64 = peak.strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024)
 }
 
 /// Creates `file` and fills it.

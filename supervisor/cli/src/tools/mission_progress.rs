@@ -1,4 +1,4 @@
-//! Many missions: how many at once, and how far they are, on standard error.
+//! The progress of many missions on standard error.
 
 use std::{
     num::NonZero,
@@ -10,10 +10,10 @@ use evaluation::runner::Progress;
 
 use crate::console::progress_line::ProgressLine;
 
-/// A line that cannot be rewritten comes so seldom.
+/// Time between lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// Missions at once: as asked for, or one for each processor.
+/// Missions at once: as many as asked for, or one for each processor.
 pub(super) fn jobs(asked_for: Option<NonZero<usize>>) -> usize {
     asked_for.map_or_else(
         || thread::available_parallelism().map_or(1, NonZero::get),
@@ -21,7 +21,6 @@ pub(super) fn jobs(asked_for: Option<NonZero<usize>>) -> usize {
     )
 }
 
-/// How far the missions are.
 pub(super) struct MissionProgress {
     title: String,
     began: Instant,
@@ -38,7 +37,7 @@ impl MissionProgress {
         }
     }
 
-    /// After a mission.
+    /// Show the progress after a mission.
     pub(super) fn show(&mut self, progress: &Progress) {
         if !self.line.is_due() {
             return;
@@ -56,7 +55,6 @@ impl MissionProgress {
         self.line.show(&line, true);
     }
 
-    /// After the last.
     pub(super) fn end(&self) {
         self.line.end();
     }

@@ -34,17 +34,17 @@ pub(crate) struct Arguments {
     /// The directory of a run that was recorded, or a recording.
     #[arg(value_name = "RUN|F.mcap")]
     recording: PathBuf,
-    /// Only these stages, with commas between; with --live those that run as processes: all but the link if none is named.
+    /// Only these stages, with commas between. With --live: the stages that run as processes, by default all but the link.
     #[arg(long, value_name = "STAGES", value_delimiter = ',')]
     stage: Vec<String>,
-    /// Publish the recording on a bus, for any consumer, and run stages in processes of their own in place of the recorded
-    /// ones. At `--pace max` time waits for their answers.
+    /// Publish the recording on a bus, for any consumer, and run stages in processes of their own instead of the recorded
+    /// ones. With `--pace max` time waits for their answers.
     #[arg(long)]
     live: bool,
-    /// With --live: name of the robot whose place the recording takes.
+    /// With --live: name of the robot on the bus.
     #[arg(long, default_value = "replay", requires = "live")]
     robot: RobotName,
-    /// With --live: KEY=VALUE over the recorded mission, for the stages that run, as often as needed; a planner of yours is
+    /// With --live: set a key of the recorded mission for the stages that run, as often as needed. Your own planner is
     /// `planner.executable="my-planner"`.
     #[arg(long, value_name = "KEY=VALUE", requires = "live")]
     set: Vec<String>,
@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     /// Compare from this mission time on, seconds.
     #[arg(long, value_name = "S", default_value = "0")]
     from: f64,
-    /// End with one line of JSON on standard output, and nothing else there.
+    /// Print one line of JSON at the end, and nothing else on standard output.
     #[arg(long)]
     json: bool,
 }

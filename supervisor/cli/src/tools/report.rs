@@ -6,14 +6,14 @@ use clap::Args;
 
 use crate::console::{failure::Failure, output::print_text};
 
-/// Write the report of a run from its recording: one page that refers to nothing else, and each figure as SVG. `run` does it at
-/// its end.
+/// Write the report of a run from its recording: one page without references to other files, and each figure as SVG. `run` does
+/// this at its end.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The directory of a run that was recorded, or a recording.
     #[arg(value_name = "RUN|F.mcap")]
     run: PathBuf,
-    /// Where to; by default `report` in the run's directory, or `F-report` beside F.mcap.
+    /// The directory of the report; by default `report` in the run's directory, or `F-report` beside F.mcap.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

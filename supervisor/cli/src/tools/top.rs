@@ -14,7 +14,7 @@ mod map;
 mod screen;
 #[cfg(test)]
 mod tests;
-mod usage;
+pub(super) mod usage;
 mod view;
 
 use std::{

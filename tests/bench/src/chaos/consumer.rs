@@ -30,7 +30,7 @@ pub enum Consumer {
     Record,
     /// `firsthand top`, on a terminal of its own.
     Top,
-    /// `firsthand hz`.
+    /// `firsthand topic hz`.
     Hz,
     /// `firsthand logs -f`.
     Logs,
@@ -130,7 +130,7 @@ impl Consumer {
                 words
             }
             Self::Top => own(&["top"]),
-            Self::Hz => own(&["hz"]),
+            Self::Hz => own(&["topic", "hz"]),
             Self::Logs => own(&["logs", "--follow"]),
             Self::Given(given) => {
                 let mut words = vec![given.program.clone().into_os_string()];
@@ -138,7 +138,7 @@ impl Consumer {
                 words
             }
         };
-        let mut command = firsthand(&[SUBCOMMAND, &std::process::id().to_string()]);
+        let mut command = firsthand(&["bench", SUBCOMMAND, &std::process::id().to_string()]);
         command.args(words);
         Some(command)
     }

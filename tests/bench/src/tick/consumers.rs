@@ -20,7 +20,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 pub(super) fn start(robot: &RobotName, number: u32) -> Result<Vec<Process>, TickError> {
     let own = std::process::id().to_string();
     let consumer = |_| {
-        let mut command = firsthand(&["latency", "--consumer", "--supervisor", &own]);
+        let mut command = firsthand(&["bench", "tick", "--consumer", "--supervisor", &own]);
         command.args(["--robot", &robot.to_string()]);
         Process::spawn(command).map_err(system("start a consumer"))
     };

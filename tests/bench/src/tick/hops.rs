@@ -50,7 +50,7 @@ pub fn measure(
     let own = std::process::id().to_string();
     let mut forwarders = Vec::new();
     for place in PLACES {
-        let arguments = ["latency", "--forwarder", place, "--supervisor", &own];
+        let arguments = ["bench", "tick", "--forwarder", place, "--supervisor", &own];
         let mut command = firsthand(&arguments);
         command.args(["--robot", &robot.to_string()]);
         forwarders.push(Process::spawn(command).map_err(system("start a forwarder"))?);

@@ -8,7 +8,7 @@ const INDENT: &str = "    ";
 /// Blanks between the columns of a table.
 const GAP: usize = 2;
 /// No column becomes narrower so that a table fits.
-const NARROWEST: usize = 8;
+const NARROWEST: usize = 4;
 
 /// `text` with lines of at most `width` characters, but for lines of code.
 pub(super) fn render(text: &str, width: usize) -> String {
@@ -28,6 +28,8 @@ pub(super) fn render(text: &str, width: usize) -> String {
                 rows.push(cells(row));
             }
             rendered += &table(rows, width);
+        } else if line.trim().is_empty() {
+            rendered.push('\n');
         } else {
             let (first, rest, start) = item(line);
             let mut paragraph = line[start..].to_owned();
@@ -116,6 +118,11 @@ fn width_of(text: &str) -> usize {
     text.chars()
         .filter(|&letter| letter != BOLD && letter != CODE)
         .count()
+}
+
+fn longest_word(text: &str) -> usize {
+    let words = text.split_whitespace().map(width_of);
+    words.max().unwrap_or_default()
 }
 
 /// `text` in lines of at most `width` characters; only a longer word is cut.
@@ -208,20 +215,30 @@ fn cells(row: &str) -> Vec<String> {
 /// A table whose columns are made narrower until it fits; its second row parts the heading from the rest.
 fn table(mut rows: Vec<Vec<String>>, width: usize) -> String {
     let columns = rows[0].len();
+    let widest = |column: usize, width: fn(&str) -> usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column));
+        // The row of dashes has no width of its own.
+        let cells = cells.filter(|cell| !is_rule(cell));
+        cells.map(|cell| width(cell)).max().unwrap_or(1)
+    };
     let mut widths: Vec<usize> = (0..columns)
-        .map(|column| {
-            let cells = rows.iter().filter_map(|row| row.get(column));
-            // The row of dashes has no width of its own.
-            let cells = cells.filter(|cell| !is_rule(cell));
-            cells.map(|cell| width_of(cell)).max().unwrap_or(1)
-        })
+        .map(|column| widest(column, width_of))
+        .collect();
+    let words: Vec<usize> = (0..columns)
+        .map(|column| widest(column, longest_word))
         .collect();
     let room = width.saturating_sub(GAP * columns.saturating_sub(1));
-    while widths.iter().sum::<usize>() > room
-        && let Some(widest) = widths.iter_mut().max()
-        && *widest > NARROWEST
-    {
-        *widest -= 1;
+    // Words are cut only if the table does not fit otherwise.
+    for least in [words, vec![NARROWEST; columns]] {
+        while widths.iter().sum::<usize>() > room
+            && let Some((widest, _)) = widths
+                .iter_mut()
+                .zip(&least)
+                .filter(|(width, least)| **width > **least)
+                .max()
+        {
+            *widest -= 1;
+        }
     }
     for cell in &mut rows[0] {
         *cell = format!("{BOLD}{cell}{BOLD}");

@@ -113,7 +113,7 @@ fn filled_in(word: &str) -> String {
         "S" | "N" | "H" | "K" | "$s" => Some("256"),
         "NAME" | "STAGE" => Some("planner"),
         "FAULT" => Some("saddle"),
-        "TOPIC" => Some("deploy"),
+        "TOPIC" | "PAGE" => Some("deploy"),
         _ => None,
     };
     let (key, last) = match word.rsplit_once('=') {
@@ -193,6 +193,18 @@ fn a_command_line_with_an_option_or_key_that_does_not_exist_is_found() {
         let found = commands(line);
         let command = found.iter().find_map(|command| arguments(command)).unwrap();
         assert!(parse(command).is_err(), "{line}");
+    }
+}
+
+#[test]
+fn every_old_name_leads_to_a_subcommand_that_exists() {
+    for (old, new) in renamed::RENAMED {
+        let words = new.iter().filter(|word| !word.starts_with('-'));
+        let mut whole = commands::command_line();
+        let found = words.fold(Some(&mut whole), |command, word| {
+            command.and_then(|command| command.find_subcommand_mut(word))
+        });
+        assert!(found.is_some(), "{old}");
     }
 }
 

@@ -1,5 +1,4 @@
-//! The recorder that `firsthand run` starts: a consumer in a process of its own. Whatever becomes of it, the mission goes
-//! on.
+//! The recorder that `firsthand run` starts: a consumer in a process of its own. The mission goes on without it too.
 
 use std::{fs::File, process::Stdio, time::Duration};
 
@@ -9,9 +8,9 @@ use supervisor::{
     process::{Process, firsthand},
 };
 
-/// A recorder that has not attached by then misses the beginning.
+/// A recorder that is attached later misses the beginning.
 const ATTACHED_WITHIN: Duration = Duration::from_secs(2);
-/// To write its last chunk it takes some milliseconds.
+/// The recorder takes some milliseconds to write its last chunk.
 const ENDED_WITHIN: Duration = Duration::from_secs(5);
 
 /// The recorder of one run.
@@ -20,7 +19,7 @@ pub(crate) struct RunRecorder {
 }
 
 impl RunRecorder {
-    /// Start it, and wait until it is attached. None where it cannot be started, which is logged.
+    /// Start it, and wait until it is attached. None if it cannot be started, which is logged.
     pub(crate) fn start(options: &Options) -> Option<Self> {
         match Self::spawn(options) {
             Ok(recorder) => Some(recorder),
@@ -38,7 +37,7 @@ impl RunRecorder {
             .append(true)
             .open(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
-        // Not over the recording of a run that is resumed.
+        // A run that is resumed may have a recording already.
         let free = recording::places(directory).find(|file| !file.exists());
         command.arg("--out").args(free);
         command.arg("--run-directory").arg(directory);
@@ -58,7 +57,7 @@ impl RunRecorder {
         Ok(Self { process })
     }
 
-    /// The run is over: let it write the rest.
+    /// Let it write the rest at the end of the run.
     pub(crate) fn end(mut self) {
         self.process.end(ENDED_WITHIN);
     }

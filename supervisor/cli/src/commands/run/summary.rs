@@ -1,4 +1,4 @@
-//! How a run ended, as numbers: for people, for scripts, for the picture.
+//! The summary of a run: its outcome and its numbers.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use supervisor::{Finished, outcome::Outcome, totals::LookTotals};
 
-/// Quantiles of a duration, microseconds; none of nothing.
+/// Quantiles of a duration, microseconds; none if nothing was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Quantiles {
     p50: Option<f64>,
@@ -27,26 +27,26 @@ impl From<&Histogram> for Quantiles {
     }
 }
 
-/// The last line of `run --json`. Distances in metres; none (null) where nothing is known, such as the ground truth of a
-/// real robot.
+/// The last line of `run --json`. Distances are in metres. An unknown value is none (null), such as the ground truth of a real
+/// robot.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Summary {
     pub(crate) outcome: Outcome,
     pub(crate) reason: String,
     /// The row of the failsafe table that ended the mission, by its name (`firsthand table failsafe`).
     pub(crate) cause: Option<&'static str>,
-    /// From the first motion order to the end by the robot's clock, which counts the time when nobody heard it.
+    /// From the first motion order to the end by the robot's clock, which goes on while the link is lost.
     pub(crate) mission_time_s: f64,
     pub(crate) path_length_m: f64,
     pub(crate) straight_m: f64,
     pub(crate) min_clearance_m: Option<f64>,
     pub(crate) collisions: Option<u64>,
     pub(crate) pose_error_m: Option<f64>,
-    /// Root mean square of that, by the covariance of the last pose.
+    /// The root mean square of the pose error by the covariance of the last pose.
     pub(crate) pose_error_expected_m: Option<f64>,
-    /// From where the robot ended to the target, by the ground truth.
+    /// Distance from the robot's end to the target, by the ground truth.
     pub(crate) true_distance_m: Option<f64>,
-    /// When the robot had moved 0.1 m, by the ground truth.
+    /// The time at which the robot had moved 0.1 m, by the ground truth.
     pub(crate) departed_s: Option<f64>,
     /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
     /// together, in an outage or when a stage is down.
@@ -56,33 +56,33 @@ pub(crate) struct Summary {
     pub(crate) local_updates: u64,
     /// Times the robot stopped to look.
     pub(crate) looks: u64,
-    /// Mission time that it looked.
+    /// Mission time spent looking.
     pub(crate) look_s: f64,
-    /// Share of the ticks in which the front sonar gave no distance, by the ground truth: a supervisor on a busy machine
-    /// may miss samples.
+    /// Share of the ticks in which the front sonar gave no distance. It is taken from the ground truth, because a supervisor on a
+    /// busy machine may miss samples.
     pub(crate) sonar_unavailable_share: Option<f64>,
     /// The greatest commanded speed of either wheel less the least one, rad/s, in the last supervisor's part.
     pub(crate) wheel_range_rad_s: Option<f64>,
     pub(crate) ticks: u64,
     pub(crate) restarts: BTreeMap<&'static str, u32>,
-    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last one's
+    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last supervisor's
     /// part; the path is the believed one, which is complete.
     pub(crate) resumes: u32,
     /// Generations of the planner started because the robot stalled.
     pub(crate) replans: u32,
-    /// Times its sensed belief was forgotten.
+    /// Times the sensed part of the map was reset.
     pub(crate) resets: u64,
-    /// From the datagram in to the datagram out.
+    /// Time from the datagram in to the datagram out.
     pub(crate) tick_latency_us: Quantiles,
     pub(crate) full_solve_us: Quantiles,
     pub(crate) local_update_us: Quantiles,
 }
 
-/// A robot that has moved so far has departed, metres.
+/// A robot has departed after this distance, metres.
 const DEPARTED_M: f64 = 0.1;
 
 impl Summary {
-    /// Of a finished run. What came after that was decided does not count.
+    /// The summary of a finished run. Samples after the end was decided do not count.
     pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
         let Finished {
             ending,
@@ -131,7 +131,7 @@ impl Summary {
             looks: looks.looks,
             look_s: looks.ticks as f64 / mission.robot.rate_hz,
             sonar_unavailable_share: sonar_unavailable_share(truth),
-            // Of a car one of the two is a steering angle.
+            // A car has a steering angle in place of the second wheel.
             wheel_range_rad_s: last_tick
                 .filter(|_| mission.body().steering.is_none())
                 .and_then(|tick| record.wheels.at(tick).range_rad_s()),
@@ -153,7 +153,7 @@ impl Summary {
         };
         let stalls = (self.replans > 0 || self.resets > 0).then(|| {
             format!(
-                "The robot stalled: replans {}, beliefs forgotten {}",
+                "The robot stalled: replans {}, map resets {}",
                 self.replans, self.resets
             )
         });
@@ -219,7 +219,7 @@ impl fmt::Display for Summary {
             "{:.1} s, {:.2} m driven, ",
             self.mission_time_s, self.path_length_m
         )?;
-        // A target where the robot stands has no straight way.
+        // The straight distance to a target at the start is 0.
         if self.straight_m > 0.0 {
             let ratio = self.path_length_m / self.straight_m;
             write!(f, "{ratio:.2} x the straight {:.2} m, ", self.straight_m)?;

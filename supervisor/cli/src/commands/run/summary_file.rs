@@ -1,5 +1,4 @@
-//! The file of a run's summary: room for it is reserved when the run starts, so that the result is kept although the disk is
-//! full by then.
+//! The file of a run's summary. Its room is reserved when the run starts, so that a full disk cannot prevent it.
 
 use std::{
     fs::{self, File},
@@ -13,14 +12,18 @@ use rustix::{
 };
 use supervisor::recovery::SUMMARY;
 
+<<<<<<< HEAD
 use crate::console::failure::Refused;
 
 /// Under this name it is written: one that is called [`SUMMARY`] is whole, and says that the run has ended.
+=======
+/// The name of the file until it is complete. A file that is called [`SUMMARY`] is complete, and means that the run has ended.
+>>>>>>> 374442d (The command line in plain sentences; picture and report of a run in one module of the tools; rates as a table)
 const UNFINISHED: &str = "summary.json.unfinished";
-/// A summary takes 2 kB.
+/// A summary takes 2 kB; a larger file is not read.
 const ROOM: u64 = 16 << 10;
 
-/// The file, before the run has ended.
+/// The file before the end of the run.
 pub(crate) struct SummaryFile {
     file: File,
     directory: PathBuf,
@@ -28,10 +31,14 @@ pub(crate) struct SummaryFile {
 
 impl SummaryFile {
     /// Reserve its room in the run `directory`.
+<<<<<<< HEAD
     ///
     /// # Errors
     /// When there is none.
     pub(crate) fn reserve(directory: &Path) -> Result<Self, Refused> {
+=======
+    pub(crate) fn reserve(directory: &Path) -> Result<Self, String> {
+>>>>>>> 374442d (The command line in plain sentences; picture and report of a run in one module of the tools; rates as a table)
         let path = directory.join(UNFINISHED);
         let reserved = File::create(&path).and_then(|file| {
             match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {
@@ -52,16 +59,13 @@ impl SummaryFile {
     }
 
     /// Write the summary.
-    ///
-    /// # Errors
-    /// When the file system refuses.
     pub(crate) fn write(mut self, text: &str) -> Result<(), String> {
         let (from, to) = (
             self.directory.join(UNFINISHED),
             self.directory.join(SUMMARY),
         );
         let written = self.file.write_all(text.as_bytes());
-        // What was reserved and is not needed is given back.
+        // The reserved room that is not needed is released.
         let written = written.and_then(|()| self.file.set_len(text.len() as u64));
         written.map_err(failed("write", &from))?;
         fs::rename(&from, &to).map_err(failed("make", &to))

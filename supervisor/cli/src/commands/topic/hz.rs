@@ -13,6 +13,7 @@ use common::{
 use super::echo::readable;
 use crate::console::{
     failure::Failure,
+    output::json_lines,
     rates::{self, TopicRates},
     stream::{LOOK_EVERY, Stream},
     waiting::Waiting,
@@ -61,23 +62,13 @@ impl Readers {
 
     fn report(&mut self, json: bool) -> serde_json::Result<String> {
         let now = Instant::now();
-        let mut text = String::new();
-        if !json {
-            text = rates::heading() + "\n";
+        let reports = self.0.iter_mut().map(|(_, rates)| rates.report(now));
+        let reports: Vec<_> = reports.collect();
+        if json {
+            json_lines(&reports)
+        } else {
+            Ok(rates::table(&reports) + "\n")
         }
-        for (_, rates) in &mut self.0 {
-            let report = rates.report(now);
-            text += &if json {
-                serde_json::to_string(&report)?
-            } else {
-                report.line()
-            };
-            text += "\n";
-        }
-        if !json {
-            text += "\n";
-        }
-        Ok(text)
     }
 }
 

@@ -1,4 +1,4 @@
-//! `firsthand topic list --python`: what a consumer in Python needs.
+//! `firsthand topic list --python`: a module for consumers in Python.
 
 use std::{collections::BTreeSet, fmt::Write as _};
 
@@ -7,7 +7,7 @@ use common::{
     topics,
 };
 
-/// A module of Python: the structs of all topics, their layout checked when it is loaded, and a follower.
+/// The module: the structs of all topics, whose layouts are checked when it is loaded, and a follower.
 pub(super) fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
     let (mut known, mut table) = (BTreeSet::new(), String::new());
@@ -72,7 +72,7 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
     module.push_str("\n\n");
 }
 
-/// A struct's name without that of the project.
+/// The name of a struct without the name of the project.
 fn class(structure: &Structure) -> &'static str {
     let name = structure.name;
     name.rsplit_once('.').map_or(name, |(_, name)| name)
@@ -96,7 +96,7 @@ fn python(kind: &Kind) -> String {
 mod tests {
     use super::*;
 
-    /// Size and alignment of what C makes of it.
+    /// Size and alignment in C.
     fn in_c(kind: &Kind) -> (usize, usize) {
         match kind {
             Kind::Number(number) => {
@@ -141,7 +141,7 @@ mod tests {
         let ran = std::process::Command::new("python3")
             .args(["-c", &module])
             .output();
-        // Elsewhere the layouts are checked when the module is loaded.
+        // Without Python here, the layouts are checked only when a consumer loads the module.
         if let Ok(output) = ran {
             let error = String::from_utf8_lossy(&output.stderr);
             assert!(output.status.success(), "{error}");

@@ -1,5 +1,5 @@
-//! A sample of any topic as text, one field a line, or as JSON, one object a line. Names and order of the fields are those
-//! of the layouts; nothing here knows a topic.
+//! A sample of any topic as text, one field a line, or as JSON, one object a line. Names and order of the fields follow from
+//! the layouts; nothing here knows a topic.
 
 use std::fmt::Write as _;
 
@@ -11,10 +11,10 @@ use serde::{
 
 /// The name of a slice's elements, beside the fields of their header.
 const ELEMENTS: &str = "elements";
-/// So many elements of an array are shown as text unless all are asked for.
+/// As text, an array is cut after this many elements unless all are asked for.
 const SHOWN: usize = 16;
 
-/// `sample` as text: one field a line, below a struct's name those of the struct. Arrays of more than 16 elements are cut,
+/// `sample` as text, one field a line. The fields of a struct stand below its name. Arrays of more than 16 elements are cut,
 /// unless `whole`.
 pub(super) fn text(sample: &dyn AnySample, whole: bool) -> String {
     let most = if whole { usize::MAX } else { SHOWN };

@@ -1,5 +1,5 @@
 # The topics of firsthand, for consumers in Python (pip install iceoryx2==0.10.0): structs, and a class that follows a robot.
-# Printed by `firsthand topic list --python` of the firsthand that runs; print it again when that is replaced.
+# `firsthand topic list --python` prints it. Print it again when firsthand is replaced.
 
 import ctypes
 import fcntl
@@ -10,9 +10,8 @@ import time
 class Follower:
     """Follows a robot from run to run.
 
-    for news, samples in Follower("x80", ["pose", "grid"]): what came: "here", "gone", "nothing" (for a second),
-    or the name of a topic with one sample of it: its struct, or its header and an array. A sample is valid until the
-    next one is asked for.
+    `for event, sample in Follower("x80", ["pose", "grid"])` yields the events "here", "gone" and "nothing" (for a second), or the
+    name of a topic with one sample: its struct, or its header and an array. A sample is valid until the next event.
     """
 
     def __init__(self, robot="x80", topics=("pose",), name="python"):
@@ -26,15 +25,15 @@ class Follower:
 
     def __iter__(self):
         while True:
-            making = self._wait()
-            readers = self._join(making)
+            instance = self._wait()
+            readers = self._join(instance)
             if readers is None:
                 time.sleep(0.1)
                 continue
             yield "here", None
             node, listener, subscribers = readers
             quiet = 0
-            while self._making() == making:
+            while self._instance() == instance:
                 came = self._wait_for(listener)
                 yield from self._take(subscribers)
                 quiet = 0 if came else quiet + 1
@@ -43,7 +42,7 @@ class Follower:
                     if not self._supervised():
                         break
                     yield "nothing", None
-            # The last ones of a run that has ended.
+            # The last samples of a run that has ended.
             yield from self._take(subscribers)
             del subscribers, listener, node, readers
             yield "gone", None
@@ -56,7 +55,7 @@ class Follower:
                 pass
             return came
         except self.iox2.ListenerWaitError as error:
-            # A process that is stopped and goes on, and one with a handler for a signal, is woken by that.
+            # A signal wakes a process that has a handler for it, or that was stopped and goes on.
             if "InterruptSignal" not in str(error):
                 raise
             return None
@@ -67,7 +66,7 @@ class Follower:
                 try:
                     sample = subscriber.receive()
                 except Exception as error:
-                    # Of a writer that has just ended.
+                    # The writer may have just ended.
                     if "Borrow" in str(error):
                         raise
                     break
@@ -83,14 +82,14 @@ class Follower:
                     yield topic, sample.payload().contents
                 del sample
 
-    def _making(self):
+    def _instance(self):
         try:
             return os.readlink(f"{self.directory}/iceoryx2.toml")
         except FileNotFoundError:
             return None
 
     def _supervised(self):
-        """Whether somebody holds the supervisor's lock: one that was killed leaves its bus."""
+        """Whether a process holds the supervisor's lock: a supervisor that was killed leaves its bus."""
         try:
             with open(f"{self.directory}/lock") as lock:
                 fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -102,21 +101,21 @@ class Follower:
 
     def _wait(self):
         while True:
-            making = self._making()
-            if making and self._supervised():
-                return making
+            instance = self._instance()
+            if instance and self._supervised():
+                return instance
             time.sleep(0.1)
 
-    def _join(self, making):
-        """Readers on the bus of `making`; None where it has just gone."""
+    def _join(self, instance):
+        """Readers on the bus `instance`; None if its run has just ended."""
         iox2 = self.iox2
         try:
-            # Until the readers are made the bus is not removed: nobody makes its files again. The lock ends with the file.
+            # Under this lock, which ends with the file, nobody removes the bus until the readers are open.
             joining = open(f"{self.directory}/joining.lock")
             fcntl.flock(joining, fcntl.LOCK_SH)
-            if self._making() != making:
+            if self._instance() != instance:
                 return None
-            config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{making}"))
+            config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
             builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
             node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
             subscribers = {}
@@ -127,13 +126,13 @@ class Follower:
                 else:
                     service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
                 subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
-            # It ends a tick: until then the stages need the processor.
+            # The link ends a tick; until then the stages need the processor.
             link = node.service_builder(iox2.ServiceName.new("link"))
             listener = link.event().open().listener_builder().create()
             joining.close()
             return node, listener, subscribers
         except Exception:
-            if self._making() == making and self._supervised():
+            if self._instance() == instance and self._supervised():
                 raise
             return None
 

@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     /// A shipped mission or a mission file.
     #[arg(default_value = "obstacle-course")]
     mission: String,
-    /// Signals to send in all; the mission under way is left to end after the last.
+    /// Number of signals; after the last one the mission goes on to its end.
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     kills: u32,
     /// Seed of the schedule; the missions' own seeds count up from it.
@@ -39,38 +39,38 @@ pub(crate) struct Arguments {
     /// `hz`) and `logs -f`.
     #[arg(long, conflicts_with = "robot_faults")]
     include_consumers: bool,
-    /// Do that to a consumer of yours: a program and its arguments, read without a shell. As often as needed.
+    /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
     #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
     consumer: Vec<GivenConsumer>,
     /// Hit consumers only, and compare ticks with those of the same missions without any.
     #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
     only_consumers: bool,
-    /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals: as a machine that stands still.
+    /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals, as if the machine stood still.
     #[arg(long)]
     freeze_all: bool,
-    /// Record the missions, and replay every generation of every stage: it must be bit-equal.
+    /// Record the missions, and replay every generation of every stage, which must be equal to the bit.
     #[arg(long)]
     replay: bool,
     /// Mission time, R times wall-clock.
     #[arg(long, default_value = "4")]
     pace: Pace,
-    /// KEY=VALUE over the mission file, as often as needed.
+    /// Set a key of the mission, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Keep a row for each signal in DIR/signals.csv, as it is measured.
+    /// Write a row for each signal to DIR/signals.csv.
     #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
     out: Option<PathBuf>,
     /// Name of the robot, which also names its shared memory.
     #[arg(long, default_value = "chaos")]
     robot: RobotName,
-    /// Instead of signals: a robot that lies to its link from a random moment on, mission after mission; all ways to lie, or
-    /// those named. At the end, for each: the time from the fault to the last moving command and to wheels at rest.
+    /// Instead of signals, put a fault into the robot's frames from a random moment on, mission after mission: all faults, or
+    /// those named. The stop-time table at the end has the time from each fault to the last moving command and to wheels at rest.
     #[arg(
         long, value_name = "FAULT,...", num_args = 0..=1, require_equals = true, default_missing_value = "all",
         value_parser = parse_faults, conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
     )]
     robot_faults: Option<Faults>,
-    /// Missions of each lying robot.
+    /// Missions for each fault.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
     missions: u32,
     /// One line of JSON.
@@ -78,7 +78,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Ways to lie.
+/// Faults of the robot.
 #[derive(Clone, Debug)]
 struct Faults(Vec<RobotFault>);
 
@@ -99,20 +99,20 @@ fn parse_faults(names: &str) -> Result<Faults, String> {
         .map(Faults)
 }
 
-/// The exit code when a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something
-/// behind; or a robot that lied did not come to rest in time.
+/// The exit code if a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something
+/// behind; or if a robot with a fault did not come to rest in time.
 const NOT_CLEAN: u8 = 8;
 
-/// Ten times that of a mission.
+/// Ten times the timeout of a mission.
 const LONG_TIMEOUT: &str = "timeout_s=1800";
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut set = arguments.set.clone();
     if arguments.freeze_all {
-        // The robot's clock goes on while its processes are frozen; what --set says comes later and holds.
+        // The robot's clock goes on while its processes are frozen. A --set of the user comes later and wins.
         set.insert(0, LONG_TIMEOUT.to_owned());
     }
-    // Errors in it are reported before anything is started.
+    // Errors in the mission are reported before anything starts.
     let loaded = missions::load(&arguments.mission, &set)?;
     if let Some(Faults(faults)) = &arguments.robot_faults {
         return robot_faults(arguments, loaded, set, faults.clone());
@@ -143,7 +143,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let report = match ended {
         Ok(report) => report,
         Err(error) => {
-            // An empty directory tells nothing.
+            // An empty directory is of no use.
             return Err(match std::fs::remove_dir(&directory) {
                 Ok(()) => error.into(),
                 Err(_) => format!("{error}; see {}", directory.display()).into(),
@@ -170,7 +170,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }))
 }
 
-/// What missions are started with, in a new directory.
+/// The options of the missions, which run in a new directory.
 fn options(
     arguments: &Arguments,
     loaded: Mission,

@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    // The signal that comes with the parent's end stays with the process whatever it executes.
+    // The kernel signals the end of the parent to this process also after it executes another program.
     become_child("consumer", arguments.parent)?;
     let Some((program, words)) = arguments.words.split_first() else {
         return Err("give a program".into());

@@ -14,25 +14,25 @@ pub(crate) struct Arguments {
     /// The mission whose ticks are measured.
     #[arg(default_value = "open-room")]
     mission: String,
-    /// Its pace; the bare hops follow each other as its ticks do.
+    /// The pace of the mission, at which the bare hops follow each other too.
     #[arg(long, default_value = "max")]
     pace: Pace,
-    /// Ticks a second, in place of the pace: 7 is what a robot gets.
+    /// Ticks a second instead of the pace; a robot has 7.
     #[arg(long, value_name = "HZ", value_parser = parse_hz, conflicts_with = "pace")]
     rate: Option<f64>,
-    /// How often both are measured, in turn: a shared machine has good and bad moments.
+    /// Number of rounds, each of which measures both, because a shared machine has good and bad moments.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
-    /// Also what each stage does with its part of a tick: microseconds by stage and item.
+    /// Measure also the parts of a tick, in microseconds by stage and item.
     #[arg(long)]
     budget: bool,
-    /// KEY=VALUE over the mission file, as often as needed.
+    /// Set a key of the mission, as often as needed.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Record the missions meanwhile, as `run` does.
     #[arg(long)]
     record: bool,
-    /// Processes that read grid and field of the missions meanwhile, each both.
+    /// Number of processes that read grid and field of the missions meanwhile.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
     consumers: u32,
     /// One line of JSON.

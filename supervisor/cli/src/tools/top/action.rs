@@ -1,4 +1,4 @@
-//! What the keys do.
+//! Keys, and the actions that they start.
 
 use std::{
     sync::mpsc::{Receiver, TryRecvError, channel},
@@ -53,7 +53,7 @@ impl Action {
     }
 }
 
-/// What a key means.
+/// The meaning of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
     /// Choose the stage above.
@@ -78,13 +78,13 @@ pub(super) const KEYS: [(&str, &str); 8] = [
     ("q", "quit"),
 ];
 
-/// Takes the keys out of `typed`, what a terminal in raw mode sent. The beginning of a key whose rest has not come stays.
+/// Take the keys out of `typed`, the bytes of a terminal in raw mode. The beginning of an incomplete key stays there.
 pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
     let mut keys = Vec::new();
     let mut rest = &typed[..];
     loop {
         rest = match rest {
-            // A key that sends a sequence: its last byte is a letter or `~`.
+            // A sequence of bytes for one key ends with a letter or `~`.
             [ESCAPE, b'[' | b'O', sequence @ ..] => {
                 let Some(last) = sequence
                     .iter()
@@ -117,10 +117,10 @@ pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
 const ESCAPE: u8 = 0x1b;
 /// Ctrl-C, which a terminal in raw mode sends as a byte.
 const CONTROL_C: u8 = 0x03;
-/// No key sends so many bytes.
+/// No key sends more bytes.
 const LONGEST_SEQUENCE: usize = 32;
 
-/// What a letter means; none for any other.
+/// The meaning of a letter; none if it has none.
 const fn meaning(letter: u8) -> Option<Key> {
     Some(match letter {
         b'k' => Key::Act(Action::Kill),
@@ -160,23 +160,23 @@ impl Operator {
         };
         let asked = format!("{} {stage}", action.name()).trim_end().to_owned();
         let (robot, name) = (self.robot.clone(), asked.clone());
-        let (tell, told) = channel();
+        let (sender, receiver) = channel();
         let thread = thread::spawn(move || {
             let message = match action.perform(&robot, &stage) {
                 Ok(()) => format!("{name}: done"),
                 Err(problem) => format!("{name}: {problem}"),
             };
             // The screen may have ended.
-            let _ = tell.send(message);
+            let _ = sender.send(message);
         });
-        self.under_way = Some((thread, told));
+        self.under_way = Some((thread, receiver));
         format!("{asked} ...")
     }
 
     /// The result of the action, once.
     pub(super) fn answer(&mut self) -> Option<String> {
-        let (_, told) = self.under_way.as_ref()?;
-        let message = match told.try_recv() {
+        let (_, receiver) = self.under_way.as_ref()?;
+        let message = match receiver.try_recv() {
             Ok(message) => message,
             Err(TryRecvError::Empty) => return None,
             Err(TryRecvError::Disconnected) => "failed".to_owned(),
@@ -216,6 +216,6 @@ mod tests {
         typed.extend([ESCAPE, b'[']);
         typed.extend([b'1'; 100]);
         assert_eq!(take_keys(&mut typed), []);
-        assert!(typed.is_empty(), "what is no key is not kept");
+        assert!(typed.is_empty(), "unknown bytes stay");
     }
 }

@@ -1,4 +1,4 @@
-//! What the screen reads from the bus.
+//! The readers of the screen on the bus.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use supervisor::stages;
 use super::{usage::Processes, view::View};
 use crate::console::{rates::TopicRates, words};
 
-/// Rates are counted over so long.
+/// Rates are counted over this time.
 const COUNT_FOR: Duration = Duration::from_secs(1);
 
 /// Readers on the bus of a run.
@@ -122,7 +122,7 @@ impl Feed {
         view.supervisor_usage = usages.next().unwrap_or_default();
     }
 
-    /// Count what the stages write.
+    /// Count the outputs of the stages.
     fn count(&mut self, view: &mut View) -> Result<(), BusError> {
         let now = Instant::now();
         let due = now.saturating_duration_since(self.counted) >= COUNT_FOR;

@@ -1,5 +1,5 @@
 //! The believed map, the field on it, the robot, its way and its target, in letters of a terminal. A letter is about twice as
-//! high as wide: it shows two squares, one above the other.
+//! high as wide, so it shows two squares, one above the other.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -15,21 +15,21 @@ use super::view::View;
 /// Directions from east on, counter-clockwise, 45 degrees each.
 const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
 const ROBOT: [char; 8] = ['▶', '◥', '▲', '◤', '◀', '◣', '▼', '◢'];
-/// Where the target is.
+/// The letter at the target.
 pub(super) const TARGET: char = 'X';
-/// Where the robot was.
+/// The letter on the way of the robot.
 pub(super) const WAY: char = '·';
-/// The field is drawn at one letter of so many, to the right and down.
+/// The field is drawn at one letter of this many to the right, and of this many down.
 const FIELD_EVERY: (usize, usize) = (4, 2);
 
-/// Nothing was sensed there, and the sonar looked.
+/// The colour of scanned cells.
 const SCANNED: Color = Color::Indexed(236);
 pub(super) const FIELD_STYLE: Style = Style::new().fg(Color::Indexed(67));
 pub(super) const WAY_STYLE: Style = Style::new().fg(Color::Magenta);
 pub(super) const TARGET_STYLE: Style = Style::new().fg(Color::Green).add_modifier(Modifier::BOLD);
 pub(super) const ROBOT_STYLE: Style = Style::new().fg(Color::White).add_modifier(Modifier::BOLD);
 
-/// What is drawn of a square.
+/// The most important cell of a square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Square {
     Free,
@@ -75,7 +75,7 @@ pub(super) fn legend() -> [(Style, &'static str); 4] {
     ]
 }
 
-/// How squares of the screen lie on the map.
+/// The squares of the screen on the map.
 struct Scale {
     frame: GridFrame,
     /// Squares along each side.
@@ -85,14 +85,14 @@ struct Scale {
 }
 
 impl Scale {
-    /// The square of `point`, from the left and from above; none outside the map.
+    /// The column and the row of the square of `point`, from above; none outside the map.
     fn square(&self, point: DVec2) -> Option<(usize, usize)> {
         let at = (self.frame.to_cells(point) + DVec2::splat(0.5)) / self.step;
         let inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(DVec2::splat(self.side as f64)).all();
         inside.then(|| (at.x as usize, self.side - 1 - at.y as usize))
     }
 
-    /// The cells of a square along one axis, the number of which is counted along the axis.
+    /// The range of cells of a square along one axis. Squares are counted in the direction of the axis.
     fn cells(&self, square: usize) -> std::ops::Range<usize> {
         let all = self.frame.cells as usize;
         let first = ((square as f64 * self.step) as usize).min(all - 1);
@@ -101,7 +101,7 @@ impl Scale {
     }
 }
 
-/// The map of `view` in at most so many letters; none before one has come.
+/// The map of `view` in at most `width` by `height` letters; none before the first grid.
 pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
     let frame = view.grid.frame()?;
     let side = usize::from(width).min(2 * usize::from(height)) & !1;
@@ -143,13 +143,13 @@ pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'st
     Some(letters.into_iter().map(line).collect())
 }
 
-/// The robot that looks along `heading`, radians.
+/// The letter of a robot with `heading`, radians.
 pub(super) fn robot(heading: f64) -> char {
     ROBOT[octant(heading)]
 }
 
 fn octant(angle: f64) -> usize {
-    // NaN is 0.
+    // The cast turns NaN into 0.
     ((angle / FRAC_PI_4).round() as i64).rem_euclid(8) as usize
 }
 

@@ -1,5 +1,3 @@
-//! Draws the screen.
-
 use common::{
     latency::Histogram,
     samples::{Action, HoldReason, LinkSample, Order, StageState, name_str},
@@ -25,7 +23,7 @@ use crate::console::{
 
 /// Columns of the table of stages.
 const TABLE_WIDTH: u16 = 80;
-/// Where the map is beside the table, and not below it: it has so many columns left.
+/// From this width on the map is beside the table instead of below it.
 const WIDE: u16 = TABLE_WIDTH + 50;
 
 const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
@@ -59,7 +57,7 @@ pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
         let [stages, below] =
             Layout::vertical([Constraint::Length(table_height), Constraint::Min(0)]).areas(body);
         table(view, frame, stages);
-        // Two letters for each line, as the map is square.
+        // The map is square, and a line is as high as two letters are wide.
         let side = (2 * below.height).min(below.width / 2);
         let [left, _, right] = Layout::horizontal([
             Constraint::Length(side),
@@ -75,9 +73,9 @@ pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
     frame.render_widget(Paragraph::new(keys_line()), keys);
 }
 
-/// Lines that `message` takes, wrapped between words; one where it is short.
+/// The lines of `message` when it is wrapped between words.
 fn message_height(message: &str, width: u16) -> u16 {
-    // Lines that end early for a long word take a fifth more.
+    // A fifth more is for lines that end early before a long word.
     let letters = message.chars().count() * 6 / 5;
     1 + (letters / usize::from(width).max(1)).min(4) as u16
 }
@@ -242,7 +240,7 @@ fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
 fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let mut lines = numbers(view);
     let legend = legend();
-    // The legend is at the foot, and events are between, as many as have room.
+    // The events get the room between the numbers and the legend at the foot.
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
     lines.extend(
@@ -257,7 +255,7 @@ fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     frame.render_widget(Paragraph::new(legend), foot);
 }
 
-/// What is known of robot, guidance and link.
+/// The numbers of robot, guidance and link.
 fn numbers(view: &View) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
     let mut line = |name: &str, text: String, style: Style| {
@@ -331,7 +329,7 @@ fn robot_words(link: &LinkSample) -> (String, Style) {
     }
 }
 
-/// Of the ticks of this process of the link.
+/// The latency of the ticks since this process of the link began.
 fn latency(link: &LinkSample) -> String {
     let mut histogram = Histogram::default();
     histogram.add(&link.latency_histogram, link.latency_max_ns);
@@ -352,7 +350,7 @@ fn time(microseconds: f64) -> String {
     }
 }
 
-/// What the letters of the map stand for.
+/// The meaning of the letters of the map.
 fn legend() -> Vec<Line<'static>> {
     let mut letters = Vec::new();
     let mut of = |letter: char, style: Style, what: &'static str| {

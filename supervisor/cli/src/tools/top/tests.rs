@@ -134,7 +134,7 @@ fn view() -> View {
     view
 }
 
-/// What is on a screen of so many columns and lines.
+/// The text on a screen of that size.
 fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| screen::draw(view, frame)).unwrap();
@@ -149,7 +149,7 @@ fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
     lines
 }
 
-/// Columns of the letters in `line` that are one of `letters`.
+/// The columns in `line` that have one of `letters`.
 fn columns(line: &str, letters: &str) -> Vec<usize> {
     let columns = line.chars().enumerate();
     columns

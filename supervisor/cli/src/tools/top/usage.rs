@@ -9,27 +9,26 @@ use std::{
 use common::process_status;
 use rustix::param::clock_ticks_per_second;
 
-/// What a process uses.
+/// Processor and memory of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Usage {
-    /// Share of one processor since the last look, 1 for all of it; none at the first.
+    /// Share of one processor since the last look, from 0 to 1; none at the first look.
     pub(super) cpu: Option<f64>,
-    /// Resident memory, shared memory among it, bytes; none of a process that has ended.
+    /// Resident memory with shared memory, bytes; none if the process has ended.
     pub(super) memory_bytes: Option<u64>,
 }
 
-/// The processes that are looked at.
 #[derive(Debug, Default)]
 pub(super) struct Processes {
-    /// When each was looked at, its processor time until then, and what it used by then.
+    /// For each process the time of the last look, its processor time then, and the result.
     seen: BTreeMap<u32, (Instant, Duration, Usage)>,
 }
 
-/// Processor time is counted in hundredths of a second: a share of a shorter while is none.
+/// The kernel counts processor time in hundredths of a second, so shares need a longer time.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 impl Processes {
-    /// What each of `processes` uses at `now`, in their order. Shares are over a second at least.
+    /// The usage of each of `processes` at `now`, in their order. Shares are over a second at least.
     pub(super) fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
         self.seen.retain(|process, _| processes.contains(process));
         processes
@@ -54,17 +53,17 @@ impl Processes {
         });
         let usage = Usage {
             cpu,
-            memory_bytes: memory_bytes(process),
+            memory_bytes: memory_bytes(&process.to_string(), "VmRSS"),
         };
         self.seen.insert(process, (now, used, usage));
         usage
     }
 }
 
-/// Processor time of all its threads, in the kernel and outside.
+/// Processor time of all threads of the process, in the kernel and outside.
 fn cpu_time(process: u32) -> Option<Duration> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // Its name, in parentheses, may hold anything; from the state on come numbers.
+    // The name in parentheses may have any letters. Numbers follow after the state.
     let (_, numbers) = stat.rsplit_once(") ")?;
     let mut times = numbers.split_ascii_whitespace().skip(11);
     let mut time = || times.next()?.parse::<u64>().ok();
@@ -74,9 +73,10 @@ fn cpu_time(process: u32) -> Option<Duration> {
     ))
 }
 
-fn memory_bytes(process: u32) -> Option<u64> {
-    let resident = process_status::field(&process.to_string(), "VmRSS")?;
-    let kilobytes: u64 = resident.strip_suffix(" kB")?.trim().parse().ok()?;
+/// The bytes that `field` of the status of `process`, a number or `self`, gives in kB.
+pub(crate) fn memory_bytes(process: &str, field: &str) -> Option<u64> {
+    let value = process_status::field(process, field)?;
+    let kilobytes: u64 = value.strip_suffix(" kB")?.trim().parse().ok()?;
     Some(kilobytes.saturating_mul(1024))
 }
 

@@ -1,4 +1,4 @@
-//! What the screen shows.
+//! The data of the screen.
 
 use std::collections::VecDeque;
 
@@ -14,37 +14,29 @@ use glam::DVec2;
 
 use super::usage::Usage;
 
-/// Points of the way that are kept; of a longer one every second is dropped, again and again.
+/// The longest way, in points. From a longer one every second point is dropped.
 const MOST_POINTS: usize = 4000;
-/// A point is kept when the robot has moved so far since the last one, metres.
+/// The distance between two points of the way, metres.
 const POINT_EVERY_M: f64 = 0.05;
-/// Events that are kept.
+/// The longest list of events.
 const MOST_EVENTS: usize = 50;
 
-/// What the screen shows.
+/// The data of the screen.
 #[derive(Debug)]
 pub(super) struct View {
-    /// The robot.
     pub(super) robot: RobotName,
-    /// Whether it is there.
+    /// Whether a run of the robot goes on.
     pub(super) connected: bool,
     /// The supervisor; none before its first roster.
     pub(super) supervisor: Option<RosterHeader>,
-    /// What its process uses.
     pub(super) supervisor_usage: Usage,
-    /// The stages.
     pub(super) stages: Vec<Stage>,
-    /// The stage that keys are about.
+    /// The row of the stage that the keys concern.
     pub(super) chosen: usize,
-    /// The newest of each.
     pub(super) pose: Option<PoseSample>,
-    /// The newest of each.
     pub(super) guidance: Option<GuidanceSample>,
-    /// The newest of each.
     pub(super) command: Option<CommandSample>,
-    /// The newest of each.
     pub(super) link: Option<LinkSample>,
-    /// The newest of each.
     pub(super) power: Option<PowerSample>,
     /// The believed map.
     pub(super) grid: Replica<u8>,
@@ -52,27 +44,24 @@ pub(super) struct View {
     pub(super) field: Replica<FieldCell>,
     /// The target, metres in the mission frame.
     pub(super) target: Option<DVec2>,
-    /// Where the robot was by its belief, metres in the mission frame.
+    /// The believed way of the robot, metres in the mission frame.
     pub(super) way: Vec<DVec2>,
     /// Deaths and stalls, the newest first.
     pub(super) events: VecDeque<String>,
-    /// What became of the last key.
+    /// The result of the last key.
     pub(super) message: String,
 }
 
 /// A row of the table.
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
-    /// As the supervisor sees it.
     pub(super) entry: RosterEntry,
-    /// Samples a second on the first topic that it writes; none before they were counted.
+    /// Samples a second on its first output; none before they were counted.
     pub(super) rate_hz: Option<f64>,
-    /// What its process uses.
     pub(super) usage: Usage,
 }
 
 impl View {
-    /// Nothing is known of `robot` yet.
     pub(super) fn of(robot: RobotName) -> Self {
         Self {
             robot,
@@ -95,7 +84,7 @@ impl View {
         }
     }
 
-    /// A run of the robot is there: nothing of the last one holds.
+    /// A run of the robot began, so the data of the last run is dropped.
     pub(super) fn on_connected(&mut self) {
         let chosen = self.chosen;
         *self = Self::of(self.robot.clone());
@@ -108,7 +97,6 @@ impl View {
         stage.map(|stage| name_str(&stage.entry.stage))
     }
 
-    /// A pose came.
     pub(super) fn on_pose(&mut self, pose: PoseSample) {
         let position = pose.pose().position;
         let last = self.way.last();
@@ -125,7 +113,6 @@ impl View {
         self.pose = Some(pose);
     }
 
-    /// A roster came.
     pub(super) fn on_roster(&mut self, header: RosterHeader, entries: &[RosterEntry]) {
         self.supervisor = Some(header);
         self.stages.resize_with(entries.len(), || Stage {
@@ -139,7 +126,6 @@ impl View {
         self.chosen = self.chosen.min(entries.len().saturating_sub(1));
     }
 
-    /// Something happened.
     pub(super) fn on_event(&mut self, event: String) {
         self.events.push_front(event);
         self.events.truncate(MOST_EVENTS);

@@ -1,15 +1,48 @@
-//! The picture a run ends with.
+//! The picture and the report of a run.
+
+use std::{fs, path::PathBuf};
 
 use common::{
     ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
 };
 use picture::{Facts, Scene};
-use supervisor::{Finished, outcome::Outcome};
+use supervisor::{Finished, Options, outcome::Outcome};
 
 use crate::commands::run::summary::Summary;
 
-/// SVG of the run.
-pub(crate) fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
+/// The name of a result and its file.
+type Written = Result<(&'static str, PathBuf), String>;
+
+/// Write the picture of a run, and its report if it was `recorded`, one after the other.
+pub(crate) fn write(
+    options: &Options,
+    finished: &Finished,
+    summary: &Summary,
+    recorded: bool,
+) -> impl Iterator<Item = Written> {
+    let report = || {
+        let page = report::write(&options.directory, None);
+        let page = page.map_err(|error| format!("no report of this run: {error}"))?;
+        Ok(("report", page))
+    };
+    let report = recorded.then_some(()).into_iter().map(move |()| report());
+    std::iter::once_with(|| draw(options, finished, summary)).chain(report)
+}
+
+/// Draw the picture of the run.
+fn draw(options: &Options, finished: &Finished, summary: &Summary) -> Written {
+    let picture = options.directory.join("picture.svg");
+    let svg = svg(&options.mission, finished, summary);
+    if let Err(error) = fs::write(&picture, svg) {
+        // A part of a picture is of no use.
+        let _ = fs::remove_file(&picture);
+        return Err(format!("cannot write {}: {error}", picture.display()));
+    }
+    Ok(("picture", picture))
+}
+
+/// The picture as SVG.
+fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
     let record = &finished.record;
     let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
     let mut captions = summary.captions();
