@@ -1,10 +1,6 @@
-//! States and ages in words.
+//! States, ages and sizes in words.
 
-use common::samples::{
-    DeathSample, GuidanceStatus, HoldReason, Order, RecoveryStep, StageState, StallCause,
-    StallSample, name_str,
-};
-use supervisor::process::ExitCause;
+use common::samples::{HoldReason, Order, StageState};
 
 /// The order of the supervisor, with its reason.
 pub(crate) const fn order(order: Order, reason: HoldReason) -> &'static str {
@@ -28,44 +24,6 @@ pub(crate) const fn state(state: StageState) -> &'static str {
         StageState::Stopping => "stopping",
         StageState::Held => "held",
     }
-}
-
-/// The status of the planner, a [`GuidanceStatus`].
-pub(crate) const fn guidance(status: u8) -> &'static str {
-    match GuidanceStatus::from_byte(status) {
-        GuidanceStatus::Waiting => "waits for a field",
-        GuidanceStatus::Along => "along the field",
-        GuidanceStatus::AtTarget => "beside the target",
-        GuidanceStatus::WayOut => "out of a hazard",
-        GuidanceStatus::Unreachable => "no way to the target",
-        GuidanceStatus::Look => "turn and look",
-    }
-}
-
-/// The end of a stage's process.
-pub(crate) fn death(death: &DeathSample) -> String {
-    let (stage, generation) = (name_str(&death.stage), death.generation);
-    let how = ExitCause::from(death);
-    let hung = if death.hung == 1 { "hung, " } else { "" };
-    let at = death.stamp.time().seconds();
-    format!("{at:.1} s {stage} {generation}: {hung}{how}")
-}
-
-/// The cause of a stall, and what is done about it.
-pub(crate) fn stall(stall: &StallSample) -> String {
-    let cause = match stall.cause() {
-        StallCause::Still => "stands still",
-        StallCause::Pinned => "stays where it is",
-        StallCause::InsideHazard => "is inside a hazard",
-        StallCause::CutOff => "is cut off",
-    };
-    let recovery = match stall.recovery() {
-        RecoveryStep::Replan => "new planner",
-        RecoveryStep::Reset => "map reset",
-        RecoveryStep::GiveUp => "given up",
-    };
-    let at = stall.stamp.time().seconds();
-    format!("{at:.1} s robot {cause}: {recovery}")
 }
 
 /// Seconds; `u64::MAX` nanoseconds stand for never.

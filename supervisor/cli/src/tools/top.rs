@@ -6,6 +6,7 @@
 //! | `feed` | brings it up to date from the bus |
 //! | `screen`, `map` | draw it |
 //! | `action` | what the keys do |
+//! | `words` | guidance, deaths and stalls in words |
 //! | `usage` | processor and memory of a process |
 
 mod action;
@@ -16,6 +17,7 @@ mod screen;
 mod tests;
 pub(super) mod usage;
 mod view;
+mod words;
 
 use std::{
     io::{self, IsTerminal as _},

@@ -13,8 +13,8 @@ use common::{
 use glam::DVec2;
 use supervisor::stages;
 
-use super::{usage::Processes, view::View};
-use crate::console::{rates::TopicRates, words};
+use super::{usage::Processes, view::View, words};
+use crate::console::rates::TopicRates;
 
 /// Rates are counted over this time.
 const COUNT_FOR: Duration = Duration::from_secs(1);

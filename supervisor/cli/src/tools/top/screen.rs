@@ -15,6 +15,7 @@ use super::{
     map,
     usage::Usage,
     view::{Stage, View},
+    words::guidance,
 };
 use crate::console::{
     waiting,
@@ -289,7 +290,7 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
         };
         line(
             "guidance",
-            format!("{}{limit}", words::guidance(guidance.status)),
+            format!("{}{limit}", guidance(guidance.status)),
             plain,
         );
         let (events, full) = (guidance.safety_events, guidance.full_solves);

@@ -13,8 +13,7 @@ use common::{
 use glam::DVec2;
 use ratatui::{Terminal, backend::TestBackend};
 
-use super::{action::KEYS, screen, usage::Usage, view::View};
-use crate::console::words;
+use super::{action::KEYS, screen, usage::Usage, view::View, words};
 
 const STAGES: [&str; 5] = [
     "x80-link",
