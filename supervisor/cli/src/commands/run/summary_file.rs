@@ -12,15 +12,11 @@ use rustix::{
 };
 use supervisor::recovery::SUMMARY;
 
-<<<<<<< HEAD
 use crate::console::failure::Refused;
 
-/// Under this name it is written: one that is called [`SUMMARY`] is whole, and says that the run has ended.
-=======
 /// The name of the file until it is complete. A file that is called [`SUMMARY`] is complete, and means that the run has ended.
->>>>>>> 374442d (The command line in plain sentences; picture and report of a run in one module of the tools; rates as a table)
 const UNFINISHED: &str = "summary.json.unfinished";
-/// A summary takes 2 kB; a larger file is not read.
+/// A summary takes 2 kB.
 const ROOM: u64 = 16 << 10;
 
 /// The file before the end of the run.
@@ -31,14 +27,7 @@ pub(crate) struct SummaryFile {
 
 impl SummaryFile {
     /// Reserve its room in the run `directory`.
-<<<<<<< HEAD
-    ///
-    /// # Errors
-    /// When there is none.
     pub(crate) fn reserve(directory: &Path) -> Result<Self, Refused> {
-=======
-    pub(crate) fn reserve(directory: &Path) -> Result<Self, String> {
->>>>>>> 374442d (The command line in plain sentences; picture and report of a run in one module of the tools; rates as a table)
         let path = directory.join(UNFINISHED);
         let reserved = File::create(&path).and_then(|file| {
             match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {

@@ -15,7 +15,7 @@ use super::{
     map,
     usage::Usage,
     view::{Stage, View},
-    words::guidance,
+    words as top_words,
 };
 use crate::console::{
     waiting,
@@ -290,7 +290,7 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
         };
         line(
             "guidance",
-            format!("{}{limit}", guidance(guidance.status)),
+            format!("{}{limit}", top_words::guidance(guidance.status)),
             plain,
         );
         let (events, full) = (guidance.safety_events, guidance.full_solves);
