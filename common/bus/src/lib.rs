@@ -13,7 +13,8 @@
 //! | [`cdr`] | the encoding they are written in elsewhere |
 //! | `encoded` | readers of any topic, whose samples come encoded |
 //! | `spec` | what a table of topics says of one topic |
-//! | `topic` | what a table of topics is made of, and the services of one topic |
+//! | `topic` | what a table of topics is made of |
+//! | `ports` | the middleware's services and ports, compiled once for all payloads |
 //! | `make` | making and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files such processes leave |
 //! | `ownership` | whose the files are, and who may write them |
@@ -46,6 +47,7 @@ mod open;
 mod ownership;
 mod payload;
 pub mod poll;
+mod ports;
 mod read;
 mod spec;
 mod topic;

@@ -21,7 +21,8 @@ use iceoryx2::{
 use super::{
     error::BusError,
     leftovers, ownership,
-    topic::{AnyTopic, BusNode},
+    ports::{self, BusNode},
+    topic::AnyTopic,
 };
 use crate::{
     bus_instance::BusInstance,
@@ -72,7 +73,7 @@ impl Bus {
         bus.supervisor = Some(std::process::id());
         let services = table
             .iter()
-            .map(|topic| topic.create(&bus.node))
+            .map(|topic| ports::create(&bus.node, topic.spec(), &topic.carried()))
             .collect::<Result<_, _>>()?;
         leftovers::back_up(&bus.services(), &bus.backup()).map_err(failed)?;
         bus.instance.make_current().map_err(failed)?;
@@ -146,7 +147,7 @@ impl Bus {
         // One that is missing was made anew with the node.
         ownership::close_to_others(&instance).map_err(failed)?;
         Ok(Self {
-            node,
+            node: node.into(),
             supervisor: None,
             instance,
         })

@@ -1,30 +1,17 @@
 //! Readers and wakeups. A reader gives the samples of the newest generation of the writer only.
-//!
-//! Why `unsafe` is allowed here: the listener's file descriptor can only be had through an `unsafe` call, and polling
-//! it needs a borrow of it. It is sound because the borrow never outlives the listener, which the same struct owns,
-//! and nobody closes the descriptor.
-#![allow(unsafe_code)]
 
 use std::{
     ops::Deref,
     os::fd::{AsFd, BorrowedFd},
 };
 
-use iceoryx2::{
-    identifiers::UniquePublisherId,
-    port::{listener::Listener, subscriber::Subscriber},
-    prelude::{FileDescriptorBased, ipc},
-    sample::Sample,
-    service::port_factory::PortFactory as _,
-};
-
 use super::{
-    error::{BusError, opening, reading, refused, taking},
-    leftovers::process_of,
+    error::BusError,
     make::Bus,
     payload::{Payload, Stamp, Stamped},
+    ports::{Listener, Sample, Service, Subscriber},
     spec::{Limits, SUPERVISOR, Spec},
-    topic::{AnyTopic, SliceTopic, Topic, open_event, slice_service, struct_service},
+    topic::{AnyTopic, SliceTopic, Topic},
 };
 
 impl Bus {
@@ -45,24 +32,15 @@ impl Bus {
         topic: &Topic<P>,
         buffer: usize,
     ) -> Result<Reader<P>, BusError> {
-        let spec = topic.spec;
-        let service = struct_service::<P>(&self.node, spec)?
-            .open()
-            .map_err(opening(spec.name))?;
+        let service = Service::of_structs(&self.node, topic.spec)?;
         self.leave_places(
-            spec,
-            spec.limits.readers,
-            service.dynamic_config().number_of_subscribers(),
+            topic.spec,
+            topic.spec.limits.readers,
+            service.number_of_readers(),
         )?;
-        let subscriber = service
-            .subscriber_builder()
-            .buffer_size(buffer)
-            .create()
-            .map_err(reading(spec))?;
         Ok(Reader {
-            subscriber,
-            authors: self.authors(spec),
-            spec,
+            subscriber: service.subscriber(buffer)?,
+            authors: self.authors(topic.spec),
         })
     }
 
@@ -86,24 +64,15 @@ impl Bus {
         topic: &SliceTopic<H, T>,
         buffer: usize,
     ) -> Result<SliceReader<H, T>, BusError> {
-        let spec = topic.spec;
-        let service = slice_service::<H, T>(&self.node, spec)?
-            .open()
-            .map_err(opening(spec.name))?;
+        let service = Service::of_slices(&self.node, topic.spec)?;
         self.leave_places(
-            spec,
-            spec.limits.readers,
-            service.dynamic_config().number_of_subscribers(),
+            topic.spec,
+            topic.spec.limits.readers,
+            service.number_of_readers(),
         )?;
-        let subscriber = service
-            .subscriber_builder()
-            .buffer_size(buffer)
-            .create()
-            .map_err(reading(spec))?;
         Ok(SliceReader {
-            subscriber,
-            authors: self.authors(spec),
-            spec,
+            subscriber: service.subscriber(buffer)?,
+            authors: self.authors(topic.spec),
         })
     }
 
@@ -113,14 +82,10 @@ impl Bus {
     /// When the topic is missing or has no place left.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
         let spec = topic.spec();
-        let service = open_event(&self.node, spec)?;
-        let listeners = service.dynamic_config().number_of_listeners();
-        self.leave_places(spec, Limits::LISTENERS, listeners)?;
-        service
-            .listener_builder()
-            .create()
-            .map(|listener| Wakeup { listener })
-            .map_err(refused("listen to", spec.name))
+        let listener = Listener::open(&self.node, spec, |taken| {
+            self.leave_places(spec, Limits::LISTENERS, taken)
+        })?;
+        Ok(Wakeup { listener })
     }
 
     /// A consumer takes no place that a stage may need.
@@ -224,9 +189,9 @@ impl Authors {
 }
 
 /// The process of a sample is in the number of the port that it was written with.
-fn author(port: UniquePublisherId, stamp: &Stamp) -> Author {
+fn author<H: Payload, T: Payload>(sample: &Sample<H, T>, stamp: &Stamp) -> Author {
     Author {
-        process: process_of(port.value()),
+        process: sample.process(),
         generation: stamp.generation,
     }
 }
@@ -234,9 +199,8 @@ fn author(port: UniquePublisherId, stamp: &Stamp) -> Author {
 /// Receives structs.
 #[derive(Debug)]
 pub struct Reader<P: Payload> {
-    subscriber: Subscriber<ipc::Service, P, ()>,
+    subscriber: Subscriber<(), P>,
     authors: Authors,
-    spec: &'static Spec,
 }
 
 impl<P: Payload + Stamped> Reader<P> {
@@ -253,10 +217,13 @@ impl<P: Payload + Stamped> Reader<P> {
     /// # Errors
     /// As [`Reader::take`].
     pub fn take_with_author(&mut self) -> Result<Option<(Author, P)>, BusError> {
-        while let Some(sample) = self.subscriber.receive().map_err(taking(self.spec))? {
-            let author = author(sample.origin(), sample.stamp());
+        while let Some(sample) = self.subscriber.take()? {
+            let Some(&payload) = sample.elements().first() else {
+                continue;
+            };
+            let author = author(&sample, payload.stamp());
             if self.authors.admits(author) {
-                return Ok(Some((author, *sample)));
+                return Ok(Some((author, payload)));
             }
         }
         Ok(None)
@@ -298,22 +265,21 @@ impl<P: Payload + Stamped> Reader<P> {
 /// Receives headers with slices.
 #[derive(Debug)]
 pub struct SliceReader<H: Payload, T: Payload> {
-    subscriber: Subscriber<ipc::Service, [T], H>,
+    subscriber: Subscriber<H, T>,
     authors: Authors,
-    spec: &'static Spec,
 }
 
 /// A header with its slice, still in shared memory; the writer cannot reuse it while this is held.
 #[derive(Debug)]
 pub struct Slice<H: Payload, T: Payload> {
-    sample: Sample<ipc::Service, [T], H>,
+    sample: Sample<H, T>,
 }
 
 impl<H: Payload, T: Payload> Slice<H, T> {
     /// The header.
     #[must_use]
     pub fn header(&self) -> &H {
-        self.sample.user_header()
+        self.sample.header()
     }
 }
 
@@ -321,7 +287,7 @@ impl<H: Payload + Stamped, T: Payload> Slice<H, T> {
     /// Who wrote it.
     #[must_use]
     pub fn author(&self) -> Author {
-        author(self.sample.origin(), self.header().stamp())
+        author(&self.sample, self.header().stamp())
     }
 }
 
@@ -329,7 +295,7 @@ impl<H: Payload, T: Payload> Deref for Slice<H, T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        self.sample.payload()
+        self.sample.elements()
     }
 }
 
@@ -351,11 +317,9 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
     /// # Errors
     /// As [`Reader::take`].
     pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
-        while let Some(sample) = self.subscriber.receive().map_err(taking(self.spec))? {
-            if self
-                .authors
-                .admits(author(sample.origin(), sample.user_header().stamp()))
-            {
+        while let Some(sample) = self.subscriber.take()? {
+            let author = author(&sample, sample.header().stamp());
+            if self.authors.admits(author) {
                 return Ok(Some(Slice { sample }));
             }
         }
@@ -366,23 +330,18 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
 /// Becomes readable when something is published on a topic.
 #[derive(Debug)]
 pub struct Wakeup {
-    listener: Listener<ipc::Service>,
+    listener: Listener,
 }
 
 impl Wakeup {
     /// Level-triggered: drain it before looking at the data, or waiting never waits again.
     pub(crate) fn drain(&self) -> Result<(), BusError> {
-        self.listener
-            .try_wait(|_| {})
-            .map(drop)
-            .map_err(refused("listen to", "a topic"))
+        self.listener.drain()
     }
 }
 
 impl AsFd for Wakeup {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        // SAFETY: the descriptor belongs to the listener that `self` owns and stays open until it is
-        // dropped; the borrow ends before that, and nobody closes it.
-        unsafe { BorrowedFd::borrow_raw(self.listener.file_descriptor().native_handle()) }
+        self.listener.as_fd()
     }
 }

@@ -1,21 +1,16 @@
 //! Writers: they stamp what they publish and wake the readers.
 
-use std::collections::HashSet;
-
-use iceoryx2::{
-    port::{notifier::Notifier, publisher::Publisher},
-    prelude::{AllocationStrategy, CallbackProgression, ipc},
-    service::port_factory::{PortFactory as _, publish_subscribe},
-};
+use std::{collections::HashSet, iter};
 
 use super::{
-    error::{BusError, opening, refused},
+    clock::MissionTime,
+    error::BusError,
     make::Bus,
     payload::{Payload, Stamp, Stamped},
+    ports::{Notifier, Publisher, Service},
     spec::Spec,
-    topic::{SliceTopic, Topic, open_event, slice_service, struct_service},
+    topic::{SliceTopic, Topic},
 };
-use crate::clock::MissionTime;
 
 impl Bus {
     /// Write `topic` as the `generation`-th process of its stage.
@@ -27,20 +22,10 @@ impl Bus {
         topic: &Topic<P>,
         generation: u32,
     ) -> Result<Writer<P>, BusError> {
-        let spec = topic.spec;
-        let service = struct_service::<P>(&self.node, spec)?
-            .open()
-            .map_err(opening(spec.name))?;
-        let publisher = service
-            .publisher_builder()
-            .create()
-            .map_err(refused("write", spec.name))?;
+        let service = Service::of_structs(&self.node, topic.spec)?;
         Ok(Writer {
-            publisher,
-            notifier: self.event_writer(spec)?,
-            generation,
-            sequence: 0,
-            topic: spec.name,
+            publisher: service.publisher(1)?,
+            turn: self.turn(topic.spec, generation)?,
         })
     }
 
@@ -54,45 +39,56 @@ impl Bus {
         generation: u32,
         longest: usize,
     ) -> Result<SliceWriter<H, T>, BusError> {
-        let spec = topic.spec;
-        let service = slice_service::<H, T>(&self.node, spec)?
-            .open()
-            .map_err(opening(spec.name))?;
-        let publisher = service
-            .publisher_builder()
-            .initial_max_slice_len(longest)
-            .allocation_strategy(AllocationStrategy::Static)
-            .create()
-            .map_err(refused("write", spec.name))?;
+        let service = Service::of_slices(&self.node, topic.spec)?;
         Ok(SliceWriter {
-            publisher,
-            readers: Readers {
-                service,
-                known: HashSet::new(),
-            },
-            notifier: self.event_writer(spec)?,
+            publisher: service.publisher(longest)?,
+            service,
+            known: HashSet::new(),
+            turn: self.turn(topic.spec, generation)?,
+        })
+    }
+
+    fn turn(&self, spec: &Spec, generation: u32) -> Result<Turn, BusError> {
+        Ok(Turn {
+            notifier: Notifier::open(&self.node, spec)?,
             generation,
             sequence: 0,
             topic: spec.name,
         })
     }
+}
 
-    fn event_writer(&self, spec: &Spec) -> Result<Notifier<ipc::Service>, BusError> {
-        open_event(&self.node, spec)?
-            .notifier_builder()
-            .create()
-            .map_err(refused("write", spec.name))
+/// The stamp of a writer's next sample, and who is woken for it.
+#[derive(Debug)]
+struct Turn {
+    notifier: Notifier,
+    generation: u32,
+    sequence: u32,
+    topic: &'static str,
+}
+
+impl Turn {
+    const fn stamp(&mut self, tick: u64, time: MissionTime) -> Stamp {
+        let stamp = Stamp {
+            tick,
+            stamp_ns: time.0,
+            generation: self.generation,
+            sequence: self.sequence,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        stamp
+    }
+
+    fn wake(&self) -> Result<(), BusError> {
+        self.notifier.wake(self.topic)
     }
 }
 
 /// Publishes one struct a sample.
 #[derive(Debug)]
 pub struct Writer<P: Payload> {
-    publisher: Publisher<ipc::Service, P, ()>,
-    notifier: Notifier<ipc::Service>,
-    generation: u32,
-    sequence: u32,
-    topic: &'static str,
+    publisher: Publisher<(), P>,
+    turn: Turn,
 }
 
 impl<P: Payload + Stamped> Writer<P> {
@@ -115,7 +111,7 @@ impl<P: Payload + Stamped> Writer<P> {
         time: MissionTime,
         mut payload: P,
     ) -> Result<(), BusError> {
-        *payload.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
+        *payload.stamp_mut() = self.turn.stamp(tick, time);
         self.send(payload)
     }
 
@@ -126,10 +122,7 @@ impl<P: Payload + Stamped> Writer<P> {
     }
 
     fn send(&self, payload: P) -> Result<(), BusError> {
-        self.publisher
-            .send_copy(payload)
-            .map(drop)
-            .map_err(refused("publish on", self.topic))
+        self.publisher.send_all((), iter::once(payload))
     }
 
     /// Wake the readers of what was published quietly.
@@ -137,44 +130,17 @@ impl<P: Payload + Stamped> Writer<P> {
     /// # Errors
     /// When the middleware refuses.
     pub fn wake(&self) -> Result<(), BusError> {
-        wake(&self.notifier, self.topic)
+        self.turn.wake()
     }
-}
-
-fn next_stamp(tick: u64, time: MissionTime, generation: u32, sequence: &mut u32) -> Stamp {
-    let stamp = Stamp {
-        tick,
-        stamp_ns: time.0,
-        generation,
-        sequence: *sequence,
-    };
-    *sequence = sequence.wrapping_add(1);
-    stamp
-}
-
-fn wake(notifier: &Notifier<ipc::Service>, topic: &'static str) -> Result<(), BusError> {
-    notifier
-        .notify()
-        .map(drop)
-        .map_err(refused("wake the readers of", topic))
-}
-
-/// Who reads a topic of slices.
-#[derive(Debug)]
-struct Readers<H: Payload, T: Payload> {
-    service: publish_subscribe::PortFactory<ipc::Service, [T], H>,
-    known: HashSet<u128>,
 }
 
 /// Publishes a header and a slice a sample.
 #[derive(Debug)]
 pub struct SliceWriter<H: Payload, T: Payload> {
-    publisher: Publisher<ipc::Service, [T], H>,
-    readers: Readers<H, T>,
-    notifier: Notifier<ipc::Service>,
-    generation: u32,
-    sequence: u32,
-    topic: &'static str,
+    publisher: Publisher<H, T>,
+    service: Service<H, T>,
+    known: HashSet<u128>,
+    turn: Turn,
 }
 
 impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
@@ -190,7 +156,7 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         cells: impl ExactSizeIterator<Item = T>,
     ) -> Result<(), BusError> {
         self.publish_quietly(tick, time, header, cells)?;
-        wake(&self.notifier, self.topic)
+        self.turn.wake()
     }
 
     /// As [`SliceWriter::publish`], and wakes nobody: for readers that something else wakes.
@@ -204,8 +170,8 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         mut header: H,
         cells: impl ExactSizeIterator<Item = T>,
     ) -> Result<(), BusError> {
-        *header.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
-        self.send(header, cells)
+        *header.stamp_mut() = self.turn.stamp(tick, time);
+        self.publisher.send_all(header, cells)
     }
 
     /// Publish `header`, with the stamp that it has, and `cells`, and wake the readers.
@@ -214,21 +180,8 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         header: H,
         cells: impl ExactSizeIterator<Item = T>,
     ) -> Result<(), BusError> {
-        self.send(header, cells)?;
+        self.publisher.send_all(header, cells)?;
         self.wake()
-    }
-
-    fn send(&self, header: H, mut cells: impl ExactSizeIterator<Item = T>) -> Result<(), BusError> {
-        let mut sample = self
-            .publisher
-            .loan_slice_uninit(cells.len())
-            .map_err(refused("publish on", self.topic))?;
-        *sample.user_header_mut() = header;
-        sample
-            .write_from_fn(|_| cells.next().unwrap_or_default())
-            .send()
-            .map(drop)
-            .map_err(refused("publish on", self.topic))
     }
 
     /// As [`SliceWriter::publish_quietly`], copies `cells` in one piece.
@@ -242,17 +195,8 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         mut header: H,
         cells: &[T],
     ) -> Result<(), BusError> {
-        *header.stamp_mut() = next_stamp(tick, time, self.generation, &mut self.sequence);
-        let mut sample = self
-            .publisher
-            .loan_slice_uninit(cells.len())
-            .map_err(refused("publish on", self.topic))?;
-        *sample.user_header_mut() = header;
-        sample
-            .write_from_slice(cells)
-            .send()
-            .map(drop)
-            .map_err(refused("publish on", self.topic))
+        *header.stamp_mut() = self.turn.stamp(tick, time);
+        self.publisher.send_slice(header, cells)
     }
 
     /// Wake the readers of what was published quietly.
@@ -260,21 +204,14 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
     /// # Errors
     /// When the middleware refuses.
     pub fn wake(&self) -> Result<(), BusError> {
-        wake(&self.notifier, self.topic)
+        self.turn.wake()
     }
 
     /// Whether a reader came since this was last asked: it needs a keyframe.
     pub fn has_new_reader(&mut self) -> bool {
-        let mut now = HashSet::new();
-        self.readers
-            .service
-            .dynamic_config()
-            .list_subscribers(|reader| {
-                now.insert(reader.subscriber_id.value());
-                CallbackProgression::Continue
-            });
-        let new = !now.is_subset(&self.readers.known);
-        self.readers.known = now;
+        let now = self.service.readers();
+        let new = !now.is_subset(&self.known);
+        self.known = now;
         new
     }
 }
