@@ -227,7 +227,7 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
             .collect();
         assert!(names.contains("common"), "{tree}");
         for tool in [
-            "image",
+            "png",
             "zip",
             "resvg",
             "serde-saphyr",

@@ -1,16 +1,14 @@
 //! Opening a topic that a list names, and asking the bus who has opened it.
 
-use std::{any::Any, collections::BTreeSet};
-
-use iceoryx2::{prelude::CallbackProgression, service::port_factory::PortFactory as _};
+use std::any::Any;
 
 use super::{
-    error::{BusError, opening},
+    error::BusError,
     layout::Layout,
-    leftovers::process_of,
     make::Bus,
     payload::{Payload, Stamped},
-    topic::{AnyTopic, SliceTopic, Topic, open_event, slice_service, struct_service},
+    ports::{self, OpenedBy},
+    topic::{AnyTopic, SliceTopic, Topic},
 };
 
 /// A row of the table whose writer a process opens from a list, without knowing what it carries.
@@ -24,51 +22,14 @@ pub trait OpenTopic: AnyTopic {
     ) -> Result<Box<dyn Any>, BusError>;
 
     /// The processes that have it open.
-    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError>;
-}
-
-/// The processes that have a topic open.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct OpenedBy {
-    /// They read its samples.
-    pub readers: BTreeSet<u32>,
-    /// They write them.
-    pub writers: BTreeSet<u32>,
-    /// They are woken by them.
-    pub woken: BTreeSet<u32>,
-}
-
-macro_rules! opened_by {
-    ($self:expr, $bus:expr, $service:expr) => {{
-        let mut opened = OpenedBy::default();
-        let service = $service.open().map_err(opening($self.spec.name))?;
-        service.dynamic_config().list_subscribers(|reader| {
-            let process = process_of(reader.subscriber_id.value());
-            opened.readers.insert(process);
-            CallbackProgression::Continue
-        });
-        service.dynamic_config().list_publishers(|writer| {
-            let process = process_of(writer.publisher_id.value());
-            opened.writers.insert(process);
-            CallbackProgression::Continue
-        });
-        let events = open_event(&$bus.node, $self.spec)?;
-        events.dynamic_config().list_listeners(|listener| {
-            let process = process_of(listener.listener_id.value());
-            opened.woken.insert(process);
-            CallbackProgression::Continue
-        });
-        Ok(opened)
-    }};
+    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError> {
+        ports::opened_by(&bus.node, self.spec(), &self.carried())
+    }
 }
 
 impl<P: Payload + Layout + Stamped> OpenTopic for Topic<P> {
     fn open_writer(&self, bus: &Bus, generation: u32, _: usize) -> Result<Box<dyn Any>, BusError> {
         Ok(Box::new(bus.writer(self, generation)?))
-    }
-
-    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError> {
-        opened_by!(self, bus, struct_service::<P>(&bus.node, self.spec)?)
     }
 }
 
@@ -80,9 +41,5 @@ impl<H: Payload + Layout + Stamped, T: Payload + Layout> OpenTopic for SliceTopi
         longest: usize,
     ) -> Result<Box<dyn Any>, BusError> {
         Ok(Box::new(bus.slice_writer(self, generation, longest)?))
-    }
-
-    fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError> {
-        opened_by!(self, bus, slice_service::<H, T>(&bus.node, self.spec)?)
     }
 }

@@ -15,7 +15,7 @@
 
 use std::{
     any::Any,
-    collections::HashSet,
+    collections::{BTreeSet, HashSet},
     fmt,
     marker::PhantomData,
     mem::{ManuallyDrop, MaybeUninit},
@@ -204,6 +204,44 @@ pub(super) fn create(
         .create()
         .map_err(refused("create", spec.name))?;
     Ok(Box::new((samples, event)))
+}
+
+/// The processes that have a topic open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OpenedBy {
+    /// They read its samples.
+    pub readers: BTreeSet<u32>,
+    /// They write them.
+    pub writers: BTreeSet<u32>,
+    /// They are woken by them.
+    pub woken: BTreeSet<u32>,
+}
+
+/// The processes that have a topic open.
+pub(super) fn opened_by(
+    node: &BusNode,
+    spec: &Spec,
+    carried: &Carried,
+) -> Result<OpenedBy, BusError> {
+    let service = RawService::open(node, spec, carried)?;
+    let event = event(node, spec)?;
+    let mut opened = OpenedBy::default();
+    service.dynamic_config().list_subscribers(|reader| {
+        let process = process_of(reader.subscriber_id.value());
+        opened.readers.insert(process);
+        CallbackProgression::Continue
+    });
+    service.dynamic_config().list_publishers(|writer| {
+        let process = process_of(writer.publisher_id.value());
+        opened.writers.insert(process);
+        CallbackProgression::Continue
+    });
+    event.dynamic_config().list_listeners(|listener| {
+        let process = process_of(listener.listener_id.value());
+        opened.woken.insert(process);
+        CallbackProgression::Continue
+    });
+    Ok(opened)
 }
 
 impl RawService {

@@ -1,11 +1,11 @@
 //! Images as maps: what is light is free.
 
 use std::{
-    io::{BufReader, Seek as _},
+    error::Error,
+    io::{self, BufRead, BufReader, Seek},
     path::Path,
 };
 
-use ::image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 use harmonic::MAX_SIDE;
 
 use crate::maps::{
@@ -51,71 +51,155 @@ impl Lightness {
     }
 }
 
+/// Why an image cannot be decoded.
+type Cause = Box<dyn Error>;
+
+/// Which pixels are free, row by row.
+struct Free {
+    cols: usize,
+    pixels: Vec<bool>,
+}
+
 /// The map in an image, a cell a pixel.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
-    let image = decode(file)?;
-    let (cols, rows) = (image.width() as usize, image.height() as usize);
-    Ok(match &image {
-        DynamicImage::ImageLuma8(grey) => {
-            // By far the most maps, and some are large: one look-up a pixel.
-            let free: Vec<bool> = (0..=u8::MAX)
-                .map(|grey| lightness.is_free(f64::from(grey) / 255.0))
-                .collect();
-            Map::new(cols, rows, grey.iter().map(|&grey| free[usize::from(grey)]))
+    let mut reader = BufReader::new(open(file, LONGEST)?);
+    let start = reader.fill_buf().map_err(|cause| MapError::Unreadable {
+        file: file.to_owned(),
+        cause,
+    })?;
+    // By its first bytes: a PNG that is called .pgm is still a PNG.
+    let decoded = match start {
+        [0x89, b'P', b'N', b'G', ..] => png(reader, lightness, file),
+        [b'P', kind @ (b'2' | b'3' | b'5' | b'6'), ..] => {
+            let kind = *kind;
+            reader.consume(2);
+            netpbm(reader, kind, lightness, file)
         }
-        other => {
-            let pixels = other.to_rgba16();
-            let with_alpha = other.color().has_alpha();
-            let free = pixels.pixels().map(|pixel| {
-                // The map_server's trinary mode takes alpha for a fourth colour.
-                let channels = if with_alpha { 4 } else { 3 };
-                let sum: f64 = pixel.0[..channels].iter().copied().map(f64::from).sum();
-                lightness.is_free(sum / (65_535.0 * channels as f64))
-            });
-            Map::new(cols, rows, free)
+        _ => {
+            return Err(MapError::malformed(
+                file,
+                "neither a PGM nor a PNG image by its first bytes; save it as one of them",
+            ));
         }
+    };
+    let Free { cols, pixels } = decoded.map_err(|cause| match cause.downcast() {
+        Ok(size) => *size,
+        Err(cause) => MapError::malformed(
+            file,
+            format!("a damaged or unusual image ({cause}); save it anew as an 8-bit PGM or PNG"),
+        ),
+    })?;
+    Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
+}
+
+/// A Netpbm image of greys (kinds 2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.
+fn netpbm(
+    reader: impl BufRead,
+    kind: u8,
+    lightness: Lightness,
+    file: &Path,
+) -> Result<Free, Cause> {
+    let mut bytes = reader.bytes();
+    let mut header = || number(&mut bytes);
+    let (cols, rows, most) = (header()?, header()?, header()?);
+    // Its size first: decoding takes memory for whatever the header claims.
+    check_size(file, cols.into(), rows.into())?;
+    if !(1..=0xffff).contains(&most) {
+        return Err(format!("its brightest is {most}").into());
+    }
+    let mut sample = || match kind {
+        b'2' | b'3' => number(&mut bytes),
+        _ if most < 256 => byte(&mut bytes).map(u32::from),
+        _ => Ok(u32::from(byte(&mut bytes)?) << 8 | u32::from(byte(&mut bytes)?)),
+    };
+    let channels = if matches!(kind, b'2' | b'5') { 1 } else { 3 };
+    let mut pixels = Vec::new();
+    for _ in 0..u64::from(cols) * u64::from(rows) {
+        let mut sum = 0.0;
+        for _ in 0..channels {
+            sum += f64::from(sample()?.min(most));
+        }
+        pixels.push(lightness.is_free(sum / f64::from(most * channels)));
+    }
+    Ok(Free {
+        cols: cols as usize,
+        pixels,
     })
 }
 
-fn decode(file: &Path) -> Result<DynamicImage, MapError> {
-    let unreadable = |cause| MapError::Unreadable {
-        file: file.to_owned(),
-        cause,
+fn byte(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u8, Cause> {
+    Ok(bytes.next().ok_or("it ends early")??)
+}
+
+/// The next number of a Netpbm image and the one space after it; comments before it are skipped.
+fn number(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u32, Cause> {
+    let mut number: Option<u32> = None;
+    loop {
+        let byte = match bytes.next().transpose()? {
+            Some(byte) => byte,
+            None => return number.ok_or_else(|| "it ends early".into()),
+        };
+        match (byte, number) {
+            (b'0'..=b'9', _) => {
+                let grown = number.unwrap_or(0).checked_mul(10);
+                let grown = grown.and_then(|tens| tens.checked_add((byte - b'0').into()));
+                number = Some(grown.ok_or("a number is too large")?);
+            }
+            (b'#', None) => while !matches!(bytes.next().transpose()?, Some(b'\n') | None) {},
+            (_, Some(number)) if byte.is_ascii_whitespace() => return Ok(number),
+            (_, None) if byte.is_ascii_whitespace() => {}
+            _ => return Err("a number has another character".into()),
+        }
+    }
+}
+
+fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result<Free, Cause> {
+    let limits = png::Limits {
+        bytes: LONGEST as usize,
     };
-    let damaged = |cause: ::image::ImageError| {
-        MapError::malformed(
-            file,
-            format!("a damaged or unusual image ({cause}); save it anew as an 8-bit PGM or PNG"),
+    let mut decoder = png::Decoder::new_with_limits(reader, limits);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let (cols, rows) = decoder.read_header_info()?.size();
+    // Its size first: decoding takes memory for whatever the header claims.
+    check_size(file, cols.into(), rows.into())?;
+    let mut reader = decoder.read_info()?;
+    let (colour, depth) = reader.output_color_type();
+    // The map_server's trinary mode takes alpha for a fourth colour.
+    let weights: &[f64] = match colour {
+        png::ColorType::Grayscale => &[1.0],
+        png::ColorType::GrayscaleAlpha => &[0.75, 0.25],
+        png::ColorType::Rgba => &[0.25; 4],
+        png::ColorType::Rgb | png::ColorType::Indexed => &[1.0 / 3.0; 3],
+    };
+    let mut samples = vec![0; reader.output_buffer_size().ok_or("it is too large")?];
+    reader.next_frame(&mut samples)?;
+    let bytes = if depth == png::BitDepth::Sixteen {
+        2
+    } else {
+        1
+    };
+    let brightness = |sample: &[u8]| match *sample {
+        [high, low] => f64::from(u16::from_be_bytes([high, low])) / 65_535.0,
+        _ => f64::from(sample[0]) / 255.0,
+    };
+    let is_free = |pixel: &[u8]| {
+        let samples = pixel.chunks_exact(bytes).map(brightness);
+        lightness.is_free(
+            samples
+                .zip(weights)
+                .map(|(sample, weight)| sample * weight)
+                .sum(),
         )
     };
-    let reader = || -> Result<_, MapError> {
-        let mut opened = open(file, LONGEST)?;
-        opened.rewind().map_err(unreadable)?;
-        // By its first bytes: a PNG that is called .pgm is still a PNG.
-        let mut reader = ImageReader::new(BufReader::new(opened))
-            .with_guessed_format()
-            .map_err(unreadable)?;
-        match reader.format() {
-            Some(ImageFormat::Pnm | ImageFormat::Png) => {}
-            _ => {
-                return Err(MapError::malformed(
-                    file,
-                    "neither a PGM nor a PNG image by its first bytes; save it as one of them",
-                ));
-            }
-        }
-        let mut limits = Limits::default();
-        // The size is checked below, where it can be told.
-        limits.max_alloc = Some(LONGEST);
-        reader.limits(limits);
-        Ok(reader)
-    };
-    // Its size first: decoding takes memory for whatever the header claims.
-    let decoder = reader()?.into_decoder().map_err(damaged)?;
-    let (cols, rows) = decoder.dimensions();
-    check_size(file, cols.into(), rows.into())?;
-    drop(decoder);
-    reader()?.decode().map_err(damaged)
+    Ok(Free {
+        cols: cols as usize,
+        pixels: samples
+            .chunks_exact(bytes * weights.len())
+            .map(is_free)
+            .collect(),
+    })
 }
 
 #[cfg(test)]
@@ -187,5 +271,43 @@ mod tests {
             let error = map_of(header.as_bytes(), usual).unwrap_err();
             assert!(matches!(error, MapError::Size { .. }), "{header}: {error}");
         }
+    }
+
+    /// The middle of a PNG of 3 x 3 pixels.
+    fn middle_of_png_is_free(colour: png::ColorType, depth: png::BitDepth, pixel: &[u8]) -> bool {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 3, 3);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&pixel.repeat(9)).unwrap();
+        drop(writer);
+        middle_is_free(&bytes, &[], Lightness::default())
+    }
+
+    #[test]
+    fn a_png_is_read_in_greys_and_colours_with_alpha_as_a_fourth_colour() {
+        use png::{BitDepth::*, ColorType::*};
+        for (colour, depth, pixel, free) in [
+            (Grayscale, Eight, &[205][..], false),
+            (Grayscale, Eight, &[206], true),
+            (Grayscale, Sixteen, &[206, 0], true),
+            (Grayscale, Sixteen, &[0, 255], false),
+            (Rgb, Eight, &[255, 255, 200], true),
+            (Rgb, Eight, &[255, 255, 60], false),
+            (Rgba, Eight, &[255, 255, 255, 0], false),
+            (GrayscaleAlpha, Eight, &[240, 255], true),
+            (GrayscaleAlpha, Eight, &[240, 0], false),
+        ] {
+            let found = middle_of_png_is_free(colour, depth, pixel);
+            assert_eq!(found, free, "{colour:?} {depth:?} {pixel:?}");
+        }
+    }
+
+    #[test]
+    fn a_map_in_ascii_with_comments_is_read_as_in_binary() {
+        let ascii = b"P2\n# by hand\n3 3 255\n0 0 0 0 206 0\n0 0 0";
+        let map = map_of(ascii, Lightness::default()).unwrap();
+        assert_eq!(map.blocked.iter().filter(|blocked| !**blocked).count(), 1);
     }
 }

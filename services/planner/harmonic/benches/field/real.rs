@@ -22,8 +22,7 @@ pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
 
 /// The map in a PGM, its target the free cell nearest to the middle.
 fn load(file: &Path) -> Domain {
-    let grey = image::open(file).expect("a PGM").into_luma8();
-    let (width, height) = (grey.width() as usize, grey.height() as usize);
+    let (width, height, grey) = pgm(&std::fs::read(file).expect("a map"));
     let mut blocked: Vec<bool> = grey.iter().map(|&grey| grey < FREE_FROM).collect();
     for (at, blocked) in blocked.iter_mut().enumerate() {
         let (col, row) = (at % width, at / width);
@@ -39,4 +38,22 @@ fn load(file: &Path) -> Domain {
         .expect("a free cell");
     let target = Cell::new(target % width, target / width);
     Domain::new(width, height, blocked, target).expect("a valid map")
+}
+
+/// Columns, rows and pixels of a binary PGM of 8 bits, whose comments are lines of their own.
+fn pgm(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
+    let mut numbers = Vec::new();
+    let mut rest = bytes.strip_prefix(b"P5\n").expect("a binary PGM");
+    while numbers.len() < 3 {
+        let end = rest.iter().position(|&byte| byte == b'\n');
+        let (line, after) = rest.split_at(end.expect("a header") + 1);
+        rest = after;
+        let line = std::str::from_utf8(line).expect("a header in ASCII");
+        if !line.starts_with('#') {
+            let words = line.split_whitespace();
+            numbers.extend(words.map(|word| word.parse::<usize>().expect("a number")));
+        }
+    }
+    assert_eq!(numbers[2], 255, "8 bits");
+    (numbers[0], numbers[1], rest.to_vec())
 }
