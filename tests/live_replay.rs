@@ -54,11 +54,7 @@ fn another_constant_or_planner_is_tried_on_a_played_recording_and_the_first_diff
     let file = golden.path().to_str().unwrap();
     for (stage, topic, set) in [
         ("controller", "command", "controller.speed_m_s=0.3"),
-        (
-            "planner",
-            "guidance",
-            "planner.executable=\"firsthand-bug\"",
-        ),
+        ("planner", "guidance", "planner.executable=\"bug\""),
     ] {
         let arguments = ["replay", file, "--live", "--robot", "live-other", "--json"];
         let arguments = [&arguments[..], &["--stage", stage, "--set", set]].concat();

@@ -29,18 +29,19 @@ pub struct StageCommandError {
     problem: String,
 }
 
-/// What the supervisor `supervisor` gives to the process of `generation`, after the executable's name.
+/// What the supervisor `supervisor` gives to the process of `generation`, after the executable's name; `called` is the name of its
+/// stage, or of the baseline in its place.
 #[must_use]
-pub fn arguments(generation: &Generation, supervisor: u32) -> Vec<OsString> {
+pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<OsString> {
     let Generation {
-        stage,
+        stage: _,
         directory,
         number,
         first_tick,
     } = generation;
     vec![
         SUBCOMMAND.into(),
-        stage.into(),
+        called.into(),
         "--run".into(),
         directory.into(),
         "--generation".into(),
@@ -147,7 +148,7 @@ mod tests {
             number: 3,
             first_tick: 77,
         };
-        let read = start("planner", arguments(&written, 4711)).unwrap();
+        let read = start("planner", arguments("planner", &written, 4711)).unwrap();
         let Start::Child {
             generation,
             supervisor,

@@ -1,4 +1,5 @@
-//! Finds, checks and makes absolute the executable that a mission names for the planner, before anything starts.
+//! Finds the planner that a mission names, before anything starts: a baseline that is in this executable, or another executable, which
+//! is checked and made absolute.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +11,21 @@ use crate::executable::{self, ExecutableError};
 /// The executable that a mission names for its planner cannot be started.
 #[derive(Debug, Error)]
 #[error(
-    "planner.executable {}: {problem}; give a path to an executable of a planner, a name on PATH, or leave the key out", named.display()
+    "planner.executable {}: {problem}; give `wavefront`, `bug`, a path to an executable of a planner, a name on PATH, or leave the key out", named.display()
 )]
 pub struct PlannerExecutableError {
     named: PathBuf,
     problem: ExecutableError,
+}
+
+/// The planners to compare with that this executable contains, as the stages `firsthand stage NAME`.
+const BASELINES: [&str; 2] = ["wavefront", "bug"];
+
+/// The baseline that is `named`, with the name of its former executable too.
+pub fn baseline(named: &Path) -> Option<&'static str> {
+    let named = named.to_str()?;
+    let named = named.strip_prefix("firsthand-").unwrap_or(named);
+    BASELINES.into_iter().find(|baseline| *baseline == named)
 }
 
 /// Make the `planner.executable` of `mission` absolute, if it names one.
@@ -25,7 +36,11 @@ pub fn resolve(mission: &mut Mission) -> Result<(), PlannerExecutableError> {
     Ok(())
 }
 
+/// The baseline that is `named`, or the absolute path of that executable.
 pub fn find(named: &Path) -> Result<PathBuf, PlannerExecutableError> {
+    if let Some(baseline) = baseline(named) {
+        return Ok(baseline.into());
+    }
     executable::find(named).map_err(|problem| PlannerExecutableError {
         named: named.to_path_buf(),
         problem,
@@ -58,6 +73,18 @@ mod tests {
             fs::canonicalize(found).unwrap(),
             fs::canonicalize(shell).unwrap()
         );
+    }
+
+    #[test]
+    fn a_baseline_is_found_by_its_name_and_by_that_of_its_former_executable() {
+        for (named, found) in [
+            ("bug", "bug"),
+            ("wavefront", "wavefront"),
+            ("firsthand-bug", "bug"),
+        ] {
+            assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(found));
+        }
+        assert_eq!(baseline(Path::new("./bug")), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::{
         fd::{AsFd, BorrowedFd, OwnedFd},
         unix::process::{CommandExt, ExitStatusExt as _},
     },
+    path::Path,
     process::{Child, ChildStdout, Command, ExitStatus, Stdio},
     time::{Duration, Instant},
 };
@@ -15,11 +16,13 @@ use std::{
 use common::{
     poll,
     samples::{DeathCause, DeathSample},
+    stage_command,
+    start::Generation,
 };
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
-use crate::descriptors;
+use crate::{descriptors, planner_executable};
 
 /// The kernel ends a killed process within this, unless it hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
@@ -30,6 +33,22 @@ const KILLED_WITHIN: Duration = Duration::from_millis(50);
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = child("/proc/self/exe");
     command.arg0("firsthand").args(arguments);
+    command
+}
+
+/// A process of the stage of `generation`, a child of this one: of the `executable` or the baseline that the mission names, or of
+/// `firsthand`'s own stage.
+pub fn stage(executable: Option<&Path>, generation: &Generation) -> Command {
+    let baseline = executable.and_then(planner_executable::baseline);
+    let mut command = match (executable, baseline) {
+        (Some(executable), None) => child(executable),
+        _ => firsthand(&[]),
+    };
+    command.args(stage_command::arguments(
+        baseline.unwrap_or(generation.stage),
+        generation,
+        std::process::id(),
+    ));
     command
 }
 

@@ -11,7 +11,6 @@ use common::{
     mission::Mission,
     run,
     samples::{HealthSample, HealthState, RosterEntry, StageState, name},
-    stage_command,
     start::Generation,
 };
 use rustix::process::Signal;
@@ -20,7 +19,7 @@ use thiserror::Error;
 use crate::{
     death::{Death, Next, log_tail},
     policy::{Action, Event, Now, Phase, Policy},
-    process::{ExitCause, Process, child, firsthand},
+    process::{self, ExitCause, Process},
     stages::Stage,
 };
 
@@ -184,11 +183,7 @@ impl StageProcess {
             number: self.generation,
             first_tick,
         };
-        let mut command = self
-            .executable
-            .as_ref()
-            .map_or_else(|| firsthand(&[]), child);
-        command.args(stage_command::arguments(&generation, std::process::id()));
+        let mut command = process::stage(self.executable.as_deref(), &generation);
         command.stdout(Stdio::null()).stderr(log);
         Process::spawn(command)
     }

@@ -89,11 +89,6 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The baselines, and their executables beside this one.
-const BASELINES: [(&str, &str); 2] = [
-    ("wavefront", "firsthand-wavefront"),
-    ("bug", "firsthand-bug"),
-];
 /// Free ground on both sides of the body in the narrowest way of a world, metres.
 const MARGIN_M: f64 = 0.05;
 
@@ -250,11 +245,9 @@ fn executable(planner: &str) -> Result<Option<String>, Failure> {
     if planner == HARMONIC {
         return Ok(None);
     }
-    let baseline = BASELINES.iter().find(|(name, _)| *name == planner);
-    let named = baseline.map_or(planner, |(_, executable)| executable);
     // A missing executable is reported before anything starts.
-    planner_executable::find(Path::new(named))?;
-    let value = toml::Value::from(named);
+    planner_executable::find(Path::new(planner))?;
+    let value = toml::Value::from(planner);
     Ok(Some(format!("planner.executable={value}")))
 }
 

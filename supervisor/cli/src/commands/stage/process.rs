@@ -1,14 +1,20 @@
 //! `firsthand stage NAME`: the process of one stage, started by the supervisor, by systemd or by a person.
 
-use std::{ffi::OsString, os::unix::process::CommandExt as _, process::Command};
+use std::{ffi::OsString, os::unix::process::CommandExt as _, path::Path, process::Command};
 
+#[cfg(feature = "baselines")]
+use common::shell::{StageError, run_stage};
 use common::{
     external,
     mission::Mission,
     stage_command::{self, SUBCOMMAND},
     start::Start,
 };
-use supervisor::stages::Stage;
+#[cfg(feature = "baselines")]
+use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
+#[cfg(feature = "baselines")]
+use supervisor::stages::PLANNER;
+use supervisor::{planner_executable, stages::Stage};
 
 use crate::console::{failure::Failure, operator};
 
@@ -16,12 +22,27 @@ use crate::console::{failure::Failure, operator};
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
+    #[cfg(feature = "baselines")]
+    if let Some(run) = baseline(&name) {
+        let start = stage_command::start_with(PLANNER, options.iter().cloned())?;
+        return Ok(run(&start)?);
+    }
     let stage = operator::known_stage(&name)?;
     let start = stage_command::start_with(stage.name, options.iter().cloned())?;
     if let Start::External { robot, .. } = &start {
         become_executable(stage, &external::mission(robot)?, options)?;
     }
     Ok((stage.run)(&start)?)
+}
+
+/// What the process of the baseline `name` does in the place of the planner.
+#[cfg(feature = "baselines")]
+fn baseline(name: &str) -> Option<fn(&Start) -> Result<(), StageError>> {
+    match name {
+        "wavefront" => Some(run_stage::<Shell<Wavefront>>),
+        "bug" => Some(run_stage::<Shell<Bug>>),
+        _ => None,
+    }
 }
 
 /// Become the executable that `mission` names for `stage`, if it names one.
@@ -33,7 +54,9 @@ fn become_executable(
     let Some(executable) = stage.executable(mission) else {
         return Ok(());
     };
-    let mut command = Command::new(executable);
-    let error = command.args([SUBCOMMAND, stage.name]).args(options).exec();
+    let baseline = planner_executable::baseline(executable);
+    let mut command = Command::new(baseline.map_or(executable, |_| Path::new("/proc/self/exe")));
+    command.args([SUBCOMMAND, baseline.unwrap_or(stage.name)]);
+    let error = command.args(options).exec();
     Err(format!("cannot execute {}: {error}", executable.display()).into())
 }

@@ -11,13 +11,12 @@ use std::{
 use common::{
     bus::{Bus, BusError, EncodedReader},
     run::Run,
-    stage_command,
     start::Generation,
     topics,
     waiter::Waiter,
 };
 use supervisor::{
-    process::{ExitCause, Process, child, firsthand},
+    process::{self, ExitCause, Process},
     stages::Stage,
 };
 
@@ -85,10 +84,8 @@ impl LiveStage {
             stage: stage.name,
             source,
         };
-        let executable = stage.executable(&run.mission);
-        let mut command = executable.map_or_else(|| firsthand(&[]), child);
+        let mut command = process::stage(stage.executable(&run.mission), &generation);
         command
-            .args(stage_command::arguments(&generation, std::process::id()))
             .stdout(Stdio::null())
             .stderr(File::create(&log).map_err(failed)?);
         let process = Process::spawn(command).map_err(failed)?;
