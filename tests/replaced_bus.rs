@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 const ROBOT: &str = "recreated";
 
-/// The next pose heard on `bus`; as the README's consumer listens.
+/// The next pose heard on `bus`; as the guide's consumer listens.
 fn next_pose(bus: &Bus) -> PoseSample {
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut waiter = Waiter::default();

@@ -1,6 +1,6 @@
 //! THE table of faults: what can be broken in a running stage on purpose, to see whether the others go on.
 //!
-//! `firsthand stage fault`, its help and the README read it. Every stage reads the topic `faults` in its process shell, which
+//! `firsthand stage fault`, its help and the guide read it. Every stage reads the topic `faults` in its process shell, which
 //! refuses them on a real robot unless the request says that it means a real one.
 
 use crate::{

@@ -1,6 +1,6 @@
 //! THE table of topics: what the processes publish for each other.
 //!
-//! Services are created from it, the README's table is printed from it (`firsthand topic list`), the stages' table is
+//! Services are created from it, the guide's list is printed from it (`firsthand topic list`), the stages' table is
 //! checked against it, and writers take from it how often they publish again. A topic is declared once, below, and
 //! named nowhere else.
 

@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn the_guide_has_every_kind_of_world() {
-        let page = include_str!("../../guide/evaluate-worlds.md");
+        let page = include_str!("../../guide/evaluation.md");
         for (name, _) in DRAWN {
             assert!(page.contains(&format!("\n| `{name}` | ")), "{name}");
         }

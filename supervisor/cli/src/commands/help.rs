@@ -40,24 +40,16 @@ macro_rules! guide {
 static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
-    "simulation",
-    "at-the-prompt",
+    "operate",
     "attach",
-    "deploy",
     "recordings",
     "break-it",
-    "field-tool",
-    "evaluate-worlds",
-    "evaluation-results",
-    "the-papers-experiments",
-    "figures",
+    "evaluation",
+    "results",
     "capabilities",
     "tables",
-    "glossary",
     "CONTRIBUTING",
     "add-a-stage",
-    "write-a-planner",
-    "CHANGELOG",
 };
 
 impl Page {

@@ -1,19 +1,22 @@
 //! `firsthand table`, and the tables of topics and stages: Markdown, as the guide shows it.
 
-use std::{fmt::Write as _, process::ExitCode};
+#[cfg(feature = "tools")]
+pub(crate) mod stored;
+
+use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use common::{
     faults,
-    topics::{self, Logged, Rate},
+    topics::{self, AnyTopic, Logged, Rate},
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Persists, Topics},
 };
 use supervisor::stages;
-use x80_link::failsafe;
+use x80_link::failsafe::{self, monitor::Clears};
 
 use crate::console::{failure::Failure, output::print_text};
 
-/// Print the tables of the failsafe and of the faults.
+/// Print a table of the guide.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -26,63 +29,104 @@ enum Table {
     Failsafe,
     /// Print the faults that can be put into stages (`firsthand stage fault`).
     Faults,
+    /// Print what was measured.
+    #[cfg(feature = "tools")]
+    Results,
+    /// Print what is promised, and the tests of it.
+    #[cfg(feature = "tools")]
+    Capabilities,
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     print_text(&match arguments.table {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
+        #[cfg(feature = "tools")]
+        Table::Results => stored::results(),
+        #[cfg(feature = "tools")]
+        Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
     })?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// The topics as a Markdown table.
-pub(super) fn topics() -> String {
-    let mut table = String::from(
-        "| topic | payload | written by | rate | logged | meaning |\n|---|---|---|---|---|---|\n",
-    );
-    for topic in topics::TABLE {
-        let spec = topic.spec();
-        let rate = match spec.rate {
-            Rate::EachTick => "each tick".to_owned(),
-            Rate::EachFrame => "each frame of the robot".to_owned(),
-            Rate::WhenItHappens => "when it happens".to_owned(),
-            Rate::OnChange {
-                at_most_every,
-                again_after,
-            } => {
-                let limit = match at_most_every.as_millis() {
-                    0 => String::new(),
-                    limit => format!(" at most every {limit} ms"),
-                };
-                format!(
-                    "on change{limit}, again after {} ms",
-                    again_after.as_millis()
-                )
-            }
-        };
-        let logged = match spec.logged {
-            Logged::Yes => "yes",
-            Logged::WithFields => "with `--fields`",
-        };
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            table,
-            "| `{}` | `{}` | {} | {rate} | {logged} | {} |",
-            spec.name,
-            topic.payload(),
-            spec.writer,
-            spec.meaning.trim()
-        );
+/// What a page of the guide shows behind `<!-- table NAME SECTION -->`; none of an unknown name.
+#[cfg(all(test, feature = "tools"))]
+pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
+    match name {
+        "topics" => Some(topics()),
+        "stages" => Some(stages()),
+        "failsafe" => Some(failsafe()),
+        "faults" => Some(faults()),
+        stored => stored::markdown(stored, section),
     }
-    table
 }
 
-/// The stages as a Markdown table.
+/// Columns that a line of a list has, unless a code span alone is longer.
+const WIDTH: usize = 120;
+
+/// `text` as an item of a Markdown list. No line ends within a code span.
+fn item(text: &str) -> String {
+    let mut item = String::from("-");
+    let mut column = 1;
+    let mut rest = text;
+    while !rest.is_empty() {
+        let mut ends = rest.match_indices(' ').map(|(at, _)| at);
+        let outside_code = |at: &usize| rest[..*at].matches('`').count() % 2 == 0;
+        let word = &rest[..ends.find(outside_code).unwrap_or(rest.len())];
+        rest = rest[word.len()..].trim_start();
+        let width = word.chars().count();
+        if column + 1 + width > WIDTH {
+            item.push_str("\n ");
+            column = 1;
+        }
+        item.push(' ');
+        item.push_str(word);
+        column += 1 + width;
+    }
+    item + "\n"
+}
+
+/// The topics as a list in Markdown.
+pub(super) fn topics() -> String {
+    topics::TABLE
+        .iter()
+        .map(|topic| topic_row(*topic))
+        .collect()
+}
+
+fn topic_row(topic: &dyn AnyTopic) -> String {
+    let spec = topic.spec();
+    let rate = match spec.rate {
+        Rate::EachTick => "each tick".to_owned(),
+        Rate::EachFrame => "each frame of the robot".to_owned(),
+        Rate::WhenItHappens => "when it happens".to_owned(),
+        Rate::OnChange {
+            at_most_every,
+            again_after,
+        } => {
+            let limit = match at_most_every.as_millis() {
+                0 => String::new(),
+                limit => format!(" at most every {limit} ms"),
+            };
+            let again = again_after.as_millis();
+            format!("on change{limit}, again after {again} ms")
+        }
+    };
+    let logged = match spec.logged {
+        Logged::Yes => "",
+        Logged::WithFields => "; recorded with `--fields`",
+    };
+    item(&format!(
+        "`{}` (`{}`, {}, {rate}{logged}): {}",
+        spec.name,
+        topic.payload(),
+        spec.writer,
+        spec.meaning.trim()
+    ))
+}
+
+/// The stages as a list in Markdown.
 pub(super) fn stages() -> String {
-    let mut table = String::from(
-        "| stage | reads | is woken by | writes | persists | ready within | beats within | answers within | each, for a million cells more | while it is down the robot |\n|---|---|---|---|---|---|---|---|---|---|\n",
-    );
     let list = |topics: &[Topics]| {
         let topics = topics.iter().copied().flatten();
         let names: Vec<_> = topics
@@ -90,65 +134,57 @@ pub(super) fn stages() -> String {
             .collect();
         names.join(", ")
     };
-    for stage in stages::TABLE {
+    let row = |stage: &stages::Stage| {
         let wiring = stage.wiring;
-        let _ = writeln!(
-            table,
-            "| `{}` | {} | {} | {} | {} | {} ms | {} ms | {} ms | {} ms | {} |",
+        let persists = match wiring.persists {
+            Persists::Nothing => "nothing".to_owned(),
+            Persists::State(bytes) => format!("its state, {bytes} bytes"),
+            Persists::Journal => "its inputs since a snapshot".to_owned(),
+        };
+        item(&format!(
+            "`{}` reads {}; is woken by {}; writes {}; persists {persists}; ready within {} ms, beats within {} ms, \
+             answers within {} ms, {} ms more for a million cells; while it is down: {}",
             stage.name,
             list(&[wiring.inputs, wiring.feedback]),
             list(&[wiring.wakes]),
             list(&[wiring.outputs]),
-            match wiring.persists {
-                Persists::Nothing => "nothing".to_owned(),
-                Persists::State(bytes) => format!("its state, {bytes} bytes"),
-                Persists::Journal => "its inputs since a snapshot".to_owned(),
-            },
             stage.deadlines.startup.as_millis(),
             stage.deadlines.heartbeat.as_millis(),
             stage.deadlines.answers.as_millis(),
             stage.per_million_cells.as_millis(),
             stage.while_down
-        );
-    }
+        ))
+    };
+    let rows: String = stages::TABLE.iter().map(row).collect();
     let (reads, writes) = (list(&[EVERY_STAGE_READS]), list(&[EVERY_STAGE_WRITES]));
-    let _ = writeln!(
-        table,
-        "\nEvery stage also reads {reads} and writes {writes}."
-    );
-    table
+    rows + &item(&format!(
+        "every stage also reads {reads} and writes {writes}"
+    ))
 }
 
-/// The rules of the link's failsafe as a Markdown table.
+/// The rules of the link's failsafe as a list in Markdown.
 fn failsafe() -> String {
-    let mut table = String::from("| cause | when | the robot | until |\n|---|---|---|---|\n");
-    for rule in failsafe::TABLE {
-        let _ = writeln!(
-            table,
-            "| {} | {} | {} | {} |",
-            rule.cause.name(),
-            rule.when,
-            rule.action.effect(),
-            rule.clears
-        );
-    }
-    table
+    let row = |rule: &failsafe::Rule| {
+        let until = match rule.clears {
+            Clears::WithCondition => String::new(),
+            clears => format!(" until {clears}"),
+        };
+        let (name, effect) = (rule.cause.name(), rule.action.effect());
+        item(&format!("{name} ({effect}{until}): {}", rule.when))
+    };
+    failsafe::TABLE.iter().map(row).collect()
 }
 
-/// The faults as a Markdown table.
+/// The faults as a list in Markdown.
 fn faults() -> String {
-    let mut table = String::from("| stage | fault | what it does | until |\n|---|---|---|---|\n");
-    for fault in &faults::TABLE {
-        let stage = fault
-            .stage
-            .map_or("any".to_owned(), |stage| format!("`{stage}`"));
-        let _ = writeln!(
-            table,
-            "| {stage} | `{}` | {} | {} |",
+    let row = |fault: &faults::Fault| {
+        let stage = fault.stage.unwrap_or("any stage");
+        item(&format!(
+            "`{}` ({stage}): {}; until: {}",
             fault.name, fault.meaning, fault.ends
-        );
-    }
-    table
+        ))
+    };
+    faults::TABLE.iter().map(row).collect()
 }
 
 #[cfg(test)]
@@ -156,20 +192,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_guide_shows_the_tables_as_they_are() {
-        let guide = include_str!("../../../guide/tables.md");
-        let tables = [
-            ("topic list", topics()),
-            ("stage list", stages()),
-            ("table failsafe", failsafe()),
-            ("table faults", faults()),
-        ];
-        for (command, table) in tables {
-            assert!(
-                guide.contains(&table),
-                "supervisor/guide/tables.md is behind; paste the output of `firsthand {command}`:\n{table}"
-            );
-        }
+    fn an_item_is_wrapped_and_its_code_spans_are_whole() {
+        let text = format!("{} `a b` c", "word ".repeat(23).trim_end());
+        let wrapped = item(&text);
+        assert!(wrapped.ends_with("\n  `a b` c\n"), "{wrapped}");
+        assert!(wrapped.lines().all(|line| line.len() <= WIDTH));
     }
 
     #[test]

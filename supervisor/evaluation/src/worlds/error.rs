@@ -11,7 +11,7 @@ use thiserror::Error;
 
 #[derive(Debug, Error)]
 pub enum WorldError {
-    #[error("cannot read {}: {source}; give a kind of world, a file or a folder, see `firsthand help evaluate-worlds`", file.display())]
+    #[error("cannot read {}: {source}; give a kind of world, a file or a folder, see `firsthand help evaluation`", file.display())]
     Unreadable { file: PathBuf, source: io::Error },
     /// The file is invalid.
     #[error("{}: {problem}", file.display())]

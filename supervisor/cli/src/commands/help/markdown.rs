@@ -22,6 +22,8 @@ pub(super) fn render(text: &str, width: usize) -> String {
         } else if line.starts_with('#') {
             let heading = spans(line.trim_start_matches('#').trim());
             rendered += &painted(&wrapped(&format!("{BOLD}{heading}{BOLD}"), width), "", "");
+        } else if line.starts_with("<!--") {
+            lines.next_if(|line| line.is_empty());
         } else if line.starts_with('|') {
             let mut rows = vec![cells(line)];
             while let Some(row) = lines.next_if(|line| line.starts_with('|')) {

@@ -1,0 +1,132 @@
+//! Results and capabilities, which are stored as CSV files beside the guide and printed from them.
+//!
+//! The first column of each file is the section of the page that shows a row.
+
+use std::fmt::Write as _;
+
+use super::item;
+
+macro_rules! stored {
+    ($($name:literal in $file:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../../../guide/", $file)))),*]
+    };
+}
+
+static FILES: &[(&str, &str)] = stored! {
+    "capabilities" in "capabilities.csv",
+    "figures" in "results/figures.csv",
+    "worlds" in "results/worlds.csv",
+    "paired" in "results/paired.csv",
+    "experiments" in "results/experiments.csv",
+    "claims" in "results/claims.csv",
+    "stop-times" in "results/stop_times.csv",
+    "tick" in "results/tick.csv",
+    "tick-at-7-hz" in "results/tick_at_7_hz.csv",
+    "field" in "results/field.csv",
+};
+
+/// Rows of the file called `name`, of some sections (`a,b`) or of all, as Markdown; none where there is no such file or section.
+pub(crate) fn markdown(name: &str, section: Option<&str>) -> Option<String> {
+    let (_, text) = FILES.iter().find(|(file, _)| *file == name)?;
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let header = reader.headers().ok()?.clone();
+    let rows: Vec<Vec<String>> = reader
+        .records()
+        .flatten()
+        .filter(|row| {
+            section.is_none_or(|asked| asked.split(',').any(|asked| row.get(0) == Some(asked)))
+        })
+        .map(|row| row.iter().skip(1).map(str::to_owned).collect())
+        .collect();
+    if rows.is_empty() {
+        return None;
+    }
+    Some(match name {
+        "capabilities" => rows.iter().map(|row| capability(row)).collect(),
+        "figures" => rows.iter().map(|row| figure(row)).collect(),
+        _ => table(header.iter().skip(1), &rows),
+    })
+}
+
+/// All results, section by section.
+pub(crate) fn results() -> String {
+    let of_results = FILES.iter().filter(|(name, _)| *name != "capabilities");
+    let printed =
+        of_results.filter_map(|(name, _)| Some(format!("{name}\n\n{}", markdown(name, None)?)));
+    printed.collect::<Vec<_>>().join("\n")
+}
+
+/// A capability without a text of its own is called by its test's name.
+fn capability(row: &[String]) -> String {
+    let [text, verdict, tests] = row else {
+        return String::new();
+    };
+    let named = |tests: &str| {
+        tests
+            .split(' ')
+            .map(|test| format!("`{test}`"))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let said = match (text.as_str(), tests.as_str()) {
+        ("", test) => test.replace('_', " "),
+        (text, "") => text.to_owned(),
+        (text, tests) => format!("{text}: {}", named(tests)),
+    };
+    item(&format!("{verdict}: {said}"))
+}
+
+/// A figure, and below it the command that prints it.
+fn figure(row: &[String]) -> String {
+    let [what, realism, n, figure, command] = row else {
+        return String::new();
+    };
+    let realism = match realism.as_str() {
+        "" => String::new(),
+        realism => format!("{realism}, "),
+    };
+    format!(
+        "{}  `{command}`\n",
+        item(&format!("{what} ({realism}n = {n}): {figure}"))
+    )
+}
+
+fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> String {
+    let header: Vec<&str> = header.collect();
+    let mut table = format!(
+        "| {} |\n|{}\n",
+        header.join(" | "),
+        "---|".repeat(header.len())
+    );
+    for row in rows {
+        // Writing to a String cannot fail.
+        let _ = writeln!(table, "| {} |", row.join(" | "));
+    }
+    table
+}
+
+/// The rows of capabilities: text, verdict, names of tests.
+#[cfg(test)]
+pub(crate) fn capabilities() -> Vec<[String; 3]> {
+    let (_, text) = FILES[0];
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let rows = reader.deserialize::<(String, String, String, String)>();
+    rows.map(|row| row.map(|(_, text, verdict, tests)| [text, verdict, tests]))
+        .collect::<Result<_, _>>()
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_of_every_stored_file_is_a_row() {
+        for (name, text) in FILES {
+            let records = csv::Reader::from_reader(text.as_bytes()).into_records();
+            let broken = records.filter(Result::is_err).count();
+            assert_eq!(broken, 0, "{name}");
+        }
+        assert!(!capabilities().is_empty());
+    }
+}
