@@ -170,7 +170,7 @@ impl Command {
     }
 }
 
-/// The subcommands by groups, each with the first line of its help.
+/// The subcommands by groups, each with the beginning of its help.
 fn listed() -> String {
     let all = Command::augment_subcommands(clap::Command::new(""));
     let mut text = String::new();
@@ -183,6 +183,8 @@ fn listed() -> String {
                 .find_subcommand(&name)
                 .and_then(clap::Command::get_about);
             let about = about.map(ToString::to_string).unwrap_or_default();
+            let about = about.split([';', ':']).next().unwrap_or_default();
+            let about = about.split(". ").next().unwrap_or_default();
             let _ = writeln!(text, "  {name:<12} {about}");
         }
         text.push('\n');

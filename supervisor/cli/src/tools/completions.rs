@@ -48,12 +48,9 @@ pub(crate) fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
 
 /// `command` with candidates for what its arguments name.
 fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
-    let command = if command.is_allow_external_subcommands_set() {
-        command.add(SubcommandCandidates::new(|| candidates("", stage_names())))
-    } else {
-        command
-    };
     command
+        // Only `stage` asks for these: no other command takes a word that is no subcommand.
+        .add(SubcommandCandidates::new(|| candidates("", stage_names())))
         .mut_args(|argument| match completer(&argument, pages) {
             Some(completer) => argument.add(completer),
             None => argument,

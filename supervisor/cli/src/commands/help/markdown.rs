@@ -171,16 +171,16 @@ fn styled(lines: &[String]) -> Vec<String> {
         .map(|line| {
             let mut text = start(bold, code).to_owned();
             for letter in line.chars() {
+                let before = start(bold, code);
                 match letter {
                     BOLD => bold = !bold,
                     CODE => code = !code,
-                    _ => {
-                        text.push(letter);
-                        continue;
-                    }
+                    _ => text.push(letter),
                 }
-                text += "\x1b[0m";
-                text += start(bold, code);
+                if matches!(letter, BOLD | CODE) {
+                    text += if before.is_empty() { "" } else { "\x1b[0m" };
+                    text += start(bold, code);
+                }
             }
             if bold || code {
                 text += "\x1b[0m";
