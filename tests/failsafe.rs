@@ -1,21 +1,13 @@
 //! What stops the robot, seen on the wire: every datagram between link and robot passes through this test.
 
 use std::{
-    io::{BufRead as _, BufReader, ErrorKind},
-    net::{SocketAddr, UdpSocket},
-    process::{Child, Stdio},
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
-        mpsc::{Receiver, Sender, channel},
-    },
-    thread::JoinHandle,
+    sync::mpsc::{Receiver, Sender, channel},
     time::{Duration, Instant},
 };
 
 use crate::support::{
-    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, firsthand,
-    operate,
+    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, operate,
+    wire::{Proxy, Robot},
 };
 use common::wire::{Command, Decoder};
 use rustix::process::Signal;
@@ -25,39 +17,6 @@ use serde_json::Value;
 const LIMIT: Duration = Duration::from_millis(250);
 /// From tick to tick at 7 Hz.
 const PERIOD: Duration = Duration::from_millis(143);
-
-/// A simulated robot on its own.
-pub(crate) struct Robot {
-    process: Child,
-    pub(crate) listening: String,
-}
-
-impl Robot {
-    pub(crate) fn start() -> Self {
-        let mut process = firsthand(&["sim", "obstacle-course", "--ground-truth"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut output = BufReader::new(process.stdout.take().unwrap());
-        let mut header = String::new();
-        output.read_line(&mut header).unwrap();
-        let header: Value = serde_json::from_str(&header).unwrap();
-        // It waits for a reader that is slow.
-        std::thread::spawn(move || std::io::copy(&mut output, &mut std::io::sink()));
-        Self {
-            process,
-            listening: header["listening"].as_str().unwrap().to_owned(),
-        }
-    }
-}
-
-impl Drop for Robot {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
 
 /// A motion command that the link has sent to the robot.
 #[derive(Clone, Copy, Debug)]
@@ -74,51 +33,23 @@ impl Heard {
     }
 }
 
-/// Stands between link and robot.
+/// Hears every command on its way to the robot.
 pub(crate) struct Tap {
-    pub(crate) address: SocketAddr,
+    pub(crate) proxy: Proxy,
     heard: Receiver<Heard>,
-    over: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<()>>,
 }
 
 impl Tap {
     pub(crate) fn before(robot: &Robot) -> Self {
-        let host = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
-        wire.connect(&robot.listening).unwrap();
-        let address = host.local_addr().unwrap();
-        let over = Arc::new(AtomicBool::new(false));
-        let peer = Arc::new(Mutex::new(None));
         let (tell, heard) = channel();
-        let (host_too, wire_too) = (host.try_clone().unwrap(), wire.try_clone().unwrap());
-        let (peer_too, over_too) = (Arc::clone(&peer), Arc::clone(&over));
-        let out = std::thread::spawn(move || {
-            let mut decoder = Decoder::default();
-            pass(&host, &over, |bytes, from| {
-                let at = Instant::now();
-                *peer.lock().unwrap() = Some(from);
-                let _ = wire_too.send(bytes);
-                decoder.push(bytes);
-                listen(&mut decoder, at, &tell);
-            });
-        });
-        let back = {
-            let over = Arc::clone(&over_too);
-            std::thread::spawn(move || {
-                pass(&wire, &over, |bytes, _| {
-                    if let Some(peer) = *peer_too.lock().unwrap() {
-                        let _ = host_too.send_to(bytes, peer);
-                    }
-                });
-            })
+        let mut decoder = Decoder::default();
+        let listens = move |bytes: &[u8]| {
+            decoder.push(bytes);
+            listen(&mut decoder, Instant::now(), &tell);
+            bytes.to_vec()
         };
-        Self {
-            address,
-            heard,
-            over: over_too,
-            threads: vec![out, back],
-        }
+        let proxy = Proxy::before(robot, Box::new(listens), Box::new(<[u8]>::to_vec));
+        Self { proxy, heard }
     }
 
     fn next(&self) -> Heard {
@@ -174,27 +105,6 @@ impl Tap {
     }
 }
 
-/// Whatever comes on `socket`, until all is over.
-pub(crate) fn pass(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
-    socket
-        .set_read_timeout(Some(Duration::from_millis(50)))
-        .unwrap();
-    let mut buffer = [0; 2048];
-    while !over.load(Ordering::Relaxed) {
-        match socket.recv_from(&mut buffer) {
-            Ok((length, from)) => take(&buffer[..length], from),
-            // Nothing, or the other end is gone for now.
-            Err(error) => assert!(
-                matches!(
-                    error.kind(),
-                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::ConnectionRefused
-                ),
-                "{error}"
-            ),
-        }
-    }
-}
-
 fn listen(decoder: &mut Decoder, at: Instant, tell: &Sender<Heard>) {
     while let Some(frame) = decoder.next_frame() {
         let Ok(Command::Motion(motion)) = Command::parse(&frame) else {
@@ -212,21 +122,11 @@ fn listen(decoder: &mut Decoder, at: Instant, tell: &Sender<Heard>) {
     }
 }
 
-impl Drop for Tap {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
-        }
-    }
-}
-
 /// A run of the default mission whose every command is heard here.
 fn tapped(robot: &str) -> (Robot, Tap, Run) {
-    let body = Robot::start();
+    let body = Robot::on_the_course();
     let tap = Tap::before(&body);
-    let address = format!("robot.address=\"{}\"", tap.address);
-    let run = Run::start(robot, "obstacle-course", &["--set", &address]);
+    let run = Run::start(robot, "obstacle-course", &["--set", &tap.proxy.as_robot()]);
     (body, tap, run)
 }
 

@@ -13,9 +13,10 @@ use std::{
 };
 
 use crate::{
-    failsafe::{Robot, Tap},
+    failsafe::Tap,
     support::{
         self, PATIENCE, Run, assert_nothing_left, assert_reached, find, firsthand, signal_process,
+        wire::Robot,
     },
 };
 use rustix::process::Signal;
@@ -285,9 +286,9 @@ fn external_stages_that_systemd_stops_before_their_supervisor_are_no_deaths() {
 #[test]
 fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
     let robot = "unit-orphan";
-    let body = Robot::start();
+    let body = Robot::on_the_course();
     let tap = Tap::before(&body);
-    let address = format!("robot.address=\"{}\"", tap.address);
+    let address = tap.proxy.as_robot();
     let (mut run, mut units) = watching_with(robot, &["--set", &address]);
     run.wait_until_under_way(1.0);
     run.kill();

@@ -1,14 +1,8 @@
 //! Missions over every wire, by robots that are not the run's own children: they come and go by themselves.
 
-use std::{
-    io::{BufRead as _, BufReader},
-    path::{Path, PathBuf},
-    process::{Child, Stdio},
-    sync::mpsc::{Receiver, channel},
-};
+use std::path::{Path, PathBuf};
 
-use crate::support::{self, Run, assert_nothing_left, assert_reached, firsthand};
-use serde_json::Value;
+use crate::support::{Run, assert_nothing_left, assert_reached, wire::Robot};
 use tempfile::TempDir;
 
 /// A few seconds straight ahead.
@@ -23,75 +17,6 @@ fn mission() -> (TempDir, PathBuf) {
     (directory, file)
 }
 
-/// A simulated robot on its own.
-struct Robot {
-    process: Child,
-    listening: String,
-    /// Read as it comes: the robot waits for a reader that is slow.
-    truth: Receiver<Value>,
-    /// How far from its start it was last seen, metres.
-    went: f64,
-}
-
-impl Robot {
-    fn start(mission: &Path, transport: &str, listen: &str) -> Self {
-        let mission = mission.to_str().unwrap();
-        let arguments = ["sim", mission, "--ground-truth", "--transport", transport];
-        let mut process = firsthand(&arguments)
-            .args(["--listen", listen])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let output = BufReader::new(process.stdout.take().unwrap());
-        let (told, truth) = channel();
-        std::thread::spawn(move || {
-            for line in output.lines().map_while(Result::ok) {
-                let Ok(value) = serde_json::from_str::<Value>(&line) else {
-                    return;
-                };
-                if told.send(value).is_err() {
-                    return;
-                }
-            }
-        });
-        let header = truth.recv_timeout(support::PATIENCE).unwrap();
-        Self {
-            process,
-            listening: header["listening"].as_str().unwrap().to_owned(),
-            truth,
-            went: 0.0,
-        }
-    }
-
-    /// Wait until it is `metres` from its start.
-    fn wait_until_driven(&mut self, metres: f64) {
-        while self.went < metres {
-            self.went = from_start(&self.truth.recv_timeout(support::PATIENCE).unwrap());
-        }
-    }
-
-    /// Kill it, and say how far from its start it was.
-    fn kill(mut self) -> f64 {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
-        let last = self.truth.iter().last();
-        last.map_or(self.went, |truth| from_start(&truth))
-    }
-}
-
-fn from_start(truth: &Value) -> f64 {
-    let metres = |axis: &str| truth[axis].as_f64().unwrap();
-    metres("x").hypot(metres("y"))
-}
-
-impl Drop for Robot {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
 /// Start a run of `mission` with the robot at `address`.
 fn drive(name: &str, mission: &Path, address: &str) -> Run {
     let assignment = format!("robot.address=\"{address}\"");
@@ -100,7 +25,7 @@ fn drive(name: &str, mission: &Path, address: &str) -> Run {
 
 fn arrives_over(transport: &str, scheme: &str) {
     let (_directory, mission) = mission();
-    let robot = Robot::start(&mission, transport, "127.0.0.1:0");
+    let robot = Robot::start(mission.to_str().unwrap(), transport, "127.0.0.1:0");
     let address = format!("{scheme}{}", robot.listening);
     let name = format!("over-{transport}");
     let (code, summary) = drive(&name, &mission, &address).finish();
@@ -132,7 +57,7 @@ const UNHEARD_M: f64 = 0.12;
 /// on: its counts begin at zero, and so does the place it takes for its start.
 fn goes_away_and_comes_back(transport: &str) {
     let (_directory, mission) = mission();
-    let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");
+    let mut robot = Robot::start(mission.to_str().unwrap(), transport, "127.0.0.1:0");
     let listened = robot.listening.clone();
     let name = format!("away-{transport}");
     let mut run = drive(&name, &mission, &format!("{transport}://{listened}"));
@@ -149,7 +74,7 @@ fn goes_away_and_comes_back(transport: &str) {
     assert_eq!(later["tick"], lost["tick"], "{later}");
     assert!(later["link"]["lost_s"].as_f64() > lost["link"]["lost_s"].as_f64());
 
-    let robot = Robot::start(&mission, transport, &listened);
+    let robot = Robot::start(mission.to_str().unwrap(), transport, &listened);
     let back = run.wait_until("the robot is back and known to have restarted", |status| {
         status["link"]["connected"] == true && status["link"]["reboots"] == 1
     });

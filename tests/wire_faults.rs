@@ -2,18 +2,13 @@
 //! fault injector here.
 
 use std::{
-    net::{SocketAddr, UdpSocket},
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::JoinHandle,
+    sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
 
-use crate::{
-    failsafe::{Robot, pass},
-    support::{Run, assert_ended, assert_nothing_left, operate, refused},
+use crate::support::{
+    Run, assert_ended, assert_nothing_left, operate, refused,
+    wire::{Proxy, Robot},
 };
 use common::wire::{
     Addressing, Command, Decoder, Motion, MotorSensors, Quantity, Report, Request, Stream,
@@ -57,18 +52,12 @@ struct Shared {
 }
 
 struct FaultInjector {
-    address: SocketAddr,
+    proxy: Proxy,
     shared: Arc<Mutex<Shared>>,
-    over: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<()>>,
 }
 
 impl FaultInjector {
     fn before(robot: &Robot, fault: Fault) -> Self {
-        let host = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
-        wire.connect(&robot.listening).unwrap();
-        let address = host.local_addr().unwrap();
         let shared = Arc::new(Mutex::new(Shared {
             fault,
             frames: 0,
@@ -78,40 +67,16 @@ impl FaultInjector {
             asked_for_streams: false,
             inject: Vec::new(),
         }));
-        let over = Arc::new(AtomicBool::new(false));
-        let peer = Arc::new(Mutex::new(None));
-        let out = {
-            let (host, wire) = (host.try_clone().unwrap(), wire.try_clone().unwrap());
-            let (shared, over) = (Arc::clone(&shared), Arc::clone(&over));
-            let peer = Arc::clone(&peer);
-            let mut decoder = Decoder::default();
-            std::thread::spawn(move || {
-                pass(&host, &over, |bytes, from| {
-                    *peer.lock().unwrap() = Some(from);
-                    decoder.push(bytes);
-                    let _ = wire.send(&shared.lock().unwrap().pass_to_robot(&mut decoder));
-                });
+        let pass = |decode: fn(&mut Shared, &mut Decoder) -> Vec<u8>| {
+            let (shared, mut decoder) = (Arc::clone(&shared), Decoder::default());
+            Box::new(move |bytes: &[u8]| {
+                decoder.push(bytes);
+                decode(&mut shared.lock().unwrap(), &mut decoder)
             })
         };
-        let back = {
-            let (shared, over) = (Arc::clone(&shared), Arc::clone(&over));
-            let mut decoder = Decoder::default();
-            std::thread::spawn(move || {
-                pass(&wire, &over, |bytes, _| {
-                    decoder.push(bytes);
-                    let said = shared.lock().unwrap().pass_to_host(&mut decoder);
-                    if let Some(peer) = *peer.lock().unwrap() {
-                        let _ = host.send_to(&said, peer);
-                    }
-                });
-            })
-        };
-        Self {
-            address,
-            shared,
-            over,
-            threads: vec![out, back],
-        }
+        let (to_robot, to_link) = (pass(Shared::pass_to_robot), pass(Shared::pass_to_link));
+        let proxy = Proxy::before(robot, to_robot, to_link);
+        Self { proxy, shared }
     }
 
     /// Stop the robot's streams as if the link had asked for that.
@@ -139,15 +104,6 @@ impl FaultInjector {
         match (shared.first_motion, shared.last_motion) {
             (Some(first), Some(last)) => last - first,
             _ => Duration::ZERO,
-        }
-    }
-}
-
-impl Drop for FaultInjector {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
         }
     }
 }
@@ -184,7 +140,7 @@ impl Shared {
         bytes
     }
 
-    fn pass_to_host(&mut self, decoder: &mut Decoder) -> Vec<u8> {
+    fn pass_to_link(&mut self, decoder: &mut Decoder) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some(frame) = decoder.next_frame() {
             let Ok(mut report) = Report::parse(&frame) else {
@@ -232,9 +188,9 @@ fn moves(motion: &Motion) -> bool {
 
 /// A run of the default mission on the wall clock with that fault from the beginning.
 fn faulty(robot: &str, fault: Fault) -> (Robot, FaultInjector, Run) {
-    let body = Robot::start();
+    let body = Robot::on_the_course();
     let faults = FaultInjector::before(&body, fault);
-    let address = format!("robot.address=\"udp://{}\"", faults.address);
+    let address = faults.proxy.as_robot();
     let run = Run::start(robot, "obstacle-course", &["--set", &address]);
     (body, faults, run)
 }

@@ -10,6 +10,8 @@
     unreachable_pub
 )]
 
+pub mod wire;
+
 use std::{
     fs,
     io::{Read as _, Write as _},

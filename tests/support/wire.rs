@@ -1,0 +1,165 @@
+//! A simulated robot that is a process of its own, and a proxy for the datagrams between it and its link.
+
+use std::{
+    io::{BufRead as _, BufReader, ErrorKind},
+    net::{SocketAddr, UdpSocket},
+    process::{Child, Stdio},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{Receiver, channel},
+    },
+    thread::JoinHandle,
+    time::Duration,
+};
+
+use serde_json::Value;
+
+use super::{PATIENCE, firsthand};
+
+/// A simulated robot, until this is dropped.
+pub struct Robot {
+    process: Child,
+    pub listening: String,
+    /// Read as it comes: the robot waits for a slow reader.
+    truth: Receiver<Value>,
+    /// Its last known distance from its start, metres.
+    went: f64,
+}
+
+impl Robot {
+    /// In the world of the default mission, on a port of its own.
+    pub fn on_the_course() -> Self {
+        Self::start("obstacle-course", "udp", "127.0.0.1:0")
+    }
+
+    pub fn start(mission: &str, transport: &str, listen: &str) -> Self {
+        let arguments = ["sim", mission, "--ground-truth", "--transport", transport];
+        let mut process = firsthand(&arguments)
+            .args(["--listen", listen])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let output = BufReader::new(process.stdout.take().unwrap());
+        let (tell, truth) = channel();
+        std::thread::spawn(move || {
+            let lines = output.lines().map_while(Result::ok);
+            let mut values = lines.map_while(|line| serde_json::from_str(&line).ok());
+            values.try_for_each(|value| tell.send(value))
+        });
+        let header: Value = truth.recv_timeout(PATIENCE).unwrap();
+        Self {
+            process,
+            listening: header["listening"].as_str().unwrap().to_owned(),
+            truth,
+            went: 0.0,
+        }
+    }
+
+    /// Wait until it is `metres` from its start.
+    pub fn wait_until_driven(&mut self, metres: f64) {
+        while self.went < metres {
+            self.went = from_start(&self.truth.recv_timeout(PATIENCE).unwrap());
+        }
+    }
+
+    /// Kill it; its distance from its start by then.
+    pub fn kill(mut self) -> f64 {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+        let last = self.truth.iter().last();
+        last.map_or(self.went, |truth| from_start(&truth))
+    }
+}
+
+fn from_start(truth: &Value) -> f64 {
+    let metres = |axis: &str| truth[axis].as_f64().unwrap();
+    metres("x").hypot(metres("y"))
+}
+
+impl Drop for Robot {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Stands between link and robot, until it is dropped.
+#[derive(Debug)]
+pub struct Proxy {
+    address: SocketAddr,
+    over: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+/// Bytes that come, to bytes that are passed on.
+type Pass = dyn FnMut(&[u8]) -> Vec<u8> + Send;
+
+impl Proxy {
+    pub fn before(robot: &Robot, mut to_robot: Box<Pass>, mut to_link: Box<Pass>) -> Self {
+        let host = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
+        wire.connect(&robot.listening).unwrap();
+        let address = host.local_addr().unwrap();
+        let (sending, answering) = (wire.try_clone().unwrap(), host.try_clone().unwrap());
+        let link = Arc::new(Mutex::new(None));
+        let link_too = Arc::clone(&link);
+        let over = Arc::new(AtomicBool::new(false));
+        let (over_out, over_back) = (Arc::clone(&over), Arc::clone(&over));
+        let out = std::thread::spawn(move || {
+            receive(&host, &over_out, |bytes, from| {
+                *link.lock().unwrap() = Some(from);
+                let _ = sending.send(&to_robot(bytes));
+            });
+        });
+        let back = std::thread::spawn(move || {
+            receive(&wire, &over_back, |bytes, _| {
+                let bytes = to_link(bytes);
+                if let Some(link) = *link_too.lock().unwrap() {
+                    let _ = answering.send_to(&bytes, link);
+                }
+            });
+        });
+        let threads = vec![out, back];
+        Self {
+            address,
+            over,
+            threads,
+        }
+    }
+
+    /// The assignment that makes it the robot of a mission.
+    pub fn as_robot(&self) -> String {
+        format!("robot.address=\"udp://{}\"", self.address)
+    }
+}
+
+impl Drop for Proxy {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Take whatever comes on `socket`, until all is over.
+fn receive(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
+    let often = Some(Duration::from_millis(50));
+    socket.set_read_timeout(often).unwrap();
+    let mut buffer = [0; 2048];
+    while !over.load(Ordering::Relaxed) {
+        match socket.recv_from(&mut buffer) {
+            Ok((length, from)) => take(&buffer[..length], from),
+            // Nothing came, or the other end is gone for now.
+            Err(error) => assert!(
+                matches!(
+                    error.kind(),
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::ConnectionRefused
+                ),
+                "{error}"
+            ),
+        }
+    }
+}
