@@ -2,17 +2,15 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
-    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
 };
 
+mod printed;
+
 use super::*;
 use crate::{
-    commands::{
-        self, parse,
-        table::{self, stored},
-    },
+    commands::{self, parse},
     console::missions,
 };
 
@@ -232,155 +230,6 @@ fn every_link_and_path_in_readme_and_guide_exists() {
     }
 }
 
-/// Test functions of the whole tree.
-fn test_functions() -> BTreeSet<String> {
-    let mut functions = BTreeSet::new();
-    let mut folders = vec![root().to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.file_name().unwrap().to_string_lossy().into_owned();
-            if path.is_dir() && name != "target" && !name.starts_with('.') {
-                folders.push(path);
-            } else if name.ends_with(".rs") {
-                let text = fs::read_to_string(&path).unwrap();
-                // A macro of tests is called with their names, each before its row.
-                if text.contains("fn $promise()") {
-                    let promises = text
-                        .lines()
-                        .filter_map(|line| line.trim().strip_suffix(':'));
-                    functions.extend(promises.map(str::to_owned));
-                }
-                functions.extend(text.split("#[test]").skip(1).filter_map(|after| {
-                    let (attributes, function) = after.split_once("fn ")?;
-                    let name = function.split_once('(')?.0;
-                    // A test that is run on demand only guards nothing.
-                    (!attributes.contains("#[ignore")).then(|| name.to_owned())
-                }));
-            }
-        }
-    }
-    functions
-}
-
-/// What is wrong with a row of the capabilities.
-fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
-    let [text, verdict, tests] = row;
-    let mut tests = tests.split_whitespace();
-    let first = tests.clone().next();
-    match (verdict.as_str(), first) {
-        ("Contract", None) => Some(format!("{text}: a contract without a test")),
-        ("Contract", Some(_)) => tests
-            .find(|test| !functions.contains(*test))
-            .map(|test| format!("{text}: there is no test {test}")),
-        ("Smoke", Some(step)) if step.starts_with(".ci/") && root().join(step).exists() => None,
-        ("Smoke", _) => Some(format!("{text}: no step of .ci/ shows it")),
-        ("Gap", None) => None,
-        ("Gap", Some(test)) => Some(format!("{text}: a gap that {test} tests")),
-        (other, _) => Some(format!("{text}: {other:?} is no verdict")),
-    }
-}
-
-#[test]
-fn every_capability_has_a_verdict_and_every_contract_tests_that_exist() {
-    let functions = test_functions();
-    let rows = stored::capabilities();
-    let flaws: Vec<_> = rows
-        .iter()
-        .filter_map(|row| flaw(row, &functions))
-        .collect();
-    assert!(flaws.is_empty(), "{flaws:#?}");
-    assert!(rows.len() > 90, "only {} rows were found", rows.len());
-}
-
-#[test]
-fn a_contract_without_a_test_or_with_one_that_does_not_exist_is_found() {
-    let functions = BTreeSet::from(["it_holds".to_owned()]);
-    let row = |text: &str, verdict: &str, tests: &str| [text, verdict, tests].map(str::to_owned);
-    for right in [
-        row("", "Contract", "it_holds"),
-        row("it is done", "Smoke", ".ci/run"),
-        row("it is missing", "Gap", ""),
-    ] {
-        assert_eq!(flaw(&right, &functions), None);
-    }
-    for wrong in [
-        row("it holds", "Contract", ""),
-        row("it holds", "Contract", "it_holds it_held"),
-        row("it holds", "Smoke", "it_holds"),
-        row("it holds", "Gap", "it_holds"),
-        row("it holds", "Measured", ""),
-    ] {
-        assert!(flaw(&wrong, &functions).is_some(), "{wrong:?}");
-    }
-}
-
-/// `text` with what stands behind each `<!-- table NAME SECTION -->` printed anew.
-fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
-    let mut renewed = String::new();
-    let mut lines = text.lines().peekable();
-    while let Some(line) = lines.next() {
-        renewed.push_str(line);
-        renewed.push('\n');
-        let marker = line
-            .strip_prefix("<!-- table ")
-            .and_then(|line| line.strip_suffix(" -->"));
-        let Some(marker) = marker else { continue };
-        let (name, section) = match marker.split_once(' ') {
-            Some((name, section)) => (name, Some(section)),
-            None => (marker, None),
-        };
-        renewed.push('\n');
-        renewed.push_str(&print(name, section));
-        while lines
-            .next_if(|line| line.is_empty() || is_of_a_table(line))
-            .is_some()
-        {}
-        if lines.peek().is_some() {
-            renewed.push('\n');
-        }
-    }
-    renewed
-}
-
-/// Whether a line can stand in a printed table or list.
-fn is_of_a_table(line: &str) -> bool {
-    ["- ", "  ", "|"]
-        .iter()
-        .any(|start| line.starts_with(start))
-}
-
-#[test]
-fn documents_show_the_tables_that_are_printed() {
-    let renew = std::env::var_os("RENEW").is_some();
-    for document in documents() {
-        let path = root().join(&document.path);
-        let print = |name: &str, section: Option<&str>| match name {
-            "crates" => crates(),
-            name => table::shown(name, section)
-                .unwrap_or_else(|| panic!("{}: no table {name} {section:?}", path.display())),
-        };
-        let text = renewed(&document.text, print);
-        if renew && text != document.text {
-            fs::write(&path, &text).unwrap();
-        }
-        assert!(
-            renew || text == document.text,
-            "{} is behind; renew it by RENEW=1 cargo test -p firsthand --bin firsthand documents_show",
-            path.display()
-        );
-    }
-}
-
-#[test]
-fn a_table_behind_its_marker_is_renewed_and_nothing_else() {
-    let print = |name: &str, section: Option<&str>| format!("- {name} {section:?}\n");
-    let page = "a\n\n<!-- table x y -->\n\n- old\n  old\n\nb\n";
-    let text = renewed(page, print);
-    assert_eq!(text, "a\n\n<!-- table x y -->\n\n- x Some(\"y\")\n\nb\n");
-    assert_eq!(renewed(&text, print), text);
-}
-
 #[test]
 fn no_line_of_a_document_is_longer_than_160_letters() {
     for document in documents() {
@@ -416,37 +265,6 @@ fn every_test_that_a_figure_names_exists() {
     }
 }
 
-/// The crates of the workspace and what each is, by their manifests.
-fn crates() -> String {
-    let manifest = |folder: &Path| -> toml::Table {
-        let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
-        toml::from_str(&text).unwrap()
-    };
-    let mut folders = BTreeSet::new();
-    for member in manifest(root())["workspace"]["members"].as_array().unwrap() {
-        let member = member.as_str().unwrap();
-        match member.strip_suffix("/*") {
-            None => folders.extend([root().join(member)]),
-            Some(folder) => folders.extend(
-                fs::read_dir(root().join(folder))
-                    .unwrap()
-                    .map(|entry| entry.unwrap().path())
-                    .filter(|path| path.join("Cargo.toml").exists()),
-            ),
-        }
-    }
-    let row = |folder: &PathBuf| {
-        let manifest = manifest(folder);
-        let description = manifest["package"]["description"].as_str().unwrap();
-        let folder = folder.strip_prefix(root()).unwrap().display();
-        format!("| `{folder}` | {description} |\n")
-    };
-    let rows: String = folders.iter().map(row).collect();
-    format!(
-        "| crate | content |\n|---|---|\n{rows}| `tests` | Whole runs through real processes |\n"
-    )
-}
-
 #[test]
 fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
     let help = commands::command_line().render_long_help().to_string();
@@ -465,7 +283,9 @@ fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
     let files = fs::read_dir(root().join("supervisor/guide")).unwrap();
     let written = files.filter(|file| {
         let path = file.as_ref().unwrap().path();
+        // The changelog is no page.
         path.extension().is_some_and(|extension| extension == "md")
+            && !path.ends_with("CHANGELOG.md")
     });
     assert_eq!(
         written.count(),
