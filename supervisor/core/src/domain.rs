@@ -40,7 +40,7 @@ pub struct DomainLock {
     bus: Option<(Services, Rc<Bus>)>,
     // Locked while the bus is made and removed, so that no stage joins meanwhile.
     stages_lock: Option<File>,
-    // Likewise for consumers, except one that is stuck while joining.
+    // Locked likewise, so that no consumer joins meanwhile, except one that is stuck.
     joining_lock: Option<File>,
     cells: usize,
     _lock: File,

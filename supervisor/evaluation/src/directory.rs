@@ -16,14 +16,14 @@ pub const PAGE_FILE: &str = "index.html";
 #[derive(Debug, Error)]
 pub enum DirectoryError {
     /// The directory is of another command.
-    #[error("--resume: what was begun in {} was another: {earlier}", directory.display())]
+    #[error("--resume: the command in {} was another: {earlier}", directory.display())]
     Another {
         directory: PathBuf,
         /// The command of the directory.
         earlier: String,
     },
     /// It has results, and `resume` is not set.
-    #[error("{} holds results; go on with them with --resume, or give another --out", directory.display())]
+    #[error("{} contains results; continue them with --resume, or give another --out", directory.display())]
     Taken { directory: PathBuf },
     #[error("cannot use {} for results: {source}; give another --out", path.display())]
     System { path: PathBuf, source: io::Error },

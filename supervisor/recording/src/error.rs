@@ -16,10 +16,10 @@ pub enum RecordingError {
     },
     #[error("cannot write recording {file}: {problem}; is the disk full?")]
     Write { file: PathBuf, problem: String },
-    #[error("{0} holds no recording.mcap: give a run that was recorded, or a recording")]
+    #[error("{0} holds no recording.mcap; give a recorded run or a recording")]
     NoRecording(PathBuf),
     #[error(
-        "{directory} holds several recordings, of a run that was resumed: give one of them, up to {last}"
+        "{directory} contains several recordings, because the run was resumed; give one of them, up to {last}"
     )]
     Several {
         directory: PathBuf,
@@ -27,11 +27,11 @@ pub enum RecordingError {
         last: PathBuf,
     },
     /// It is not a recording of `firsthand`.
-    #[error("{file} is no recording of firsthand: {problem}; `firsthand record` makes one")]
+    #[error("{file} is not a recording of firsthand: {problem}; `firsthand record` makes one")]
     Foreign { file: PathBuf, problem: String },
     /// A message does not match its topic.
     #[error(
-        "{file} holds a message on {topic:?} that this version does not know; read it with the version that wrote it"
+        "{file} contains a message on {topic:?} that this version cannot read; use the version that wrote it"
     )]
     Message { file: PathBuf, topic: String },
     #[error(transparent)]

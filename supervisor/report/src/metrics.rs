@@ -167,7 +167,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
             shown(content.summed("replans"), 0, ""),
         ),
         row(
-            "beliefs forgotten",
+            "resets of the map",
             "resets",
             shown(content.summed("resets"), 0, ""),
         ),

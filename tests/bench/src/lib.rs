@@ -8,6 +8,19 @@
 pub mod chaos;
 pub mod tick;
 
+use std::fs;
+
+/// The ids of all processes of this machine.
+pub(crate) fn processes() -> impl Iterator<Item = u32> {
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
+}
+
+/// The command line of `process`, a zero byte after each word; empty if it has ended.
+pub(crate) fn command_line(process: u32) -> Vec<u8> {
+    fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default()
+}
+
 /// The value that `share` of all values do not exceed; none of nothing.
 pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();

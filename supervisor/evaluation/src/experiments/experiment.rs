@@ -42,7 +42,7 @@ pub enum ExperimentError {
     #[error(transparent)]
     Mission(#[from] MissionError),
     #[error(
-        "experiment {name}: the robot cannot get to the target; move what stands in its mission"
+        "experiment {name}: the robot cannot get to the target; change the obstacles of its mission"
     )]
     Unsolvable {
         /// The experiment.

@@ -283,7 +283,7 @@ mod tests {
         for seed in 0..20 {
             let Ends { start, target, .. } = draw(seed);
             assert!((3.0..=15.0).contains(&start.distance(target)));
-            // That of the row in the middle of the upper corridor.
+            // The row in the middle of the upper corridor has this y.
             let middle = 4.25;
             assert_eq!(
                 (start.y, target.y),

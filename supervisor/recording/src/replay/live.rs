@@ -240,12 +240,12 @@ impl Player {
             let stage = live.stage.name;
             let ended = live.ended();
             let ended = ended.map_err(|source| LiveError::Start { stage, source })?;
-            if let Some((cause, words)) = ended {
+            if let Some((cause, log_tail)) = ended {
                 return Err(LiveError::Ended {
                     stage,
                     tick: self.tick,
                     cause,
-                    words,
+                    log_tail,
                 });
             }
         }

@@ -268,11 +268,9 @@ fn signal_all(process: &Process, signal: Signal) {
 
 /// The recorder that the run of `supervisor` started, and the file that it writes.
 fn run_recorder(supervisor: u32) -> Option<(Process, PathBuf)> {
-    let entries = fs::read_dir("/proc").ok()?.flatten();
-    let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     let supervisor = supervisor.to_string();
-    for pid in pids {
-        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+    for pid in crate::processes() {
+        let line = crate::command_line(pid);
         let words: Vec<&[u8]> = line.split(|&byte| byte == 0).collect();
         let after = |name: &str| {
             let at = words.iter().position(|word| *word == name.as_bytes())?;

@@ -127,15 +127,8 @@ fn stat(process: u32) -> Option<Vec<u64>> {
 
 /// `root` and every process that descends from it.
 fn descendants(root: u32) -> BTreeSet<u32> {
-    let Ok(entries) = fs::read_dir("/proc") else {
-        return BTreeSet::new();
-    };
-    let parents: Vec<(u32, u64)> = entries
-        .flatten()
-        .filter_map(|entry| {
-            let process = entry.file_name().to_str()?.parse().ok()?;
-            Some((process, *stat(process)?.get(PARENT)?))
-        })
+    let parents: Vec<(u32, u64)> = crate::processes()
+        .filter_map(|process| Some((process, *stat(process)?.get(PARENT)?)))
         .collect();
     let mut found: BTreeSet<u32> = parents
         .iter()

@@ -31,7 +31,7 @@ pub struct Report {
     ratio: f64,
     /// Ratio at 99 %.
     ratio_p99: f64,
-    /// Of the mission's processes, including supervisor and simulated robot; none for a mission of a second or two.
+    /// Resources of all processes of the mission and the simulated robot; none for a mission of a second or two.
     wakeups_per_s: Option<f64>,
     cpu_share: Option<f64>,
     pss_mib: Option<f64>,

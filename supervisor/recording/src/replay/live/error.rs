@@ -27,16 +27,16 @@ pub enum LiveError {
         stage: &'static str,
         source: io::Error,
     },
-    #[error("{stage} ended in tick {tick}: {cause}; its last words: {words:?}")]
+    #[error("{stage} ended in tick {tick}: {cause}; its log ends: {log_tail:?}")]
     Ended {
         stage: &'static str,
         /// The tick that was played last.
         tick: u64,
         cause: ExitCause,
-        words: String,
+        log_tail: String,
     },
     #[error(
-        "{NEVER_LIVE} cannot run live: it would doubt a robot that does not do what it is told now; `replay` without --live feeds it what it heard"
+        "{NEVER_LIVE} cannot run live: a robot that does not obey its commands would be implausible to it; use `replay` without --live"
     )]
     Link,
 }

@@ -26,7 +26,7 @@ use crate::replay::samples::{COMPARED, First, difference, is_keyframe, tick_of};
 /// Time between SIGTERM and SIGKILL to a stage.
 const GRACE: Duration = Duration::from_secs(2);
 /// Characters of the log of an ended stage that an error shows.
-const LAST_WORDS: usize = 400;
+const LOG_TAIL: usize = 400;
 
 pub(super) struct LiveStage {
     pub(super) stage: &'static Stage,
@@ -104,9 +104,9 @@ impl LiveStage {
             return Ok(None);
         };
         let log = fs::read_to_string(&self.log).unwrap_or_default();
-        let start = log.len().saturating_sub(LAST_WORDS);
-        let words = log.get(log.ceil_char_boundary(start)..).unwrap_or_default();
-        Ok(Some((cause, words.trim().to_owned())))
+        let start = log.len().saturating_sub(LOG_TAIL);
+        let tail = log.get(log.ceil_char_boundary(start)..).unwrap_or_default();
+        Ok(Some((cause, tail.trim().to_owned())))
     }
 
     /// Take a recorded sample of the current tick. Returns whether it is this stage's.

@@ -1,0 +1,337 @@
+//! Histories of random and of all short event sequences, compared with a model of the rules.
+
+use std::collections::HashSet;
+
+use rand_pcg::{Pcg64, rand_core::Rng as _};
+
+use super::*;
+
+/// One process and its policy: what is true of the process, written down without a look at the phases.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Model {
+    policy: Policy,
+    now: Now,
+    /// The process, if there is one.
+    generation: Option<Generation>,
+    /// Whether a process is wanted.
+    wanted: bool,
+    /// Held, until somebody starts it.
+    held: bool,
+    /// Deaths, when they happened: those in a row, of no generation that was stable, and the last wait between them.
+    deaths: Vec<Now>,
+    row: usize,
+    wait: Duration,
+    blocked_starts: u32,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Generation {
+    ready: Option<Now>,
+    /// Its last sign; its start counts.
+    sign: Now,
+    /// Asked to stop, for a successor or for good: that is no death.
+    stopping: bool,
+    aborted: bool,
+    /// When it is to be killed.
+    kill: Option<Now>,
+}
+
+const EVENTS: [Event; 10] = [
+    Event::Start,
+    Event::StartFailed,
+    Event::BeatStarting,
+    Event::BeatReady,
+    Event::OutputStale,
+    Event::Exited,
+    Event::Refused,
+    Event::Replace,
+    Event::Stop,
+    Event::Time,
+];
+
+impl Model {
+    fn new() -> Self {
+        Self {
+            policy: Policy::new(TABLE[0].deadlines),
+            now: ms(0),
+            generation: None,
+            wanted: false,
+            held: false,
+            deaths: Vec::new(),
+            row: 0,
+            wait: ms(0),
+            blocked_starts: 0,
+        }
+    }
+
+    /// Whether that can happen: only a process can beat or end.
+    fn can(&self, event: Event) -> bool {
+        match event {
+            Event::Start => self.generation.is_none(),
+            // Known in the moment of the start.
+            Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
+                generation.sign == self.now && generation.ready.is_none() && !generation.stopping
+            }),
+            Event::BeatStarting
+            | Event::BeatReady
+            | Event::OutputStale
+            | Event::Exited
+            | Event::Refused => self.generation.is_some(),
+            Event::Replace | Event::Stop | Event::Time => true,
+        }
+    }
+
+    /// When the clock must be looked at, by the rules alone.
+    fn due(&self) -> Option<Now> {
+        match &self.generation {
+            Some(generation) => Some(generation.kill.unwrap_or_else(|| match generation.ready {
+                Some(_) => generation.sign + ms(750),
+                None => generation.sign + ms(3000),
+            })),
+            None if self.wanted && !self.held => {
+                Some(self.deaths.last().copied().unwrap_or_default() + self.wait)
+            }
+            None => None,
+        }
+    }
+
+    /// The action that the rules demand.
+    fn expect(&mut self, event: Event) -> Option<Action> {
+        let now = self.now;
+        let due = self.due().is_some_and(|due| now >= due);
+        let Some(generation) = &mut self.generation else {
+            let starts = match event {
+                Event::Start if !self.held => true,
+                Event::Start | Event::Replace if self.wanted => {
+                    (self.row, self.blocked_starts) = (0, 0);
+                    self.deaths.clear();
+                    true
+                }
+                Event::Time => self.wanted && !self.held && due,
+                _ => false,
+            };
+            if event == Event::Stop {
+                (self.wanted, self.held) = (false, false);
+            }
+            return starts.then(|| self.begin());
+        };
+        match event {
+            Event::BeatReady if generation.kill.is_none() => {
+                generation.ready.get_or_insert(now);
+                generation.sign = now;
+                self.blocked_starts = 0;
+                None
+            }
+            Event::Time if due && generation.kill.is_some() => {
+                generation.kill = Some(now + ms(100));
+                Some(Action::Kill)
+            }
+            Event::Time if due => self.abort(),
+            Event::OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
+                generation.sign = now;
+                self.abort()
+            }
+            Event::Replace if self.wanted && !generation.stopping => {
+                generation.stopping = true;
+                let running = generation.kill.is_none();
+                generation.kill.get_or_insert(now + ms(300));
+                running.then_some(Action::Terminate)
+            }
+            Event::Stop if self.wanted => {
+                (generation.stopping, generation.kill) = (true, Some(now + ms(300)));
+                self.wanted = false;
+                Some(Action::Terminate)
+            }
+            Event::StartFailed => self.death(true, false),
+            Event::Exited => {
+                let blocked = generation.aborted && generation.ready.is_none();
+                self.death(false, blocked)
+            }
+            Event::Refused => {
+                let blocked = generation.ready.is_none();
+                self.death(false, blocked)
+            }
+            _ => None,
+        }
+    }
+
+    fn begin(&mut self) -> Action {
+        (self.wanted, self.held) = (true, false);
+        self.generation = Some(Generation {
+            ready: None,
+            sign: self.now,
+            stopping: false,
+            aborted: false,
+            kill: None,
+        });
+        Action::Start
+    }
+
+    fn abort(&mut self) -> Option<Action> {
+        let generation = self.generation.as_mut().unwrap();
+        (generation.aborted, generation.kill) = (true, Some(self.now + ms(100)));
+        Some(Action::Abort)
+    }
+
+    fn death(&mut self, start_failed: bool, blocked: bool) -> Option<Action> {
+        let now = self.now;
+        let generation = self.generation.take().unwrap();
+        if generation.stopping {
+            return self.wanted.then(|| self.begin());
+        }
+        let until = if generation.aborted {
+            generation.sign
+        } else {
+            now
+        };
+        if generation
+            .ready
+            .is_some_and(|since| until - since >= ms(500))
+        {
+            self.row = 0;
+        }
+        self.row += 1;
+        if start_failed {
+            self.row = self.row.max(2);
+        }
+        self.deaths.retain(|then| now - *then < ms(10_000));
+        self.deaths.push(now);
+        self.blocked_starts += u32::from(blocked);
+        if self.deaths.len() >= 12 || self.row >= 12 {
+            self.held = true;
+            return None;
+        }
+        let waits = [0, 0, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1000];
+        self.wait = ms(waits[self.row.min(11)]);
+        if blocked && self.blocked_starts == 2 {
+            return Some(Action::RecreateBus);
+        }
+        self.wait.is_zero().then(|| self.begin())
+    }
+
+    /// Let it happen, and compare.
+    fn step(&mut self, event: Event) {
+        let expected = self.expect(event);
+        let action = self.policy.step(event, self.now);
+        let (phase, now) = (self.policy.phase(), self.now);
+        assert_eq!(action, expected, "{event:?} at {now:?}, now {phase:?}");
+        assert_eq!(self.policy.deadline(), self.due(), "{event:?}: {phase:?}");
+        assert_eq!(phase == Phase::Held, self.held, "{event:?}: {phase:?}");
+        assert_eq!(
+            phase == Phase::Down,
+            self.generation.is_none() && !self.wanted
+        );
+        let no_process = matches!(phase, Phase::Down | Phase::Held | Phase::BackingOff { .. });
+        assert_eq!(
+            no_process,
+            self.generation.is_none(),
+            "{event:?}: {phase:?}"
+        );
+    }
+
+    /// The moments at and around what is due, and one long after anything.
+    fn moments(&self) -> Vec<Duration> {
+        let mut pauses = vec![ms(0), ms(20), ms(11_000)];
+        if let Some(due) = self.due() {
+            let left = due.saturating_sub(self.now);
+            pauses.extend([left.saturating_sub(ms(1)), left]);
+        }
+        pauses
+    }
+
+    /// This model with its clock set back: two models of equal ages are equal.
+    fn at_zero(&self) -> Self {
+        // A common origin of all times, so that what lies behind stays behind.
+        const ORIGIN: Duration = Duration::from_secs(100);
+        let back = |then: &mut Now| *then = (*then + ORIGIN).saturating_sub(self.now);
+        let mut same = self.clone();
+        same.deaths
+            .retain(|then| self.now - *then < ms(10_000) || self.wanted);
+        same.deaths.iter_mut().for_each(back);
+        same.policy.recent.iter_mut().for_each(back);
+        match &mut same.policy.phase {
+            Phase::Down | Phase::Held => {}
+            Phase::BackingOff { until: then }
+            | Phase::Starting { since: then }
+            | Phase::Aborted { kill: then, .. }
+            | Phase::Replaced { kill: then }
+            | Phase::Stopping { kill: then } => back(then),
+            Phase::Running { since, beat } => {
+                back(since);
+                back(beat);
+            }
+        }
+        if let Some(generation) = &mut same.generation {
+            back(&mut generation.sign);
+            generation.ready.iter_mut().for_each(back);
+            generation.kill.iter_mut().for_each(back);
+        }
+        same.now = ORIGIN;
+        same
+    }
+}
+
+#[test]
+fn every_short_history_keeps_every_rule() {
+    let mut seen = HashSet::new();
+    let mut newest = vec![Model::new().at_zero()];
+    let mut cases = 0_u64;
+    for _ in 0..6 {
+        let mut next = Vec::new();
+        for model in newest {
+            for pause in model.moments() {
+                for event in EVENTS {
+                    let mut model = model.clone();
+                    model.now += pause;
+                    if model.can(event) {
+                        cases += 1;
+                        model.step(event);
+                        let model = model.at_zero();
+                        if seen.insert(model.clone()) {
+                            next.push(model);
+                        }
+                    }
+                }
+            }
+        }
+        newest = next;
+    }
+    println!("{cases} cases, {} models", seen.len());
+}
+
+#[test]
+fn two_million_steps_of_long_histories_keep_every_rule() {
+    let mut chance = Pcg64::new(5, 5);
+    let mut phases = HashSet::new();
+    let mut actions = 0_u64;
+    for history in 0..2_000 {
+        let mut model = Model::new();
+        // How likely each event is differs from history to history.
+        let weights: Vec<u64> = EVENTS.iter().map(|_| chance.next_u64() % 100).collect();
+        let sum: u64 = weights.iter().sum::<u64>().max(1);
+        for _ in 0..1_000 {
+            let moments = model.moments();
+            let pause = moments[chance.next_u64() as usize % moments.len()];
+            // Mostly the short ones: after a long pause earlier events no longer matter.
+            if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
+                model.now += pause;
+            }
+            let mut pick = chance.next_u64() % sum;
+            let event = EVENTS.iter().zip(&weights).find(|(_, weight)| {
+                let found = pick < **weight;
+                pick = pick.saturating_sub(**weight);
+                found
+            });
+            let event = *event.map_or(&Event::Time, |(event, _)| event);
+            if model.can(event) {
+                model.step(event);
+                actions += 1;
+                phases.insert(std::mem::discriminant(&model.policy.phase()));
+            }
+            assert!(model.policy.recent_deaths() <= 12, "history {history}");
+        }
+    }
+    // Every phase was visited.
+    assert_eq!(phases.len(), 8);
+    assert!(actions > 1_000_000, "{actions}");
+}
