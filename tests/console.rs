@@ -430,7 +430,7 @@ fn bash_completes_options_stages_topics_missions_pages_and_old_names_nowhere() {
         ("firsthand stage pla", "planner"),
         ("firsthand topic echo po", "pose"),
         ("firsthand run tr", "trap"),
-        ("firsthand help dep", "deploy"),
+        ("firsthand help att", "attach"),
         ("firsthand lo", "logs"),
     ] {
         let completed = completed(words);
