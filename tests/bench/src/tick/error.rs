@@ -1,12 +1,13 @@
 //! Why a tick could not be measured.
 
-use std::{io, path::PathBuf};
+use std::{io, path::PathBuf, time::Duration};
 
 use common::{bus::BusError, start::StageError};
 use supervisor::DomainError;
 use thiserror::Error;
 
-use super::hops::LOST;
+/// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
+pub(super) const LOST: Duration = Duration::from_secs(5);
 
 /// Why a tick could not be measured.
 #[derive(Debug, Error)]

@@ -21,14 +21,12 @@ use supervisor::{
     process::{Process, firsthand},
 };
 
-use super::error::{TickError, system};
+use super::error::{LOST, TickError, system};
 
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
 /// The forwarders, by the stage that each stands for.
 const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
-/// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
-pub(super) const LOST: Duration = Duration::from_secs(5);
 /// Pause between samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
 /// Trips before the measurement, which map all memory.
