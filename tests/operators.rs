@@ -25,9 +25,9 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
 
 #[test]
 fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
-    let (pace, timeout_s) = (8.0, 45.0);
+    let (pace, timeout_s) = (4.0, 45.0);
     let set = format!("timeout_s={timeout_s}");
-    let arguments = ["--pace", "8", "--set", &set];
+    let arguments = ["--pace", "4", "--set", &set];
     let mut run = Run::start("stop-time", "open-room", &arguments);
     run.wait_until_under_way(2.0);
     operate("stop-time", &["stop"]);
