@@ -190,12 +190,8 @@ payloads! {
         epoch: u64,
         /// Full solves in this generation of the planner.
         full_solves: u64,
-        /// Local updates in this generation of the planner.
-        local_updates: u64,
         /// Wall-clock of the last full solve, nanoseconds.
         full_solve_ns: u64,
-        /// Wall-clock of the last local update, nanoseconds.
-        local_update_ns: u64,
     }
 }
 

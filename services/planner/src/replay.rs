@@ -25,10 +25,8 @@ use crate::{
 /// An action of the planner, and its tick.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Entry<'a> {
-    /// The action.
     #[serde(borrow)]
     pub taken: Taken<'a>,
-    /// The tick.
     pub at: Progress,
 }
 
@@ -39,13 +37,10 @@ pub enum Taken<'a> {
     Grid(#[serde(with = "serde_bytes")] &'a [u8]),
     /// The step takes the pose of the tick.
     Pose {
-        /// The pose.
         #[serde(with = "inputs::sample")]
         pose: PoseSample,
         /// Wall-clock of the last full solve, nanoseconds, which the shell adds to the guidance.
         full_solve_ns: u64,
-        /// 0; recordings have it.
-        local_update_ns: u64,
     },
     /// The step is asked for a job.
     Idle,
@@ -140,14 +135,12 @@ impl Replay for Generation {
             Taken::Pose {
                 pose,
                 full_solve_ns,
-                local_update_ns,
             } => {
                 let outcome = self.planner.step(Input::Pose(&pose), time);
                 let guidance = outcome.ok().and_then(|outcome| outcome.guidance);
                 let published = guidance.map(|guidance| {
                     let guidance = GuidanceSample {
                         full_solve_ns,
-                        local_update_ns,
                         ..guidance
                     };
                     Output::of(&topics::GUIDANCE, tick, time, guidance)

@@ -239,7 +239,6 @@ impl Shell {
         self.note(Taken::Pose {
             pose,
             full_solve_ns,
-            local_update_ns: 0,
         })?;
         self.budget.end(Item::Persist);
         let outcome = self.planner.step(Input::Pose(&pose), time);

@@ -57,12 +57,11 @@ pub struct Record {
     pub link: Option<LinkSample>,
     /// Latencies by generation of the link.
     latencies: BTreeMap<u32, LinkSample>,
-    /// Newest counts of each generation of the planner: full solves, local updates.
-    planners: BTreeMap<u32, (u64, u64)>,
+    /// Full solves of each generation of the planner.
+    planners: BTreeMap<u32, u64>,
     pub looks: Totals<LookTotals>,
     pub wheels: Totals<WheelTotals>,
     pub full_solves: Histogram,
-    pub local_updates: Histogram,
     pub grid: Replica<u8>,
     pub field: Replica<FieldCell>,
 }
@@ -180,15 +179,13 @@ impl Observer {
 
 impl Record {
     fn take_guidance(&mut self, guidance: GuidanceSample) {
-        let counts = (guidance.full_solves, guidance.local_updates);
-        let before = self.planners.insert(guidance.stamp.generation, counts);
-        let (full, local) = before.unwrap_or_default();
+        let GuidanceSample {
+            stamp, full_solves, ..
+        } = guidance;
+        let before = self.planners.insert(stamp.generation, full_solves);
         // If a sample covers several solves, only the last one's time is known.
-        if counts.0 > full {
+        if full_solves > before.unwrap_or_default() {
             self.full_solves.record(guidance.full_solve_ns);
-        }
-        if counts.1 > local {
-            self.local_updates.record(guidance.local_update_ns);
         }
         self.looks
             .add(guidance.stamp.tick, |totals| totals.with(&guidance));
@@ -252,20 +249,16 @@ impl Record {
         }
     }
 
-    /// Full solves and local updates of all generations of the planner, up to the sample `last`.
-    pub fn solves(&self, last: Option<&GuidanceSample>) -> (u64, u64) {
-        let mut sum = (0, 0);
+    /// Full solves of all generations of the planner, up to the sample `last`.
+    pub fn solves(&self, last: Option<&GuidanceSample>) -> u64 {
         let newest = last.map_or(u32::MAX, |last| last.stamp.generation);
-        for (&generation, &counts) in self.planners.range(..=newest) {
-            let (full, local) = match last {
-                Some(last) if last.stamp.generation == generation => {
-                    (last.full_solves, last.local_updates)
-                }
-                _ => counts,
-            };
-            sum = (sum.0 + full, sum.1 + local);
-        }
-        sum
+        let generations = self.planners.range(..=newest);
+        generations
+            .map(|(&generation, &count)| match last {
+                Some(last) if last.stamp.generation == generation => last.full_solves,
+                _ => count,
+            })
+            .sum()
     }
 
     /// Tick latencies of every generation of the link.

@@ -24,10 +24,6 @@ pub struct Latency {
     pub full_solve_p50_us: Option<f64>,
     pub full_solve_p99_us: Option<f64>,
     pub full_solve_max_us: Option<f64>,
-    /// A local update of the field.
-    pub local_update_p50_us: Option<f64>,
-    pub local_update_p99_us: Option<f64>,
-    pub local_update_max_us: Option<f64>,
 }
 
 impl Latency {
@@ -37,7 +33,6 @@ impl Latency {
         let Summary {
             tick_latency_us: tick,
             full_solve_us: full,
-            local_update_us: local,
             ..
         } = summary;
         Self {
@@ -50,9 +45,6 @@ impl Latency {
             full_solve_p50_us: full.p50,
             full_solve_p99_us: full.p99,
             full_solve_max_us: full.max,
-            local_update_p50_us: local.p50,
-            local_update_p99_us: local.p99,
-            local_update_max_us: local.max,
         }
     }
 }
@@ -67,7 +59,7 @@ impl Record for Latency {
 pub(crate) type Line = (&'static str, [Option<f64>; 3]);
 
 /// The medians over all missions of `setting`.
-pub(crate) fn medians(setting: &str, latencies: &[Latency]) -> [Line; 3] {
+pub(crate) fn medians(setting: &str, latencies: &[Latency]) -> [Line; 2] {
     type Column = fn(&Latency) -> Option<f64>;
     let over = |column: Column| {
         let its = latencies.iter().filter(|it| it.setting == setting);
@@ -88,14 +80,6 @@ pub(crate) fn medians(setting: &str, latencies: &[Latency]) -> [Line; 3] {
                 over(|it| it.full_solve_p50_us),
                 over(|it| it.full_solve_p99_us),
                 over(|it| it.full_solve_max_us),
-            ],
-        ),
-        (
-            "local update",
-            [
-                over(|it| it.local_update_p50_us),
-                over(|it| it.local_update_p99_us),
-                over(|it| it.local_update_max_us),
             ],
         ),
     ]

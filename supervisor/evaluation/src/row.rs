@@ -97,8 +97,6 @@ pub struct Row {
     pub resets: u64,
     /// Full solves of the field.
     pub full_solves: u64,
-    /// Local updates of the field.
-    pub local_updates: u64,
 }
 
 /// A robot that takes the first number of optimal times or less gets the best score, the second or more the worst.
@@ -152,7 +150,6 @@ impl Row {
             replans: summary.replans,
             resets: summary.resets,
             full_solves: summary.full_solves,
-            local_updates: summary.local_updates,
         }
     }
 
@@ -176,10 +173,8 @@ impl Row {
             replans: 0,
             resets: 0,
             full_solves: 0,
-            local_updates: 0,
             tick_latency_us: Quantiles::default(),
             full_solve_us: Quantiles::default(),
-            local_update_us: Quantiles::default(),
         };
         Self::new(trial, seed, setting, &nothing)
     }
@@ -249,8 +244,8 @@ mod tests {
             r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
             "pose_error_m": 0.1, "pose_error_expected_m": 0.2, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
             "sonar_unavailable_share": 0.5, "wheel_range_rad_s": 2.0, "looks": 1,
-            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2, "local_updates": 1,
-            "tick_latency_us": {{"p50": 300.0, "p99": 900.5, "max": null}}, "full_solve_us": {{}}, "local_update_us": {{}}}}"#
+            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2,
+            "tick_latency_us": {{"p50": 300.0, "p99": 900.5, "max": null}}, "full_solve_us": {{}}}}"#
         );
         serde_json::from_str(&text).unwrap()
     }

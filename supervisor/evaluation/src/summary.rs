@@ -31,9 +31,7 @@ pub struct Summary {
     pub(crate) replans: u64,
     pub(crate) resets: u64,
     pub(crate) full_solves: u64,
-    pub(crate) local_updates: u64,
     /// From the datagram in to the datagram out.
     pub(crate) tick_latency_us: Quantiles,
     pub(crate) full_solve_us: Quantiles,
-    pub(crate) local_update_us: Quantiles,
 }

@@ -187,7 +187,7 @@ fn three_drums() -> Run {
         believed,
         truth,
         captions: vec![
-            "Least true clearance 0.11 m · pose error at the end 0.08 m · 1 full solve, 13 local updates".to_owned(),
+            "Least true clearance 0.11 m · pose error at the end 0.08 m · 1 full solve".to_owned(),
             "Tick latency 310 µs (median), 520 µs (99 %) · no restarts".to_owned(),
         ],
     }

@@ -28,7 +28,7 @@ pub(crate) struct Measured {
     link: Option<LinkSample>,
     latency: Histogram,
     planner: Option<GuidanceSample>,
-    solves: [u64; 2],
+    solves: u64,
 }
 
 impl Measured {
@@ -87,7 +87,7 @@ impl Measured {
         self.safety_events = self.safety_events.max(guidance.safety_events);
         let last = self.planner.replace(*guidance);
         if let Some(last) = last.filter(|last| last.stamp.generation != guidance.stamp.generation) {
-            self.solves = added(self.solves, &last);
+            self.solves = self.solves.saturating_add(last.full_solves);
         }
     }
 
@@ -100,11 +100,10 @@ impl Measured {
         latency
     }
 
-    /// Full solves and local updates of all generations of the planner.
-    pub(crate) fn solves(&self) -> [u64; 2] {
-        self.planner
-            .as_ref()
-            .map_or(self.solves, |last| added(self.solves, last))
+    /// Full solves of all generations of the planner.
+    pub(crate) fn solves(&self) -> u64 {
+        let last = self.planner.map_or(0, |last| last.full_solves);
+        self.solves.saturating_add(last)
     }
 
     /// The newest pose.
@@ -131,13 +130,6 @@ impl Measured {
     pub(crate) fn wheel_range(&self) -> Option<f64> {
         self.wheels.map(|(least, greatest)| greatest - least)
     }
-}
-
-fn added([full, local]: [u64; 2], last: &GuidanceSample) -> [u64; 2] {
-    [
-        full.saturating_add(last.full_solves),
-        local.saturating_add(last.local_updates),
-    ]
 }
 
 fn share(sum: f64, count: u64) -> Option<f64> {

@@ -46,7 +46,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
     let straight = content.mission.target.length();
     let straight = (straight > 0.0).then_some(straight);
     let ratio = path.zip(straight).map(|(path, straight)| path / straight);
-    let [full, local] = measured.solves();
+    let full = measured.solves();
     let latency = measured.latency();
     let quantile = |field: &str, share: f64| {
         let summed = content.summary.get("tick_latency_us");
@@ -133,11 +133,6 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
             "full solves",
             "full_solves",
             shown(of("full_solves", count(full)), 0, ""),
-        ),
-        row(
-            "local updates",
-            "local_updates",
-            shown(of("local_updates", count(local)), 0, ""),
         ),
         row("looks", "looks", shown(content.summed("looks"), 0, "")),
         row(

@@ -18,13 +18,11 @@ pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::COMMAND,
 ];
 /// Fields that a process measures of itself, or that count its restarts. No two runs have the same.
-const OWN: [&str; 6] = [
+const OWN: [&str; 4] = [
     "stamp.generation",
     "stamp.sequence",
     "full_solve_ns",
-    "local_update_ns",
     "full_solves",
-    "local_updates",
 ];
 
 /// The first difference of two recordings.

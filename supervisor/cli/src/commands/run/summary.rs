@@ -53,7 +53,6 @@ pub(crate) struct Summary {
     pub(crate) stopping_time_s: Option<f64>,
     pub(crate) safety_events: u64,
     pub(crate) full_solves: u64,
-    pub(crate) local_updates: u64,
     /// Times the robot stopped to look.
     pub(crate) looks: u64,
     /// Mission time spent looking.
@@ -75,7 +74,6 @@ pub(crate) struct Summary {
     /// Time from the datagram in to the datagram out.
     pub(crate) tick_latency_us: Quantiles,
     pub(crate) full_solve_us: Quantiles,
-    pub(crate) local_update_us: Quantiles,
 }
 
 /// A robot has departed after this distance, metres.
@@ -94,7 +92,6 @@ impl Summary {
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
         let truth = &finished.truth[..];
-        let (full_solves, local_updates) = record.solves(guidance);
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
         let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
         let collisions = truth.last().map(|tick| tick.contacts);
@@ -126,8 +123,7 @@ impl Summary {
                 .map(|tick| tick.time_s),
             stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
-            full_solves,
-            local_updates,
+            full_solves: record.solves(guidance),
             looks: looks.looks,
             look_s: looks.ticks as f64 / mission.robot.rate_hz,
             sonar_unavailable_share: sonar_unavailable_share(truth),
@@ -142,7 +138,6 @@ impl Summary {
             resets: finished.resets,
             tick_latency_us: (&record.latency()).into(),
             full_solve_us: (&record.full_solves).into(),
-            local_update_us: (&record.local_updates).into(),
         }
     }
 
@@ -159,12 +154,11 @@ impl Summary {
         });
         let numbers = [
             format!(
-                "Least true clearance {} · pose error at the end {} (expected {}) · {} full solves, {} local updates",
+                "Least true clearance {} · pose error at the end {} (expected {}) · {} full solves",
                 metres(self.min_clearance_m),
                 metres(self.pose_error_m),
                 metres(self.pose_error_expected_m),
                 self.full_solves,
-                self.local_updates,
             ),
             format!(
                 "tick latency {} · {} ticks · {}{}",

@@ -294,9 +294,8 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
             plain,
         );
         let (events, full) = (guidance.safety_events, guidance.full_solves);
-        let local = guidance.local_updates;
         line("map", format!("{events} safety events"), plain);
-        line("solves", format!("{full} full, {local} local"), plain);
+        line("solves", format!("{full} full"), plain);
     }
     if let Some(link) = &view.link {
         let (text, style) = robot_words(link);

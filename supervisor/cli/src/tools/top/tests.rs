@@ -108,7 +108,6 @@ fn view() -> View {
         status: GuidanceStatus::Unreachable.into(),
         speed_limit_m_s: 0.5,
         full_solves: 1000,
-        local_updates: 10_000,
         ..GuidanceSample::default()
     });
     view.link = Some(LinkSample {
@@ -194,7 +193,7 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
             "0.00, -0.10 m, 90°",
             "4.10 m; driven 123.45 m",
             "no way to the target, at most 0.50 m/s",
-            "1000 full, 10000 local",
+            "1000 full",
             "stands: odometry implausible",
             "dead-reckoning 59: hung, signal 9",
             "█ perimeter",
