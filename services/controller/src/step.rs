@@ -12,7 +12,7 @@ use common::{
 use glam::DVec2;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Likewise for turning on the spot, rad/s.
+/// Least turn rate on the spot, rad/s: below it the wheels stick.
 const LEAST_TURN_RAD_S: f64 = 0.25;
 /// Turn rate on the spot per angle that is left, 1/s.
 const TURN_GAIN: f64 = 3.0;
@@ -32,7 +32,6 @@ pub struct Alignment {
 
 impl Alignment {
     /// (14): of a robot facing `axis` under the unit vector `guidance`.
-    #[must_use]
     pub fn of(axis: DVec2, guidance: DVec2) -> Self {
         Self {
             cosine: axis.dot(guidance),
@@ -41,37 +40,15 @@ impl Alignment {
     }
 }
 
-/// Which way an antipodal robot turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Left,
-    Right,
-}
-
-impl Side {
-    const fn sign(self) -> f64 {
-        match self {
-            Self::Left => 1.0,
-            Self::Right => -1.0,
-        }
-    }
-}
-
 /// How alignment becomes speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SpeedLaw {
     /// The paper's (16): the robot drives while it turns.
-    Paper {
-        /// Whether alignment slows it at all.
-        modulated: bool,
-    },
+    Paper,
     /// The evidential method's: it turns on the spot until it faces its way, then drives no faster than guidance allows.
     Evidential,
     /// A car's, by either method: the paper's, no faster than guidance allows. A car does not turn on the spot.
-    Car {
-        /// Whether alignment slows it at all.
-        modulated: bool,
-    },
+    Car,
 }
 
 /// The controller of (15)-(17).
@@ -85,8 +62,11 @@ pub struct Controller {
     look: f64,
     slow_radius: f64,
     dead_zone: f64,
+    /// Whether alignment slows the robot by the paper's law.
+    modulated: bool,
     law: SpeedLaw,
-    side: Side,
+    /// Which way an antipodal robot turns: 1 to the left, -1 to the right.
+    side: f64,
     arrived: bool,
 }
 
@@ -108,16 +88,13 @@ impl Step for Controller {
             look: settings.look_rad_s,
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
+            modulated: settings.modulated,
             law: match mission.method {
-                _ if body.steering.is_some() => SpeedLaw::Car {
-                    modulated: settings.modulated,
-                },
-                Method::Paper => SpeedLaw::Paper {
-                    modulated: settings.modulated,
-                },
+                _ if body.steering.is_some() => SpeedLaw::Car,
+                Method::Paper => SpeedLaw::Paper,
                 Method::Evidential => SpeedLaw::Evidential,
             },
-            side: Side::Left,
+            side: 1.0,
             arrived: false,
         }
     }
@@ -193,16 +170,14 @@ impl Controller {
             omega: controller.turn_to(alignment),
         };
         match (status, self.law) {
-            (_, SpeedLaw::Car { modulated }) => {
-                self.car_motion(modulated, status, alignment, distance, limit)
-            }
+            (_, SpeedLaw::Car) => self.car_motion(status, alignment, distance, limit),
             // The paper's method gives no direction where the target is unreachable.
             (GuidanceStatus::Look, _) | (GuidanceStatus::Unreachable, SpeedLaw::Evidential) => {
                 Some(on_the_spot(self))
             }
-            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Paper { modulated }) => {
+            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Paper) => {
                 let omega = self.angular(alignment);
-                let v = self.tangential(modulated, alignment, omega, distance);
+                let v = self.tangential(alignment, omega, distance);
                 Some(Twist { v, omega })
             }
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
@@ -219,17 +194,16 @@ impl Controller {
         }
     }
 
-    /// (15): wc. Within the dead zone of the exact antipode the side is kept: noise there would make the
-    /// sign chatter.
+    /// (15): wc. Within the dead zone of the exact antipode the side stays: noise there would make the sign chatter.
     fn angular(&mut self, alignment: Alignment) -> f64 {
         let Alignment { cosine, sine } = alignment;
         if cosine > 0.0 {
             return self.turn * sine;
         }
         if sine.abs() >= self.dead_zone {
-            self.side = if sine > 0.0 { Side::Left } else { Side::Right };
+            self.side = if sine > 0.0 { 1.0 } else { -1.0 };
         }
-        self.turn * self.side.sign()
+        self.turn * self.side
     }
 
     /// The evidential method's wc on the spot: to the guidance and no farther, and never so slowly that the
@@ -260,8 +234,8 @@ impl Controller {
 
     /// (16): vc. Slowing down for the target multiplies what alignment allows; printed as a case of its
     /// own it would override it.
-    fn tangential(&self, modulated: bool, alignment: Alignment, omega: f64, distance: f64) -> f64 {
-        let aligned = if !modulated {
+    fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
+        let aligned = if !self.modulated {
             1.0
         } else if alignment.cosine < 0.0 {
             f64::midpoint(alignment.cosine, 1.0)

@@ -3,7 +3,7 @@
 //! The error has five parts: x, y, theta, and two errors of the robot that stay the same for a mission, of the ratio of
 //! the wheels' diameters and of the track (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation 12(6), 1996). Each
 //! wheel slips besides, independently, by a variance that grows with the way it rolls (K. S. Chong, L. Kleeman, "Accurate
-//! odometry and error modelling for a mobile robot", ICRA 1997). Of a car there are the driven wheel's slip and,
+//! odometry and error modelling for a mobile robot", ICRA 1997). A car has the driven wheel's slip and,
 //! nominally, the same share of its curvature in place of the ratio of the wheels.
 
 use common::{
@@ -19,7 +19,7 @@ type Error = SVector<f64, 5>;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Covariance(SMatrix<f64, 5, 5>);
 
-/// What the motions of a robot add to the covariance.
+/// The errors that the motions of a robot add to the covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ErrorModel {
     /// Variance of a wheel's slip, m^2 per metre rolled.
@@ -31,7 +31,6 @@ pub(crate) struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// As the mission says.
     pub(crate) fn new(settings: &DeadReckoning, body: &Body) -> Self {
         // Evenly distributed within the spread.
         let variance = |spread: f64| spread * spread / 3.0;
@@ -65,7 +64,7 @@ impl ErrorModel {
             ..pose
         }
         .axis();
-        // What an error of arc and turn does to the pose, the turn's half way through the arc.
+        // The error of the pose that follows from one of arc and turn; the turn's acts half way through the arc.
         let effect = |arc_error: f64, turn_error: f64| {
             let aside = 0.5 * arc * turn_error;
             Error::from([
@@ -103,7 +102,7 @@ impl ErrorModel {
 }
 
 impl Covariance {
-    /// Of x, y and theta: xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
+    /// The entries of x, y and theta: xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
     pub(crate) fn of_pose(&self) -> [f64; 6] {
         [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| self.0[entry])
     }
@@ -121,7 +120,12 @@ mod tests {
         ErrorModel::new(&mission.dead_reckoning, &mission.body())
     }
 
-    /// After `steps` times the same motion.
+    const AHEAD: Twist = Twist {
+        v: 0.002,
+        omega: 0.0,
+    };
+
+    /// The covariance after `steps` times the same motion.
     fn drive(model: &ErrorModel, steps: usize, moved: Twist) -> [f64; 6] {
         let (mut pose, mut covariance) = (Pose2::default(), model.start());
         for _ in 0..steps {
@@ -142,14 +146,7 @@ mod tests {
     fn slip_on_a_straight_way_by_hand() {
         // Variance of the heading 2 q s / W^2, aside its integral q s^3 2 / (3 W^2), ahead q s / 2.
         let model = model("slip_noise = 0.01\ndiameter_spread = 0\ntrack_spread = 0");
-        let [xx, _, _, yy, _, heading] = drive(
-            &model,
-            1000,
-            Twist {
-                v: 0.002,
-                omega: 0.0,
-            },
-        );
+        let [xx, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
         let per_metre = 2.0 * 1e-4 / (0.26 * 0.26);
         close(heading, per_metre * 2.0);
         close(yy, per_metre * 8.0 / 3.0);
@@ -160,14 +157,7 @@ mod tests {
     fn unequal_wheels_bend_a_straight_way_into_a_circle() {
         // The heading is off by e s / W and the way aside by e s^2 / 2 W; e is evenly drawn: e^2 / 3.
         let model = model("slip_noise = 0\ndiameter_spread = 0.006\ntrack_spread = 0");
-        let [_, _, _, yy, _, heading] = drive(
-            &model,
-            1000,
-            Twist {
-                v: 0.002,
-                omega: 0.0,
-            },
-        );
+        let [_, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
         let variance = 0.006 * 0.006 / 3.0;
         close(heading, variance * (2.0_f64 / 0.26).powi(2));
         close(yy, variance * (4.0_f64 / 2.0 / 0.26).powi(2));
@@ -183,16 +173,9 @@ mod tests {
         let [.., heading] = drive(&model, 50, there);
         close(heading, 1e-4 / 3.0);
         let (mut covariance, mut pose) = (model.start(), Pose2::default());
-        for turn in [0.02; 50].into_iter().chain([-0.02; 50]) {
-            covariance = model.after(
-                &covariance,
-                pose,
-                Twist {
-                    v: 0.0,
-                    omega: turn,
-                },
-            );
-            pose = pose.along_arc(0.0, turn);
+        for omega in [0.02; 50].into_iter().chain([-0.02; 50]) {
+            covariance = model.after(&covariance, pose, Twist { v: 0.0, omega });
+            pose = pose.along_arc(0.0, omega);
         }
         assert!(covariance.of_pose()[5] < 1e-18);
     }

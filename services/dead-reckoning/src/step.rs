@@ -1,4 +1,5 @@
-//! Counts to pose: of two wheels, (20), or of a car's driven wheel and steering, (3). Nothing can recompute an integral, so its state is what the checkpoint keeps.
+//! Counts to pose: of two wheels, (20), or of a car's driven wheel and steering, (3). Nothing can recompute an integral, so the
+//! checkpoint holds its state.
 
 use common::{
     clock::MissionTime,
@@ -22,7 +23,7 @@ const SLACK_S: f64 = 0.3;
 /// No robot is switched off and on again and answers sooner, seconds; a link that was killed is back in a tenth.
 const BOOTS_IN_S: f64 = 2.0;
 
-/// What must survive the process: the pose, and the counts it was computed at.
+/// The state that survives the process: the pose, and the counts it was computed at.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     position: DVec2,
@@ -34,7 +35,6 @@ pub struct State {
 
 impl State {
     /// Tick and mission time of the newest wheel sample in it; none before the first.
-    #[must_use]
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
@@ -54,10 +54,9 @@ struct Last {
     omega: f64,
 }
 
-/// What one wheel sample gave.
+/// The result of one wheel sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reckoned {
-    /// The pose with it.
     pub pose: PoseSample,
     /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays.
     pub rejected: bool,

@@ -1,8 +1,8 @@
 //! The newest readings as evidence of free ground.
 //!
 //! A smooth surface answers only a beam along its normal. A beam without an echo therefore excludes only surfaces square
-//! to it, and the evidence grid, which stores no directions, cannot hold that. The newest readings are kept for it: the
-//! planner asks them about every surface that the body could touch. The rays of infrared rangers are kept beside them,
+//! to it, and the evidence grid, which stores no directions, cannot hold that. The newest readings are held for it: the
+//! planner asks them about every surface that the body could touch. The rays of infrared rangers are held beside them,
 //! because a ray ends at a surface of any angle.
 
 use common::samples::{CLEAR_BEAMS, CLEAR_RAYS, ClearBeam, GridHeader};
@@ -38,25 +38,15 @@ impl ClearBeams {
             .echo
             .map_or(f64::INFINITY, |range| range - sonar.ahead_of_echo_m);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(sonar.clear_m));
-        let oldest_m = rolled_m - sonar.clear_for_m;
-        keep(
-            &mut self.beams,
-            CLEAR_BEAMS,
-            oldest_m,
-            Dated { beam, rolled_m },
-        );
+        let newest = Dated { beam, rolled_m };
+        append(&mut self.beams, CLEAR_BEAMS, sonar, newest);
     }
 
     /// Take a reading of an infrared ranger, as [`ClearBeams::take`] does of the sonar.
     pub(crate) fn take_ray(&mut self, sonar: &SonarModel, ray: &Ray, rolled_m: f64) {
         let beam = clear_beam(ray.origin, ray.axis, ray.seen.clear_m);
-        let oldest_m = rolled_m - sonar.clear_for_m;
-        keep(
-            &mut self.rays,
-            CLEAR_RAYS,
-            oldest_m,
-            Dated { beam, rolled_m },
-        );
+        let newest = Dated { beam, rolled_m };
+        append(&mut self.rays, CLEAR_RAYS, sonar, newest);
     }
 
     pub(crate) fn clear(&mut self) {
@@ -86,8 +76,9 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
     }
 }
 
-/// Append `newest`, and drop readings older than `oldest_m` and beyond the newest `most`.
-fn keep(readings: &mut Vec<Dated>, most: usize, oldest_m: f64, newest: Dated) {
+/// Append `newest`, and drop readings that are too old and those beyond the newest `most`.
+fn append(readings: &mut Vec<Dated>, most: usize, sonar: &SonarModel, newest: Dated) {
+    let oldest_m = newest.rolled_m - sonar.clear_for_m;
     readings.retain(|dated| dated.rolled_m > oldest_m);
     if readings.len() >= most {
         readings.remove(0);

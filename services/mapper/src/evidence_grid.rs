@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     infrared_model::{SCANNED_ASIDE_M, Seen},
-    reading::Ray,
+    reading::{Ray, Reading},
     sonar_model::SonarModel,
 };
 
@@ -38,19 +38,6 @@ const SEEN: u8 = 2;
 /// Distance that the wheels roll until scanned ground is one step less certain, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
     sonar.scanned_for_m / f64::from(SCANNED - sonar.pointed_enough)
-}
-
-/// One reading of the sonar in the mission's frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Beam {
-    /// Position of the sensor, metres.
-    pub(crate) origin: DVec2,
-    /// Direction of the beam, a unit vector.
-    pub(crate) axis: DVec2,
-    /// The echo's range, metres; none where nothing answered within reach.
-    pub(crate) echo: Option<f64>,
-    /// Range up to which the reading counts as evidence, metres.
-    pub(crate) reach: f64,
 }
 
 /// A cell that became occupied or free.
@@ -155,13 +142,13 @@ impl EvidenceGrid {
         window
     }
 
-    /// Take one reading of a robot at `robot` with a body of `radius` metres. Appends the cells that flipped to `flips` and
-    /// returns the window of all cells that changed.
+    /// Take one reading, which counts as evidence up to `reach` metres, of a robot at `robot` with a body of `radius` metres.
+    /// Appends the cells that flipped to `flips` and returns the window of all cells that changed.
     pub(crate) fn take(
         &mut self,
         sonar: &SonarModel,
         lattice: &GridFrame,
-        beam: &Beam,
+        (beam, reach): (&Reading, f64),
         (robot, radius): (DVec2, f64),
         flips: &mut Vec<Flip>,
     ) -> Window {
@@ -169,12 +156,12 @@ impl EvidenceGrid {
         let half_cell = lattice.resolution_m / 2.0;
         let half_diagonal = half_cell * std::f64::consts::SQRT_2;
         let band = sonar.band_m.max(half_cell * 1.2);
-        let echo = beam.echo.filter(|range| *range <= beam.reach);
+        let echo = beam.echo.filter(|range| *range <= reach);
         let passed_to = beam
             .echo
             .map_or(f64::INFINITY, |range| range - sonar.before_m);
-        let clear_to = passed_to.min(beam.reach);
-        let scanned_to = passed_to.min(sonar.scanned_m.max(beam.reach));
+        let clear_to = passed_to.min(reach);
+        let scanned_to = passed_to.min(sonar.scanned_m.max(reach));
         let known_to = echo.map_or(scanned_to, |range| range + sonar.behind_m);
         let far = known_to
             .max(sonar.pointed_m)

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     clear_beams::ClearBeams,
-    evidence_grid::{Beam, EvidenceGrid, Flip, lattice, step_m},
+    evidence_grid::{EvidenceGrid, Flip, lattice, step_m},
     inflation::{Geometry, Inflation},
     reading::{Ray, Reading},
     sonar_model::SonarModel,
@@ -20,16 +20,10 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
-    beams: ClearBeams,
+    pub(crate) beams: ClearBeams,
     /// Not saved: it is recomputed from the evidence.
     #[serde(skip)]
     inflation: Inflation,
-}
-
-impl EvidenceMap {
-    pub(crate) const fn beams(&self) -> &ClearBeams {
-        &self.beams
-    }
 }
 
 /// The effect of a reading.
@@ -132,15 +126,10 @@ impl Evidential {
         }
         if let Some(reading) = reading {
             map.beams.take(&self.sonar, &reading, rolled_m);
-            let beam = Beam {
-                origin: reading.origin,
-                axis: reading.axis,
-                echo: reading.echo,
-                reach: self.map_within,
-            };
+            let beam = (&reading, self.map_within);
             let heard = map
                 .evidence
-                .take(&self.sonar, lattice, &beam, body, &mut flips);
+                .take(&self.sonar, lattice, beam, body, &mut flips);
             touched = touched.union(heard);
         }
         let mut window = self.on_grid(touched);
@@ -201,14 +190,14 @@ impl Evidential {
         if window.area() == 0 {
             return window;
         }
+        let Geometry { lattice, grid, .. } = self.geometry;
+        let last = DVec2::splat(f64::from(grid.cells) - 1.0);
         let corner = |col: u32, row: u32| {
-            let point = self.geometry.lattice.centre_of(Cell { col, row });
-            let last = DVec2::splat(f64::from(self.geometry.grid.cells) - 1.0);
-            self.geometry.grid.to_cells(point).clamp(DVec2::ZERO, last)
+            let point = lattice.centre_of(Cell { col, row });
+            grid.to_cells(point).clamp(DVec2::ZERO, last)
         };
         // A cell of the lattice shows as far as half of it, and half a cell of the grid, beyond its centre.
-        let more = 0.5 * self.geometry.lattice.resolution_m / self.geometry.grid.resolution_m + 0.5;
-        let last = DVec2::splat(f64::from(self.geometry.grid.cells) - 1.0);
+        let more = 0.5 * lattice.resolution_m / grid.resolution_m + 0.5;
         let from = (corner(window.col, window.row) - more)
             .floor()
             .max(DVec2::ZERO);

@@ -85,7 +85,6 @@ impl Process for Shell {
         self.is_keyframe_due() || self.runner.out.is_journal_long()
     }
 
-    /// What takes the time of the whole map.
     fn idle(&mut self) -> Result<(), StageError> {
         if self.is_keyframe_due() {
             self.publish_again()?;

@@ -4,7 +4,6 @@ use common::{
     grid::Part,
     mission::Mission,
     outputs::Outputs,
-    samples::GridHeader,
     shell::{Context, Progress},
     stage::Stage,
     start::StageError,
@@ -15,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Belief, Change, Input, Mapper};
 
-/// What a generation starts from.
+/// The state that a generation starts from.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Start {
     /// The snapshot, if there was one.
@@ -24,7 +23,7 @@ pub struct Start {
     inputs: Vec<Input>,
 }
 
-/// What the mapper does, and at which tick.
+/// An action of the mapper, and its tick.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
     /// The step takes this; what changed is published.
@@ -36,7 +35,7 @@ pub enum Entry {
 impl Stage for Mapper {
     type Start = Start;
     type Entry<'a> = Entry;
-    /// What was published.
+    /// The part that was published.
     type Outcome = Option<Part>;
 
     fn new(mission: &Mission) -> Self {
@@ -81,7 +80,7 @@ impl Stage for Mapper {
             Change::Window(window) => Part::of(frame, window, version),
             Change::Whole => Part::whole(frame, version),
         };
-        let (header, cells): (GridHeader, _) = (self.header(part), self.state().cells());
+        let (header, cells) = (self.header(part), self.state().cells());
         if part.is_keyframe() {
             out.answer_slice(&GRID, header, cells)?;
         } else {

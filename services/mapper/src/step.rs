@@ -87,19 +87,15 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// One [`CellState`] byte a cell, row-major.
     pub fn cells(&self) -> &[u8] {
         &self.cells
     }
 
-    /// Grows by one with every change; 1 for the map a mission starts with.
-    #[must_use]
+    /// 1 for the map a mission starts with.
     pub const fn version(&self) -> u64 {
         self.version
     }
 
-    /// Range samples that put a hazard on the map.
-    #[must_use]
     pub const fn safety_events(&self) -> u64 {
         self.safety_events
     }
@@ -203,7 +199,6 @@ impl Mapper {
     }
 
     /// Upper bound of an encoded belief, bytes.
-    #[must_use]
     pub const fn saved_bytes(&self) -> usize {
         let evidence = match self.belief.sensed {
             Sensed::Hits => 0,
@@ -213,7 +208,6 @@ impl Mapper {
     }
 
     /// The header of a `grid` sample with `part` of this belief.
-    #[must_use]
     pub fn header(&self, part: Part) -> GridHeader {
         let mut header = GridHeader {
             part,
@@ -222,7 +216,7 @@ impl Mapper {
             ..GridHeader::default()
         };
         if let Sensed::Evidence(map) = &self.belief.sensed {
-            map.beams().fill(&mut header);
+            map.beams.fill(&mut header);
         }
         header
     }
@@ -409,9 +403,8 @@ impl Mapper {
             for col in 0..self.frame.cells {
                 let cell = Cell { col, row };
                 let state = &mut self.belief.cells[self.frame.index(cell)];
-                let kept_free =
-                    Some(cell) == self.target || CellState::from_byte(*state).is_hazard();
-                if !kept_free && area.covers(self.frame.centre_of(cell), self.frame.resolution_m) {
+                let stays = Some(cell) == self.target || CellState::from_byte(*state).is_hazard();
+                if !stays && area.covers(self.frame.centre_of(cell), self.frame.resolution_m) {
                     *state = CellState::Sensed as u8;
                     changed = changed.including(cell);
                 }

@@ -1,4 +1,5 @@
-//! A thread that does one job after the other beside the tick.
+//! A thread that does one job after the other beside the tick, and its priority: only the tick's own thread has a real-time
+//! priority that the process was given.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -8,6 +9,11 @@ use std::{
     },
     sync::mpsc::{Receiver, Sender, channel},
     thread::JoinHandle,
+};
+
+use thread_priority::{
+    NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
+    ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
 /// The thread. Dropping it waits for the job that runs.
@@ -22,10 +28,9 @@ pub(crate) struct Background<Job, Done> {
 }
 
 impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
-    /// Start the thread `name`, which first does `prepare`.
+    /// Start the thread `name`.
     pub(crate) fn start(
         name: &str,
-        prepare: fn(),
         mut work: impl FnMut(Job) -> Done + Send + 'static,
     ) -> io::Result<Self> {
         let (jobs, orders) = channel::<Job>();
@@ -35,7 +40,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         // A full pipe is readable already.
         wakeup.set_nonblocking(true)?;
         let all = move || {
-            prepare();
+            behind_stages();
             for job in orders {
                 if finished.send(work(job)).is_err() {
                     return;
@@ -102,5 +107,39 @@ impl<Job, Done> Drop for Background<Job, Done> {
             // A panic there has been printed; the process ends anyway.
             let _ = thread.join();
         }
+    }
+}
+
+/// Niceness 10 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
+const NICENESS_10: u8 = 22;
+
+/// Give this thread a tenth of the share that a stage gets of a processor that both want.
+///
+/// It gets no less, though nobody waits for it: a killed process ends only once each of its threads has run, and other
+/// threads wait for what it holds in the kernel. With SCHED_IDLE both took seconds on a busy machine.
+fn behind_stages() {
+    let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
+        return;
+    };
+    let policy = ThreadSchedulePolicy::Normal(Normal::Other);
+    let priority = ThreadPriority::Crossplatform(value);
+    // Where the system refuses, they share the processor equally.
+    let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn niceness_10_is_10() {
+        let value = ThreadPriorityValue::try_from(NICENESS_10).unwrap();
+        let policy = ThreadSchedulePolicy::Normal(Normal::Other);
+        assert_eq!(
+            ThreadPriority::Crossplatform(value)
+                .to_posix(policy)
+                .unwrap(),
+            10
+        );
     }
 }

@@ -11,7 +11,6 @@ use harmonic::{Cancellation, Field, Solver};
 
 use crate::{
     background::Background,
-    scheduling,
     step::{Job, Solved},
 };
 
@@ -33,7 +32,7 @@ impl BackgroundSolver {
         let solve = move |job| worker.solve(job);
         Ok(Self {
             cancellation,
-            thread: Background::start("full-solve", scheduling::behind_stages, solve)?,
+            thread: Background::start("full-solve", solve)?,
         })
     }
 

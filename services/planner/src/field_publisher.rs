@@ -16,7 +16,7 @@ use common::{
     topics::{self, AnyTopic as _},
 };
 
-use crate::{background::Background, scheduling, step::Snapshot};
+use crate::{background::Background, step::Snapshot};
 
 /// The policy of every cell.
 #[derive(Debug)]
@@ -94,7 +94,7 @@ impl FieldPublisher {
         let policy = move |job| worker.policy(job);
         Ok(Self {
             writer,
-            thread: Background::start("policy", scheduling::behind_stages, policy)?,
+            thread: Background::start("policy", policy)?,
             busy: false,
             published: None,
             version: 0,

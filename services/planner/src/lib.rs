@@ -15,7 +15,6 @@ mod fault;
 mod field_publisher;
 mod near_echoes;
 pub mod replay;
-mod scheduling;
 pub mod shell;
 pub mod step;
 mod undetected_surfaces;

@@ -2,7 +2,6 @@
 
 mod input;
 mod live;
-mod snapshot;
 
 use std::sync::Arc;
 
@@ -24,8 +23,7 @@ use crate::fault::lead_astray;
 use crate::view::field_cell;
 use live::{Live, Robot, is_hazard};
 
-pub use input::{Input, Job, Outcome, Solved, Work};
-pub use snapshot::Snapshot;
+pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
 
 /// How fast the evidential method leaves a hazard the robot stands in, m/s: something is near.
 const WAY_OUT_M_S: f64 = 0.08;

@@ -12,7 +12,6 @@ impl Controller {
     /// spot.
     pub(super) fn car_motion(
         &mut self,
-        modulated: bool,
         status: GuidanceStatus,
         alignment: Alignment,
         distance: f64,
@@ -23,7 +22,7 @@ impl Controller {
         }
         let least = LEAST_SPEED_M_S.min(self.speed);
         let omega = self.angular(alignment);
-        let wanted = self.tangential(modulated, alignment, omega, distance);
+        let wanted = self.tangential(alignment, omega, distance);
         let wanted = wanted.max(least);
         // Written so that a limit that is no number stands.
         if limit >= least {

@@ -22,13 +22,8 @@ impl Cancellation {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether [`cancel`](Self::cancel) was called.
-    pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-
     pub(crate) fn check(&self) -> Result<(), SolveError> {
-        if self.is_cancelled() {
+        if self.0.load(Ordering::Relaxed) {
             Err(SolveError::Cancelled)
         } else {
             Ok(())

@@ -3,17 +3,14 @@
 /// Longest side of a map, in cells.
 pub const MAX_SIDE: usize = 16_384;
 
-/// A cell of the map.
+/// A cell of the map, by column and row from 0.
 #[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
 pub struct Cell {
-    /// Column, from 0.
     pub col: usize,
-    /// Row, from 0.
     pub row: usize,
 }
 
 impl Cell {
-    /// The cell of column `col` and row `row`.
     pub const fn new(col: usize, row: usize) -> Self {
         Self { col, row }
     }
@@ -22,7 +19,6 @@ impl Cell {
 /// A cell that became blocked or free since the field was solved.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub struct Change {
-    /// The cell.
     pub cell: Cell,
     /// Whether it is blocked from now on.
     pub blocked: bool,

@@ -42,14 +42,16 @@ impl Domain {
                 expected,
             });
         }
-        let mut domain = Self {
+        let domain = Self {
             width,
             height,
             blocked,
             screening: Coefficients::NONE,
             target,
         };
-        domain.set_target(target)?;
+        if domain.blocked[domain.checked_index(target, "the target")?] {
+            return Err(SolveError::TargetBlocked { target });
+        }
         Ok(domain)
     }
 
@@ -86,19 +88,6 @@ impl Domain {
         Ok(self)
     }
 
-    /// Moves the target.
-    ///
-    /// # Errors
-    /// [`SolveError::Outside`] and [`SolveError::TargetBlocked`]; the target then stays where it was.
-    pub fn set_target(&mut self, target: Cell) -> Result<(), SolveError> {
-        let index = self.checked_index(target, "the target")?;
-        if self.blocked[index] {
-            return Err(SolveError::TargetBlocked { target });
-        }
-        self.target = target;
-        Ok(())
-    }
-
     /// Blocks or frees cells.
     ///
     /// # Errors
@@ -120,12 +109,10 @@ impl Domain {
         Ok(())
     }
 
-    /// Columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -150,7 +137,6 @@ impl Domain {
         self.screening.at(index)
     }
 
-    /// The screening coefficients of all cells.
     pub(crate) fn screening(&self) -> &Coefficients {
         &self.screening
     }
@@ -158,6 +144,18 @@ impl Domain {
     /// Row-major index of a cell of the map.
     pub(crate) fn index(&self, cell: Cell) -> usize {
         cell.row * self.width + cell.col
+    }
+
+    /// Row-major indices of the neighbours inside the map of the cell with index `index`: west, east, north, south.
+    pub fn neighbours(&self, index: usize) -> [Option<usize>; 4] {
+        let (width, height) = (self.width, self.height);
+        let (col, row) = (index % width, index / width);
+        [
+            (col > 0).then(|| index - 1),
+            (col + 1 < width).then(|| index + 1),
+            (row > 0).then(|| index - width),
+            (row + 1 < height).then(|| index + width),
+        ]
     }
 
     fn checked_index(&self, cell: Cell, what: &'static str) -> Result<usize, SolveError> {

@@ -11,52 +11,32 @@ use crate::screening::MIN_SCREENING_CELLS;
 pub enum SolveError {
     /// The map has no cells.
     #[error("the map is empty ({width} x {height} cells): give it at least one cell")]
-    MapEmpty {
-        /// Columns of the map.
-        width: usize,
-        /// Rows of the map.
-        height: usize,
-    },
+    MapEmpty { width: usize, height: usize },
     /// The map is wider or higher than [`MAX_SIDE`].
     #[error(
         "the map is too large ({width} x {height} cells): at most {MAX_SIDE} a side; use larger cells"
     )]
-    MapTooLarge {
-        /// Columns of the map.
-        width: usize,
-        /// Rows of the map.
-        height: usize,
-    },
+    MapTooLarge { width: usize, height: usize },
     /// A per-cell input does not have one value for each cell.
     #[error(
         "{what} has {found} values, the map {expected} cells: give one value a cell, row by row"
     )]
     WrongLength {
-        /// The input.
         what: &'static str,
-        /// Values it has.
         found: usize,
-        /// Cells of the map.
         expected: usize,
     },
     /// A cell was named that the map does not have.
     #[error("{what} (column {}, row {}) lies outside the map of {width} x {height} cells", cell.col, cell.row)]
     Outside {
-        /// The cell's role.
         what: &'static str,
-        /// The cell.
         cell: Cell,
-        /// Columns of the map.
         width: usize,
-        /// Rows of the map.
         height: usize,
     },
     /// The target is on a blocked cell.
     #[error("the target (column {}, row {}) is blocked: choose a free cell or free that one", target.col, target.row)]
-    TargetBlocked {
-        /// The target's cell.
-        target: Cell,
-    },
+    TargetBlocked { target: Cell },
     /// A screening length is not a number or shorter than [`MIN_SCREENING_CELLS`].
     #[error(
         "a screening length of {cells} cells at cell index {index}: it must be at least {MIN_SCREENING_CELLS}; an \
@@ -81,9 +61,7 @@ pub enum SolveError {
         needed: u64,
         /// Bytes the settings allow.
         allowed: u64,
-        /// Columns of the map.
         width: usize,
-        /// Rows of the map.
         height: usize,
     },
     /// No method produced a field that passes verification; the field is not handed out.

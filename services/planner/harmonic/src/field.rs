@@ -2,9 +2,10 @@
 
 use crate::cell::Cell;
 use crate::domain::Domain;
+use crate::method::Method;
 use crate::scaled::Scaled;
 use crate::store::Store;
-use crate::verification::Verification;
+use crate::verification::{Check, Verification};
 
 /// The field of one domain: u = 1 at the target, 0 where blocked or cut off, positive wherever the target can be reached.
 ///
@@ -19,27 +20,26 @@ pub struct Field {
 }
 
 impl Field {
-    pub(crate) fn new(
-        (width, height): (usize, usize),
-        target: Cell,
-        store: Store,
-        verification: Verification,
-    ) -> Self {
+    /// The field of `domain` that `method` computed, with the result of its check.
+    pub(crate) fn new(domain: &Domain, store: Store, check: &Check, method: Method) -> Self {
         Self {
-            width,
-            height,
-            target,
+            width: domain.width(),
+            height: domain.height(),
+            target: domain.target(),
             store,
-            verification,
+            verification: Verification {
+                worst_residual: check.worst_residual,
+                worst_tile: check.worst_tile,
+                method,
+                reachable: check.reachable,
+            },
         }
     }
 
-    /// Columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -49,7 +49,6 @@ impl Field {
         self.target
     }
 
-    /// The result of its verification.
     pub fn verification(&self) -> &Verification {
         &self.verification
     }
@@ -59,8 +58,7 @@ impl Field {
         if cell.col >= self.width || cell.row >= self.height {
             return Scaled::ZERO;
         }
-        let (value, exponent) = self.store.raw(cell.row * self.width + cell.col);
-        Scaled::new(value, exponent)
+        self.store.u(cell.row * self.width + cell.col)
     }
 
     /// Replaces u of a reachable cell by `u`, which must not be zero: a fault injected on purpose, to see what follows a
@@ -88,8 +86,7 @@ impl Field {
     pub fn log10_u_min(&self) -> f64 {
         let mut least = Scaled::ONE;
         for index in 0..self.width * self.height {
-            let (value, exponent) = self.store.raw(index);
-            let u = Scaled::new(value, exponent);
+            let u = self.store.u(index);
             if !u.is_zero() && u < least {
                 least = u;
             }

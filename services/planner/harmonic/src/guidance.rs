@@ -54,17 +54,20 @@ impl Field {
         let position = [col, row];
         let gradient =
             self.interpolate(here, position, |c, r| self.central_difference(here, (c, r)));
-        let kept = self.without_wall_component(here, position, gradient);
+        let allowed = self.without_wall_component(here, position, gradient);
         // The component removed is replaced by steepest ascent from cell to cell, which leads around walls; a gradient
         // straight into a wall would otherwise keep its direction, however small it gets.
-        let removed = (gradient[0] - kept[0]).hypot(gradient[1] - kept[1]);
-        let mut total = kept;
+        let removed = (gradient[0] - allowed[0]).hypot(gradient[1] - allowed[1]);
+        let mut total = allowed;
         if removed > 0.0 {
             let ascent = self.interpolate(here, position, |c, r| {
                 self.steepest_ascent(c, r).map(|step| step as f64)
             });
             let ascent = self.without_wall_component(here, position, ascent);
-            total = [kept[0] + removed * ascent[0], kept[1] + removed * ascent[1]];
+            total = [
+                allowed[0] + removed * ascent[0],
+                allowed[1] + removed * ascent[1],
+            ];
         }
         unit(total, SADDLE)
             .or_else(|| self.toward_best_neighbour(here, position))
@@ -166,7 +169,7 @@ impl Field {
     ) -> [f64; 2] {
         let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
         let blocked = |dc: i64, dr: i64| self.blocked_at(here.0 + dc, here.1 + dr);
-        let mut kept = gradient;
+        let mut allowed = gradient;
         for (dc, dr) in [
             (1, 0),
             (-1, 0),
@@ -199,13 +202,16 @@ impl Field {
                 let length = (dc as f64).hypot(dr as f64);
                 [dc as f64 / length, dr as f64 / length]
             };
-            let inward = kept[0] * normal[0] + kept[1] * normal[1];
+            let inward = allowed[0] * normal[0] + allowed[1] * normal[1];
             if inward > 0.0 {
                 let share = inward * (1.0 - distance / WALL_REACH);
-                kept = [kept[0] - share * normal[0], kept[1] - share * normal[1]];
+                allowed = [
+                    allowed[0] - share * normal[0],
+                    allowed[1] - share * normal[1],
+                ];
             }
         }
-        kept
+        allowed
     }
 
     /// Straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way

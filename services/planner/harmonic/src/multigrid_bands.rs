@@ -82,24 +82,12 @@ pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Stor
 /// The inflow from resolved cells to their free neighbours that are not, scaled to at most 2^TOP, after the exponent it was
 /// scaled by. `None` if every cell that can be reached is resolved.
 fn inflow(domain: &Domain, u: &[Scaled]) -> Option<(i32, Vec<(Cell, f64)>)> {
-    let (width, height) = (domain.width(), domain.height());
+    let width = domain.width();
     let mut edges: Vec<(usize, Scaled)> = Vec::new();
     for (index, &from) in u.iter().enumerate().filter(|(_, u)| !u.is_zero()) {
-        let (col, row) = (index % width, index / width);
-        let around = [
-            (col > 0).then(|| index - 1),
-            (col + 1 < width).then(|| index + 1),
-            (row > 0).then(|| index - width),
-            (row + 1 < height).then(|| index + width),
-        ];
+        let around = domain.neighbours(index).into_iter().flatten();
         let open = |to: &usize| u[*to].is_zero() && !domain.blocked()[*to];
-        edges.extend(
-            around
-                .into_iter()
-                .flatten()
-                .filter(open)
-                .map(|to| (to, from)),
-        );
+        edges.extend(around.filter(open).map(|to| (to, from)));
     }
     let top = edges.iter().map(|(_, u)| u.exponent).max()?;
     let scale = pow2(f64::TOP);

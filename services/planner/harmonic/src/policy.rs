@@ -22,27 +22,29 @@ impl Field {
     pub fn policy_of_row(&self, row: usize, mut each: impl FnMut(Policy)) {
         let width = self.width();
         let inside = (1..self.height().saturating_sub(1)).contains(&row);
-        let rows = (
-            row.saturating_sub(1) * width,
-            row * width,
-            (row + 1) * width,
-        );
         match self.store() {
             Store::Single { values, exponent } if inside => {
-                let row_at = |start: usize| &values[start..start + width];
-                let [above, own, below] = [rows.0, rows.1, rows.2].map(row_at);
-                for col in 0..width {
-                    each(self.of_cell([above, own, below], *exponent, Cell::new(col, row)));
-                }
+                self.of_row(values, *exponent, row, each);
             }
             Store::Double { values, exponent } if inside => {
-                let row_at = |start: usize| &values[start..start + width];
-                let [above, own, below] = [rows.0, rows.1, rows.2].map(row_at);
-                for col in 0..width {
-                    each(self.of_cell([above, own, below], *exponent, Cell::new(col, row)));
-                }
+                self.of_row(values, *exponent, row, each);
             }
             _ => (0..width).for_each(|col| each(self.policy(Cell::new(col, row)))),
+        }
+    }
+
+    /// [`policy_of_row`](Self::policy_of_row) for a row between two others; `values` are those of all cells as stored.
+    fn of_row<T: Copy + Into<f64>>(
+        &self,
+        values: &[T],
+        exponent: i32,
+        row: usize,
+        mut each: impl FnMut(Policy),
+    ) {
+        let width = self.width();
+        let rows = [row - 1, row, row + 1].map(|row| &values[row * width..(row + 1) * width]);
+        for col in 0..width {
+            each(self.of_cell(rows, exponent, Cell::new(col, row)));
         }
     }
 

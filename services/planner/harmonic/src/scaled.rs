@@ -3,19 +3,15 @@
 /// A non-negative number, `mantissa` * 2^`exponent`, the mantissa in 1.0 .. 2.0; zero is (0.0, 0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scaled {
-    /// 0, or in 1.0 .. 2.0.
     pub mantissa: f64,
-    /// Power of two; 0 for zero.
     pub exponent: i32,
 }
 
 impl Scaled {
-    /// Zero.
     pub const ZERO: Self = Self {
         mantissa: 0.0,
         exponent: 0,
     };
-    /// One.
     pub const ONE: Self = Self {
         mantissa: 1.0,
         exponent: 0,
@@ -41,7 +37,6 @@ impl Scaled {
         }
     }
 
-    /// Whether this is zero.
     pub fn is_zero(self) -> bool {
         self.mantissa == 0.0
     }

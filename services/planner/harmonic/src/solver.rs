@@ -2,25 +2,61 @@
 //!
 //! - [`plan`]: which method to try first.
 //! - [`full`]: one full solve: try, verify, fall back.
-//! - [`settings`]: threads and memory.
 
 mod full;
 mod plan;
-mod settings;
+
+use std::num::NonZeroUsize;
 
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::field::Field;
-use full::{Full, Task};
-pub use settings::{Phase, Settings};
+use crate::multifrontal::Workspace;
+use full::Prepared;
+
+/// How a solver may work; what full solves compute does not depend on it.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Threads a solve may use; the result is the same to the bit. Only the verification of large maps uses more than
+    /// one.
+    pub threads: NonZeroUsize,
+    /// Bytes the multifrontal factorisation may take; a solve that needs more ends in [`SolveError::TooCostly`].
+    pub memory_limit: u64,
+}
+
+impl Default for Settings {
+    /// One thread, 2 GiB.
+    fn default() -> Self {
+        Self {
+            threads: NonZeroUsize::MIN,
+            memory_limit: 2 << 30,
+        }
+    }
+}
+
+/// A step of a solve that has just ended, for callers that measure time.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[non_exhaustive]
+pub enum Phase {
+    /// The part that does not depend on the target is ready.
+    SetUp,
+    /// One cycle of multigrid has ended.
+    Cycled,
+    /// A field was computed.
+    Solved,
+    /// The field was checked. If it failed, more cycles or a costlier method follow, with phases of their own.
+    Verified,
+}
 
 /// Solves fields. Between solves it holds the set-up, which does not depend on the target, and updates it where cells
 /// changed.
 #[derive(Debug, Default)]
 pub struct Solver {
     settings: Settings,
-    full: Full,
+    single: Prepared<f32>,
+    double: Prepared<f64>,
+    multifrontal: Workspace,
 }
 
 impl Solver {
@@ -56,15 +92,7 @@ impl Solver {
         near: &Field,
         cancellation: &Cancellation,
     ) -> Result<Field, SolveError> {
-        self.full.solve(
-            Task {
-                settings: &self.settings,
-                domain,
-                near: Some(near),
-                cancellation,
-            },
-            &mut |_| {},
-        )
+        self.run(domain, Some(near), cancellation, &mut |_| {})
     }
 
     /// [`solve`](Self::solve), calling `observe` at the end of each phase: the library has no clock of its own.
@@ -77,14 +105,6 @@ impl Solver {
         cancellation: &Cancellation,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
-        self.full.solve(
-            Task {
-                settings: &self.settings,
-                domain,
-                near: None,
-                cancellation,
-            },
-            observe,
-        )
+        self.run(domain, None, cancellation, observe)
     }
 }

@@ -5,7 +5,7 @@ mod maps;
 mod random;
 mod reference;
 
-pub use exact::{Angles, CLEAR, exact};
+pub use exact::{Angles, exact};
 pub use maps::{Kind, Map};
 pub use random::Random;
 pub use reference::{Reference, angle, follow};

@@ -1,8 +1,12 @@
-//! Inputs and outputs of the planner's step.
+//! Inputs and outputs of the planner's step, and the field at one moment, from which the policy of every cell is computed while the
+//! planner goes on.
 
 use std::sync::Arc;
 
-use common::samples::{FaultKind, GridHeader, GuidanceSample, PoseSample};
+use common::{
+    grid::GridFrame,
+    samples::{FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample, PoseSample},
+};
 use glam::DVec2;
 use harmonic::{Domain, Field, SolveError};
 
@@ -11,7 +15,6 @@ use harmonic::{Domain, Field, SolveError};
 pub enum Input<'a> {
     /// A sample of `grid`.
     Grid {
-        /// Its header.
         header: &'a GridHeader,
         /// The cells of its window.
         cells: &'a [u8],
@@ -24,7 +27,6 @@ pub enum Input<'a> {
     Solved(Solved),
     /// A fault is injected.
     Fault {
-        /// Which fault.
         fault: FaultKind,
         /// Where the robot is, metres.
         robot: DVec2,
@@ -88,10 +90,39 @@ pub struct Job {
 /// The result of a job.
 #[derive(Debug)]
 pub struct Solved {
-    /// The job's number.
     pub number: u64,
     /// The field of the job's map.
     pub field: Result<Arc<Field>, SolveError>,
     /// How long it took, nanoseconds of wall-clock; nothing is decided by it.
     pub took_ns: u64,
+}
+
+/// The field at one moment.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The header of a `field` sample; stamp and part are still to be set.
+    pub header: FieldHeader,
+    /// Where its cells are.
+    pub frame: GridFrame,
+    pub(super) field: Arc<Field>,
+}
+
+impl Snapshot {
+    /// The policy of every cell, row-major.
+    pub fn cells(&self) -> Vec<FieldCell> {
+        let mut cells = Vec::with_capacity(self.frame.area());
+        for row in 0..self.frame.cells as usize {
+            self.append_row(row, &mut cells);
+        }
+        cells
+    }
+
+    /// Append the policy of the cells of `row` to `cells`.
+    pub fn append_row(&self, row: usize, cells: &mut Vec<FieldCell>) {
+        self.field.policy_of_row(row, |policy| {
+            let [ex, ey] = policy.direction.map(|component| component as f32);
+            let log2_u = policy.log2_u as f32;
+            cells.push(FieldCell { ex, ey, log2_u });
+        });
+    }
 }

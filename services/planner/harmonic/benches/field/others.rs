@@ -33,7 +33,8 @@ pub(crate) fn dijkstra(domain: &Domain) -> f64 {
     })
 }
 
-/// The same equations by `faer`'s sparse Cholesky factorisation on one core, in `f64`; cells whose u is below its range are unreached.
+/// Solves the equations by `faer`'s sparse Cholesky factorisation on one core, in `f64`; cells whose u is below its range are
+/// unreached.
 pub(crate) fn sparse_cholesky(domain: &Domain) -> f64 {
     use faer::linalg::solvers::Solve;
     use faer::sparse::{SparseColMat, Triplet};
@@ -53,14 +54,7 @@ pub(crate) fn sparse_cholesky(domain: &Domain) -> f64 {
     let mut right = faer::Mat::<f64>::zeros(unknowns, 1);
     for index in (0..place.len()).filter(|&index| free(index)) {
         entries.push(Triplet::new(place[index], place[index], 4.0));
-        let (col, row) = (index % width, index / width);
-        let around = [
-            (col > 0).then(|| index - 1),
-            (col + 1 < width).then(|| index + 1),
-            (row > 0).then(|| index - width),
-            (row + 1 < domain.height()).then(|| index + width),
-        ];
-        for next in around.into_iter().flatten() {
+        for next in domain.neighbours(index).into_iter().flatten() {
             if next == target {
                 right[(place[index], 0)] += 1.0;
             } else if free(next) && next < index {

@@ -1,9 +1,10 @@
 //! One full solve: the planned method, its check, and the costlier methods where the check fails.
 
+use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use super::plan::plan;
-use super::settings::{Phase, Settings};
+use super::{Phase, Solver};
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
@@ -15,7 +16,7 @@ use crate::multigrid_bands;
 use crate::real::Real;
 use crate::screening::Coefficients;
 use crate::store::{BLOCKED, Store};
-use crate::verification::{self, Check, Verification};
+use crate::verification::{self, Check};
 
 /// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
 /// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
@@ -45,27 +46,17 @@ const BETWEEN_CHECKS: f64 = 4.0;
 const SINGLE_CYCLES: usize = 60;
 const DOUBLE_CYCLES: usize = 450;
 
-/// The inputs of a full solve.
+/// The inputs of a solve by cycles of multigrid.
 #[derive(Clone, Copy)]
-pub(super) struct Task<'a> {
-    pub settings: &'a Settings,
-    pub domain: &'a Domain,
-    /// The field of a similar map, to start from.
-    pub near: Option<&'a Field>,
-    pub cancellation: &'a Cancellation,
-}
-
-/// The set-up that full solves share.
-#[derive(Debug, Default)]
-pub(super) struct Full {
-    single: Prepared<f32>,
-    double: Prepared<f64>,
-    multifrontal: multifrontal::Workspace,
+struct Task<'a> {
+    threads: NonZeroUsize,
+    domain: &'a Domain,
+    cancellation: &'a Cancellation,
 }
 
 /// The levels of one precision, and the map they were set up for.
 #[derive(Debug)]
-struct Prepared<R> {
+pub(super) struct Prepared<R> {
     levels: Option<Multigrid<R>>,
     width: usize,
     blocked: Vec<bool>,
@@ -83,22 +74,23 @@ impl<R> Default for Prepared<R> {
     }
 }
 
-impl Full {
-    /// See [`Solver::solve_observed`](super::Solver::solve_observed).
-    pub(super) fn solve(
+impl Solver {
+    /// A solve that starts from the field `near` of a similar map, where there is one.
+    pub(super) fn run(
         &mut self,
-        task: Task<'_>,
+        domain: &Domain,
+        near: Option<&Field>,
+        cancellation: &Cancellation,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
-        let Task {
-            settings,
+        let threads = self.settings.threads;
+        let task = Task {
+            threads,
             domain,
             cancellation,
-            near,
-            ..
-        } = task;
+        };
         cancellation.check()?;
-        let budget = Budget::of(domain, settings.memory_limit);
+        let budget = Budget::of(domain, self.settings.memory_limit);
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
             let solved = match method {
@@ -114,7 +106,7 @@ impl Full {
             if let Some((store, check)) = solved
                 && check.holds()
             {
-                return Ok(field(domain, store, &check, method));
+                return Ok(Field::new(domain, store, &check, method));
             }
         }
         let mut plan = plan(domain, &budget, cancellation)?;
@@ -126,7 +118,7 @@ impl Full {
                 Method::MultigridBands => {
                     let store = multigrid_bands::solve(domain, cancellation)?;
                     observe(Phase::Solved);
-                    let check = verification::check(domain, &store, settings.threads);
+                    let check = verification::check(domain, &store, threads);
                     observe(Phase::Verified);
                     (store, check)
                 }
@@ -148,19 +140,19 @@ impl Full {
                         cancellation,
                     )?;
                     observe(Phase::Solved);
-                    let mut check = verification::check(domain, &store, settings.threads);
+                    let mut check = verification::check(domain, &store, threads);
                     observe(Phase::Verified);
                     if !check.holds() {
                         multifrontal::relax(domain, &pass, &mut store);
                         observe(Phase::Solved);
-                        check = verification::check(domain, &store, settings.threads);
+                        check = verification::check(domain, &store, threads);
                         observe(Phase::Verified);
                     }
                     (store, check)
                 }
             };
             if check.holds() {
-                return Ok(field(domain, store, &check, method));
+                return Ok(Field::new(domain, store, &check, method));
             }
             failed = check;
         }
@@ -169,18 +161,6 @@ impl Full {
             local_maxima: failed.local_maxima + failed.unreached,
         })
     }
-}
-
-/// The field of `domain` that `method` computed and `check` found to hold.
-fn field(domain: &Domain, store: Store, check: &Check, method: Method) -> Field {
-    let verification = Verification {
-        worst_residual: check.worst_residual,
-        worst_tile: check.worst_tile,
-        method,
-        reachable: check.reachable,
-    };
-    let size = (domain.width(), domain.height());
-    Field::new(size, domain.target(), store, verification)
 }
 
 impl<R: Real> Prepared<R>
@@ -197,10 +177,9 @@ where
         observe: &mut dyn FnMut(Phase),
     ) -> Result<(Store, Check), SolveError> {
         let Task {
-            settings,
+            threads,
             domain,
             cancellation,
-            ..
         } = task;
         let levels = self.prepare(domain);
         observe(Phase::SetUp);
@@ -230,7 +209,7 @@ where
             levels.read(domain.target(), R::of(BLOCKED), &mut values);
             let store = Store::from(values);
             observe(Phase::Solved);
-            let check = verification::check(domain, &store, settings.threads);
+            let check = verification::check(domain, &store, threads);
             observe(Phase::Verified);
             // All settled and some unreached: u goes below what this precision holds.
             if check.holds() || (check.unreached > 0 && cycle >= REACHED) || last {

@@ -41,6 +41,25 @@ pub(super) struct Plan {
     pub multifrontal: Option<(BreadthFirst, Tree)>,
 }
 
+/// The methods by growing range of u.
+const METHODS: [Method; 4] = [
+    Method::MultigridSingle,
+    Method::MultigridDouble,
+    Method::MultigridBands,
+    Method::Multifrontal,
+];
+
+impl Plan {
+    /// Try the multigrid method `first`, then those after it.
+    fn multigrid(first: Method) -> Self {
+        let methods = METHODS.into_iter().skip_while(|&method| method != first);
+        Self {
+            methods: methods.collect(),
+            multifrontal: None,
+        }
+    }
+}
+
 /// The plan for `domain`; the multifrontal factorisation is in it only as the last resort where `budget` refuses it.
 ///
 /// # Errors
@@ -50,7 +69,7 @@ pub(super) fn plan(
     budget: &Budget,
     cancellation: &Cancellation,
 ) -> Result<Plan, SolveError> {
-    use Method::{Multifrontal, MultigridBands, MultigridDouble, MultigridSingle};
+    use Method::{MultigridBands, MultigridDouble, MultigridSingle};
     let width = mean_width(domain);
     // Screening makes u fall by this much a cell on its own: cosh(1 / L) = 1 + 2 k.
     let screened = (1.0 + 2.0 * domain.screening().least()).acosh() / std::f64::consts::LN_10;
@@ -62,22 +81,11 @@ pub(super) fn plan(
             ..DOUBLE_DECADES => MultigridDouble,
             _ => MultigridBands,
         };
-        return Ok(Plan {
-            methods: costlier(first, &[MultigridDouble, MultigridBands, Multifrontal]),
-            multifrontal: None,
-        });
+        return Ok(Plan::multigrid(first));
     }
     let pass = match BreadthFirst::from_target(domain, budget, cancellation) {
         // The length of the ways is then not known: from single precision up, whatever holds.
-        Err(SolveError::TooCostly { .. }) => {
-            return Ok(Plan {
-                methods: costlier(
-                    MultigridSingle,
-                    &[MultigridDouble, MultigridBands, Multifrontal],
-                ),
-                multifrontal: None,
-            });
-        }
+        Err(SolveError::TooCostly { .. }) => return Ok(Plan::multigrid(MultigridSingle)),
         pass => pass?,
     };
     let cells = pass.len() as f64;
@@ -91,45 +99,26 @@ pub(super) fn plan(
         ..TWICE_DOUBLE_DECADES => (MultigridDouble, DOUBLE_CYCLE_PER_CELL),
         _ => (MultigridBands, DOUBLE_CYCLE_PER_CELL),
     };
-    let multigrid = costlier(method, &[MultigridDouble, MultigridBands, Multifrontal]);
+    let multigrid = Plan::multigrid(method);
     let cost = domain.blocked().len() as f64 * (SET_UP_PER_CELL + per_cycle * cycles(decades));
     // The factorisation costs more than this on any map: no need to build its tree.
     if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
-        return Ok(Plan {
-            methods: multigrid,
-            multifrontal: None,
-        });
+        return Ok(multigrid);
     }
     let tree = match Tree::of(&pass, budget, cancellation) {
-        Err(SolveError::TooCostly { .. }) => {
-            return Ok(Plan {
-                methods: multigrid,
-                multifrontal: None,
-            });
-        }
+        Err(SolveError::TooCostly { .. }) => return Ok(multigrid),
         tree => tree?,
     };
     let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
     let methods = if exact <= cost {
-        vec![Multifrontal]
+        vec![Method::Multifrontal]
     } else {
-        multigrid
+        multigrid.methods
     };
     Ok(Plan {
         methods,
         multifrontal: Some((pass, tree)),
     })
-}
-
-/// The method `first` and those of `rest` that come after it.
-fn costlier(first: Method, rest: &[Method]) -> Vec<Method> {
-    let after = rest
-        .iter()
-        .position(|&method| method == first)
-        .map_or(0, |at| at + 1);
-    std::iter::once(first)
-        .chain(rest[after..].iter().copied())
-        .collect()
 }
 
 /// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.

@@ -10,7 +10,7 @@ use crate::error::SolveError;
 use crate::field::Field;
 use crate::method::Method;
 use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
-use crate::verification::{self, Verification};
+use crate::verification;
 
 /// The field of `domain` by multifrontal factorisation: exact but for the rounding of `f64`, on maps of any shape.
 ///
@@ -26,14 +26,7 @@ pub fn exact(domain: &Domain) -> Result<Field, SolveError> {
         multifrontal::solve(domain, &pass, &tree, &budget, &mut workspace, &cancellation)?;
     multifrontal::relax(domain, &pass, &mut store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
-    let verification = Verification {
-        worst_residual: check.worst_residual,
-        worst_tile: check.worst_tile,
-        method: Method::Multifrontal,
-        reachable: check.reachable,
-    };
-    let size = (domain.width(), domain.height());
-    Ok(Field::new(size, domain.target(), store, verification))
+    Ok(Field::new(domain, store, &check, Method::Multifrontal))
 }
 
 /// Angles between the directions of two fields of one map, degrees, over the cells that can reach the target.
@@ -47,13 +40,11 @@ pub struct Angles {
     pub max: f64,
     /// The largest away from saddle points: of the cells where u changes by at least [`CLEAR`] of itself from one cell to the next.
     pub clear_max: f64,
-    /// Share of the directions off by more than ten degrees.
-    pub over_10: f64,
 }
 
 /// From this relative change of u a cell on the direction is clear: nearer to a saddle point, a change of u by a
 /// thousandth turns it by degrees, in any solution.
-pub const CLEAR: f64 = 2e-3;
+const CLEAR: f64 = 2e-3;
 
 impl Angles {
     /// The angles between `field` and `right`, of the cells `counted` holds for.
@@ -78,13 +69,11 @@ impl Angles {
             return Self::default();
         };
         let at = |share: f64| angles[((angles.len() - 1) as f64 * share) as usize];
-        let over_10 = angles.iter().filter(|&&off| off > 10.0).count();
         Self {
             p50: at(0.5),
             p99: at(0.99),
             max,
             clear_max,
-            over_10: over_10 as f64 / angles.len() as f64,
         }
     }
 }

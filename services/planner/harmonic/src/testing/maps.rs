@@ -15,32 +15,20 @@ pub enum Kind {
     /// Eight by eight rooms joined by doors.
     Office,
     /// A spanning tree of corridors of this width, a twentieth of the walls opened again.
-    Maze {
-        /// Corridor width, cells.
-        corridor: usize,
-    },
+    Maze { corridor: usize },
     /// One corridor of this width, folded over the whole map.
-    Serpentine {
-        /// Corridor width, cells.
-        corridor: usize,
-    },
+    Serpentine { corridor: usize },
     /// A U-shaped wall that opens away from the target.
     Trap,
     /// Every cell blocked with this chance: islands, pockets, diagonal leaks.
-    Noise {
-        /// Chance of a cell to be blocked.
-        density: f64,
-    },
+    Noise { density: f64 },
 }
 
 /// A map under construction: blocked cells and a target.
 #[derive(Clone, Debug)]
 pub struct Map {
-    /// Columns.
     pub width: usize,
-    /// Rows.
     pub height: usize,
-    /// Row-major mask.
     pub blocked: Vec<bool>,
     /// A free cell.
     pub target: Cell,

@@ -8,9 +8,7 @@ use crate::scaled::Scaled;
 
 /// u of every cell to about 1e-12, relatively.
 pub struct Reference {
-    width: usize,
-    height: usize,
-    target: Cell,
+    domain: Domain,
     u: Vec<Scaled>,
     /// Largest relative residual of any cell with u > 0.
     pub worst_residual: f64,
@@ -19,8 +17,8 @@ pub struct Reference {
 impl Reference {
     /// Solves `domain`. Takes width^3 * height operations and width^2 * height numbers: for small or narrow maps.
     pub fn solve(domain: &Domain) -> Self {
-        let (width, height) = (domain.width(), domain.height());
-        let cells = width * height;
+        let width = domain.width();
+        let cells = domain.blocked().len();
         let target = domain.target().row * width + domain.target().col;
         let free = |i: usize| !domain.blocked()[i];
         // Row i keeps its couplings (positive, i.e. minus the entry) to i + 1 ..= i + width, and its diagonal.
@@ -29,9 +27,7 @@ impl Reference {
         let mut right = vec![Scaled::ZERO; cells];
         for i in (0..cells).filter(|&i| free(i) && i != target) {
             diagonal[i] = 4.0 * (1.0 + domain.screening_coefficient(i));
-            let (col, row) = (i % width, i / width);
-            let east = (col + 1 < width).then_some(i + 1);
-            let south = (row + 1 < height).then_some(i + width);
+            let [_, east, _, south] = domain.neighbours(i);
             for next in [east, south]
                 .into_iter()
                 .flatten()
@@ -39,7 +35,7 @@ impl Reference {
             {
                 coupling[i * width + (next - i - 1)] += 1.0;
             }
-            if neighbours(i, width, height).contains(&Some(target)) {
+            if domain.neighbours(i).contains(&Some(target)) {
                 right[i] = Scaled::ONE;
             }
         }
@@ -76,28 +72,25 @@ impl Reference {
             };
         }
         let mut reference = Self {
-            width,
-            height,
-            target: domain.target(),
+            domain: domain.clone(),
             u,
             worst_residual: f64::INFINITY,
         };
         for _ in 0..4 {
-            reference.worst_residual = reference.polish(domain);
+            reference.worst_residual = reference.polish();
         }
         reference
     }
 
     /// u of a cell of the map.
     pub fn u(&self, cell: Cell) -> Scaled {
-        self.u[cell.row * self.width + cell.col]
+        self.u[self.domain.index(cell)]
     }
 
     /// Central difference of u in units of the largest u around, and that largest; `None` where u is zero.
     pub fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
-        let i = cell.row * self.width + cell.col;
-        let [west, east, north, south] =
-            neighbours(i, self.width, self.height).map(|n| n.map_or(Scaled::ZERO, |n| self.u[n]));
+        let i = self.domain.index(cell);
+        let [west, east, north, south] = self.around(i);
         let largest = [west, east, north, south, self.u[i]]
             .into_iter()
             .fold(Scaled::ZERO, |a, b| if b > a { b } else { a });
@@ -116,8 +109,10 @@ impl Reference {
     pub fn compare(&self, field: &Field) -> (f64, f64) {
         let (mut off, mut seen, mut worst) = (0, 0, 0.0_f64);
         for index in 0..self.u.len() {
-            let cell = Cell::new(index % self.width, index / self.width);
-            let Some(gradient) = self.gradient(cell).filter(|_| cell != self.target) else {
+            let width = self.domain.width();
+            let cell = Cell::new(index % width, index / width);
+            let gradient = self.gradient(cell);
+            let Some(gradient) = gradient.filter(|_| cell != self.domain.target()) else {
                 continue;
             };
             let error = match field.direction(cell) {
@@ -133,14 +128,15 @@ impl Reference {
         (off as f64 / f64::from(seen.max(1)), worst)
     }
 
-    /// The size of the map.
-    pub fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
+    /// u of the neighbours of a cell: west, east, north, south.
+    fn around(&self, index: usize) -> [Scaled; 4] {
+        let around = self.domain.neighbours(index);
+        around.map(|there| there.map_or(Scaled::ZERO, |there| self.u[there]))
     }
 
     /// Two Gauss-Seidel passes; returns the largest relative change of the second.
-    fn polish(&mut self, domain: &Domain) -> f64 {
-        let target = self.target.row * self.width + self.target.col;
+    fn polish(&mut self) -> f64 {
+        let target = self.domain.index(self.domain.target());
         let mut worst = 0.0_f64;
         let order: Vec<usize> = (0..self.u.len()).collect();
         for (pass, order) in [order.clone(), order.into_iter().rev().collect()]
@@ -151,9 +147,8 @@ impl Reference {
                 if self.u[i].is_zero() || i == target {
                     continue;
                 }
-                let around = neighbours(i, self.width, self.height)
-                    .map(|n| n.map_or(Scaled::ZERO, |n| self.u[n]));
-                let mean = scale(sum(around), 0.25 / (1.0 + domain.screening_coefficient(i)));
+                let weight = 0.25 / (1.0 + self.domain.screening_coefficient(i));
+                let mean = scale(sum(self.around(i)), weight);
                 if pass == 1 {
                     let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
                     worst = worst.max((ratio - 1.0).abs());
@@ -203,16 +198,6 @@ pub fn follow(field: &Field) -> f64 {
         all += 1;
     }
     arrived as f64 / all.max(1) as f64
-}
-
-fn neighbours(i: usize, width: usize, height: usize) -> [Option<usize>; 4] {
-    let (col, row) = (i % width, i / width);
-    [
-        (col > 0).then(|| i - 1),
-        (col + 1 < width).then(|| i + 1),
-        (row > 0).then(|| i - width),
-        (row + 1 < height).then(|| i + width),
-    ]
 }
 
 fn scale(a: Scaled, factor: f64) -> Scaled {
