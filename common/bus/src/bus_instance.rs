@@ -109,11 +109,16 @@ impl BusInstance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::DirBuilderExt as _;
 
     #[test]
     fn the_bus_that_is_there_is_the_one_made_last() {
         let domain = Domain::of("instance".parse().unwrap());
-        fs::create_dir_all(domain.directory()).unwrap();
+        let mut own = fs::DirBuilder::new();
+        own.recursive(true)
+            .mode(0o700)
+            .create(domain.directory())
+            .unwrap();
         assert!(BusInstance::current(&domain).is_err());
         for _ in 0..2 {
             let made = BusInstance::new(&domain);

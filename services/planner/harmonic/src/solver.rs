@@ -1,19 +1,52 @@
-//! From a domain to its verified field.
-//!
-//! - [`plan`]: which method to try first.
-//! - [`full`]: one full solve: try, verify, fall back.
+//! From a domain to its verified field: the method that [`plan`] chooses, its check, and the costlier methods where the
+//! check fails.
 
-mod full;
 mod plan;
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 
 use crate::cancellation::Cancellation;
 use crate::domain::Domain;
 use crate::error::SolveError;
 use crate::field::Field;
-use crate::multifrontal::Workspace;
-use full::Prepared;
+use crate::method::Method;
+use crate::multifrontal::{self, BreadthFirst, Budget, Tree, Workspace};
+use crate::multigrid::Multigrid;
+use crate::multigrid_bands;
+use crate::real::Real;
+use crate::screening::Coefficients;
+use crate::store::{BLOCKED, Store};
+use crate::verification::{self, Check};
+use plan::plan;
+
+/// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
+/// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
+const TOLERANCE: f64 = 0.02;
+
+/// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count
+/// as unsettled.
+const FIRST_CHECK: usize = 3;
+
+/// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to
+/// judge by.
+const FIRST_CHECK_NEAR: usize = 2;
+
+/// Most cycles from the field of a similar map; then it is solved from scratch. Maps that need more are mostly those in which cells
+/// were cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
+const NEAR_CYCLES: usize = 20;
+
+/// Cycles after which a cell still at zero is one whose u is below what the precision holds.
+const REACHED: usize = 6;
+
+/// A cycle divides residuals by at least this.
+const PER_CYCLE: f64 = 3.0;
+/// Most cycles between a check that failed and the next.
+const BETWEEN_CHECKS: f64 = 4.0;
+
+/// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
+const SINGLE_CYCLES: usize = 60;
+const DOUBLE_CYCLES: usize = 450;
 
 /// How a solver may work; what full solves compute does not depend on it.
 #[derive(Clone, Debug)]
@@ -107,4 +140,219 @@ impl Solver {
     ) -> Result<Field, SolveError> {
         self.run(domain, None, cancellation, observe)
     }
+}
+
+/// The inputs of a solve by cycles of multigrid.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    threads: NonZeroUsize,
+    domain: &'a Domain,
+    cancellation: &'a Cancellation,
+}
+
+/// The levels of one precision, and the map they were set up for.
+#[derive(Debug)]
+pub(super) struct Prepared<R> {
+    levels: Option<Multigrid<R>>,
+    width: usize,
+    blocked: Vec<bool>,
+    screening: Coefficients,
+}
+
+impl<R> Default for Prepared<R> {
+    fn default() -> Self {
+        Self {
+            levels: None,
+            width: 0,
+            blocked: Vec::new(),
+            screening: Coefficients::NONE,
+        }
+    }
+}
+
+impl Solver {
+    /// A solve that starts from the field `near` of a similar map, where there is one.
+    pub(super) fn run(
+        &mut self,
+        domain: &Domain,
+        near: Option<&Field>,
+        cancellation: &Cancellation,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<Field, SolveError> {
+        let threads = self.settings.threads;
+        let task = Task {
+            threads,
+            domain,
+            cancellation,
+        };
+        cancellation.check()?;
+        let budget = Budget::of(domain, self.settings.memory_limit);
+        if let Some(near) = near.filter(|near| near.fits(domain)) {
+            let method = near.verification().method;
+            let solved = match method {
+                Method::MultigridSingle => {
+                    Some(self.single.solve(task, Some(near), NEAR_CYCLES, observe)?)
+                }
+                Method::MultigridDouble => {
+                    Some(self.double.solve(task, Some(near), NEAR_CYCLES, observe)?)
+                }
+                // The cost of these follows from the shape of the map alone.
+                Method::MultigridBands | Method::Multifrontal => None,
+            };
+            if let Some((store, check)) = solved
+                && check.holds()
+            {
+                return Ok(Field::new(domain, store, &check, method));
+            }
+        }
+        let mut plan = plan(domain, &budget, cancellation)?;
+        let mut failed = Check::default();
+        for method in plan.methods {
+            let (store, check) = match method {
+                Method::MultigridSingle => self.single.solve(task, None, SINGLE_CYCLES, observe)?,
+                Method::MultigridDouble => self.double.solve(task, None, DOUBLE_CYCLES, observe)?,
+                Method::MultigridBands => {
+                    let store = multigrid_bands::solve(domain, cancellation)?;
+                    observe(Phase::Solved);
+                    let check = verification::check(domain, &store, threads);
+                    observe(Phase::Verified);
+                    (store, check)
+                }
+                Method::Multifrontal => {
+                    let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
+                        planned
+                    } else {
+                        let pass = BreadthFirst::from_target(domain, &budget, cancellation)?;
+                        let tree = Tree::of(&pass, &budget, cancellation)?;
+                        (pass, tree)
+                    };
+                    observe(Phase::SetUp);
+                    let mut store = multifrontal::solve(
+                        domain,
+                        &pass,
+                        &tree,
+                        &budget,
+                        &mut self.multifrontal,
+                        cancellation,
+                    )?;
+                    observe(Phase::Solved);
+                    let mut check = verification::check(domain, &store, threads);
+                    observe(Phase::Verified);
+                    if !check.holds() {
+                        multifrontal::relax(domain, &pass, &mut store);
+                        observe(Phase::Solved);
+                        check = verification::check(domain, &store, threads);
+                        observe(Phase::Verified);
+                    }
+                    (store, check)
+                }
+            };
+            if check.holds() {
+                return Ok(Field::new(domain, store, &check, method));
+            }
+            failed = check;
+        }
+        Err(SolveError::Unverified {
+            worst_residual: failed.worst_residual,
+            local_maxima: failed.local_maxima + failed.unreached,
+        })
+    }
+}
+
+impl<R: Real> Prepared<R>
+where
+    Store: From<Vec<R>>,
+{
+    /// Cycles, from the field `near` where there is one, until every cell has converged and the check holds, or this is given up;
+    /// returns what there is then.
+    fn solve(
+        &mut self,
+        task: Task<'_>,
+        near: Option<&Field>,
+        most_cycles: usize,
+        observe: &mut dyn FnMut(Phase),
+    ) -> Result<(Store, Check), SolveError> {
+        let Task {
+            threads,
+            domain,
+            cancellation,
+        } = task;
+        let levels = self.prepare(domain);
+        observe(Phase::SetUp);
+        let mut next_check = FIRST_CHECK;
+        match near {
+            Some(near) => {
+                let width = domain.width();
+                levels.start_near(domain.target(), |row, guess| {
+                    let cells = row * width..(row + 1) * width;
+                    near.store().read_row_as(cells, -R::TOP, guess);
+                });
+                next_check = FIRST_CHECK_NEAR;
+            }
+            None => levels.start(domain.target()),
+        }
+        for cycle in 1.. {
+            cancellation.check()?;
+            let last = cycle == most_cycles;
+            let judged = (cycle >= next_check).then_some(TOLERANCE);
+            let settled = levels.cycle(judged).unsettled == 0 && judged.is_some();
+            observe(Phase::Cycled);
+            if !(last || settled) {
+                continue;
+            }
+            levels.finish();
+            let mut values = Vec::new();
+            levels.read(domain.target(), R::of(BLOCKED), &mut values);
+            let store = Store::from(values);
+            observe(Phase::Solved);
+            let check = verification::check(domain, &store, threads);
+            observe(Phase::Verified);
+            // All settled and some unreached: u goes below what this precision holds.
+            if check.holds() || (check.unreached > 0 && cycle >= REACHED) || last {
+                return Ok((store, check));
+            }
+            let cycles = check.excess().ln() / PER_CYCLE.ln();
+            next_check = cycle + cycles.clamp(1.0, BETWEEN_CHECKS) as usize;
+        }
+        Err(SolveError::Cancelled)
+    }
+
+    /// The levels for `domain`: new, patched where it changed, or as they are.
+    fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
+        let same_size =
+            self.width == domain.width() && self.blocked.len() == domain.blocked().len();
+        let changed = if same_size && self.levels.is_some() && self.screening == *domain.screening()
+        {
+            changed_rows(&self.blocked, domain)
+        } else {
+            Some(0..domain.height())
+        };
+        if !same_size {
+            self.levels = None;
+        }
+        let levels = self
+            .levels
+            .get_or_insert_with(|| Multigrid::new(domain.width(), domain.height()));
+        if let Some(rows) = changed {
+            levels.set_up_rows(domain, rows);
+            self.width = domain.width();
+            self.blocked.clear();
+            self.blocked.extend_from_slice(domain.blocked());
+            self.screening.clone_from(domain.screening());
+        }
+        levels
+    }
+}
+
+/// The rows between the first and the last in which the map differs from `before`.
+fn changed_rows(before: &[bool], domain: &Domain) -> Option<Range<usize>> {
+    let width = domain.width();
+    let mut differ = before
+        .chunks_exact(width)
+        .zip(domain.blocked().chunks_exact(width))
+        .enumerate()
+        .filter(|(_, (before, now))| before != now)
+        .map(|(row, _)| row);
+    let first = differ.next()?;
+    Some(first..differ.next_back().unwrap_or(first) + 1)
 }

@@ -1,5 +1,6 @@
 //! `firsthand table`, and the tables of topics and stages: Markdown, as the guide shows it.
 
+mod item;
 #[cfg(feature = "tools")]
 pub(crate) mod stored;
 
@@ -14,6 +15,7 @@ use common::{
 use supervisor::stages;
 use x80_link::failsafe::{self, monitor::Clears};
 
+use self::item::item;
 use crate::console::{failure::Failure, output::print_text};
 
 /// Print a table of the guide.
@@ -59,31 +61,6 @@ pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
         "faults" => Some(faults()),
         stored => stored::markdown(stored, section),
     }
-}
-
-/// Columns that a line of a list has, unless a code span alone is longer.
-const WIDTH: usize = 120;
-
-/// `text` as an item of a Markdown list. No line ends within a code span.
-fn item(text: &str) -> String {
-    let mut item = String::from("-");
-    let mut column = 1;
-    let mut rest = text;
-    while !rest.is_empty() {
-        let mut ends = rest.match_indices(' ').map(|(at, _)| at);
-        let outside_code = |at: &usize| rest[..*at].matches('`').count() % 2 == 0;
-        let word = &rest[..ends.find(outside_code).unwrap_or(rest.len())];
-        rest = rest[word.len()..].trim_start();
-        let width = word.chars().count();
-        if column + 1 + width > WIDTH {
-            item.push_str("\n ");
-            column = 1;
-        }
-        item.push(' ');
-        item.push_str(word);
-        column += 1 + width;
-    }
-    item + "\n"
 }
 
 /// The topics as a list in Markdown.

@@ -1,0 +1,169 @@
+//! The bytes of the bus against the middleware's own typed API.
+
+use std::{fs, os::unix::fs::DirBuilderExt as _};
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use super::*;
+use crate::{
+    AnyTopic, Bus, Logged, Rate, SliceTopic, Stamp, Stamped, Topic, bus_instance::BusInstance,
+    clock::MissionTime, domain::Domain, layouts,
+};
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.Test")]
+#[repr(C)]
+struct Test {
+    stamp: Stamp,
+    number: f64,
+    small: u32,
+    rest: u32,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("firsthand.TestCell")]
+#[repr(C)]
+struct Cell {
+    first: f32,
+    second: u32,
+    third: f32,
+}
+
+layouts! {
+    Test { stamp number small rest }
+    Cell { first second third }
+}
+
+impl Stamped for Test {
+    fn stamp(&self) -> &Stamp {
+        &self.stamp
+    }
+    fn stamp_mut(&mut self) -> &mut Stamp {
+        &mut self.stamp
+    }
+}
+
+const fn spec(name: &'static str) -> Spec {
+    Spec {
+        name,
+        writer: "test",
+        rate: Rate::EachTick,
+        logged: Logged::Yes,
+        limits: Limits::SMALL,
+        meaning: "",
+    }
+}
+
+static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
+static SLICES: SliceTopic<Test, Cell> = SliceTopic::new(&spec("slices"));
+static BYTES: SliceTopic<Test, u8> = SliceTopic::new(&spec("bytes"));
+
+/// A bus of these topics, removed at the end.
+fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
+    let domain = Domain::of(robot.parse().unwrap());
+    fs::DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(domain.directory())
+        .unwrap();
+    let table: [&dyn AnyTopic; 3] = [&STRUCTS, &SLICES, &BYTES];
+    let (bus, services) = Bus::make(&domain, robot, &table).unwrap();
+    test(&bus);
+    drop((services, bus));
+    fs::remove_dir_all(BusInstance::current(&domain).unwrap().root()).unwrap();
+    fs::remove_dir_all(domain.directory()).unwrap();
+}
+
+const TIME: MissionTime = MissionTime(7);
+
+#[test]
+fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() {
+    with_bus("ports-typed", |bus| {
+        let name = |name: &str| ServiceName::new(name).unwrap();
+        let structs = bus.node.service_builder(&name("structs"));
+        let structs = structs.publish_subscribe::<Test>().open().unwrap();
+        let typed = structs.subscriber_builder().create().unwrap();
+        let mut reader = bus.reader(&STRUCTS).unwrap();
+        let mut sent = Test {
+            number: 0.5,
+            rest: 9,
+            ..Test::default()
+        };
+        let mut writer = bus.writer(&STRUCTS, 3).unwrap();
+        writer.publish(5, TIME, sent).unwrap();
+        (sent.stamp.tick, sent.stamp.stamp_ns, sent.stamp.generation) = (5, 7, 3);
+        assert_eq!(*typed.receive().unwrap().unwrap(), sent);
+        assert_eq!(reader.take().unwrap(), Some(sent));
+        sent.small = 4;
+        let publisher = structs.publisher_builder().create().unwrap();
+        publisher.send_copy(sent).unwrap();
+        let (author, taken) = reader.take_with_author().unwrap().unwrap();
+        assert_eq!((author.process, taken), (std::process::id(), sent));
+
+        let slices = bus.node.service_builder(&name("slices"));
+        let slices = slices
+            .publish_subscribe::<[Cell]>()
+            .user_header::<Test>()
+            .open()
+            .unwrap();
+        let typed = slices.subscriber_builder().create().unwrap();
+        let mut reader = bus.slice_reader(&SLICES).unwrap();
+        let cells = [1.0, 2.0, 3.0].map(|first| Cell {
+            first,
+            second: 8,
+            third: -first,
+        });
+        let mut writer = bus.slice_writer(&SLICES, 3, 4).unwrap();
+        writer.publish(5, TIME, sent, cells.into_iter()).unwrap();
+        let sample = typed.receive().unwrap().unwrap();
+        assert_eq!(
+            (sample.payload(), sample.user_header().rest),
+            (&cells[..], 9)
+        );
+        let slice = reader.take().unwrap().unwrap();
+        assert_eq!((&*slice, slice.header().number), (&cells[..], 0.5));
+        let publisher = slices.publisher_builder().initial_max_slice_len(2);
+        let publisher = publisher.create().unwrap();
+        let mut loan = publisher.loan_slice_uninit(2).unwrap();
+        *loan.user_header_mut() = sent;
+        loan.write_from_slice(&cells[1..]).send().unwrap();
+        let slice = reader.take().unwrap().unwrap();
+        assert_eq!((&*slice, *slice.header()), (&cells[1..], sent));
+    });
+}
+
+#[test]
+fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
+    with_bus("ports-slices", |bus| {
+        let mut reader = bus.slice_reader(&BYTES).unwrap();
+        let mut writer = bus.slice_writer(&BYTES, 1, 3).unwrap();
+        for sent in [&[][..], &[1], &[1, 2, 3]] {
+            writer
+                .publish_slice_quietly(1, TIME, Test::default(), sent)
+                .unwrap();
+            assert_eq!(&*reader.take().unwrap().unwrap(), sent);
+        }
+        let long = [0; 4];
+        let refused = writer.publish_slice_quietly(1, TIME, Test::default(), &long);
+        assert!(matches!(
+            refused,
+            Err(BusError::Refused { topic: "bytes", .. })
+        ));
+    });
+}
+
+#[test]
+fn a_topic_is_not_opened_as_another_payload_or_another_shape() {
+    with_bus("ports-foreign", |bus| {
+        let as_cells = SliceTopic::<Test, Cell>::new(BYTES.spec());
+        let as_slices = SliceTopic::<Test, Test>::new(STRUCTS.spec());
+        let as_structs = Topic::<Test>::new(SLICES.spec());
+        for error in [
+            bus.slice_reader(&as_cells).unwrap_err(),
+            bus.slice_reader(&as_slices).unwrap_err(),
+            bus.reader(&as_structs).unwrap_err(),
+        ] {
+            assert!(matches!(error, BusError::Incompatible { .. }), "{error}");
+        }
+    });
+}
