@@ -14,7 +14,7 @@
 pub use bus::{Stamp, Stamped};
 
 /// Payloads of topics, each a name for other languages and its fields. They are `repr(C)`, begin with a
-/// [`Stamp`](crate::bus::Stamp), and need nothing else to be written, read, shown and recorded; `ZeroCopySend` must be in scope.
+/// [`Stamp`], and need nothing else to be written, read, shown and recorded; `ZeroCopySend` must be in scope.
 #[macro_export]
 macro_rules! payloads {
     ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)* })*) => {$(

@@ -113,7 +113,8 @@ static NOT_RUN: AtomicUsize = AtomicUsize::new(0);
 /// Say that `test` did not run, and count it. It is written past the harness, which prints nothing of a test that passes.
 pub fn not_run(test: &str, why: &str) {
     let count = NOT_RUN.fetch_add(1, Ordering::Relaxed) + 1;
-    writeln!(std::io::stderr(), "\nNOT RUN ({count}): {test}: {why}").unwrap();
+    let said = format!("\nNOT RUN ({count}): {test}: {why}\n");
+    std::io::stderr().write_all(said.as_bytes()).unwrap();
 }
 
 /// The name of the test that a closure of type `T` is in: CRATE::MODULE::TEST::{{closure}}.

@@ -1,4 +1,4 @@
-//! From a domain to its verified field: the method that [`plan`] chooses, its check, and the costlier methods where the
+//! From a domain to its verified field: the method that [`plan()`] chooses, its check, and the costlier methods where the
 //! check fails.
 
 mod plan;

@@ -54,7 +54,7 @@ fn at(x_m: f64, y_m: f64) -> PoseSample {
 }
 
 /// The result of a job.
-fn solve(job: Job) -> Solved {
+fn solve(job: &Job) -> Solved {
     let field = Solver::default().solve(&job.domain, &Cancellation::default());
     Solved {
         number: job.number,
@@ -319,7 +319,7 @@ impl LargeRoom {
     /// The background solver runs the job that is due.
     fn solve(&mut self) {
         let job = self.planner.begin_job().unwrap();
-        assert_eq!(self.planner.swap_in(solve(job)).unwrap(), Work::SwappedIn);
+        assert_eq!(self.planner.swap_in(solve(&job)).unwrap(), Work::SwappedIn);
     }
 
     fn status_at(&self, x: f64, y: f64) -> GuidanceStatus {
@@ -363,7 +363,7 @@ fn on_a_large_map_a_robot_goes_on_where_nothing_changed_on_its_way_ahead() {
 fn a_result_that_no_field_waits_for_changes_nothing() {
     let mut room = LargeRoom::new();
     room.close_near_gap();
-    let mut solved = solve(room.planner.begin_job().unwrap());
+    let mut solved = solve(&room.planner.begin_job().unwrap());
     solved.number += 1;
     assert_eq!(room.planner.swap_in(solved).unwrap(), Work::None);
     assert_eq!(room.status_at(0.6, 0.0), GuidanceStatus::Waiting);
@@ -378,7 +378,7 @@ fn a_change_while_a_job_runs_is_in_the_field_of_the_job_after() {
     room.block_post(0.4, 0.6);
     let version = |room: &LargeRoom| room.planner.snapshot().unwrap().header.grid_version;
     assert_eq!(version(&room), 1);
-    room.planner.swap_in(solve(first)).unwrap();
+    room.planner.swap_in(solve(&first)).unwrap();
     assert_eq!(version(&room), 2);
     assert_eq!(room.status_at(0.4, 0.4), GuidanceStatus::Waiting);
     room.solve();

@@ -169,14 +169,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_item_is_wrapped_and_its_code_spans_are_whole() {
-        let text = format!("{} `a b` c", "word ".repeat(23).trim_end());
-        let wrapped = item(&text);
-        assert!(wrapped.ends_with("\n  `a b` c\n"), "{wrapped}");
-        assert!(wrapped.lines().all(|line| line.len() <= WIDTH));
-    }
-
-    #[test]
     fn every_fault_is_of_a_stage_that_exists() {
         let its = faults::TABLE.iter().filter_map(|fault| fault.stage);
         for stage in its {

@@ -253,20 +253,17 @@ fn table(mut rows: Vec<Vec<String>>, width: usize) -> String {
         let cells = row.iter().zip(&widths);
         let cells: Vec<_> = cells.map(|(cell, &width)| wrapped(cell, width)).collect();
         let height = cells.iter().map(Vec::len).max().unwrap_or_default();
-        let blanks: Vec<Vec<usize>> = cells
-            .iter()
-            .zip(&widths)
-            .map(|(cell, width)| cell.iter().map(|line| width - width_of(line)).collect())
-            .collect();
-        let cells: Vec<_> = cells.iter().map(|cell| styled(cell)).collect();
-        for line in 0..height {
+        // Each line of a cell as it is shown, and the blanks after it.
+        let cells = cells.iter().zip(&widths).map(|(cell, width)| {
+            let blanks = cell.iter().map(|line| width - width_of(line));
+            styled(cell).into_iter().zip(blanks.collect::<Vec<_>>())
+        });
+        let mut cells: Vec<_> = cells.collect();
+        for _ in 0..height {
             let mut shown = String::new();
-            for (column, cell) in cells.iter().enumerate() {
-                let (part, blank) = match cell.get(line) {
-                    Some(part) => (part.as_str(), blanks[column][line]),
-                    None => ("", widths[column]),
-                };
-                shown += part;
+            for (cell, width) in cells.iter_mut().zip(&widths) {
+                let (part, blank) = cell.next().unwrap_or((String::new(), *width));
+                shown += &part;
                 shown += &" ".repeat(blank + GAP);
             }
             text += shown.trim_end();

@@ -201,10 +201,10 @@ fn a_command_line_with_an_option_or_key_that_does_not_exist_is_found() {
 #[test]
 fn every_old_name_leads_to_a_subcommand_that_exists() {
     for (old, new) in renamed::RENAMED {
-        let words = new.iter().filter(|word| !word.starts_with('-'));
+        let mut words = new.iter().filter(|word| !word.starts_with('-'));
         let mut whole = commands::command_line();
-        let found = words.fold(Some(&mut whole), |command, word| {
-            command.and_then(|command| command.find_subcommand_mut(word))
+        let found = words.try_fold(&mut whole, |command, word| {
+            command.find_subcommand_mut(word)
         });
         assert!(found.is_some(), "{old}");
     }

@@ -35,9 +35,13 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     Ok((stage.run)(&start)?)
 }
 
-/// What the process of the baseline `name` does in the place of the planner.
+/// The function that runs a stage's process until it is asked to stop.
 #[cfg(feature = "baselines")]
-fn baseline(name: &str) -> Option<fn(&Start) -> Result<(), StageError>> {
+type RunStage = fn(&Start) -> Result<(), StageError>;
+
+/// The process of the baseline `name`, which takes the place of the planner.
+#[cfg(feature = "baselines")]
+fn baseline(name: &str) -> Option<RunStage> {
     match name {
         "wavefront" => Some(run_stage::<Shell<Wavefront>>),
         "bug" => Some(run_stage::<Shell<Bug>>),

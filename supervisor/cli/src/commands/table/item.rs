@@ -10,7 +10,7 @@ pub(super) fn item(text: &str) -> String {
     let mut rest = text;
     while !rest.is_empty() {
         let mut ends = rest.match_indices(' ').map(|(at, _)| at);
-        let outside_code = |at: &usize| rest[..*at].matches('`').count() % 2 == 0;
+        let outside_code = |at: &usize| rest[..*at].matches('`').count().is_multiple_of(2);
         let word = &rest[..ends.find(outside_code).unwrap_or(rest.len())];
         rest = rest[word.len()..].trim_start();
         let width = word.chars().count();
@@ -23,4 +23,17 @@ pub(super) fn item(text: &str) -> String {
         column += 1 + width;
     }
     item + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_item_is_wrapped_and_its_code_spans_are_whole() {
+        let text = format!("{} `a b` c", "word ".repeat(23).trim_end());
+        let wrapped = item(&text);
+        assert!(wrapped.ends_with("\n  `a b` c\n"), "{wrapped}");
+        assert!(wrapped.lines().all(|line| line.len() <= WIDTH));
+    }
 }
