@@ -49,9 +49,7 @@ fn half_make_connection(bus: &BusInstance, port: u128) {
     let made = shared(bus, ".connection");
     // Prefix and hash of the type: up to the first port's number.
     let start = made[0].rsplitn(3, '_').last().unwrap();
-    half_make(Path::new(&format!(
-        "/dev/shm/{start}_{port}_{port}.connection"
-    )));
+    half_make(Path::new(&format!("/dev/shm/{start}_{port}_{port}.connection")));
 }
 
 /// The mission is finished as if nothing had happened, and leaves nothing.

@@ -33,13 +33,7 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("results");
     let arguments = ["chaos", "open-room", "--kills", "12", "--include-startup"];
-    let robot = [
-        "--robot",
-        "chd-rows",
-        "--json",
-        "--out",
-        out.to_str().unwrap(),
-    ];
+    let robot = ["--robot", "chd-rows", "--json", "--out", out.to_str().unwrap()];
     let ended = output(&[&arguments[..], &robot, &SLOW].concat());
     let report: Value =
         serde_json::from_slice(&ended.stdout).unwrap_or_else(|_| panic!("{ended:?}"));
@@ -58,15 +52,11 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
     }
     let column = |name| header.iter().position(|it| *it == name).unwrap();
     let measured = |name| {
-        let cells = rows
-            .iter()
-            .filter_map(|row| row[column(name)].parse::<f64>().ok());
+        let cells = rows.iter().filter_map(|row| row[column(name)].parse::<f64>().ok());
         cells.count()
     };
     // Only a signal from before the first pose has no mission time.
-    let timed = rows
-        .iter()
-        .skip_while(|row| row[column("time_s")].is_empty());
+    let timed = rows.iter().skip_while(|row| row[column("time_s")].is_empty());
     assert_eq!(timed.count(), measured("time_s"), "{table}");
     assert!(measured("time_s") >= rows.len() / 2, "{table}");
     for name in ["noticed_ms", "ready_ms", "first_output_ms"] {
@@ -77,18 +67,8 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
 
 #[test]
 fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_nothing() {
-    let given = format!(
-        "'{}' echo pose --robot chd-hit",
-        env!("CARGO_BIN_EXE_firsthand")
-    );
-    let arguments = [
-        "chaos",
-        "open-room",
-        "--kills",
-        "30",
-        "--include-consumers",
-        "--replay",
-    ];
+    let given = format!("'{}' echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
+    let arguments = ["chaos", "open-room", "--kills", "30", "--include-consumers", "--replay"];
     let robot = ["--robot", "chd-hit", "--json", "--consumer", &given];
     let ended = output(&[&arguments[..], &robot, &SLOW].concat());
     let report: Value =
@@ -100,10 +80,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     for name in ["record", "logs -f", &given] {
         let counts = &consumers[name];
         // It was started again after each kill.
-        assert!(
-            number(&counts["started"]) > number(&counts["killed"]),
-            "{name}: {report}"
-        );
+        assert!(number(&counts["started"]) > number(&counts["killed"]), "{name}: {report}");
     }
     let hit = |counts: &Value| number(&counts["killed"]) + number(&counts["frozen"]);
     let hits: u64 = consumers.as_object().unwrap().values().map(hit).sum();
@@ -120,10 +97,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
 #[test]
 fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let directory = tempfile::tempdir().unwrap();
-    let given = format!(
-        "'{}' echo pose --robot chd-cut",
-        env!("CARGO_BIN_EXE_firsthand")
-    );
+    let given = format!("'{}' echo pose --robot chd-cut", env!("CARGO_BIN_EXE_firsthand"));
     let mut chaos = firsthand(&["chaos", "obstacle-course", "--robot", "chd-cut", "--out"])
         .arg(directory.path())
         .args(["--consumer", &given])
@@ -144,10 +118,7 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     chaos.wait().unwrap();
     let table = rows();
     let columns = |row: &str| row.matches(',').count();
-    assert!(
-        table.ends_with('\n') && table.lines().all(|row| columns(row) == 10),
-        "{table}"
-    );
+    assert!(table.ends_with('\n') && table.lines().all(|row| columns(row) == 10), "{table}");
     let left = std::env::temp_dir().join(format!("firsthand-chaos-{}", chaos.id()));
     let marks = ["chd-cut", left.to_str().unwrap()];
     let began = Instant::now();

@@ -27,11 +27,8 @@ struct Reading {
 
 impl Reading {
     fn start(arguments: &[&str]) -> Self {
-        let mut child = firsthand(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child =
+            firsthand(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap());
         let said = BufReader::new(child.stderr.take().unwrap());
         Self { child, lines, said }
@@ -50,11 +47,7 @@ impl Reading {
 
     /// Close the pipe; how the command ended by that, and what it said.
     fn close(self) -> (Option<i32>, String) {
-        let Self {
-            mut child,
-            lines,
-            mut said,
-        } = self;
+        let Self { mut child, lines, mut said } = self;
         drop(lines);
         let mut rest = String::new();
         said.read_to_string(&mut rest).unwrap();
@@ -87,10 +80,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             pose["stamp"]["tick"].as_u64().unwrap()
         })
         .collect();
-    assert!(
-        ticks.windows(2).all(|pair| pair[1] == pair[0] + 1),
-        "{ticks:?}"
-    );
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "{ticks:?}");
     for topic in topics::TABLE {
         let name = topic.spec().name;
         // These come when something happens; that of lockstep is not this run's.
@@ -98,10 +88,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             continue;
         }
         let text = printed(&["echo", name, "--robot", robot, "-n", "1"]);
-        assert!(
-            text.starts_with("stamp:\n  tick: ") && text.ends_with("---\n"),
-            "{text}"
-        );
+        assert!(text.starts_with("stamp:\n  tick: ") && text.ends_with("---\n"), "{text}");
         let (header, element) = topic.layout();
         let Kind::Struct(header) = header else {
             panic!("{name}");
@@ -116,10 +103,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     }
     let roster = printed(&["echo", "roster", "--robot", robot, "-n", "1"]);
     for stage in STAGES {
-        assert!(
-            roster.contains(&format!("- {{stage: {stage:?}, pid: ")),
-            "{roster}"
-        );
+        assert!(roster.contains(&format!("- {{stage: {stage:?}, pid: ")), "{roster}");
     }
     let unknown = ["echo", "poses", "--robot", robot];
     refused(&unknown, "unknown-topic", &["poses", "pose, grid"]);
@@ -145,11 +129,7 @@ fn echo_follows_its_robot_from_run_to_run_and_ends_on_a_signal() {
     let (code, said) = echo.close();
     assert_eq!(code, Some(0));
     // Once, when the first run ended.
-    assert_eq!(
-        said.lines().filter(|line| line.contains(robot)).count(),
-        1,
-        "{said}"
-    );
+    assert_eq!(said.lines().filter(|line| line.contains(robot)).count(), 1, "{said}");
     second.arrives();
 }
 
@@ -179,10 +159,7 @@ fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
         &["echo", "pose", "-n", "1", "--robot", robot],
     ] {
         let (code, said) = Reading::start(command).close();
-        assert!(
-            code == Some(0) && !said.contains("panic"),
-            "{command:?}: {said}"
-        );
+        assert!(code == Some(0) && !said.contains("panic"), "{command:?}: {said}");
     }
     run.stop();
 }
@@ -193,38 +170,19 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
     let mut run = Run::start(robot, "obstacle-course", &["--pace", "1"]);
     run.wait_until_under_way(0.5);
     let lines = printed(&["hz", "--robot", robot, "--json", "-n", "2"]);
-    let reports: Vec<Value> = lines
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
-    let names: Vec<_> = reports
-        .iter()
-        .map(|report| report["topic"].as_str().unwrap())
-        .collect();
-    let table: Vec<_> = topics::TABLE
-        .iter()
-        .map(|topic| topic.spec().name)
-        .collect();
+    let reports: Vec<Value> =
+        lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<_> = reports.iter().map(|report| report["topic"].as_str().unwrap()).collect();
+    let table: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();
     assert_eq!(names, [&table[..], &table].concat());
     let second = |topic: &str| {
-        reports[table.len()..]
-            .iter()
-            .find(|report| report["topic"] == topic)
-            .unwrap()
+        reports[table.len()..].iter().find(|report| report["topic"] == topic).unwrap()
     };
     // 7 ticks a second.
     let rate = second("pose")["rate_hz"].as_f64().unwrap();
     assert!((0.5..=20.0).contains(&rate), "{}", second("pose"));
-    assert!(
-        second("pose")["missing_ticks"].is_u64(),
-        "{}",
-        second("pose")
-    );
-    assert!(
-        second("health")["rate_hz"].as_f64() > Some(5.0),
-        "{}",
-        second("health")
-    );
+    assert!(second("pose")["missing_ticks"].is_u64(), "{}", second("pose"));
+    assert!(second("health")["rate_hz"].as_f64() > Some(5.0), "{}", second("health"));
     assert!(second("stalls")["age_s"].is_null(), "{}", second("stalls"));
     let text = printed(&["hz", "pose", "--robot", robot, "-n", "1"]);
     assert!(
@@ -246,22 +204,16 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
 fn list_shows_the_robots_that_run_and_where() {
     let [one, two] = ["con-list-1", "con-list-2"];
     let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &["--pace", "1"]));
-    runs.iter_mut()
-        .for_each(|run| drop(run.wait_until_under_way(0.5)));
+    runs.iter_mut().for_each(|run| drop(run.wait_until_under_way(0.5)));
     let listed = |robot: &str| {
         let lines = printed(&["list", "--json"]);
-        let mut robots = lines
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let mut robots = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
         robots.find(|it| it["robot"] == robot)
     };
     for run in &runs {
         let robot = listed(&run.robot).unwrap();
         assert_eq!(robot["supervisor_pid"], run.pid(), "{robot}");
-        assert_eq!(
-            (&robot["state"], &robot["simulated"]),
-            (&"driving".into(), &true.into())
-        );
+        assert_eq!((&robot["state"], &robot["simulated"]), (&"driving".into(), &true.into()));
         let directory = fs::canonicalize(run.directory()).unwrap();
         assert_eq!(robot["run"], directory.to_str().unwrap(), "{robot}");
         assert!(robot["mission_time_s"].as_f64() > Some(0.4), "{robot}");
@@ -300,22 +252,14 @@ fn runs_are_listed_with_their_outcomes_and_pruned() {
     wait_for_status(robot, |status| status["order"] == "driving");
     let list = |arguments: &[&str]| -> Vec<(String, String)> {
         let lines = printed(&[&["runs", "--runs", below, "--json"], arguments].concat());
-        let runs = lines
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let runs = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
         let of = |run: Value| {
             assert!(
                 run["size_bytes"].as_u64() > Some(10_000) && run["mission"] == "open-room",
                 "{run}"
             );
-            let name = Path::new(run["run"].as_str().unwrap())
-                .file_name()
-                .unwrap()
-                .to_owned();
-            (
-                name.into_string().unwrap(),
-                run["outcome"].as_str().unwrap().to_owned(),
-            )
+            let name = Path::new(run["run"].as_str().unwrap()).file_name().unwrap().to_owned();
+            (name.into_string().unwrap(), run["outcome"].as_str().unwrap().to_owned())
         };
         runs.map(of).collect()
     };
@@ -328,15 +272,8 @@ fn runs_are_listed_with_their_outcomes_and_pruned() {
     assert_eq!(list(&[]), all);
     assert_eq!(list(&["--robot", "con-other"]), []);
     let table = printed(&["runs", "--runs", below]);
-    assert!(
-        table.contains("3 runs, ") && table.contains(" reached "),
-        "{table}"
-    );
-    assert_eq!(
-        list(&["--prune", "0"]),
-        all[2..],
-        "what goes on is not removed"
-    );
+    assert!(table.contains("3 runs, ") && table.contains(" reached "), "{table}");
+    assert_eq!(list(&["--prune", "0"]), all[2..], "what goes on is not removed");
     goes_on.kill().unwrap();
     goes_on.wait().unwrap();
     assert_eq!(list(&[]), [run("open-room-003", "cut off")]);
@@ -361,10 +298,7 @@ fn logs_of_all_processes_come_merged_by_time_and_are_followed_into_the_next_run(
     assert_eq!(follow.close().0, Some(0));
 
     let all = printed(&["logs", "--run", directory.to_str().unwrap()]);
-    let words: Vec<Vec<_>> = all
-        .lines()
-        .map(|line| line.split_whitespace().collect())
-        .collect();
+    let words: Vec<Vec<_>> = all.lines().map(|line| line.split_whitespace().collect()).collect();
     let times: Vec<_> = words.iter().map(|words| words[0]).collect();
     assert!(times.is_sorted() && times[0].ends_with('Z'), "{all}");
     let processes: BTreeSet<_> = words.iter().map(|words| words[1]).collect();
@@ -379,10 +313,7 @@ fn logs_of_all_processes_come_merged_by_time_and_are_followed_into_the_next_run(
         .sum();
     assert_eq!(words.len(), written);
     let mapper = printed(&["logs", "mapper", "--run", directory.to_str().unwrap()]);
-    assert!(
-        mapper.lines().all(|line| line.contains(" mapper ")),
-        "{mapper}"
-    );
+    assert!(mapper.lines().all(|line| line.contains(" mapper ")), "{mapper}");
     let unknown = ["logs", "wheel", "--run", directory.to_str().unwrap()];
     refused(&unknown, "unknown-process", &["dead-reckoning"]);
     drop(kept);
@@ -418,10 +349,8 @@ fn bash_completes_options_stages_topics_missions_pages_and_old_names_nowhere() {
             "PATH={path}:$PATH; COMP_TYPE=9; COMP_WORDS=({words} ''); COMP_CWORD={at}
             _clap_complete_firsthand firsthand '{last}' ''; printf '%s\\n' \"${{COMPREPLY[@]}}\""
         );
-        let output = Command::new("bash")
-            .args(["-c", &format!("{script}\n{ask}")])
-            .output()
-            .unwrap();
+        let output =
+            Command::new("bash").args(["-c", &format!("{script}\n{ask}")]).output().unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
     for (words, candidate) in [
@@ -434,16 +363,10 @@ fn bash_completes_options_stages_topics_missions_pages_and_old_names_nowhere() {
         ("firsthand lo", "logs"),
     ] {
         let completed = completed(words);
-        assert!(
-            completed.lines().any(|it| it == candidate),
-            "{words}: {completed}"
-        );
+        assert!(completed.lines().any(|it| it == candidate), "{words}: {completed}");
     }
     assert_eq!(completed("firsthand ki").trim(), "");
     for shell in ["zsh", "fish", "elvish", "powershell"] {
-        assert!(
-            printed(&["completions", shell]).contains("firsthand"),
-            "{shell}"
-        );
+        assert!(printed(&["completions", shell]).contains("firsthand"), "{shell}");
     }
 }

@@ -37,11 +37,7 @@ fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
     let mut heard = Heard::default();
     let began = Instant::now();
     while !enough(&heard) {
-        assert!(
-            began.elapsed() < support::PATIENCE,
-            "heard {} poses",
-            heard.poses.len()
-        );
+        assert!(began.elapsed() < support::PATIENCE, "heard {} poses", heard.poses.len());
         waiter.wait(support::PATIENCE).unwrap();
         while let Some(sample) = pose.take().unwrap() {
             heard.poses.push((sample.stamp.tick, sample.x_m));
@@ -75,30 +71,14 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
         let frame = heard.grid.frame().expect("a keyframe came");
         assert_eq!(heard.grid.cells().len(), frame.area());
         let count = |state: CellState| {
-            heard
-                .grid
-                .cells()
-                .iter()
-                .filter(|&&cell| cell == state as u8)
-                .count()
+            heard.grid.cells().iter().filter(|&&cell| cell == state as u8).count()
         };
-        assert_eq!(
-            count(CellState::Perimeter),
-            4 * (frame.cells as usize - 1),
-            "the whole rim"
-        );
-        assert!(
-            count(CellState::Sensed) > 0,
-            "what was sensed before the consumer came"
-        );
+        assert_eq!(count(CellState::Perimeter), 4 * (frame.cells as usize - 1), "the whole rim");
+        assert!(count(CellState::Sensed) > 0, "what was sensed before the consumer came");
 
         assert_eq!(heard.field.frame(), Some(frame));
-        let directed = heard
-            .field
-            .cells()
-            .iter()
-            .filter(|cell| cell.ex != 0.0 || cell.ey != 0.0)
-            .count();
+        let directed =
+            heard.field.cells().iter().filter(|cell| cell.ex != 0.0 || cell.ey != 0.0).count();
         assert!(
             directed > frame.area() / 2,
             "{directed} of {} cells have a direction",
@@ -184,10 +164,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
             }
             assert!(began.elapsed() < support::PATIENCE, "{} held", held.len());
         };
-        assert!(
-            matches!(refused, BusError::HoldsTooMany { .. }),
-            "{refused}"
-        );
+        assert!(matches!(refused, BusError::HoldsTooMany { .. }), "{refused}");
         let mut readers = Vec::new();
         let refused = loop {
             match bus.reader(&topics::POSE) {
@@ -244,11 +221,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
  {
     in_own_process(|| {
         let robot = "visited-c6";
-        let mut run = Run::start(
-            robot,
-            "obstacle-course",
-            &["--pace", "2", "--timeout", "30"],
-        );
+        let mut run = Run::start(robot, "obstacle-course", &["--pace", "2", "--timeout", "30"]);
         run.wait_until_under_way(0.5);
         let mut staying = Vec::new();
         for consumer in 0..10 {
@@ -293,9 +266,7 @@ fn poses_go_on_while_an_operators_stop_holds() {
             status["order"] == "stopped by an operator" && status["link"]["stopped"] == true
         });
         let heard = listen("held-poses", |heard| heard.poses.len() >= 40);
-        let [.., before, last] = &heard.poses[..] else {
-            panic!("{:?}", heard.poses)
-        };
+        let [.., before, last] = &heard.poses[..] else { panic!("{:?}", heard.poses) };
         assert_eq!(before.1, last.1, "it stands");
         operate("held-poses", &["resume"]);
         let summary = run.arrives();

@@ -22,32 +22,15 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let name = out.to_str().unwrap();
     let whole = evaluate(name, &["--seed", "5"]);
     assert_eq!(whole["count"], 2, "{whole}");
-    let shares = [
-        "success",
-        "collision",
-        "timeout",
-        "wrong_place",
-        "unreachable",
-        "aborted",
-    ];
-    let sum: f64 = shares
-        .iter()
-        .map(|share| whole[share].as_f64().unwrap())
-        .sum();
-    assert!(
-        (sum - 1.0).abs() < 1e-9 && whole["aborted"] == 0.0,
-        "{whole}"
-    );
+    let shares = ["success", "collision", "timeout", "wrong_place", "unreachable", "aborted"];
+    let sum: f64 = shares.iter().map(|share| whole[share].as_f64().unwrap()).sum();
+    assert!((sum - 1.0).abs() < 1e-9 && whole["aborted"] == 0.0, "{whole}");
     assert!(out.join("index.html").exists());
 
     let rows = std::fs::read_to_string(out.join("rows.csv")).unwrap();
     let (first, _) = rows.trim_end().rsplit_once('\n').unwrap();
     // Killed while it wrote the last row.
-    std::fs::write(
-        out.join("rows.csv"),
-        format!("{first}\nrooms-5-0001,6,evid"),
-    )
-    .unwrap();
+    std::fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
     let resumed = evaluate(name, &["--seed", "5", "--resume"]);
     assert_eq!(resumed["count"], 2, "{resumed}");
     assert_eq!(resumed["success"], whole["success"]);
@@ -84,11 +67,7 @@ fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
     let grey = |at: usize| {
         let (col, row) = (at % cols, at / cols);
         let rim = col == 0 || row == 0 || col + 1 == cols || row + 1 == rows;
-        if rim || (col == 30 && row > 15) {
-            0
-        } else {
-            254
-        }
+        if rim || (col == 30 && row > 15) { 0 } else { 254 }
     };
     let mut image = format!("P5 {cols} {rows} 255\n").into_bytes();
     image.extend((0..cols * rows).map(grey));
@@ -103,15 +82,8 @@ fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
     let more = ["--realism", "laboratory"];
     let found = printed(&[&common[..], &ends, &more].concat());
     let found: Value = serde_json::from_str(&found).unwrap();
-    assert_eq!(
-        (&found["count"], &found["success"]),
-        (&1.into(), &1.0.into()),
-        "{found}"
-    );
-    assert!(
-        found["median_k"].as_f64() > Some(1.05),
-        "around the wall: {found}"
-    );
+    assert_eq!((&found["count"], &found["success"]), (&1.into(), &1.0.into()), "{found}");
+    assert!(found["median_k"].as_f64() > Some(1.05), "around the wall: {found}");
 
     let refused = |arguments: &[&str], code, name| {
         refused(&[&["evaluate"], arguments].concat(), code, &[name]);

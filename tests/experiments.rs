@@ -16,9 +16,7 @@ fn three_of_them<'a>(out: &'a Path, seeds: &'a str, more: &[&'a str]) -> Vec<&'a
 /// The objects that they end with.
 fn experiments(out: &Path, more: &[&str]) -> Vec<Value> {
     let lines = printed(&three_of_them(out, "1", more));
-    let objects = lines
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap());
+    let objects = lines.lines().map(|line| serde_json::from_str(line).unwrap());
     objects.collect()
 }
 
@@ -27,10 +25,7 @@ fn experiments_give_a_row_each_and_the_same_ones_again_when_they_were_cut_off() 
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("experiments");
     let whole = experiments(&out, &[]);
-    let names: Vec<_> = whole
-        .iter()
-        .map(|it| it["experiment"].as_str().unwrap())
-        .collect();
+    let names: Vec<_> = whole.iter().map(|it| it["experiment"].as_str().unwrap()).collect();
     assert_eq!(names, ["1a", "3", "5-constant"]);
     for object in &whole {
         let paper = &object["paper"];
@@ -41,14 +36,8 @@ fn experiments_give_a_row_each_and_the_same_ones_again_when_they_were_cut_off() 
             assert!(median > Some(0.0), "{figure}: {object}");
         }
     }
-    assert_eq!(
-        whole[1]["paper"]["safety_events"]["median"], 0.0,
-        "nothing is sensed"
-    );
-    assert!(
-        whole[2].get("evidential").is_none(),
-        "it has no constant speed"
-    );
+    assert_eq!(whole[1]["paper"]["safety_events"]["median"], 0.0, "nothing is sensed");
+    assert!(whole[2].get("evidential").is_none(), "it has no constant speed");
     assert!(out.join("index.html").exists());
     assert!(out.join("pictures/3-1-paper.svg").exists());
 

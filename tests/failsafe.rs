@@ -111,14 +111,9 @@ fn listen(decoder: &mut Decoder, at: Instant, tell: &Sender<Heard>) {
             continue;
         };
         let turns = |channel| motion.targets.of(channel).is_some_and(|speed| speed != 0);
-        let limit = motion
-            .limit_ms
-            .map_or(Duration::MAX, |limit| Duration::from_millis(limit.into()));
-        let _ = tell.send(Heard {
-            at,
-            moving: turns(0) || turns(1),
-            limit,
-        });
+        let limit =
+            motion.limit_ms.map_or(Duration::MAX, |limit| Duration::from_millis(limit.into()));
+        let _ = tell.send(Heard { at, moving: turns(0) || turns(1), limit });
     }
 }
 
@@ -154,10 +149,7 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
     run.signal(Signal::STOP);
     let froze = Instant::now();
     let at_rest = tap.next_that(|heard| !heard.moving && heard.at > froze);
-    println!(
-        "at rest {} ms after the freeze",
-        (at_rest.at - froze).as_millis()
-    );
+    println!("at rest {} ms after the freeze", (at_rest.at - froze).as_millis());
     for _ in 0..10 {
         let heard = tap.next();
         assert!(!heard.moving, "{heard:?}");

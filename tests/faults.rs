@@ -26,10 +26,7 @@ fn inject(robot: &str, stage: &str, fault: &str) {
 
 /// How many stalls were met by `recovery`.
 fn count(stalls: &[Value], recovery: &str) -> usize {
-    stalls
-        .iter()
-        .filter(|stall| stall["recovery"] == recovery)
-        .count()
+    stalls.iter().filter(|stall| stall["recovery"] == recovery).count()
 }
 
 /// A mission of open-room in which `stage` is broken on the way, and which arrives all the same: its stalls.
@@ -87,23 +84,13 @@ fn a_robot_cut_off_for_good_ends_unreachable_with_a_picture_that_says_so() {
     let directory = directory.path().join("run");
     let stalls = records(&directory.join("stalls.jsonl"));
     let recoveries: Vec<_> = stalls.iter().map(|stall| &stall["recovery"]).collect();
-    assert_eq!(
-        recoveries,
-        ["reset", "reset", "reset", "give_up"],
-        "{stalls:?}"
-    );
-    assert!(
-        stalls.iter().all(|stall| stall["cause"] == "cut_off"),
-        "{stalls:?}"
-    );
+    assert_eq!(recoveries, ["reset", "reset", "reset", "give_up"], "{stalls:?}");
+    assert!(stalls.iter().all(|stall| stall["cause"] == "cut_off"), "{stalls:?}");
     assert_eq!(summary["resets"], 3, "{summary}");
     let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
     for field in ["outcome", "reason"] {
         let value = summary[field].as_str().unwrap();
-        assert!(
-            picture.contains(value),
-            "the picture does not say {value:?}"
-        );
+        assert!(picture.contains(value), "the picture does not say {value:?}");
     }
     assert_nothing_left("cut-off");
 }
@@ -124,14 +111,7 @@ fn a_stage_that_spins_is_aborted_as_hung() {
 
 #[test]
 fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
-    let slow = [
-        "--pace",
-        "4",
-        "--set",
-        "controller.speed_m_s=0.02",
-        "--timeout",
-        "2000",
-    ];
+    let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02", "--timeout", "2000"];
     let mut run = Run::start("mutes", "open-room", &slow);
     run.wait_until_under_way(1.0);
     // The link has no input from a stage that it owes an answer for.
@@ -177,10 +157,7 @@ fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
     faults.publish(0, MissionTime::default(), request).unwrap();
     let began = std::time::Instant::now();
     loop {
-        assert!(
-            began.elapsed() < support::PATIENCE,
-            "the planner says nothing"
-        );
+        assert!(began.elapsed() < support::PATIENCE, "the planner says nothing");
         waiter.wait(support::PATIENCE).unwrap();
         while let Some(beat) = health.take().unwrap() {
             if name_str(&beat.stage) == "planner" && beat.last_fault == request.id {
@@ -196,17 +173,12 @@ fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor
         // An address makes it real. Nobody answers there: it never moves.
         let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
         let mut run = Run::start("metal", "open-room", &address);
-        run.wait_until("its stages run", |status| {
-            find(status, "planner")["state"] == "running"
-        });
+        run.wait_until("its stages run", |status| find(status, "planner")["state"] == "running");
         let fault = ["fault", "planner", "saddle", "--robot", "metal"];
         refused(&fault, "real-robot", &["--break-a-real-robot"]);
         assert_eq!(ask_planner("metal", false), FaultAnswer::Refused);
         assert_eq!(ask_planner("metal", true), FaultAnswer::Taken);
-        operate(
-            "metal",
-            &["fault", "planner", "saddle", "--break-a-real-robot"],
-        );
+        operate("metal", &["fault", "planner", "saddle", "--break-a-real-robot"]);
         run.stop();
     });
 }
@@ -216,12 +188,7 @@ fn a_fault_that_nobody_has_is_refused_with_those_there_are() {
     let fault = |stage, fault, code, names: &[&str]| {
         refused(&["fault", stage, fault, "--robot", "nobody"], code, names);
     };
-    fault(
-        "mapper",
-        "saddle",
-        "unknown-fault",
-        &["hazard-around-robot", "spin"],
-    );
+    fault("mapper", "saddle", "unknown-fault", &["hazard-around-robot", "spin"]);
     fault("wheel", "spin", "unknown-stage", &["dead-reckoning"]);
     fault("mapper", "spin", "not-running", &["nobody"]);
 }

@@ -25,10 +25,7 @@ fn rooms() -> Vec<String> {
 
 fn write_map(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.map");
-    let text = format!(
-        "type octile\nheight 16\nwidth 24\nmap\n{}\n",
-        rooms().join("\n")
-    );
+    let text = format!("type octile\nheight 16\nwidth 24\nmap\n{}\n", rooms().join("\n"));
     std::fs::write(&file, text).unwrap();
     file
 }
@@ -36,11 +33,8 @@ fn write_map(directory: &Path) -> PathBuf {
 /// The same rooms as an image, light where free.
 fn write_image(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.pgm");
-    let pixels: Vec<u8> = rooms()
-        .concat()
-        .bytes()
-        .map(|cell| if cell == b'.' { 254 } else { 0 })
-        .collect();
+    let pixels: Vec<u8> =
+        rooms().concat().bytes().map(|cell| if cell == b'.' { 254 } else { 0 }).collect();
     std::fs::write(&file, [b"P5\n24 16\n255\n".as_slice(), &pixels].concat()).unwrap();
     file
 }
@@ -61,9 +55,7 @@ fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
 /// The bytes of an array in an .npz whose members are stored: after its name, its own header and 20 x 24 x 16 bytes.
 fn array(npz: &[u8], name: &str, bytes_each: usize) -> Vec<u8> {
     let find = |from: usize, what: &[u8]| {
-        let at = npz[from..]
-            .windows(what.len())
-            .position(|window| window == what);
+        let at = npz[from..].windows(what.len()).position(|window| window == what);
         from + at.unwrap_or_else(|| panic!("no {what:?} in the archive"))
     };
     let magic = find(find(0, format!("{name}.npy").as_bytes()), b"\x93NUMPY");
@@ -144,10 +136,7 @@ fn guidance_in_the_file_is_uphill_with_y_down_and_of_unit_length() {
 fn the_report_tells_size_reach_method_and_times() {
     let directory = tempfile::tempdir().unwrap();
     let map = write_map(directory.path());
-    let report = report(
-        &map,
-        &["--target-cell", "3,12", "--repeat", "3", "--threads", "2"],
-    );
+    let report = report(&map, &["--target-cell", "3,12", "--repeat", "3", "--threads", "2"]);
     let free = rooms().concat().matches('.').count() as u64;
     assert_eq!(report["rows"], 16);
     assert_eq!(report["cols"], 24);
@@ -157,10 +146,7 @@ fn the_report_tells_size_reach_method_and_times() {
     for phase in ["setup_ms", "solve_ms", "verify_ms"] {
         let least = report[phase].as_f64().unwrap();
         let median = report[format!("{phase}_median")].as_f64().unwrap();
-        assert!(
-            0.0 <= least && least <= median,
-            "{phase}: {least}, {median}"
-        );
+        assert!(0.0 <= least && least <= median, "{phase}: {least}, {median}");
     }
     assert!(report["worst_residual"].as_f64().unwrap() < 1e-2);
     assert!(report["log10_u_min"].as_f64().unwrap() < 0.0);
@@ -179,10 +165,7 @@ fn every_format_of_one_map_gives_one_field() {
     .unwrap();
     let archives = [write_map(directory.path()), image, yaml].map(|map| {
         let out = directory.path().join("out.npz");
-        report(
-            &map,
-            &["--target-cell", "3,12", "--out", out.to_str().unwrap()],
-        );
+        report(&map, &["--target-cell", "3,12", "--out", out.to_str().unwrap()]);
         let npz = std::fs::read(&out).unwrap();
         ["mantissa", "exponent", "ex", "ey"].map(|name| array(&npz, name, 4))
     });
@@ -196,12 +179,7 @@ fn the_picture_is_a_png_of_a_size_to_look_at() {
     let picture = directory.path().join("rooms.png");
     report(
         &write_map(directory.path()),
-        &[
-            "--target-cell",
-            "3,12",
-            "--picture",
-            picture.to_str().unwrap(),
-        ],
+        &["--target-cell", "3,12", "--picture", picture.to_str().unwrap()],
     );
     let bytes = std::fs::read(picture).unwrap();
     assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"));

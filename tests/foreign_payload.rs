@@ -16,10 +16,7 @@ fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
         let bus = Bus::join(&support::domain("foreign"), "foreigner").unwrap();
         let pose_as_wheels = Topic::<WheelSample>::new(topics::POSE.spec());
         let error = bus.reader(&pose_as_wheels).unwrap_err();
-        assert!(
-            matches!(error, BusError::Incompatible { topic: "pose" }),
-            "{error}"
-        );
+        assert!(matches!(error, BusError::Incompatible { topic: "pose" }), "{error}");
         drop(bus);
         run.wait_until_under_way(1.0);
         run.signal(Signal::TERM);

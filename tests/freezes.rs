@@ -13,14 +13,7 @@ const SLACK: f64 = 0.020;
 /// Freeze each stage so often in a mission at the pace of the wall, and print how late each was noticed.
 fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
     // At this speed the mission outlasts every freeze.
-    let slow = [
-        "--pace",
-        "1",
-        "--set",
-        "controller.speed_m_s=0.002",
-        "--timeout",
-        "80000",
-    ];
+    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
     let mut run = Run::start(robot, "open-room", &slow);
     run.wait_until_under_way(0.5);
     for _ in 0..times {

@@ -297,9 +297,5 @@ fn a_run_that_came_to_its_end_is_not_resumed() {
     let run = directory.path().join("run");
     let run = run.to_str().unwrap();
     refused(&["run", "--resume", run], "ended", &[run]);
-    refused(
-        &["run", "--resume", "/no/such/run"],
-        "no-run",
-        &["/no/such/run"],
-    );
+    refused(&["run", "--resume", "/no/such/run"], "no-run", &["/no/such/run"]);
 }

@@ -71,10 +71,8 @@ fn another_constant_or_planner_is_tried_on_a_played_recording_and_the_first_diff
 fn a_consumer_reads_a_played_recording_as_it_reads_a_robot() {
     let directory = tempfile::tempdir().unwrap();
     let copy = directory.path().join("copy.mcap");
-    let mut recorder = firsthand(&["record", "--robot", "live-read", "--out"])
-        .arg(&copy)
-        .spawn()
-        .unwrap();
+    let mut recorder =
+        firsthand(&["record", "--robot", "live-read", "--out"]).arg(&copy).spawn().unwrap();
     let golden = golden();
     let file = golden.path().to_str().unwrap();
     let arguments = ["--robot", "live-read", "--stage", "planner", "--pace", "4"];

@@ -19,14 +19,8 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 /// At this speed a mission outlasts its test, which stops it.
-const SLOW: [&str; 6] = [
-    "--pace",
-    "1",
-    "--set",
-    "controller.speed_m_s=0.002",
-    "--timeout",
-    "80000",
-];
+const SLOW: [&str; 6] =
+    ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
 
 #[test]
 fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
@@ -62,9 +56,7 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        support::wait_for_status(robot, |status| {
-            status["mission_time_s"].as_f64() > Some(1.0)
-        });
+        support::wait_for_status(robot, |status| status["mission_time_s"].as_f64() > Some(1.0));
         disk.fill();
         for stage in STAGES {
             let before = support::wait_for_status(robot, all_run);
@@ -125,10 +117,7 @@ fn a_wrongly_written_mission_has_an_exit_code_that_the_units_do_not_try_again() 
         let setting = |key: &str| unit.lines().find_map(|line| line.strip_prefix(key));
         let never = setting("RestartPreventExitStatus=").unwrap();
         assert!(never.split(' ').any(|code| code == "78"), "{file}: {never}");
-        assert!(
-            setting("ExecStart=").unwrap().contains(" --keep "),
-            "{file}"
-        );
+        assert!(setting("ExecStart=").unwrap().contains(" --keep "), "{file}");
         assert_eq!(setting("LimitCORE="), None, "{file}");
     }
 }
@@ -218,9 +207,8 @@ fn a_checkpoint_of_another_version_is_refused_by_name_and_not_taken_for_none() {
     run.kill();
     let file = run.directory().join("supervisor.checkpoint");
     let mut bytes = fs::read(&file).unwrap();
-    let slots: Vec<_> = (0..bytes.len() - 4)
-        .filter(|&at| bytes[at..].starts_with(b"FHC2"))
-        .collect();
+    let slots: Vec<_> =
+        (0..bytes.len() - 4).filter(|&at| bytes[at..].starts_with(b"FHC2")).collect();
     assert!(!slots.is_empty());
     for at in slots {
         bytes[at + 3] = b'1';
@@ -328,11 +316,7 @@ fn a_pipe_in_place_of_a_mission_is_refused_by_name_and_not_waited_for() {
     let pipe = directory.path().join("pipe.toml");
     let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success() && fs::metadata(&pipe).unwrap().file_type().is_fifo());
-    refused(
-        &["check", pipe.to_str().unwrap()],
-        "mission",
-        &["pipe.toml"],
-    );
+    refused(&["check", pipe.to_str().unwrap()], "mission", &["pipe.toml"]);
 }
 
 #[test]
@@ -359,9 +343,6 @@ fn a_target_where_the_robot_stands_is_reached_in_a_finite_ratio() {
     let run = ["run", "open-room", "--set", "target=[0,0]", "--robot"];
     let out = ["mach-here", "--out", out.to_str().unwrap()];
     let printed = support::printed(&[&run[..], &out].concat());
-    assert!(
-        !printed.contains("NaN") && !printed.contains("inf"),
-        "{printed}"
-    );
+    assert!(!printed.contains("NaN") && !printed.contains("inf"), "{printed}");
     assert_nothing_left("mach-here");
 }

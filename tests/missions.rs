@@ -61,10 +61,7 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
         let (_, summary) = run("faded", "obstacle-course", &arguments);
         let outcome = summary["outcome"].as_str().unwrap();
         // Measured wheels drift: where the target is taken to be is not what this is about.
-        assert!(
-            ["reached", "wrong_place"].contains(&outcome),
-            "{arguments:?}: {summary}"
-        );
+        assert!(["reached", "wrong_place"].contains(&outcome), "{arguments:?}: {summary}");
         assert_eq!(summary["collisions"], 0, "{arguments:?}");
     }
 }
@@ -78,11 +75,8 @@ fn mission_time_and_timeout_count_the_time_in_which_nobody_hears_the_robot() {
     let unheard = 1.0 - heard_s / time_s;
     assert!((0.1..0.3).contains(&unheard), "{unheard}: {summary}");
 
-    let (_, summary) = run(
-        "unheard",
-        "obstacle-course",
-        &[&out[..], &["--timeout", "20"]].concat(),
-    );
+    let (_, summary) =
+        run("unheard", "obstacle-course", &[&out[..], &["--timeout", "20"]].concat());
     let time_s = summary["mission_time_s"].as_f64().unwrap();
     assert_eq!(summary["outcome"], "timeout", "{summary}");
     assert!((19.5..=20.0).contains(&time_s), "{summary}");
@@ -99,11 +93,7 @@ fn a_finer_grid_is_no_more_dangerous() {
     for cells in ["100", "256", "512"] {
         for seed in ["1", "2"] {
             let cells = format!("perimeter.cells={cells}");
-            arrives_untouched(
-                "grids",
-                "obstacle-course",
-                &["--set", &cells, "--seed", seed],
-            );
+            arrives_untouched("grids", "obstacle-course", &["--set", &cells, "--seed", seed]);
         }
     }
 }
@@ -126,11 +116,7 @@ const CAR: [&str; 2] = ["--set", "robot.model=\"car\""];
 fn a_car_crosses_the_course_untouched_for_seeds_1_to_5() {
     for seed in 1..=5 {
         let seed = seed.to_string();
-        arrives_untouched(
-            "car",
-            "obstacle-course",
-            &[&CAR[..], &["--seed", &seed]].concat(),
-        );
+        arrives_untouched("car", "obstacle-course", &[&CAR[..], &["--seed", &seed]].concat());
     }
 }
 
@@ -171,10 +157,7 @@ fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
     let (_, knowing) = run("knowing", "obstacle-course", &knows);
     assert_eq!(knowing["outcome"], "reached", "{knowing}");
     let time = |summary: &Value| summary["mission_time_s"].as_f64().unwrap();
-    assert!(
-        time(&knowing) < time(&sensing),
-        "{knowing} against {sensing}"
-    );
+    assert!(time(&knowing) < time(&sensing), "{knowing} against {sensing}");
 }
 
 #[test]
@@ -219,13 +202,7 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
 fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
     let arguments = ["latency", "--rounds", "1", "--json", "--robot", "hops"];
     let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
-    for key in [
-        "tick_p50_us",
-        "tick_p99_us",
-        "hops_p50_us",
-        "hops_p99_us",
-        "ratio",
-    ] {
+    for key in ["tick_p50_us", "tick_p99_us", "hops_p50_us", "hops_p99_us", "ratio"] {
         assert!(report[key].as_f64().unwrap() > 0.0, "{key}: {report}");
     }
     assert_nothing_left("hops");
@@ -252,10 +229,7 @@ fn a_latency_budget_has_every_item_of_every_stage() {
     assert_eq!(report["regime"], "back to back", "{report}");
     let rows = report["budget"].as_array().unwrap();
     for stage in support::STAGES {
-        assert!(
-            rows.iter().any(|row| row["stage"] == stage),
-            "{stage}: {report}"
-        );
+        assert!(rows.iter().any(|row| row["stage"] == stage), "{stage}: {report}");
     }
     for (number, row) in rows.iter().enumerate() {
         for cell in row["cells"].as_array().unwrap() {

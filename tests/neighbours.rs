@@ -62,11 +62,7 @@ fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with
         }
         drop((commands, orders, bus));
         let (code, summary) = run.finish();
-        assert_eq!(
-            (code, &summary["outcome"]),
-            (Some(0), &"reached".into()),
-            "{summary}"
-        );
+        assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
         assert_eq!(summary["collisions"], 0, "{summary}");
         let restarts = summary["restarts"].as_object().unwrap();
         assert!(restarts.values().all(|times| times == 0), "{summary}");
@@ -79,10 +75,7 @@ fn no_file_of_a_run_is_open_to_other_users() {
     let mut run = Run::start("closed", "open-room", &["--pace", "1"]);
     run.wait_until_under_way(0.3);
     let robot = domain("closed");
-    for path in shared("closed")
-        .into_iter()
-        .chain([robot.directory().to_owned()])
-    {
+    for path in shared("closed").into_iter().chain([robot.directory().to_owned()]) {
         // One that has just gone is not open.
         if let Ok(found) = fs::symlink_metadata(&path) {
             assert_eq!(found.mode() & 0o077, 0, "{}", path.display());
@@ -125,21 +118,14 @@ fn a_bus_whose_count_of_nodes_is_empty_is_not_joined_and_the_message_says_so() {
         run.signal(Signal::TERM);
         let began = Instant::now();
         run.finish();
-        assert!(
-            began.elapsed() < Duration::from_secs(5),
-            "{:?}",
-            began.elapsed()
-        );
+        assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
         assert_nothing_left("emptied");
     });
 }
 
 #[test]
 fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_file() {
-    let mut bystander = std::process::Command::new("sleep")
-        .arg("60")
-        .spawn()
-        .unwrap();
+    let mut bystander = std::process::Command::new("sleep").arg("60").spawn().unwrap();
     let robot = domain("stale-lock");
     fs::create_dir_all(robot.directory()).unwrap();
     for stale in [bystander.id().to_string(), "-1".to_owned()] {
@@ -162,11 +148,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
         let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
         let root = bus_instance(robot).root();
         for path in shared(robot).into_iter().filter(|path| *path != root) {
-            let _ = if remove {
-                fs::remove_file(path)
-            } else {
-                fs::File::create(path).map(drop)
-            };
+            let _ = if remove { fs::remove_file(path) } else { fs::File::create(path).map(drop) };
         }
         if remove {
             fs::remove_dir_all(root).unwrap();
@@ -194,10 +176,7 @@ fn two_robots_on_one_machine_do_not_see_each_other() {
     let status = one.wait_until_under_way(1.0);
     two.wait_until_under_way(1.0);
     let other = two.status().unwrap();
-    assert_ne!(
-        find(&status, "mapper")["pid"],
-        find(&other, "mapper")["pid"]
-    );
+    assert_ne!(find(&status, "mapper")["pid"], find(&other, "mapper")["pid"]);
     one.kill_and_await_successor("mapper", Signal::KILL);
     assert_eq!(one.arrives()["restarts"]["mapper"], 1);
     assert_eq!(two.arrives()["restarts"]["mapper"], 0);

@@ -10,9 +10,8 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
     let mut run = Run::start("halt", "open-room", &PACE);
     run.wait_until_under_way(2.0);
     operate("halt", &["stop"]);
-    let stopped = run.wait_until("it is stopped", |status| {
-        status["order"] == "stopped by an operator"
-    });
+    let stopped =
+        run.wait_until("it is stopped", |status| status["order"] == "stopped by an operator");
     // Its ticks go on: it may be carried.
     let tick = stopped["tick"].as_u64().unwrap();
     let later = run.wait_until("some ticks have passed", |status| {
@@ -48,27 +47,18 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     std::fs::remove_file(&checkpoint).unwrap();
     std::fs::create_dir(&checkpoint).unwrap();
     operate("held", &["kill", "mapper"]);
-    run.wait_until("it is held", |status| {
-        find(status, "mapper")["state"] == "held"
-    });
-    let status = run.wait_until("the robot is stopped", |status| {
-        status["order"] == "stopped, a stage is held"
-    });
+    run.wait_until("it is held", |status| find(status, "mapper")["state"] == "held");
+    let status = run
+        .wait_until("the robot is stopped", |status| status["order"] == "stopped, a stage is held");
     for stage in status["stages"].as_array().unwrap() {
         let others = stage["name"] != "mapper";
-        assert!(
-            !others || stage["restarts"] == 0,
-            "a sibling was touched: {status}"
-        );
+        assert!(!others || stage["restarts"] == 0, "a sibling was touched: {status}");
     }
     let deaths = run.records("deaths.jsonl");
     assert_eq!(deaths[0]["cause"]["signalled"]["signal"], 9, "{deaths:?}");
     assert_eq!(deaths[0]["next"], "start_now", "{deaths:?}");
     let last = deaths.last().unwrap();
-    assert_eq!(
-        (&last["cause"]["exited"], &last["next"]),
-        (&1.into(), &"hold".into())
-    );
+    assert_eq!((&last["cause"]["exited"], &last["next"]), (&1.into(), &"hold".into()));
     let log_tail = last["log_tail"].as_str().unwrap();
     assert!(log_tail.contains("mapper.checkpoint"), "{log_tail}");
     std::fs::remove_dir(&checkpoint).unwrap();

@@ -82,10 +82,7 @@ fn a_stage_started_by_another_becomes_the_planner_that_the_mission_names() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("planner");
     own_planner(&own);
-    for (robot, named) in [
-        ("own-units", own.to_str().unwrap()),
-        ("base-units", "wavefront"),
-    ] {
+    for (robot, named) in [("own-units", own.to_str().unwrap()), ("base-units", "wavefront")] {
         becomes_the_planner(robot, named);
     }
 }
@@ -149,15 +146,6 @@ fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
     let mut column: Vec<_> = column.collect();
     column.sort_unstable();
     assert_eq!(column, ["bug", "harmonic", "planner"]);
-    let other = [
-        "evaluate",
-        "--planner",
-        "bug",
-        "--count",
-        "1",
-        "--out",
-        out,
-        "--resume",
-    ];
+    let other = ["evaluate", "--planner", "bug", "--count", "1", "--out", out, "--resume"];
     refused(&other, "other-results", &[out]);
 }

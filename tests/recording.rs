@@ -49,10 +49,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     let mut grids = recording.slices(&topics::GRID).unwrap();
     let first = grids.next().unwrap().unwrap();
     assert!(first.header.part.is_keyframe());
-    assert_eq!(
-        first.elements.len(),
-        recording.run().mission.grid_frame().area()
-    );
+    assert_eq!(first.elements.len(), recording.run().mission.grid_frame().area());
     assert!(recording.counts()["log"] > 5);
     assert!(recording.counts()["wire"] > 2 * ticks.len() as u64);
 
@@ -117,11 +114,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     assert!(cut >= 5, "{cut} recorders were killed");
     assert!(read > 0, "none of them lived to its first chunk");
     let (code, summary, directory) = run.finish_in();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
+    assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
     let restarts = summary["restarts"].as_object().unwrap();
     assert!(restarts.values().all(|times| times == 0), "{summary}");
     // The run's own recorder was not touched by that.
@@ -143,26 +136,14 @@ fn a_constant_that_changes_makes_a_replay_fail_with_stage_tick_topic_field_and_i
     let recording = golden();
     let mut run = recording.run().clone();
     run.mission.controller.speed_m_s = Some(run.mission.speed_m_s() * 1.01);
-    let options = Options {
-        run: Some(run),
-        ..Options::default()
-    };
+    let options = Options { run: Some(run), ..Options::default() };
     let report = replay(&recording, &options).unwrap();
     let difference = report.difference.as_ref().unwrap();
-    assert_eq!(
-        (difference.stage, &*difference.topic),
-        ("controller", "command")
-    );
+    assert_eq!((difference.stage, &*difference.topic), ("controller", "command"));
     let speeds = ["left_rad_s", "right_rad_s", "v_m_s"];
     assert!(speeds.contains(&&*difference.field), "{difference}");
     assert_ne!(difference.recorded, difference.computed);
-    assert!(
-        difference
-            .inputs
-            .iter()
-            .any(|input| input.contains("guidance")),
-        "{difference}"
-    );
+    assert!(difference.inputs.iter().any(|input| input.contains("guidance")), "{difference}");
     assert_eq!(report.stages["controller"].different, 1);
     assert_eq!(report.stages["mapper"].equal, 1);
 }
@@ -188,16 +169,8 @@ fn replay_and_diff_print_what_they_found_and_exit_with_1_on_a_difference() {
     assert!(!found[0]["first"].is_null(), "{found:?}");
 
     let no_recording = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
-    refused(
-        &["replay", no_recording],
-        "not-a-recording",
-        &[no_recording],
-    );
-    refused(
-        &["replay", file, "--stage", "wheel"],
-        "unknown-stage",
-        &["wheel"],
-    );
+    refused(&["replay", no_recording], "not-a-recording", &[no_recording]);
+    refused(&["replay", file, "--stage", "wheel"], "unknown-stage", &["wheel"]);
 }
 
 #[test]

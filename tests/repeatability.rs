@@ -61,11 +61,8 @@ fn record(robot: &str) -> Recording {
     let mut grids = bus.slice_reader(&topics::GRID).unwrap();
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::GRID).unwrap());
-    let mut received = Recording {
-        samples: BTreeMap::new(),
-        grids: BTreeMap::new(),
-        summary: Value::Null,
-    };
+    let mut received =
+        Recording { samples: BTreeMap::new(), grids: BTreeMap::new(), summary: Value::Null };
     let mut grid = Replica::default();
     loop {
         // Asked first: what was published until then is received below.
@@ -110,18 +107,13 @@ fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
         // A consumer that the machine did not let run in time has lost some.
         let whole = || {
             let mut records = (0..20).map(|_| record("recorded"));
-            records
-                .find(|recording| recording.is_whole(5))
-                .expect("a recording without a gap")
+            records.find(|recording| recording.is_whole(5)).expect("a recording without a gap")
         };
         let (mut one, mut other) = (whole(), whole());
         let last = |recording: &Recording| *recording.grids.keys().last().unwrap();
         assert_eq!(last(&one), last(&other));
-        one.grids
-            .retain(|version, _| other.grids.contains_key(version));
-        other
-            .grids
-            .retain(|version, _| one.grids.contains_key(version));
+        one.grids.retain(|version, _| other.grids.contains_key(version));
+        other.grids.retain(|version, _| one.grids.contains_key(version));
         println!("{} samples, {} grids", one.samples.len(), one.grids.len());
         assert!(one.grids.len() > 10, "{:?}", one.grids.keys());
         for (key, sample) in &one.samples {
@@ -142,12 +134,7 @@ fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
 #[test]
 fn a_mission_that_ends_by_a_touch_or_its_timeout_gives_the_same_summary_to_the_bit() {
     // Blind: hits beyond 5 cm are not mapped.
-    let blind = [
-        "--set",
-        "method='paper'",
-        "--set",
-        "mapper.map_within_m=0.05",
-    ];
+    let blind = ["--set", "method='paper'", "--set", "mapper.map_within_m=0.05"];
     for (outcome, arguments) in [("collision", &blind[..]), ("timeout", &["--timeout", "5"])] {
         let summary = || numbers(support::run("again", "obstacle-course", arguments).1);
         let one = summary();
@@ -186,9 +173,7 @@ fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
     let mut run = Run::start("tick-held", "open-room", &slow);
     run.wait_until("the robot drives", |status| status["order"] == "driving");
     support::operate("tick-held", &["stop"]);
-    run.wait_until("it is stopped", |status| {
-        status["link"]["cause"] == "stopped by an operator"
-    });
+    run.wait_until("it is stopped", |status| status["link"]["cause"] == "stopped by an operator");
     support::operate("tick-held", &["resume"]);
     let (_, resumed) = run.finish();
     assert_eq!(numbers(resumed), numbers(undisturbed));

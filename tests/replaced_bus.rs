@@ -65,11 +65,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         // One start, not two that were refused and a bus recreated once more.
         let generation = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
         for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
-            assert_eq!(
-                generation(&after, stage),
-                generation(&before, stage) + more,
-                "{stage}"
-            );
+            assert_eq!(generation(&after, stage), generation(&before, stage) + more, "{stage}");
         }
         drop(new);
         let (code, summary) = run.finish();

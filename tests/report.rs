@@ -71,10 +71,6 @@ fn a_report_that_cannot_be_written_does_not_end_the_mission() {
     // A file where the directory goes.
     fs::write(run.directory().join("report"), "").unwrap();
     let (code, summary, _directory) = run.finish_in();
-    assert_eq!(
-        (code, &summary["outcome"]),
-        (Some(0), &"reached".into()),
-        "{summary}"
-    );
+    assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
     assert_nothing_left("report-full");
 }

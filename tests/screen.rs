@@ -56,9 +56,7 @@ fn shown(written: &[u8]) -> String {
             col = column.parse::<usize>().unwrap() - 1;
         }
     }
-    let lines = letters
-        .into_iter()
-        .map(|line| line.into_iter().collect::<String>());
+    let lines = letters.into_iter().map(|line| line.into_iter().collect::<String>());
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -68,17 +66,10 @@ impl Screen {
             openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&terminal).unwrap();
         unlockpt(&terminal).unwrap();
-        let size = Winsize {
-            ws_row: SIZE.0 as u16,
-            ws_col: SIZE.1 as u16,
-            ws_xpixel: 0,
-            ws_ypixel: 0,
-        };
+        let size =
+            Winsize { ws_row: SIZE.0 as u16, ws_col: SIZE.1 as u16, ws_xpixel: 0, ws_ypixel: 0 };
         tcsetwinsize(&terminal, size).unwrap();
-        let name = ptsname(&terminal, Vec::new())
-            .unwrap()
-            .into_string()
-            .unwrap();
+        let name = ptsname(&terminal, Vec::new()).unwrap().into_string().unwrap();
         let its = || File::options().read(true).write(true).open(&name).unwrap();
         // With the terminal as the one that controls it, as from a shell.
         let child = firsthand_under(&["setsid", "--ctty"], &["top", "--robot", robot])
@@ -87,11 +78,7 @@ impl Screen {
             .stderr(its())
             .spawn()
             .unwrap();
-        Self {
-            child,
-            terminal: Some(terminal.into()),
-            written: Vec::new(),
-        }
+        Self { child, terminal: Some(terminal.into()), written: Vec::new() }
     }
 
     /// Read what is written, until the screen shows `text`.
@@ -161,9 +148,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     screen.wait_for("signal 9");
     screen.press("s");
     screen.wait_for("stop: done");
-    run.wait_until("it stands", |status| {
-        status["order"] == "stopped by an operator"
-    });
+    run.wait_until("it stands", |status| status["order"] == "stopped by an operator");
     screen.press("c");
     screen.wait_for("resume: done");
     screen.press("r");
@@ -195,10 +180,6 @@ fn top_ends_when_its_terminal_is_closed_and_on_a_signal_and_needs_one() {
     let (code, written) = signalled.end();
     assert_eq!(code, Some(0), "{written:?}");
     assert!(written.contains("\x1b[?1049l"), "{written:?}");
-    refused(
-        &["top", "--robot", robot],
-        "no-terminal",
-        &["firsthand status"],
-    );
+    refused(&["top", "--robot", robot], "no-terminal", &["firsthand status"]);
     run.arrives();
 }

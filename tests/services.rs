@@ -150,9 +150,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     let status = support::wait_for_status("journal", |status| status["order"] == "driving");
     let mapper = find(&status, "mapper")["pid"].as_u64().unwrap();
     signal_process(mapper as u32, Signal::KILL);
-    support::wait_for_status("journal", |status| {
-        find(status, "mapper")["generation"] == 2
-    });
+    support::wait_for_status("journal", |status| find(status, "mapper")["generation"] == 2);
     signal_process(run.id(), Signal::TERM);
     run.wait().unwrap();
     let text = std::fs::read_to_string(directory.path().join("journal")).unwrap();
@@ -186,11 +184,7 @@ impl Units {
             let keeper = thread::spawn(move || keep_up(robot, stage, &log, &over));
             (stage, keeper)
         };
-        Self {
-            keepers: support::STAGES.map(keep).into(),
-            over,
-            directory,
-        }
+        Self { keepers: support::STAGES.map(keep).into(), over, directory }
     }
 
     /// Wait until all have ended of themselves, each in order.
@@ -305,9 +299,7 @@ fn a_frozen_external_stage_that_outlives_its_supervisor_does_not_hinder_the_next
     watching.wait_until("there is a bus", |_| true);
     let mut mapper = firsthand(&["stage", "mapper", "--robot", robot]);
     let mut mapper = mapper.spawn().unwrap();
-    watching.wait_until("the mapper runs", |status| {
-        find(status, "mapper")["state"] == "running"
-    });
+    watching.wait_until("the mapper runs", |status| find(status, "mapper")["state"] == "running");
     signal_process(mapper.id(), Signal::STOP);
     watching.kill();
     Run::start(robot, "open-room", &[]).arrives();

@@ -37,31 +37,17 @@ fn files(folder: &Path, end: &str) -> Vec<PathBuf> {
 /// The manifests of all crates, without what needs another compiler.
 fn manifests() -> Vec<PathBuf> {
     let folders = ["common", "services", "supervisor", "tests"];
-    let all = folders
-        .iter()
-        .flat_map(|folder| files(&root().join(folder), "/Cargo.toml"));
-    all.filter(|file| !file.ends_with("fuzz/Cargo.toml"))
-        .collect()
+    let all = folders.iter().flat_map(|folder| files(&root().join(folder), "/Cargo.toml"));
+    all.filter(|file| !file.ends_with("fuzz/Cargo.toml")).collect()
 }
 
 /// The names under `[dependencies]` of a manifest.
 fn dependencies(manifest: &Path) -> Vec<String> {
     let text = fs::read_to_string(manifest).unwrap();
-    let lines = text
-        .lines()
-        .skip_while(|line| *line != "[dependencies]")
-        .skip(1);
+    let lines = text.lines().skip_while(|line| *line != "[dependencies]").skip(1);
     let lines = lines.take_while(|line| !line.starts_with('['));
-    let name = |line: &str| {
-        line.split(['.', ' ', '='])
-            .next()
-            .unwrap_or_default()
-            .to_owned()
-    };
-    lines
-        .filter(|line| !line.starts_with('#'))
-        .map(name)
-        .collect()
+    let name = |line: &str| line.split(['.', ' ', '=']).next().unwrap_or_default().to_owned();
+    lines.filter(|line| !line.starts_with('#')).map(name).collect()
 }
 
 #[test]
@@ -96,11 +82,7 @@ fn circles_of(sources: &[(&str, &str)]) -> usize {
 #[test]
 fn a_circle_is_found_however_it_is_written_and_only_where_there_is_one() {
     let circles = |a: &str, b: &str| {
-        circles_of(&[
-            ("lib.rs", "mod a; mod b; pub use a::A;"),
-            ("a.rs", a),
-            ("b.rs", b),
-        ])
+        circles_of(&[("lib.rs", "mod a; mod b; pub use a::A;"), ("a.rs", a), ("b.rs", b)])
     };
     let a = "use crate::b::B; pub struct A(B);";
     let circular = [
@@ -133,18 +115,8 @@ fn a_circle_is_found_however_it_is_written_and_only_where_there_is_one() {
     // A parent that re-exports what its child defines, while the child needs the parent; and through a third file.
     let lib = ("lib.rs", "pub mod a;");
     let child = ("a/b.rs", "use super::Base; pub struct B(Base);");
-    assert_eq!(
-        circles_of(&[
-            lib,
-            ("a.rs", "mod b; pub use b::B; pub struct Base;"),
-            child
-        ]),
-        1
-    );
-    assert_eq!(
-        circles_of(&[lib, ("a.rs", "mod b; pub struct Base;"), child]),
-        0
-    );
+    assert_eq!(circles_of(&[lib, ("a.rs", "mod b; pub use b::B; pub struct Base;"), child]), 1);
+    assert_eq!(circles_of(&[lib, ("a.rs", "mod b; pub struct Base;"), child]), 0);
     let long = [
         ("lib.rs", "mod a; mod b; mod c;"),
         ("a.rs", "use crate::b::B;"),
@@ -165,15 +137,8 @@ fn the_middleware_is_named_in_one_place() {
             assert!(may || !names, "{} names iceoryx2", path.display());
         }
     }
-    for manifest in manifests()
-        .iter()
-        .filter(|file| !file.ends_with("common/bus/Cargo.toml"))
-    {
-        assert!(
-            !dependencies(manifest).contains(&"iceoryx2".to_owned()),
-            "{}",
-            manifest.display()
-        );
+    for manifest in manifests().iter().filter(|file| !file.ends_with("common/bus/Cargo.toml")) {
+        assert!(!dependencies(manifest).contains(&"iceoryx2".to_owned()), "{}", manifest.display());
     }
 }
 
@@ -216,15 +181,11 @@ fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
-    for arguments in [
-        &["--package", "supervisor"][..],
-        &["--package", "firsthand", "--no-default-features"],
-    ] {
+    for arguments in
+        [&["--package", "supervisor"][..], &["--package", "firsthand", "--no-default-features"]]
+    {
         let tree = tree(arguments);
-        let names: BTreeSet<_> = tree
-            .lines()
-            .filter_map(|line| line.split(' ').next())
-            .collect();
+        let names: BTreeSet<_> = tree.lines().filter_map(|line| line.split(' ').next()).collect();
         assert!(names.contains("common"), "{tree}");
         for tool in [
             "png",

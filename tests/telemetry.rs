@@ -10,9 +10,8 @@ fn infrared_power_and_surroundings_reach_a_consumer_and_a_low_battery_is_told_on
     in_own_process(|| {
         let low = ["--pace", "4", "--set", "simulation.battery.start_v=6.4"];
         let mut run = Run::start("telemetry", "obstacle-course", &low);
-        let status = run.wait_until("the battery is known to be low", |status| {
-            status["power"]["low"] == true
-        });
+        let status = run
+            .wait_until("the battery is known to be low", |status| status["power"]["low"] == true);
         let volts = status["power"]["motor_v"].as_f64().unwrap();
         assert!((volts - 6.4).abs() < 0.01, "{status}");
         run.wait_until_under_way(2.0);

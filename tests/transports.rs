@@ -87,10 +87,7 @@ fn goes_away_and_comes_back(transport: &str) {
     let believed = summary["path_length_m"].as_f64().unwrap();
     // But for what the first one went unheard: up to two ticks at 0.5 m/s.
     assert!((went - believed).abs() < UNHEARD_M, "{went} m: {summary}");
-    assert!(
-        (went - TARGET_M).abs() < TOLERANCE_M + UNHEARD_M,
-        "{went} m"
-    );
+    assert!((went - TARGET_M).abs() < TOLERANCE_M + UNHEARD_M, "{went} m");
     assert_nothing_left(&name);
 }
 

@@ -83,10 +83,7 @@ impl FaultInjector {
     fn stop_streams(&self) {
         let mut shared = self.shared.lock().unwrap();
         shared.asked_for_streams = false;
-        shared.inject.push(Command::Stream {
-            stream: Stream::All,
-            request: Request::Stop,
-        });
+        shared.inject.push(Command::Stream { stream: Stream::All, request: Request::Stop });
     }
 
     fn set(&self, fault: Fault) {
@@ -202,12 +199,7 @@ fn cause_is(cause: &'static str) -> impl Fn(&Value) -> bool {
 #[test]
 fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_mission_ends_with_the_reason()
  {
-    for fault in [
-        Fault::SameFrame,
-        Fault::DeadEncoder,
-        Fault::Reversed,
-        Fault::Random,
-    ] {
+    for fault in [Fault::SameFrame, Fault::DeadEncoder, Fault::Reversed, Fault::Random] {
         let (_body, faults, mut run) = faulty("fi-encoders", fault);
         run.wait_until("it is suspected", cause_is("odometry implausible"));
         let moved = faults.moved_for();
@@ -219,10 +211,7 @@ fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_missio
         let (code, summary) = run.finish();
         assert_eq!(faults.moved_for(), moved, "{fault:?}: it never moved again");
         assert_ended(code, &summary, 6, "aborted");
-        assert_eq!(
-            summary["cause"], "odometry implausible for long",
-            "{summary}"
-        );
+        assert_eq!(summary["cause"], "odometry implausible for long", "{summary}");
         assert_nothing_left("fi-encoders");
     }
 }
@@ -274,9 +263,7 @@ fn streams_that_stop_while_the_robot_answers_are_asked_for_again_and_the_mission
     let (_body, faults, mut run) = faulty("fi-mute", Fault::None);
     run.wait_until_under_way(0.5);
     faults.stop_streams();
-    run.wait_until("they are asked for", |_| {
-        faults.shared.lock().unwrap().asked_for_streams
-    });
+    run.wait_until("they are asked for", |_| faults.shared.lock().unwrap().asked_for_streams);
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
     run.stop();
 }

@@ -38,16 +38,8 @@ fn every_stage_has_open_what_its_row_lists_and_nothing_else() {
             let reads = names(&[wiring.inputs, wiring.feedback, EVERY_STAGE_READS]);
             let writes = names(&[wiring.outputs, EVERY_STAGE_WRITES]);
             let name = stage.name;
-            assert_eq!(
-                found(&|opened| opened.readers.contains(&pid)),
-                reads,
-                "{name}"
-            );
-            assert_eq!(
-                found(&|opened| opened.writers.contains(&pid)),
-                writes,
-                "{name}"
-            );
+            assert_eq!(found(&|opened| opened.readers.contains(&pid)), reads, "{name}");
+            assert_eq!(found(&|opened| opened.writers.contains(&pid)), writes, "{name}");
             let woken = found(&|opened| opened.woken.contains(&pid));
             assert_eq!(woken, names(&[wiring.wakes]), "{name}");
         }

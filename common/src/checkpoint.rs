@@ -105,13 +105,8 @@ impl Checkpoint {
             .open(path)
             .map_err(failed("open", path))?;
         reserve(&file, 2 * (HEADER + capacity) as u64).map_err(failed("reserve room for", path))?;
-        let mut checkpoint = Self {
-            file,
-            path: path.to_path_buf(),
-            capacity,
-            sequence: 0,
-            buffer: Vec::new(),
-        };
+        let mut checkpoint =
+            Self { file, path: path.to_path_buf(), capacity, sequence: 0, buffer: Vec::new() };
         let mut newest: Option<(u64, T)> = None;
         for slot in 0..2 {
             if let Some((sequence, state)) = checkpoint.read_slot(slot)?
@@ -139,10 +134,8 @@ impl Checkpoint {
         let mut bytes = vec![0; HEADER + self.capacity];
         let length =
             read_up_to(&self.file, &mut bytes, offset).map_err(failed("read", &self.path))?;
-        decode(&bytes[..length]).map_err(|problem| CheckpointError::Foreign {
-            file: self.path.clone(),
-            problem,
-        })
+        decode(&bytes[..length])
+            .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
 
     /// Save `state` in place of the older of the two held.
@@ -154,11 +147,8 @@ impl Checkpoint {
         let mut bytes = std::mem::take(&mut self.buffer);
         bytes.clear();
         bytes.resize(HEADER, 0);
-        let mut bytes =
-            postcard::to_extend(state, bytes).map_err(|source| CheckpointError::Encode {
-                file: self.path.clone(),
-                source,
-            })?;
+        let mut bytes = postcard::to_extend(state, bytes)
+            .map_err(|source| CheckpointError::Encode { file: self.path.clone(), source })?;
         let length = bytes.len() - HEADER;
         if length > self.capacity {
             return Err(CheckpointError::TooLarge {
@@ -187,11 +177,7 @@ pub(crate) fn failed(
     path: &Path,
 ) -> impl FnOnce(io::Error) -> CheckpointError {
     let file = path.to_path_buf();
-    move |source| CheckpointError::File {
-        action,
-        file,
-        source,
-    }
+    move |source| CheckpointError::File { action, file, source }
 }
 
 /// Over everything but the checksum itself.
@@ -314,18 +300,12 @@ mod tests {
         let (mut checkpoint, _) = open(&path);
         checkpoint.save(&vec![1_u32]).unwrap();
         let refused = || Checkpoint::open::<[String; 3]>(&path, CAPACITY).unwrap_err();
-        assert!(
-            refused().to_string().contains("cannot be decoded"),
-            "{}",
-            refused()
-        );
+        assert!(refused().to_string().contains("cannot be decoded"), "{}", refused());
         let mut bytes = std::fs::read(&path).unwrap();
         let slot = checkpoint.slot_offset(1) as usize;
         bytes[slot + 3] = b'1';
         std::fs::write(&path, bytes).unwrap();
-        let refused = Checkpoint::open::<Vec<u32>>(&path, CAPACITY)
-            .unwrap_err()
-            .to_string();
+        let refused = Checkpoint::open::<Vec<u32>>(&path, CAPACITY).unwrap_err().to_string();
         assert!(refused.contains("version 1, not 2"), "{refused}");
     }
 

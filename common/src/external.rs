@@ -66,19 +66,8 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
     let bus = Bus::join_as_stage(&domain, stage, supervisor)?;
     let place = wait_for_place(&bus, stage)?;
     let number = run::next_generation(&directory, stage)?;
-    let generation = Generation {
-        stage,
-        directory,
-        number,
-        first_tick: place.first_tick,
-    };
-    Ok(Joined {
-        generation,
-        run,
-        bus,
-        supervisor: Some(place.supervisor),
-        stage_lock,
-    })
+    let generation = Generation { stage, directory, number, first_tick: place.first_tick };
+    Ok(Joined { generation, run, bus, supervisor: Some(place.supervisor), stage_lock })
 }
 
 /// What the roster says about a free place.
@@ -95,9 +84,7 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place, StageError> {
             return Some(Err(error));
         }
         let mut entries = entries.iter();
-        holder = entries
-            .find(|entry| name_str(&entry.stage) == stage)
-            .map(|entry| entry.pid);
+        holder = entries.find(|entry| name_str(&entry.stage) == stage).map(|entry| entry.pid);
         (holder == Some(0)).then(|| {
             Ok(Place {
                 first_tick: header.stamp.tick + 1,

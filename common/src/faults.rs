@@ -78,9 +78,7 @@ pub fn find(stage: &str, name: &str) -> Option<&'static Fault> {
 
 /// What can be broken in `stage`.
 pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
-    TABLE
-        .iter()
-        .filter(move |fault| fault.stage.is_none_or(|its| its == stage))
+    TABLE.iter().filter(move |fault| fault.stage.is_none_or(|its| its == stage))
 }
 
 /// What to do with a request, before the stage itself is asked: inject the fault, or give an answer at once.
@@ -121,11 +119,7 @@ pub(crate) struct Requests {
 
 impl Requests {
     pub(crate) fn open(bus: &Bus, stage: &'static str, simulated: bool) -> Result<Self, BusError> {
-        Ok(Self {
-            requests: bus.reader(&topics::FAULTS)?,
-            stage,
-            simulated,
-        })
+        Ok(Self { requests: bus.reader(&topics::FAULTS)?, stage, simulated })
     }
 
     /// The next request for this stage.
@@ -157,10 +151,7 @@ mod tests {
     #[test]
     fn a_fault_in_a_real_robot_needs_a_request_that_says_so() {
         let unspecific = request(FaultKind::Saddle, false);
-        assert_eq!(
-            admit(&unspecific, "planner", false),
-            Err(FaultAnswer::Refused)
-        );
+        assert_eq!(admit(&unspecific, "planner", false), Err(FaultAnswer::Refused));
         assert_eq!(admit(&unspecific, "planner", true), Ok(FaultKind::Saddle));
         let meant = request(FaultKind::Saddle, true);
         assert_eq!(admit(&meant, "planner", false), Ok(FaultKind::Saddle));
@@ -169,18 +160,9 @@ mod tests {
     #[test]
     fn a_stage_has_neither_the_faults_of_others_nor_unknown_ones() {
         let request = request(FaultKind::Saddle, true);
-        assert_eq!(
-            admit(&request, "mapper", true),
-            Err(FaultAnswer::Impossible)
-        );
-        let unknown = FaultSample {
-            kind: 200,
-            ..request
-        };
-        assert_eq!(
-            admit(&unknown, "planner", true),
-            Err(FaultAnswer::Impossible)
-        );
+        assert_eq!(admit(&request, "mapper", true), Err(FaultAnswer::Impossible));
+        let unknown = FaultSample { kind: 200, ..request };
+        assert_eq!(admit(&unknown, "planner", true), Err(FaultAnswer::Impossible));
     }
 
     #[test]

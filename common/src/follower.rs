@@ -169,11 +169,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
                 waiter.on(bus.wakeup(topic)?);
             }
         }
-        Ok(Joined {
-            topics: (self.open)(&bus)?,
-            waiter,
-            bus,
-        })
+        Ok(Joined { topics: (self.open)(&bus)?, waiter, bus })
     }
 
     fn on_disconnected(&self) -> bool {

@@ -44,13 +44,8 @@ impl InputLog {
         let cells = context.run.mission.grid_frame().area();
         let piece = PIECE.max(cells / CELLS_FOR_A_BYTE);
         let mut log = Self {
-            writer: context
-                .bus
-                .slice_writer(&topics::INPUTS, generation.number, piece)?,
-            header: InputsHeader {
-                stage: name(generation.stage),
-                ..InputsHeader::default()
-            },
+            writer: context.bus.slice_writer(&topics::INPUTS, generation.number, piece)?,
+            header: InputsHeader { stage: name(generation.stage), ..InputsHeader::default() },
             piece,
             unpublished: Vec::new(),
         };
@@ -91,8 +86,7 @@ impl InputLog {
     /// When it cannot be published.
     pub fn publish(&mut self, at: Progress) -> Result<(), BusError> {
         for piece in self.unpublished.chunks(self.piece) {
-            self.writer
-                .publish_slice_quietly(at.tick, at.time, self.header, piece)?;
+            self.writer.publish_slice_quietly(at.tick, at.time, self.header, piece)?;
         }
         self.unpublished.clear();
         Ok(())

@@ -91,15 +91,8 @@ impl Journal {
             Some(Snapshot { next, state }) => (next, Some(state)),
             None => (0, None),
         };
-        let mut journal = Self {
-            snapshots,
-            file,
-            path,
-            end: 0,
-            number: first,
-            first,
-            snapshot_after,
-        };
+        let mut journal =
+            Self { snapshots, file, path, end: 0, number: first, first, snapshot_after };
         let entries = journal.read()?;
         Ok((journal, Restored { state, entries }))
     }
@@ -142,11 +135,8 @@ impl Journal {
     /// When the file system refuses.
     pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
         let header = vec![0; HEADER];
-        let mut bytes =
-            postcard::to_extend(entry, header).map_err(|source| CheckpointError::Encode {
-                file: self.path.clone(),
-                source,
-            })?;
+        let mut bytes = postcard::to_extend(entry, header)
+            .map_err(|source| CheckpointError::Encode { file: self.path.clone(), source })?;
         let length = bytes.len() - HEADER;
         bytes.extend_from_slice(&END);
         if length > LONGEST {
@@ -161,9 +151,7 @@ impl Journal {
         let end = HEADER + length;
         let crc = checksum(&bytes[..end]);
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
-        self.file
-            .write_all_at(&bytes, self.end)
-            .map_err(failed("write", &self.path))?;
+        self.file.write_all_at(&bytes, self.end).map_err(failed("write", &self.path))?;
         self.end += end as u64;
         self.number += 1;
         Ok(())
@@ -181,10 +169,7 @@ impl Journal {
     /// # Errors
     /// When the file system refuses, or the state is larger than was said at opening.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
-        self.snapshots.save(&Snapshot {
-            next: self.number,
-            state,
-        })?;
+        self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
         self.end = 0;
         self.cut()
@@ -262,11 +247,7 @@ mod tests {
         let whole = std::fs::read(&file).unwrap();
         for cut in before..=whole.len() {
             std::fs::write(&file, &whole[..cut]).unwrap();
-            let mut sum = if cut >= whole.len() - HEADER {
-                300
-            } else {
-                100
-            };
+            let mut sum = if cut >= whole.len() - HEADER { 300 } else { 100 };
             assert_eq!(folded(&path), sum, "cut at {cut}");
             // The next process writes over the torn tail.
             open(&path).0.append(&7_u64).unwrap();

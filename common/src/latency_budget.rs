@@ -35,13 +35,7 @@ pub enum Item {
 
 impl Item {
     /// Every item.
-    pub const ALL: [Self; 5] = [
-        Self::Read,
-        Self::Step,
-        Self::Persist,
-        Self::Publish,
-        Self::After,
-    ];
+    pub const ALL: [Self; 5] = [Self::Read, Self::Step, Self::Persist, Self::Publish, Self::After];
 
     /// As a table heads it.
     #[must_use]
@@ -100,18 +94,11 @@ impl LatencyBudget {
     /// Measures if the environment asks for it.
     #[must_use]
     pub fn from_environment() -> Self {
-        if env::var_os(ASKED_FOR).is_some() {
-            Self::measuring()
-        } else {
-            Self::default()
-        }
+        if env::var_os(ASKED_FOR).is_some() { Self::measuring() } else { Self::default() }
     }
 
     fn measuring() -> Self {
-        let stopwatch = Stopwatch {
-            ticks: Vec::with_capacity(MOST_TICKS),
-            ..Stopwatch::default()
-        };
+        let stopwatch = Stopwatch { ticks: Vec::with_capacity(MOST_TICKS), ..Stopwatch::default() };
         Self(Some(Rc::new(RefCell::new(stopwatch))))
     }
 
@@ -223,11 +210,7 @@ impl fmt::Display for TickTimes {
             Answers::Inputs => INPUTS,
             Answers::Feedback => FEEDBACK,
         };
-        write!(
-            to,
-            "{} {answers} {} {}",
-            self.tick, self.awake_ns, self.published_ns
-        )?;
+        write!(to, "{} {answers} {} {}", self.tick, self.awake_ns, self.published_ns)?;
         self.items_ns.iter().try_for_each(|ns| write!(to, " {ns}"))
     }
 }
@@ -274,12 +257,9 @@ mod tests {
     /// One tick of a stage that keeps before and after it publishes.
     fn tick(stopwatch: &mut Stopwatch, tick: u64, began_ns: u64) {
         stopwatch.awake(began_ns);
-        for (item, after_ns) in [
-            (Item::Read, 3),
-            (Item::Persist, 5),
-            (Item::Step, 12),
-            (Item::Persist, 13),
-        ] {
+        for (item, after_ns) in
+            [(Item::Read, 3), (Item::Persist, 5), (Item::Step, 12), (Item::Persist, 13)]
+        {
             stopwatch.end(item, began_ns + after_ns);
         }
         stopwatch.published(tick, Answers::Inputs, began_ns + 20);
@@ -320,13 +300,9 @@ mod tests {
         assert_eq!((read.tick, read.answers), (9, Answers::Feedback));
         assert!(read.published_ns >= read.awake_ns);
         let whole = text.trim_end();
-        for bad in [
-            "",
-            "9",
-            "9 sideways 1 2 3 4 5 6 7",
-            "9 inputs 1 2 3 4 5 6 -7",
-            &format!("{whole} 1"),
-        ] {
+        for bad in
+            ["", "9", "9 sideways 1 2 3 4 5 6 7", "9 inputs 1 2 3 4 5 6 -7", &format!("{whole} 1")]
+        {
             let said = bad.parse::<TickTimes>();
             assert!(said.is_err(), "{bad}: {said:?}");
         }

@@ -64,17 +64,11 @@ impl Outputs {
             noted: false,
         };
         process.open(context, longest, false)?;
-        Ok(Self {
-            at: Progress::default(),
-            to: Destination::Process(Box::new(process)),
-        })
+        Ok(Self { at: Progress::default(), to: Destination::Process(Box::new(process)) })
     }
 
     pub(crate) fn of_replay() -> Self {
-        Self {
-            at: Progress::default(),
-            to: Destination::Replay(Vec::new()),
-        }
+        Self { at: Progress::default(), to: Destination::Replay(Vec::new()) }
     }
 
     /// Open the topics that follow each frame of the robot.

@@ -60,12 +60,7 @@ impl Output {
 }
 
 const fn stamp(tick: u64, time: MissionTime) -> Stamp {
-    Stamp {
-        tick,
-        stamp_ns: time.0,
-        generation: 0,
-        sequence: 0,
-    }
+    Stamp { tick, stamp_ns: time.0, generation: 0, sequence: 0 }
 }
 
 /// An entry of a generation's inputs cannot be taken.

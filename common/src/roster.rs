@@ -26,10 +26,7 @@ impl Roster {
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::ROSTER)?);
-        Ok(Self {
-            samples: bus.slice_reader(&topics::ROSTER)?,
-            waiter,
-        })
+        Ok(Self { samples: bus.slice_reader(&topics::ROSTER)?, waiter })
     }
 
     /// What `find` finds in a roster first; none if it finds nothing for `patience`.

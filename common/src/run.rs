@@ -62,11 +62,7 @@ impl Run {
             file: file.clone(),
             problem: error.to_string(),
         })?;
-        replace(&file, &text).map_err(|source| RunError::File {
-            action: "write",
-            file,
-            source,
-        })
+        replace(&file, &text).map_err(|source| RunError::File { action: "write", file, source })
     }
 
     /// Read it back from `directory`.
@@ -80,10 +76,8 @@ impl Run {
             file: file.clone(),
             source,
         })?;
-        toml::from_str(&text).map_err(|error| RunError::Content {
-            file,
-            problem: error.message().to_owned(),
-        })
+        toml::from_str(&text)
+            .map_err(|error| RunError::Content { file, problem: error.message().to_owned() })
     }
 }
 
@@ -130,9 +124,8 @@ mod tests {
     #[test]
     fn generations_are_counted_on_by_the_next_supervisor() {
         let directory = tempfile::tempdir().unwrap();
-        let numbers: Vec<_> = (0..3)
-            .map(|_| next_generation(directory.path(), "mapper").unwrap())
-            .collect();
+        let numbers: Vec<_> =
+            (0..3).map(|_| next_generation(directory.path(), "mapper").unwrap()).collect();
         assert_eq!(numbers, [1, 2, 3]);
         assert_eq!(next_generation(directory.path(), "planner").unwrap(), 1);
     }

@@ -123,10 +123,7 @@ mod tests {
 
     #[test]
     fn a_sample_is_read_as_it_was_written_and_none_from_half_of_it() {
-        let mut link = LinkSample {
-            losses: 7,
-            ..LinkSample::default()
-        };
+        let mut link = LinkSample { losses: 7, ..LinkSample::default() };
         link.latency_histogram[3] = 11;
         let mut message = Vec::new();
         encode_sample(&link, &mut message);

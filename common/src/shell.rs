@@ -148,10 +148,7 @@ pub struct Progress {
 impl Progress {
     /// The tick of a sample.
     pub const fn of(stamp: &Stamp) -> Self {
-        Self {
-            tick: stamp.tick,
-            time: stamp.time(),
-        }
+        Self { tick: stamp.tick, time: stamp.time() }
     }
 }
 
@@ -255,17 +252,8 @@ const WRONG_USAGE: u8 = 2;
 /// What [`Process`] returns, or what keeps it from being opened.
 pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
-    let Joined {
-        generation,
-        run,
-        bus,
-        supervisor,
-        stage_lock: _stage_lock,
-    } = match start {
-        Start::Child {
-            generation,
-            supervisor,
-        } => start::join_as_child(generation, *supervisor)?,
+    let Joined { generation, run, bus, supervisor, stage_lock: _stage_lock } = match start {
+        Start::Child { generation, supervisor } => start::join_as_child(generation, *supervisor)?,
         Start::External { stage, robot } => external::join(stage, robot)?,
     };
     let mut waiter = Waiter::default();
@@ -273,10 +261,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     if let Some(supervisor) = &supervisor {
         waiter.on_readable(supervisor)?;
     }
-    let mut stop = StopRequest {
-        terminated,
-        supervisor,
-    };
+    let mut stop = StopRequest { terminated, supervisor };
     let mut heartbeat = Heartbeat::new(&bus, &generation)?;
     heartbeat.beat(HealthState::Starting, Progress::default())?;
     let number = generation.number;
@@ -297,15 +282,10 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
     // Whatever went wrong, the stage is stopped in order: the link then stops the robot.
     let stopped = process.stop();
-    let Generation {
-        stage, directory, ..
-    } = &context.generation;
+    let Generation { stage, directory, .. } = &context.generation;
     let file = latency_budget::file(directory, stage, number);
     if let Err(error) = context.budget.save(&file) {
-        tracing::warn!(
-            "cannot save the times of ticks in {}: {error}",
-            file.display()
-        );
+        tracing::warn!("cannot save the times of ticks in {}: {error}", file.display());
     }
     tracing::info!("stopped");
     worked.and(stopped)
@@ -423,8 +403,7 @@ impl Heartbeat {
     fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result<(), StageError> {
         self.sample.state = state.into();
         (self.last, self.tick) = (Instant::now(), progress.tick);
-        self.writer
-            .publish_quietly(progress.tick, progress.time, self.sample)?;
+        self.writer.publish_quietly(progress.tick, progress.time, self.sample)?;
         Ok(())
     }
 

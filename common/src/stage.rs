@@ -169,11 +169,7 @@ pub struct Answer<P> {
 
 impl<P> From<P> for Answer<P> {
     fn from(sample: P) -> Self {
-        Self {
-            sample,
-            saves_first: true,
-            warning: None,
-        }
+        Self { sample, saves_first: true, warning: None }
     }
 }
 
@@ -241,10 +237,7 @@ impl<A: Answering> Process for Answers<A> {
     };
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        Ok(Self {
-            runner: Runner::open(context, |_| 0)?,
-            input: context.reader(A::INPUT)?,
-        })
+        Ok(Self { runner: Runner::open(context, |_| 0)?, input: context.reader(A::INPUT)? })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {

@@ -33,12 +33,7 @@ pub struct StageCommandError {
 /// stage, or of the baseline in its place.
 #[must_use]
 pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<OsString> {
-    let Generation {
-        stage: _,
-        directory,
-        number,
-        first_tick,
-    } = generation;
+    let Generation { stage: _, directory, number, first_tick } = generation;
     vec![
         SUBCOMMAND.into(),
         called.into(),
@@ -149,11 +144,7 @@ mod tests {
             first_tick: 77,
         };
         let read = start("planner", arguments("planner", &written, 4711)).unwrap();
-        let Start::Child {
-            generation,
-            supervisor,
-        } = read
-        else {
+        let Start::Child { generation, supervisor } = read else {
             panic!("{read:?}");
         };
         assert_eq!((generation, supervisor), (written, 4711));
@@ -180,10 +171,7 @@ mod tests {
             ("stage planner --robot a/b", "--robot a/b"),
             ("stage planner --warp 9", "--warp is no option"),
             ("stage planner --run /tmp", "go together"),
-            (
-                "stage planner --run /tmp --supervisor 1 --robot a",
-                "go together",
-            ),
+            ("stage planner --run /tmp --supervisor 1 --robot a", "go together"),
         ] {
             let said = start("planner", words(line)).unwrap_err().to_string();
             assert!(said.contains(problem), "{line:?}: {said}");

@@ -106,20 +106,12 @@ pub(crate) fn join_as_child(
     let domain = Domain::of(run.robot.clone());
     let stage_lock = enter(&domain)?;
     let bus = Bus::join_as_stage(&domain, generation.stage, supervisor)?;
-    Ok(Joined {
-        generation: generation.clone(),
-        run,
-        bus,
-        supervisor: None,
-        stage_lock,
-    })
+    Ok(Joined { generation: generation.clone(), run, bus, supervisor: None, stage_lock })
 }
 
 /// Count as a process of `domain`, until the result is dropped.
 pub(crate) fn enter(domain: &Domain) -> Result<File, StageError> {
-    domain
-        .enter()
-        .map_err(system("enter the robot's directory"))
+    domain.enter().map_err(system("enter the robot's directory"))
 }
 
 pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {

@@ -29,10 +29,7 @@ const FIELD_RATE: Rate = Rate::OnChange {
 
 /// At every change at once, and again after `again_after`.
 const fn on_change(again_after: Duration) -> Rate {
-    Rate::OnChange {
-        at_most_every: Duration::ZERO,
-        again_after,
-    }
+    Rate::OnChange { at_most_every: Duration::ZERO, again_after }
 }
 
 macro_rules! topics {

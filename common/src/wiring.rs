@@ -105,10 +105,7 @@ pub enum WiringError {
 
 impl Opened {
     pub(crate) const fn none_of(wiring: &'static Wiring) -> Self {
-        Self {
-            wiring,
-            topics: Vec::new(),
-        }
+        Self { wiring, topics: Vec::new() }
     }
 
     /// Note that `topic` is opened, if it is listed.
@@ -149,10 +146,7 @@ mod tests {
         let mut opened = Opened::none_of(&WIRING);
         assert_eq!(opened.add(Access::Read, "guidance"), Ok(()));
         let refused = opened.add(Access::Write, "guidance");
-        assert_eq!(
-            refused,
-            Err(WiringError::NotListed(Access::Write, "guidance"))
-        );
+        assert_eq!(refused, Err(WiringError::NotListed(Access::Write, "guidance")));
         let refused = opened.add(Access::Read, "range");
         assert_eq!(refused, Err(WiringError::NotListed(Access::Read, "range")));
     }
@@ -160,11 +154,9 @@ mod tests {
     #[test]
     fn a_listed_topic_that_is_not_opened_is_found() {
         let mut opened = Opened::none_of(&WIRING);
-        for (access, topic) in [
-            (Access::Read, "guidance"),
-            (Access::Write, "command"),
-            (Access::Read, "pose"),
-        ] {
+        for (access, topic) in
+            [(Access::Read, "guidance"), (Access::Write, "command"), (Access::Read, "pose")]
+        {
             assert!(opened.check_all().is_err(), "before {topic}");
             opened.add(access, topic).unwrap();
         }

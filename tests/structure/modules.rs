@@ -49,11 +49,8 @@ fn reached<'a>(edges: &'a Edges<'_>, from: &'a Path) -> BTreeSet<&'a Path> {
 /// Words, `::` and single characters; comments, strings, characters and lifetimes left out.
 pub(super) fn tokens(source: &str) -> Names {
     let text: Vec<char> = source.chars().collect();
-    let starts = |at: usize, what: &str| {
-        what.chars()
-            .enumerate()
-            .all(|(i, c)| text.get(at + i) == Some(&c))
-    };
+    let starts =
+        |at: usize, what: &str| what.chars().enumerate().all(|(i, c)| text.get(at + i) == Some(&c));
     let mut tokens: Names = Vec::new();
     let mut at = 0;
     while at < text.len() {
@@ -191,10 +188,7 @@ impl Crate {
     }
 
     fn read_module(&mut self, tokens: &[String], file: &Path, folder: &Path, name: Names) {
-        let mut module = Module {
-            file: file.to_owned(),
-            ..Module::default()
-        };
+        let mut module = Module { file: file.to_owned(), ..Module::default() };
         let word = |at: usize| tokens.get(at).map_or("", |token| &**token);
         let is_word = |at: usize| word(at).starts_with(|c: char| c.is_alphabetic() || c == '_');
         let (mut at, mut depth) = (0, 0);
@@ -205,11 +199,7 @@ impl Crate {
                     let condition = &tokens[at + 4..end];
                     let is_test = condition[0] == "test"
                         || condition[0] == "all" && condition.iter().any(|it| it == "test");
-                    at = if is_test {
-                        past_item(tokens, end + 1)
-                    } else {
-                        end + 1
-                    };
+                    at = if is_test { past_item(tokens, end + 1) } else { end + 1 };
                     continue;
                 }
                 "{" => depth += 1,
@@ -219,11 +209,8 @@ impl Crate {
                     let path = [&name[..], std::slice::from_ref(&child)].concat();
                     if word(at + 2) == ";" {
                         let flat = folder.join(format!("{child}.rs"));
-                        let file = if flat.exists() {
-                            flat
-                        } else {
-                            folder.join(&child).join("mod.rs")
-                        };
+                        let file =
+                            if flat.exists() { flat } else { folder.join(&child).join("mod.rs") };
                         self.read_file(&file, &folder.join(&child), path);
                         at += 3;
                     } else {
@@ -251,11 +238,7 @@ impl Crate {
                 "fn" | "struct" | "enum" | "union" | "trait" | "type" | "const" | "static"
                     if depth == 0 && is_word(at + 1) =>
                 {
-                    let name = if word(at + 1) == "mut" {
-                        at + 2
-                    } else {
-                        at + 1
-                    };
+                    let name = if word(at + 1) == "mut" { at + 2 } else { at + 1 };
                     module.items.insert(word(name).to_owned());
                 }
                 // A macro may define what stands alone at the top of its braces.
@@ -331,12 +314,10 @@ impl Crate {
             // `use rand::rand` names another crate, not itself.
             (path.first() != Some(name)).then(|| self.resolve(module, path, depth - 1))?
         } else {
-            it.globs
-                .iter()
-                .find_map(|glob| match self.resolve(module, glob, depth - 1)? {
-                    Target::Module(of) => self.member(&of, name, depth - 1),
-                    Target::Item(_) => None,
-                })
+            it.globs.iter().find_map(|glob| match self.resolve(module, glob, depth - 1)? {
+                Target::Module(of) => self.member(&of, name, depth - 1),
+                Target::Item(_) => None,
+            })
         }
     }
 
@@ -363,10 +344,7 @@ impl Crate {
     /// Files that name each other, directly or by way of others; a line for each such group.
     pub(super) fn circles(&self) -> Vec<String> {
         let edges = self.edges();
-        let all: BTreeMap<_, _> = edges
-            .keys()
-            .map(|file| (*file, reached(&edges, file)))
-            .collect();
+        let all: BTreeMap<_, _> = edges.keys().map(|file| (*file, reached(&edges, file))).collect();
         let with = |file: &Path| {
             all[file]
                 .iter()
@@ -388,11 +366,7 @@ impl Crate {
                     .collect();
                 format!("\n  {} -> {}", file.display(), inside.join(", "))
             });
-            format!(
-                "a circle of {} files:{}",
-                group.len(),
-                arrows.collect::<String>()
-            )
+            format!("a circle of {} files:{}", group.len(), arrows.collect::<String>())
         };
         groups.iter().map(line).collect()
     }

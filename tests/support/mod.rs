@@ -2,13 +2,7 @@
 //!
 //! Every test names its own robots. Each process that a test starts gets SIGKILL when the test ends, however it ends, so that
 //! a suite that was killed leaves nothing that hinders the next.
-#![allow(
-    dead_code,
-    clippy::unwrap_used,
-    clippy::panic,
-    missing_docs,
-    unreachable_pub
-)]
+#![allow(dead_code, clippy::unwrap_used, clippy::panic, missing_docs, unreachable_pub)]
 
 pub mod wire;
 
@@ -29,13 +23,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Every stage, in the order of the pipeline.
-pub const STAGES: [&str; 5] = [
-    "x80-link",
-    "dead-reckoning",
-    "mapper",
-    "planner",
-    "controller",
-];
+pub const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
 
 /// Nothing a test waits for takes nearly as long; what does is broken.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -61,10 +49,7 @@ pub fn in_own_process<T: FnOnce()>(test: T) {
 pub fn on_small_disk<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
     let namespaces = ["unshare", "--user", "--map-root-user", "--mount"];
     if !can_run(&namespaces) {
-        return not_run(
-            name_of::<T>(),
-            "no user namespace with mounts can be had here",
-        );
+        return not_run(name_of::<T>(), "no user namespace with mounts can be had here");
     }
     let directory = tempfile::tempdir().unwrap();
     // The inner namespace gives the test its own user back: files of the robot have that user's number in their names.
@@ -134,10 +119,8 @@ fn in_process_under(wrapper: &[&str], name: &str, test: impl FnOnce()) {
         .env(OWN_PROCESS, name)
         .output()
         .unwrap();
-    let (printed, said) = (
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr),
-    );
+    let (printed, said) =
+        (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     let passed = output.status.success() && printed.contains("1 passed");
     assert!(passed, "{printed}\n{said}");
 }
@@ -239,11 +222,7 @@ impl Run {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        Self {
-            robot: robot.to_owned(),
-            child: Some(child),
-            directory,
-        }
+        Self { robot: robot.to_owned(), child: Some(child), directory }
     }
 
     pub fn directory(&self) -> PathBuf {
@@ -326,9 +305,8 @@ impl Run {
 
     /// Kill a stage, or freeze it (`Signal::STOP`), and wait until its successor runs; the status then.
     pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
-        let status = self.wait_until("the stage runs", |status| {
-            find(status, stage)["state"] == "running"
-        });
+        let status =
+            self.wait_until("the stage runs", |status| find(status, stage)["state"] == "running");
         self.kill_and_await(stage, signal, &status)
     }
 
@@ -430,10 +408,7 @@ pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Valu
 
 /// The committed recording of the first seconds of a mission.
 pub fn golden() -> Recording {
-    let file = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/golden/open-room.mcap"
-    );
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
     Recording::open(file.as_ref()).unwrap()
 }
 
@@ -469,8 +444,7 @@ pub fn half_make(path: &Path) {
     // An existing one may not be writable.
     let _ = fs::remove_file(path);
     let file = fs::File::create(path).unwrap();
-    file.set_permissions(fs::Permissions::from_mode(0o200))
-        .unwrap();
+    file.set_permissions(fs::Permissions::from_mode(0o200)).unwrap();
 }
 
 pub fn domain(robot: &str) -> Domain {

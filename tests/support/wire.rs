@@ -122,11 +122,7 @@ impl Proxy {
             });
         });
         let threads = vec![out, back];
-        Self {
-            address,
-            over,
-            threads,
-        }
+        Self { address, over, threads }
     }
 
     /// The assignment that makes it the robot of a mission.

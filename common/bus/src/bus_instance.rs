@@ -36,10 +36,7 @@ impl BusInstance {
             random /= 32;
             char::from(letter)
         });
-        Self {
-            domain: domain.clone(),
-            name: name.collect(),
-        }
+        Self { domain: domain.clone(), name: name.collect() }
     }
 
     /// The one whose bus is there.
@@ -59,10 +56,7 @@ impl BusInstance {
             let text = format!("{link} leads to {config}, which is no configuration of a bus");
             io::Error::new(io::ErrorKind::InvalidData, text)
         })?;
-        Ok(Self {
-            domain: domain.clone(),
-            name: name.to_owned(),
-        })
+        Ok(Self { domain: domain.clone(), name: name.to_owned() })
     }
 
     /// From now on this is the one that is joined.
@@ -115,10 +109,7 @@ mod tests {
     fn the_bus_that_is_there_is_the_one_made_last() {
         let domain = Domain::of("instance".parse().unwrap());
         let mut own = fs::DirBuilder::new();
-        own.recursive(true)
-            .mode(0o700)
-            .create(domain.directory())
-            .unwrap();
+        own.recursive(true).mode(0o700).create(domain.directory()).unwrap();
         assert!(BusInstance::current(&domain).is_err());
         for _ in 0..2 {
             let made = BusInstance::new(&domain);

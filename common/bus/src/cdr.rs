@@ -46,10 +46,7 @@ impl<'a> Decoder<'a> {
     #[must_use]
     pub fn new(message: &'a [u8]) -> Option<Self> {
         let rest = message.strip_prefix(&HEADER)?;
-        Some(Self {
-            rest,
-            length: rest.len(),
-        })
+        Some(Self { rest, length: rest.len() })
     }
 
     /// A number of N bytes.

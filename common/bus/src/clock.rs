@@ -133,10 +133,7 @@ mod tests {
 
     #[test]
     fn wall_time_runs_from_the_epoch_at_its_rate() {
-        let clock = MissionClock::Wall {
-            epoch_ns: 1_000,
-            rate: 2.0,
-        };
+        let clock = MissionClock::Wall { epoch_ns: 1_000, rate: 2.0 };
         assert_eq!(clock.at(9, 1_500), MissionTime(1_000));
         assert_eq!(clock.at(9, 500), MissionTime(0), "before the epoch");
     }

@@ -80,11 +80,7 @@ impl Domain {
         // Not $XDG_RUNTIME_DIR: it differs between a login, a service and a container of one user, and
         // a consumer must find the robot from any of them.
         let directory = PathBuf::from(format!("/tmp/firsthand-{user}/{robot}"));
-        Self {
-            robot,
-            user,
-            directory,
-        }
+        Self { robot, user, directory }
     }
 
     /// Holds the files below; only its owner may enter.

@@ -49,9 +49,7 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedTopic for SliceT
         bus: &Bus,
         longest: usize,
     ) -> Result<Box<dyn EncodedWriter>, BusError> {
-        Ok(Box::new(SliceSampleWriter(
-            bus.slice_writer(self, 0, longest)?,
-        )))
+        Ok(Box::new(SliceSampleWriter(bus.slice_writer(self, 0, longest)?)))
     }
 }
 
@@ -120,8 +118,6 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedWriter for Slice
             return Ok(false);
         };
         let elements: Vec<T> = elements;
-        self.0
-            .publish_as_stamped(header, elements.into_iter())
-            .map(|()| true)
+        self.0.publish_as_stamped(header, elements.into_iter()).map(|()| true)
     }
 }

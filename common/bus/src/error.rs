@@ -79,11 +79,7 @@ pub(super) fn refused<E: Debug>(
     action: &'static str,
     topic: &'static str,
 ) -> impl FnOnce(E) -> BusError {
-    move |detail| BusError::Refused {
-        action,
-        topic,
-        detail: format!("{detail:?}"),
-    }
+    move |detail| BusError::Refused { action, topic, detail: format!("{detail:?}") }
 }
 
 /// A reader was not admitted.

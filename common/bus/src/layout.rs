@@ -129,11 +129,7 @@ impl Structure {
     /// Of `P`, which has these fields.
     #[must_use]
     pub fn of<P: Payload>(fields: Vec<Field>) -> Kind {
-        Kind::Struct(Self {
-            name: type_name::<P>(),
-            size: size_of::<P>(),
-            fields,
-        })
+        Kind::Struct(Self { name: type_name::<P>(), size: size_of::<P>(), fields })
     }
 }
 

@@ -54,9 +54,7 @@ fn unfilled_for(entry: &DirEntry) -> Option<Duration> {
     let file = entry.metadata().ok()?;
     let unfilled = file.is_file() && file.permissions().mode() & 0o777 == UNFILLED;
     // A clock that was set back makes it new.
-    unfilled
-        .then(|| file.modified().ok()?.elapsed().ok())
-        .map(Option::unwrap_or_default)
+    unfilled.then(|| file.modified().ok()?.elapsed().ok()).map(Option::unwrap_or_default)
 }
 
 /// Remove from the directory `nodes` what is named after nodes of `ended`, a process that must have ended.
@@ -115,9 +113,7 @@ fn removed(result: io::Result<()>) -> io::Result<()> {
 
 /// Whether a file's name holds an id that `process` made.
 fn names(file: &str, process: u32) -> bool {
-    file.split(['_', '.'])
-        .filter_map(|part| part.parse().ok())
-        .any(|id| process_of(id) == process)
+    file.split(['_', '.']).filter_map(|part| part.parse().ok()).any(|id| process_of(id) == process)
 }
 
 /// The process that made a node or a port: the third of the four words of its id.
@@ -139,9 +135,8 @@ mod tests {
 
     fn left(directory: &Path) -> Vec<String> {
         let entries = fs::read_dir(directory).unwrap();
-        let mut left: Vec<_> = entries
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let mut left: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         left.sort();
         left
     }
@@ -189,10 +184,7 @@ mod tests {
             fs::set_permissions(&path, Permissions::from_mode(mode)).unwrap();
             name
         };
-        make(
-            format!("fh0_x80_ab12_{running}_{ended}.connection"),
-            UNFILLED,
-        );
+        make(format!("fh0_x80_ab12_{running}_{ended}.connection"), UNFILLED);
         make(format!("fh0_x80_ab12_{ended}.data"), UNFILLED);
         let mut stay = [
             make(format!("fh0_x80_ab12_{ended}_{running}.connection"), 0o600),
@@ -202,8 +194,7 @@ mod tests {
         let old = make(format!("fh0_x80_cd34_{running}.data"), 0o600);
         let old = directory.path().join(old);
         let file = fs::File::options().write(true).open(&old).unwrap();
-        file.set_modified(std::time::SystemTime::now() - FILLED)
-            .unwrap();
+        file.set_modified(std::time::SystemTime::now() - FILLED).unwrap();
         fs::set_permissions(&old, Permissions::from_mode(UNFILLED)).unwrap();
         stay.sort();
         assert!(remove_unfilled(directory.path(), "fh0_x80_", ENDED).unwrap());

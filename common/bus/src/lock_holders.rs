@@ -31,13 +31,9 @@ pub fn holders(file: &File) -> io::Result<Vec<u32>> {
 fn lockers(locks: &str, inode: u64) -> Vec<u32> {
     let holder = |line: &str| {
         let mut words = line.split_ascii_whitespace().skip(1);
-        let ("FLOCK", _, _, pid, file) = (
-            words.next()?,
-            words.next()?,
-            words.next()?,
-            words.next()?,
-            words.next()?,
-        ) else {
+        let ("FLOCK", _, _, pid, file) =
+            (words.next()?, words.next()?, words.next()?, words.next()?, words.next()?)
+        else {
             return None;
         };
         let locked: u64 = file.rsplit(':').next()?.parse().ok()?;

@@ -43,10 +43,7 @@ pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn A
 
 fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
     let robot = domain.robot.to_string();
-    move |detail| BusError::Join {
-        robot: robot.clone(),
-        detail,
-    }
+    move |detail| BusError::Join { robot: robot.clone(), detail }
 }
 
 impl Bus {
@@ -64,10 +61,7 @@ impl Bus {
         let failed = |error: io::Error| no_join(domain)(error.to_string());
         let instance = BusInstance::new(domain);
         // Not one that is there: another user may have made it.
-        DirBuilder::new()
-            .mode(0o700)
-            .create(instance.root())
-            .map_err(failed)?;
+        DirBuilder::new().mode(0o700).create(instance.root()).map_err(failed)?;
         Self::write_config(&instance)?;
         let mut bus = Self::join_instance(instance, name)?;
         bus.supervisor = Some(std::process::id());
@@ -119,10 +113,7 @@ impl Bus {
     /// # Errors
     /// As [`Bus::join`].
     pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
-        Ok(Self {
-            supervisor: Some(supervisor),
-            ..Self::join(domain, name)?
-        })
+        Ok(Self { supervisor: Some(supervisor), ..Self::join(domain, name)? })
     }
 
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
@@ -146,11 +137,7 @@ impl Bus {
             .map_err(|error| join(format!("{error:?}")))?;
         // One that is missing was made anew with the node.
         ownership::close_to_others(&instance).map_err(failed)?;
-        Ok(Self {
-            node: node.into(),
-            supervisor: None,
-            instance,
-        })
+        Ok(Self { node: node.into(), supervisor: None, instance })
     }
 
     /// Whether nothing is published on it any more: another bus has taken its place, of this run or of the robot's next,

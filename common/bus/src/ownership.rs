@@ -82,8 +82,5 @@ fn check_one(path: &Path, directory: bool) -> io::Result<()> {
 }
 
 fn wrong(path: &Path, what: &str) -> Error {
-    Error::new(
-        ErrorKind::PermissionDenied,
-        format!("{} {what}", path.display()),
-    )
+    Error::new(ErrorKind::PermissionDenied, format!("{} {what}", path.display()))
 }

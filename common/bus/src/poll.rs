@@ -25,10 +25,7 @@ pub fn readable(
         .map(|&descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
         .collect();
     wait(&mut polled, timeout)?;
-    Ok(polled
-        .iter()
-        .map(|descriptor| !descriptor.revents().is_empty())
-        .collect())
+    Ok(polled.iter().map(|descriptor| !descriptor.revents().is_empty()).collect())
 }
 
 /// Whether `descriptor` is readable, closed or broken within `timeout`.
@@ -44,10 +41,7 @@ pub fn is_readable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool>
 /// # Errors
 /// As [`readable`].
 pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
-    wait(
-        &mut [PollFd::new(&descriptor, PollFlags::OUT)],
-        Some(timeout),
-    )
+    wait(&mut [PollFd::new(&descriptor, PollFlags::OUT)], Some(timeout))
 }
 
 /// Whether the other end of `descriptor` was closed, or it broke.

@@ -106,11 +106,7 @@ struct Type {
 
 impl Type {
     fn of<P: Payload>() -> Self {
-        Self {
-            name: type_name::<P>(),
-            size: size_of::<P>(),
-            alignment: align_of::<P>(),
-        }
+        Self { name: type_name::<P>(), size: size_of::<P>(), alignment: align_of::<P>() }
     }
 
     fn detail(self, variant: TypeVariant, spec: &Spec) -> Result<TypeDetail, BusError> {
@@ -143,11 +139,7 @@ impl Carried {
 
     /// A header and a slice.
     pub(super) fn slice<H: Payload, T: Payload>() -> Self {
-        Self {
-            header: Type::of::<H>(),
-            element: Type::of::<T>(),
-            elements: TypeVariant::Dynamic,
-        }
+        Self { header: Type::of::<H>(), element: Type::of::<T>(), elements: TypeVariant::Dynamic }
     }
 }
 
@@ -192,9 +184,7 @@ pub(super) fn create(
     spec: &Spec,
     carried: &Carried,
 ) -> Result<Box<dyn Any>, BusError> {
-    let samples = samples(node, spec, carried)?
-        .create()
-        .map_err(refused("create", spec.name))?;
+    let samples = samples(node, spec, carried)?.create().map_err(refused("create", spec.name))?;
     let event = node
         .service_builder(&service_name(spec)?)
         .event()
@@ -246,9 +236,7 @@ pub(super) fn opened_by(
 
 impl RawService {
     fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self, BusError> {
-        let service = samples(node, spec, carried)?
-            .open()
-            .map_err(opening(spec.name))?;
+        let service = samples(node, spec, carried)?.open().map_err(opening(spec.name))?;
         let there = service.static_config().message_type_details();
         let fits = carried.header.is_that_of(&there.user_header)
             && carried.element.is_that_of(&there.payload)
@@ -270,11 +258,8 @@ impl RawService {
     }
 
     fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber, BusError> {
-        let subscriber = self
-            .subscriber_builder()
-            .buffer_size(buffer)
-            .create()
-            .map_err(reading(spec))?;
+        let subscriber =
+            self.subscriber_builder().buffer_size(buffer).create().map_err(reading(spec))?;
         Ok(subscriber.into())
     }
 
@@ -315,10 +300,7 @@ impl RawPublisher {
             return Err(BusError::Incompatible { topic });
         }
         // SAFETY: `fill` has written all of it.
-        unsafe { sample.assume_init() }
-            .send()
-            .map(drop)
-            .map_err(refused("publish on", topic))
+        unsafe { sample.assume_init() }.send().map(drop).map_err(refused("publish on", topic))
     }
 }
 
@@ -370,11 +352,7 @@ impl<H: Payload, T: Payload> Service<H, T> {
 
     /// `carried` is made of `H` and `T`.
     fn open(node: &BusNode, spec: &'static Spec, carried: &Carried) -> Result<Self, BusError> {
-        Ok(Self {
-            raw: RawService::open(node, spec, carried)?,
-            spec,
-            carries: PhantomData,
-        })
+        Ok(Self { raw: RawService::open(node, spec, carried)?, spec, carries: PhantomData })
     }
 
     /// Write it: at most `longest` elements a sample.
@@ -466,10 +444,7 @@ pub(super) struct Subscriber<H, T> {
 impl<H: Payload, T: Payload> Subscriber<H, T> {
     pub(super) fn take(&self) -> Result<Option<Sample<H, T>>, BusError> {
         let raw = self.raw.take(self.spec)?;
-        Ok(raw.map(|raw| Sample {
-            raw,
-            carries: PhantomData,
-        }))
+        Ok(raw.map(|raw| Sample { raw, carries: PhantomData }))
     }
 }
 
@@ -499,10 +474,7 @@ impl<H: Payload, T: Payload> Sample<H, T> {
 }
 
 fn event(node: &BusNode, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {
-    node.service_builder(&service_name(spec)?)
-        .event()
-        .open()
-        .map_err(refused("open", spec.name))
+    node.service_builder(&service_name(spec)?).event().open().map_err(refused("open", spec.name))
 }
 
 impl Notifier {
@@ -513,9 +485,7 @@ impl Notifier {
 
     #[inline(never)]
     pub(super) fn wake(&self, topic: &'static str) -> Result<(), BusError> {
-        self.notify()
-            .map(drop)
-            .map_err(refused("wake the readers of", topic))
+        self.notify().map(drop).map_err(refused("wake the readers of", topic))
     }
 }
 
@@ -533,9 +503,7 @@ impl Listener {
     }
 
     pub(super) fn drain(&self) -> Result<(), BusError> {
-        self.try_wait(|_| {})
-            .map(drop)
-            .map_err(refused("listen to", "a topic"))
+        self.try_wait(|_| {}).map(drop).map_err(refused("listen to", "a topic"))
     }
 }
 

@@ -33,15 +33,8 @@ impl Bus {
         buffer: usize,
     ) -> Result<Reader<P>, BusError> {
         let service = Service::of_structs(&self.node, topic.spec)?;
-        self.leave_places(
-            topic.spec,
-            topic.spec.limits.readers,
-            service.number_of_readers(),
-        )?;
-        Ok(Reader {
-            subscriber: service.subscriber(buffer)?,
-            authors: self.authors(topic.spec),
-        })
+        self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
+        Ok(Reader { subscriber: service.subscriber(buffer)?, authors: self.authors(topic.spec) })
     }
 
     /// Read the slices of `topic`.
@@ -65,11 +58,7 @@ impl Bus {
         buffer: usize,
     ) -> Result<SliceReader<H, T>, BusError> {
         let service = Service::of_slices(&self.node, topic.spec)?;
-        self.leave_places(
-            topic.spec,
-            topic.spec.limits.readers,
-            service.number_of_readers(),
-        )?;
+        self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
         Ok(SliceReader {
             subscriber: service.subscriber(buffer)?,
             authors: self.authors(topic.spec),
@@ -99,20 +88,13 @@ impl Bus {
 
     fn authors(&self, spec: &Spec) -> Authors {
         let admitted = match self.supervisor {
-            Some(process) if spec.writer == SUPERVISOR => Admitted::One(
-                Author {
-                    process,
-                    generation: 1,
-                },
-                None,
-            ),
+            Some(process) if spec.writer == SUPERVISOR => {
+                Admitted::One(Author { process, generation: 1 }, None)
+            }
             _ if spec.has_one_writer() => Admitted::Newest(0),
             _ => Admitted::All,
         };
-        Authors {
-            admitted,
-            ignored: Ignored::default(),
-        }
+        Authors { admitted, ignored: Ignored::default() }
     }
 }
 
@@ -190,10 +172,7 @@ impl Authors {
 
 /// The process of a sample is in the number of the port that it was written with.
 fn author<H: Payload, T: Payload>(sample: &Sample<H, T>, stamp: &Stamp) -> Author {
-    Author {
-        process: sample.process(),
-        generation: stamp.generation,
-    }
+    Author { process: sample.process(), generation: stamp.generation }
 }
 
 /// Receives structs.

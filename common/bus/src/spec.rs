@@ -78,31 +78,13 @@ pub struct Limits {
 
 impl Limits {
     /// For topics of one small struct.
-    pub const SMALL: Self = Self {
-        buffer: 128,
-        recorder_buffer: 1024,
-        borrowed: 2,
-        readers: 16,
-    };
+    pub const SMALL: Self = Self { buffer: 128, recorder_buffer: 1024, borrowed: 2, readers: 16 };
     /// For what a replay needs whole: a recorder that the machine keeps waiting for a tenth of a second loses nothing.
-    pub const DEEP: Self = Self {
-        buffer: 1024,
-        recorder_buffer: 1024,
-        borrowed: 2,
-        readers: 8,
-    };
+    pub const DEEP: Self = Self { buffer: 1024, recorder_buffer: 1024, borrowed: 2, readers: 8 };
     /// For slices of a whole map.
-    pub const MAP: Self = Self {
-        buffer: 4,
-        recorder_buffer: 256,
-        borrowed: 2,
-        readers: 24,
-    };
+    pub const MAP: Self = Self { buffer: 4, recorder_buffer: 256, borrowed: 2, readers: 24 };
     /// For slices that are most of a whole map each.
-    pub const WHOLE_MAP: Self = Self {
-        recorder_buffer: 8,
-        ..Self::MAP
-    };
+    pub const WHOLE_MAP: Self = Self { recorder_buffer: 8, ..Self::MAP };
     /// Writers at once. One is meant; a kill while starting can leak a place for good.
     pub(super) const WRITERS: usize = 16;
     /// Who waits for one topic: consumers of all that a tick publishes wait for the one that ends it.

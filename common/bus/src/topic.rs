@@ -27,10 +27,7 @@ impl<P> Topic<P> {
     /// A row of the table.
     #[must_use]
     pub const fn new(spec: &'static Spec) -> Self {
-        Self {
-            spec,
-            payload: PhantomData,
-        }
+        Self { spec, payload: PhantomData }
     }
 }
 
@@ -38,10 +35,7 @@ impl<H, T> SliceTopic<H, T> {
     /// A row of the table.
     #[must_use]
     pub const fn new(spec: &'static Spec) -> Self {
-        Self {
-            spec,
-            payload: PhantomData,
-        }
+        Self { spec, payload: PhantomData }
     }
 }
 

@@ -25,10 +25,7 @@ impl Waiter {
     /// # Errors
     /// When the process has no descriptor left.
     pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result<(), BusError> {
-        let own = descriptor
-            .as_fd()
-            .try_clone_to_owned()
-            .map_err(BusError::Wait)?;
+        let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
         self.descriptors.push(own);
         Ok(())
     }

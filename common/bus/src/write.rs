@@ -23,10 +23,7 @@ impl Bus {
         generation: u32,
     ) -> Result<Writer<P>, BusError> {
         let service = Service::of_structs(&self.node, topic.spec)?;
-        Ok(Writer {
-            publisher: service.publisher(1)?,
-            turn: self.turn(topic.spec, generation)?,
-        })
+        Ok(Writer { publisher: service.publisher(1)?, turn: self.turn(topic.spec, generation)? })
     }
 
     /// Write slices of at most `longest` elements on `topic`.
@@ -69,12 +66,8 @@ struct Turn {
 
 impl Turn {
     const fn stamp(&mut self, tick: u64, time: MissionTime) -> Stamp {
-        let stamp = Stamp {
-            tick,
-            stamp_ns: time.0,
-            generation: self.generation,
-            sequence: self.sequence,
-        };
+        let stamp =
+            Stamp { tick, stamp_ns: time.0, generation: self.generation, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         stamp
     }

@@ -62,10 +62,7 @@ impl FromStr for Address<String> {
     type Err = AddressError;
 
     fn from_str(address: &str) -> Result<Self, AddressError> {
-        let refused = |problem| AddressError::Form {
-            address: address.to_owned(),
-            problem,
-        };
+        let refused = |problem| AddressError::Form { address: address.to_owned(), problem };
         let (over, rest) = address.split_once("://").unwrap_or(("udp", address));
         if over == "serial" {
             return if rest.starts_with('/') {
@@ -74,9 +71,7 @@ impl FromStr for Address<String> {
                 Err(refused("names no device by its absolute path"))
             };
         }
-        let (host, port) = rest
-            .rsplit_once(':')
-            .ok_or_else(|| refused("has no port"))?;
+        let (host, port) = rest.rsplit_once(':').ok_or_else(|| refused("has no port"))?;
         if port.parse::<u16>().is_ok_and(|port| port > 0) {
             let bracketed = host.starts_with('[') && host.ends_with(']');
             let plain = |c: char| !c.is_whitespace() && c != '/' && (c != ':' || bracketed);
@@ -101,16 +96,10 @@ impl Address<String> {
     /// When the host is not known.
     pub fn resolve(&self) -> Result<Address, AddressError> {
         let number = |host: &String| {
-            let unknown = |source| AddressError::Host {
-                address: self.to_string(),
-                source,
-            };
+            let unknown = |source| AddressError::Host { address: self.to_string(), source };
             let mut found = host.to_socket_addrs().map_err(unknown)?;
             found.next().ok_or_else(|| {
-                unknown(std::io::Error::new(
-                    std::io::ErrorKind::NotFound,
-                    "it has no number",
-                ))
+                unknown(std::io::Error::new(std::io::ErrorKind::NotFound, "it has no number"))
             })
         };
         Ok(match self {
@@ -152,10 +141,7 @@ mod tests {
         assert_eq!(read("tcp://192.168.0.201:10001"), Address::Tcp(host()));
         assert_eq!(read("tcp://[::1]:7"), Address::Tcp("[::1]:7".to_owned()));
         assert_eq!(read("x80.local:7"), Address::Udp("x80.local:7".to_owned()));
-        assert_eq!(
-            read("serial:///dev/ttyUSB0"),
-            Address::Serial("/dev/ttyUSB0".into())
-        );
+        assert_eq!(read("serial:///dev/ttyUSB0"), Address::Serial("/dev/ttyUSB0".into()));
     }
 
     #[test]

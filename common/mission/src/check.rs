@@ -27,9 +27,7 @@ fn read_bounded(path: &Path) -> io::Result<String> {
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("it is no regular file"));
     }
-    let read = File::open(path)?
-        .take(MAX_BYTES)
-        .read_to_string(&mut text)?;
+    let read = File::open(path)?.take(MAX_BYTES).read_to_string(&mut text)?;
     if read as u64 == MAX_BYTES {
         return Err(io::Error::other(format!("it is {MAX_BYTES} bytes or more")));
     }
@@ -61,10 +59,8 @@ impl Mission {
     /// # Errors
     /// When it cannot be read, or is far too long for a mission.
     pub fn read(path: &Path) -> Result<String, MissionError> {
-        read_bounded(path).map_err(|source| MissionError::Unreadable {
-            file: PathBuf::from(path),
-            source,
-        })
+        read_bounded(path)
+            .map_err(|source| MissionError::Unreadable { file: PathBuf::from(path), source })
     }
 }
 
@@ -77,18 +73,13 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     let tree = DeTable::parse(text).map_err(|error| syntax(&error))?;
     let mut mission: Mission = toml::from_str(text).map_err(|error| syntax(&error))?;
     if mission.name.is_empty() {
-        mission.name = origin
-            .file_stem()
-            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        mission.name =
+            origin.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     }
     mission.remarks = remarks(text, origin, tree.get_ref(), &mission);
     match Checker::default().run(&mission) {
         Ok(()) => Ok(mission),
-        Err(Objection {
-            key,
-            problem,
-            remedy,
-        }) => Err(MissionError::Value {
+        Err(Objection { key, problem, remedy }) => Err(MissionError::Value {
             file: origin.to_path_buf(),
             line: line_of(text, span_of(tree.get_ref(), key)),
             key: key.to_owned(),
@@ -100,9 +91,7 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
 
 /// What goes by another name now, and what this robot does not do.
 fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> Vec<String> {
-    let method = tree
-        .get("method")
-        .and_then(|value| value.get_ref().as_str());
+    let method = tree.get("method").and_then(|value| value.get_ref().as_str());
     let file = origin.display();
     let line = |key| line_of(text, span_of(tree, key));
     let renamed = method.filter(|name| *name == "careful").map(|_| {
@@ -169,12 +158,7 @@ impl Checker {
         self.perimeter(mission)?;
         self.target(mission)?;
         within("timeout_s", mission.timeout_s, 1.0..=MAX_TIMEOUT_S, "s")?;
-        within(
-            "start.heading_deg",
-            mission.start.heading_deg,
-            -360.0..=360.0,
-            "degrees",
-        )?;
+        within("start.heading_deg", mission.start.heading_deg, -360.0..=360.0, "degrees")?;
         robot::check(mission)?;
         stages(mission)?;
         self.shapes("known", &mission.known)?;
@@ -196,10 +180,7 @@ impl Checker {
         }
         self.point("perimeter.centre", perimeter.centre)?;
         let frame = mission.grid_frame();
-        if frame
-            .cell_at(DVec2::ZERO)
-            .is_none_or(|cell| frame.is_rim(cell))
-        {
+        if frame.cell_at(DVec2::ZERO).is_none_or(|cell| frame.is_rim(cell)) {
             return Err(objection(
                 "perimeter.centre",
                 "the robot's start (0, 0) is not inside the perimeter",
@@ -212,10 +193,7 @@ impl Checker {
     fn target(&mut self, mission: &Mission) -> Result<(), Objection> {
         self.point("target", mission.target)?;
         let frame = mission.grid_frame();
-        if frame
-            .cell_at(mission.target)
-            .is_none_or(|cell| frame.is_rim(cell))
-        {
+        if frame.cell_at(mission.target).is_none_or(|cell| frame.is_rim(cell)) {
             return Err(objection(
                 "target",
                 format!(
@@ -226,81 +204,33 @@ impl Checker {
             ));
         }
         let half = mission.perimeter.width_m / 2.0;
-        within(
-            "arrival_tolerance_m",
-            mission.arrival_tolerance_m,
-            0.01..=half,
-            "m",
-        )
+        within("arrival_tolerance_m", mission.arrival_tolerance_m, 0.01..=half, "m")
     }
 
     fn point(&mut self, key: &'static str, point: DVec2) -> Result<(), Objection> {
         if point.is_finite() {
             return Ok(());
         }
-        Err(objection(
-            key,
-            format!("{point} is not a place"),
-            "give two finite numbers, metres",
-        ))
+        Err(objection(key, format!("{point} is not a place"), "give two finite numbers, metres"))
     }
 }
 
 fn stages(mission: &Mission) -> Result<(), Objection> {
     let controller = &mission.controller;
     let top = mission.body().top_speed_m_s;
-    within(
-        "controller.speed_m_s",
-        mission.speed_m_s(),
-        0.001..=top,
-        "m/s",
-    )?;
-    within(
-        "controller.turn_rad_s",
-        controller.turn_rad_s,
-        0.01..=20.0,
-        "rad/s",
-    )?;
-    within(
-        "controller.look_rad_s",
-        controller.look_rad_s,
-        0.01..=20.0,
-        "rad/s",
-    )?;
-    within(
-        "controller.slow_radius_m",
-        controller.slow_radius_m,
-        0.001..=1000.0,
-        "m",
-    )?;
+    within("controller.speed_m_s", mission.speed_m_s(), 0.001..=top, "m/s")?;
+    within("controller.turn_rad_s", controller.turn_rad_s, 0.01..=20.0, "rad/s")?;
+    within("controller.look_rad_s", controller.look_rad_s, 0.01..=20.0, "rad/s")?;
+    within("controller.slow_radius_m", controller.slow_radius_m, 0.001..=1000.0, "m")?;
     within("controller.dead_zone", controller.dead_zone, 0.0..=0.9, "")?;
-    within(
-        "mapper.map_within_m",
-        mission.map_within_m(),
-        0.04..=2.54,
-        "m",
-    )?;
+    within("mapper.map_within_m", mission.map_within_m(), 0.04..=2.54, "m")?;
     let perimeter = &mission.perimeter;
-    within(
-        "mapper.margin_m",
-        mission.mapper.margin_m,
-        0.0..=perimeter.width_m / 4.0,
-        "m",
-    )?;
-    within(
-        "mapper.clearance_m",
-        mission.mapper.clearance_m,
-        0.0..=1.0,
-        "m",
-    )?;
+    within("mapper.margin_m", mission.mapper.margin_m, 0.0..=perimeter.width_m / 4.0, "m")?;
+    within("mapper.clearance_m", mission.mapper.clearance_m, 0.0..=1.0, "m")?;
     let wheels = &mission.dead_reckoning;
     for (key, value, most) in [
         ("dead_reckoning.slip_noise", wheels.slip_noise, 0.5),
-        (
-            "dead_reckoning.diameter_spread",
-            wheels.diameter_spread,
-            0.1,
-        ),
+        ("dead_reckoning.diameter_spread", wheels.diameter_spread, 0.1),
         ("dead_reckoning.track_spread", wheels.track_spread, 0.1),
     ] {
         within(key, value, 0.0..=most, "")?;
@@ -337,11 +267,7 @@ fn start_is_free(mission: &Mission) -> Result<(), Objection> {
             ));
         }
         if shapes.clearance(mission.target) <= 0.0 {
-            return Err(objection(
-                key,
-                "the target lies inside a shape",
-                "move one of them",
-            ));
+            return Err(objection(key, "the target lies inside a shape", "move one of them"));
         }
     }
     Ok(())

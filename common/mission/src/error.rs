@@ -50,12 +50,7 @@ impl MissionError {
         match self {
             Self::Unreadable { source, .. } => source.to_string(),
             Self::Syntax { problem, .. } => problem.clone(),
-            Self::Value {
-                key,
-                problem,
-                remedy,
-                ..
-            } => format!("{key}: {problem}; {remedy}"),
+            Self::Value { key, problem, remedy, .. } => format!("{key}: {problem}; {remedy}"),
         }
     }
 
@@ -64,14 +59,9 @@ impl MissionError {
     pub fn is_same_fault(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Syntax { problem, .. }, Self::Syntax { problem: its, .. }) => problem == its,
-            (
-                Self::Value { key, problem, .. },
-                Self::Value {
-                    key: its_key,
-                    problem: its,
-                    ..
-                },
-            ) => (key, problem) == (its_key, its),
+            (Self::Value { key, problem, .. }, Self::Value { key: its_key, problem: its, .. }) => {
+                (key, problem) == (its_key, its)
+            }
             _ => false,
         }
     }

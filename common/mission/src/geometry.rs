@@ -20,9 +20,7 @@ impl Profile {
     /// Vertical distance from `height_m` to its nearest part, metres; 0 where it is as high as that.
     #[must_use]
     pub fn height_gap(&self, height_m: f64) -> f64 {
-        (self.bottom_m - height_m)
-            .max(height_m - self.top_m)
-            .max(0.0)
+        (self.bottom_m - height_m).max(height_m - self.top_m).max(0.0)
     }
 
     /// Whether any of it is between two heights, metres.
@@ -156,11 +154,7 @@ impl Shapes {
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> + '_ {
         let edges = self.walls.iter().flat_map(Wall::edges);
         let walls = edges.map(|(from, to)| Piece::Edge(from, to));
-        self.drums
-            .iter()
-            .map(Piece::Drum)
-            .chain(walls)
-            .chain(self.boxes.iter().map(Piece::Box))
+        self.drums.iter().map(Piece::Drum).chain(walls).chain(self.boxes.iter().map(Piece::Box))
     }
 
     /// Those of which something is between two heights, metres: what a body of that extent can touch.
@@ -178,9 +172,7 @@ impl Shapes {
     /// infinite where nothing stands.
     #[must_use]
     pub fn clearance(&self, point: DVec2) -> f64 {
-        self.pieces()
-            .map(|piece| piece.clearance(point))
-            .fold(f64::INFINITY, f64::min)
+        self.pieces().map(|piece| piece.clearance(point)).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -262,11 +254,7 @@ mod tests {
     #[test]
     fn clearance_is_to_the_surface_and_negative_inside() {
         let shapes = Shapes {
-            drums: vec![Drum {
-                at: DVec2::new(2.0, 0.0),
-                radius_m: 0.5,
-                ..Drum::default()
-            }],
+            drums: vec![Drum { at: DVec2::new(2.0, 0.0), radius_m: 0.5, ..Drum::default() }],
             walls: vec![Wall {
                 points: vec![DVec2::new(-1.0, -3.0), DVec2::new(-1.0, 3.0)],
                 ..Wall::default()
@@ -282,22 +270,15 @@ mod tests {
         assert_eq!(shapes.clearance(DVec2::new(1.0, 0.0)), 0.5, "the drum is");
         assert_eq!(shapes.clearance(DVec2::new(2.0, 0.0)), -0.5, "in the drum");
         let above = shapes.clearance(DVec2::new(0.0, 2.5));
-        assert!(
-            (above - 0.5).abs() < 1e-12,
-            "the turned box is 2 m tall: {above}"
-        );
+        assert!((above - 0.5).abs() < 1e-12, "the turned box is 2 m tall: {above}");
         let inside = shapes.clearance(DVec2::new(0.0, 4.0));
         assert!((inside + 0.5).abs() < 1e-12, "inside the box: {inside}");
     }
 
     #[test]
     fn a_body_meets_what_is_between_its_lowest_and_its_highest_part() {
-        let block = |bottom_m, top_m| Box2 {
-            bottom_m,
-            top_m,
-            size_m: DVec2::ONE,
-            ..Box2::default()
-        };
+        let block =
+            |bottom_m, top_m| Box2 { bottom_m, top_m, size_m: DVec2::ONE, ..Box2::default() };
         let shapes = Shapes {
             boxes: vec![
                 block(None, None),
@@ -312,10 +293,7 @@ mod tests {
         let tops: Vec<_> = met.iter().map(|block| block.top_m).collect();
         assert_eq!(tops, [None, Some(0.1), Some(0.3)]);
         let profile = met[1].profile();
-        assert!(
-            (profile.height_gap(0.18) - 0.08).abs() < 1e-12,
-            "{profile:?}"
-        );
+        assert!((profile.height_gap(0.18) - 0.08).abs() < 1e-12, "{profile:?}");
         assert_eq!(profile.height_gap(0.05), 0.0);
     }
 

@@ -86,12 +86,7 @@ impl Window {
     #[must_use]
     pub fn including(self, cell: Cell) -> Self {
         if self.area() == 0 {
-            return Self {
-                col: cell.col,
-                row: cell.row,
-                width: 1,
-                height: 1,
-            };
+            return Self { col: cell.col, row: cell.row, width: 1, height: 1 };
         }
         let (col, row) = (self.col.min(cell.col), self.row.min(cell.row));
         Self {
@@ -108,17 +103,9 @@ impl Window {
         if other.area() == 0 {
             return self;
         }
-        let Self {
-            col,
-            row,
-            width,
-            height,
-        } = other;
+        let Self { col, row, width, height } = other;
         let (last_col, last_row) = (col + width - 1, row + height - 1);
-        self.including(Cell { col, row }).including(Cell {
-            col: last_col,
-            row: last_row,
-        })
+        self.including(Cell { col, row }).including(Cell { col: last_col, row: last_row })
     }
 }
 
@@ -161,10 +148,7 @@ impl GridFrame {
         if !(index.cmpge(DVec2::ZERO).all() && index.cmple(DVec2::splat(last)).all()) {
             return None;
         }
-        Some(Cell {
-            col: index.x as u32,
-            row: index.y as u32,
-        })
+        Some(Cell { col: index.x as u32, row: index.y as u32 })
     }
 
     /// The middle of `cell` in the mission frame, metres.
@@ -191,12 +175,7 @@ impl GridFrame {
     /// The window of the whole map.
     #[must_use]
     pub const fn whole(&self) -> Window {
-        Window {
-            col: 0,
-            row: 0,
-            width: self.cells,
-            height: self.cells,
-        }
+        Window { col: 0, row: 0, width: self.cells, height: self.cells }
     }
 
     /// The cells of `window` out of a row-major slice of the whole map, in order.
@@ -207,10 +186,8 @@ impl GridFrame {
     ) -> impl ExactSizeIterator<Item = T> + use<'map, T> {
         let (frame, width) = (*self, window.width.max(1));
         (0..window.area() as u32).map(move |offset| {
-            map[frame.index(Cell {
-                col: window.col + offset % width,
-                row: window.row + offset / width,
-            })]
+            map[frame
+                .index(Cell { col: window.col + offset % width, row: window.row + offset / width })]
         })
     }
 
@@ -229,10 +206,7 @@ impl GridFrame {
             let first = old.iter().zip(new).position(differs);
             let last = old.iter().zip(new).rposition(differs);
             for col in [first, last].into_iter().flatten() {
-                window = window.including(Cell {
-                    col: col as u32,
-                    row: row as u32,
-                });
+                window = window.including(Cell { col: col as u32, row: row as u32 });
             }
         }
         window
@@ -241,10 +215,8 @@ impl GridFrame {
     /// Whether `window` lies inside the map.
     #[must_use]
     pub fn contains(&self, window: Window) -> bool {
-        let fits = |from: u32, extent: u32| {
-            from.checked_add(extent)
-                .is_some_and(|end| end <= self.cells)
-        };
+        let fits =
+            |from: u32, extent: u32| from.checked_add(extent).is_some_and(|end| end <= self.cells);
         fits(window.col, window.width) && fits(window.row, window.height)
     }
 }
@@ -254,11 +226,7 @@ mod tests {
     use super::*;
 
     fn frame(cells: u32) -> GridFrame {
-        GridFrame {
-            cells,
-            resolution_m: 0.1,
-            centre: DVec2::ZERO,
-        }
+        GridFrame { cells, resolution_m: 0.1, centre: DVec2::ZERO }
     }
 
     #[test]
@@ -274,10 +242,7 @@ mod tests {
 
     #[test]
     fn a_cell_centre_falls_in_its_own_cell() {
-        let frame = GridFrame {
-            centre: DVec2::new(1.3, -0.7),
-            ..frame(41)
-        };
+        let frame = GridFrame { centre: DVec2::new(1.3, -0.7), ..frame(41) };
         for cell in [Cell { col: 0, row: 40 }, Cell { col: 17, row: 3 }] {
             assert_eq!(frame.cell_at(frame.centre_of(cell)), Some(cell));
         }

@@ -25,10 +25,7 @@ const RING: [(f64, f64); RANGERS] = [
 pub fn rangers(pose: Pose2, radius: f64) -> [Pose2; RANGERS] {
     RING.map(|(bearing_deg, share)| {
         let heading = pose.heading + bearing_deg.to_radians();
-        Pose2 {
-            position: pose.position + share * radius * DVec2::from_angle(heading),
-            heading,
-        }
+        Pose2 { position: pose.position + share * radius * DVec2::from_angle(heading), heading }
     })
 }
 
@@ -38,10 +35,7 @@ mod tests {
 
     #[test]
     fn the_ring_turns_with_the_robot_and_ranger_5_looks_to_its_right() {
-        let pose = Pose2 {
-            position: DVec2::new(1.0, 2.0),
-            heading: std::f64::consts::FRAC_PI_2,
-        };
+        let pose = Pose2 { position: DVec2::new(1.0, 2.0), heading: std::f64::consts::FRAC_PI_2 };
         let right = rangers(pose, 0.19)[4];
         assert!(right.position.distance(DVec2::new(1.121, 2.0)) < 1e-9);
         assert!(right.axis().distance(DVec2::X) < 1e-9);

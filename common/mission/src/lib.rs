@@ -276,21 +276,13 @@ mod defaults {
 
 impl Default for Perimeter {
     fn default() -> Self {
-        Self {
-            width_m: 12.0,
-            cells: None,
-            centre: DVec2::ZERO,
-        }
+        Self { width_m: 12.0, cells: None, centre: DVec2::ZERO }
     }
 }
 
 impl Default for Mapper {
     fn default() -> Self {
-        Self {
-            margin_m: 0.25,
-            clearance_m: 0.03,
-            map_within_m: None,
-        }
+        Self { margin_m: 0.25, clearance_m: 0.03, map_within_m: None }
     }
 }
 
@@ -311,19 +303,13 @@ impl Mission {
     /// Delta = D / N and where the cells lie.
     #[must_use]
     pub fn grid_frame(&self) -> GridFrame {
-        let Perimeter {
-            width_m, centre, ..
-        } = self.perimeter;
+        let Perimeter { width_m, centre, .. } = self.perimeter;
         let cells = self.perimeter.cells.unwrap_or_else(|| {
             let side_m = if self.looks_first() { 0.05 } else { 0.1 };
             let cells = (width_m / side_m).round();
             cells.clamp(f64::from(MIN_CELLS), Perimeter::DEFAULT_MOST_CELLS) as u32
         });
-        GridFrame {
-            cells,
-            resolution_m: width_m / f64::from(cells),
-            centre,
-        }
+        GridFrame { cells, resolution_m: width_m / f64::from(cells), centre }
     }
 
     /// Im of (19): the least number of cells around a hit's own that covers the margin, however fine the
@@ -383,10 +369,7 @@ impl Mission {
     /// The pose at mission time 0.
     #[must_use]
     pub fn start_pose(&self) -> Pose2 {
-        Pose2 {
-            position: DVec2::ZERO,
-            heading: self.start.heading_deg.to_radians(),
-        }
+        Pose2 { position: DVec2::ZERO, heading: self.start.heading_deg.to_radians() }
     }
 
     /// What of the world the robot's body can touch; the rest it passes under or over.

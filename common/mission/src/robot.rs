@@ -95,11 +95,7 @@ pub struct BatteryLimits {
 
 impl Default for BatteryLimits {
     fn default() -> Self {
-        Self {
-            board: 6.6,
-            motor: 6.6,
-            servo: 6.6,
-        }
+        Self { board: 6.6, motor: 6.6, servo: 6.6 }
     }
 }
 
@@ -118,14 +114,8 @@ impl Default for RobotConfig {
             counts_per_turn: None,
             radius_m: None,
             top_speed_m_s: None,
-            left: Channel {
-                channel: 0,
-                reversed: true,
-            },
-            right: Channel {
-                channel: 1,
-                reversed: false,
-            },
+            left: Channel { channel: 0, reversed: true },
+            right: Channel { channel: 1, reversed: false },
             command_limit_s: 0.25,
             low_battery_v: BatteryLimits::default(),
         }
@@ -186,11 +176,9 @@ impl Body {
         let top = self.top_speed_m_s / self.wheel_radius_m;
         match self.ackermann() {
             Some(ackermann) => Drive::Ackermann(ackermann),
-            None => Drive::Differential(DifferentialDrive::new(
-                self.wheel_radius_m,
-                self.track_m,
-                top,
-            )),
+            None => {
+                Drive::Differential(DifferentialDrive::new(self.wheel_radius_m, self.track_m, top))
+            }
         }
     }
 
@@ -267,15 +255,9 @@ impl RobotConfig {
             top_speed_m_s: self.top_speed_m_s.unwrap_or(preset.top_speed_m_s),
             steering: preset.steering.map(|steering| Steering {
                 wheelbase_m: self.wheelbase_m.unwrap_or(steering.wheelbase_m),
-                limit_rad: self
-                    .steering_limit_deg
-                    .map_or(steering.limit_rad, f64::to_radians),
-                rate_rad_s: self
-                    .steering_rate_deg_s
-                    .map_or(steering.rate_rad_s, f64::to_radians),
-                counts_per_turn: self
-                    .steering_counts_per_turn
-                    .unwrap_or(steering.counts_per_turn),
+                limit_rad: self.steering_limit_deg.map_or(steering.limit_rad, f64::to_radians),
+                rate_rad_s: self.steering_rate_deg_s.map_or(steering.rate_rad_s, f64::to_radians),
+                counts_per_turn: self.steering_counts_per_turn.unwrap_or(steering.counts_per_turn),
             }),
         }
     }
@@ -297,19 +279,12 @@ impl SonarConfig {
     /// How it is mounted.
     #[must_use]
     pub fn mount(&self) -> Mount {
-        Mount {
-            forward_m: self.forward_m,
-            bearing_rad: self.bearing_deg.to_radians(),
-        }
+        Mount { forward_m: self.forward_m, bearing_rad: self.bearing_deg.to_radians() }
     }
 }
 
 impl Default for SonarConfig {
     fn default() -> Self {
-        Self {
-            index: 1,
-            forward_m: 0.1915,
-            bearing_deg: 0.0,
-        }
+        Self { index: 1, forward_m: 0.1915, bearing_deg: 0.0 }
     }
 }

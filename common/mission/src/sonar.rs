@@ -22,10 +22,7 @@ impl Mount {
     #[must_use]
     pub fn on(&self, robot: Pose2) -> Pose2 {
         let heading = robot.heading + self.bearing_rad;
-        Pose2 {
-            position: robot.position + self.forward_m * DVec2::from_angle(heading),
-            heading,
-        }
+        Pose2 { position: robot.position + self.forward_m * DVec2::from_angle(heading), heading }
     }
 
     /// The hit of (19), metres: what a ranger on a robot at `robot` hears `range_m` away on its axis.
@@ -42,10 +39,7 @@ mod tests {
 
     #[test]
     fn equation_19_by_hand_at_bearings_0_45_and_minus_90() {
-        let robot = Pose2 {
-            position: DVec2::new(1.0, 2.0),
-            heading: 0.0,
-        };
+        let robot = Pose2 { position: DVec2::new(1.0, 2.0), heading: 0.0 };
         // W/2 = 0.2, S = 0.8: 1 m from the centre along the bearing.
         let half = std::f64::consts::FRAC_1_SQRT_2;
         for (bearing_deg, hit) in [
@@ -53,10 +47,7 @@ mod tests {
             (45.0, DVec2::new(1.0 + half, 2.0 + half)),
             (-90.0, DVec2::new(1.0, 1.0)),
         ] {
-            let mount = Mount {
-                forward_m: 0.2,
-                bearing_rad: f64::to_radians(bearing_deg),
-            };
+            let mount = Mount { forward_m: 0.2, bearing_rad: f64::to_radians(bearing_deg) };
             let got = mount.hit(robot, 0.8);
             assert!(got.distance(hit) < 1e-12, "{bearing_deg} degrees: {got}");
             let ranger = mount.on(robot);

@@ -63,10 +63,7 @@ impl Part {
     /// All of version `version` of a map that lies as `frame` says: a keyframe.
     #[must_use]
     pub const fn whole(frame: GridFrame, version: u64) -> Self {
-        Self {
-            keyframe: 1,
-            ..Self::of(frame, frame.whole(), version)
-        }
+        Self { keyframe: 1, ..Self::of(frame, frame.whole(), version) }
     }
 
     /// How the map lies.
@@ -82,12 +79,7 @@ impl Part {
     /// The cells that came along, row-major.
     #[must_use]
     pub const fn window(&self) -> Window {
-        Window {
-            col: self.col,
-            row: self.row,
-            width: self.width,
-            height: self.height,
-        }
+        Window { col: self.col, row: self.row, width: self.width, height: self.height }
     }
 
     /// Whether they are the whole map.

@@ -65,20 +65,14 @@ impl<T: Copy + PartialEq> Replica<T> {
             return Applied::Missed;
         };
         // Without a change the version stays: one that is newer says that the part with its change was missed.
-        let follows = if window.area() == 0 {
-            version == held
-        } else {
-            held.checked_add(1) == Some(version)
-        };
+        let follows =
+            if window.area() == 0 { version == held } else { held.checked_add(1) == Some(version) };
         if held_frame != frame || !follows {
             self.state = None;
             return Applied::Missed;
         }
         for (offset, row) in cells.chunks_exact(window.width.max(1) as usize).enumerate() {
-            let start = frame.index(Cell {
-                col: window.col,
-                row: window.row + offset as u32,
-            });
+            let start = frame.index(Cell { col: window.col, row: window.row + offset as u32 });
             self.cells[start..start + row.len()].copy_from_slice(row);
         }
         self.state = Some((frame, version));

@@ -2,23 +2,14 @@ use super::*;
 use glam::DVec2;
 
 fn frame(cells: u32) -> GridFrame {
-    GridFrame {
-        cells,
-        resolution_m: 0.1,
-        centre: DVec2::ZERO,
-    }
+    GridFrame { cells, resolution_m: 0.1, centre: DVec2::ZERO }
 }
 
 #[test]
 fn a_replica_follows_windows_and_drops_the_map_when_one_is_missing() {
     let frame = frame(4);
     let mut replica = Replica::default();
-    let part = Window {
-        col: 1,
-        row: 2,
-        width: 2,
-        height: 1,
-    };
+    let part = Window { col: 1, row: 2, width: 2, height: 1 };
     let change = |version| Part::of(frame, part, version);
     assert_eq!(replica.apply(&change(2), &[1, 1]), Applied::Missed);
     let whole = Part::whole(frame, 1);
@@ -51,12 +42,7 @@ fn a_keyframe_that_changes_one_cell_is_told_as_that_window() {
     let nothing = Applied::Window(Window::default());
     assert_eq!(replica.apply(&keyframe(1), &cells), nothing);
     cells[9] = 1;
-    let one = Window {
-        col: 1,
-        row: 2,
-        width: 1,
-        height: 1,
-    };
+    let one = Window { col: 1, row: 2, width: 1, height: 1 };
     assert_eq!(replica.apply(&keyframe(2), &cells), Applied::Window(one));
 }
 
@@ -73,22 +59,14 @@ fn a_map_without_cells_is_refused() {
 fn a_window_that_does_not_fit_is_refused() {
     let frame = frame(4);
     let mut replica = Replica::default();
-    let window = Window {
-        col: 3,
-        row: 0,
-        width: u32::MAX,
-        height: 1,
-    };
+    let window = Window { col: 3, row: 0, width: u32::MAX, height: 1 };
     let outside = Part::of(frame, window, 1);
     assert_eq!(replica.apply(&outside, &[0_u8; 1]), Applied::Missed);
 }
 
 #[test]
 fn a_part_says_what_it_was_made_of() {
-    let frame = GridFrame {
-        centre: DVec2::new(1.0, -2.0),
-        ..frame(40)
-    };
+    let frame = GridFrame { centre: DVec2::new(1.0, -2.0), ..frame(40) };
     let whole = Part::whole(frame, 7);
     assert_eq!((whole.frame(), whole.window()), (frame, frame.whole()));
     assert!(whole.is_keyframe() && whole.version == 7);

@@ -40,10 +40,7 @@ impl PoseSample {
     /// Position and heading.
     #[must_use]
     pub const fn pose(&self) -> Pose2 {
-        Pose2 {
-            position: DVec2::new(self.x_m, self.y_m),
-            heading: self.heading_rad,
-        }
+        Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 
     /// Root of the mean square of the position's error, as the covariance has it, metres.
@@ -56,10 +53,7 @@ impl PoseSample {
     /// Speeds over the last tick.
     #[must_use]
     pub const fn twist(&self) -> Twist {
-        Twist {
-            v: self.v_m_s,
-            omega: self.omega_rad_s,
-        }
+        Twist { v: self.v_m_s, omega: self.omega_rad_s }
     }
 }
 
@@ -213,10 +207,7 @@ impl GuidanceSample {
     /// The pose it was computed for.
     #[must_use]
     pub const fn pose(&self) -> Pose2 {
-        Pose2 {
-            position: DVec2::new(self.x_m, self.y_m),
-            heading: self.heading_rad,
-        }
+        Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 }
 

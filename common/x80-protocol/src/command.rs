@@ -46,10 +46,7 @@ impl Targets {
     #[must_use]
     pub fn of(&self, channel: u8) -> Option<i16> {
         match self {
-            Self::One {
-                channel: set,
-                value,
-            } => (*set == channel).then_some(*value),
+            Self::One { channel: set, value } => (*set == channel).then_some(*value),
             Self::All(values) => values.get(usize::from(channel)).copied().flatten(),
         }
     }
@@ -214,13 +211,7 @@ impl Command {
                 did::SYSTEM
             }
         };
-        Frame {
-            rid: addressing.robot(),
-            sn: 0,
-            did,
-            data: &data,
-        }
-        .encode(out);
+        Frame { rid: addressing.robot(), sn: 0, did, data: &data }.encode(out);
     }
 }
 

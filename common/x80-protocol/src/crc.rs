@@ -9,11 +9,7 @@ const fn table() -> [u8; 256] {
         let mut crc = index as u8;
         let mut bit = 0;
         while bit < 8 {
-            crc = if crc & 1 == 1 {
-                (crc >> 1) ^ 0x8c
-            } else {
-                crc >> 1
-            };
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0x8c } else { crc >> 1 };
             bit += 1;
         }
         table[index] = crc;
@@ -25,9 +21,7 @@ const fn table() -> [u8; 256] {
 /// The CRC of `bytes`: in a frame, RID to the last data byte.
 #[must_use]
 pub fn crc8(bytes: &[u8]) -> u8 {
-    bytes
-        .iter()
-        .fold(0, |crc, byte| TABLE[usize::from(crc ^ byte)])
+    bytes.iter().fold(0, |crc, byte| TABLE[usize::from(crc ^ byte)])
 }
 
 #[cfg(test)]

@@ -83,10 +83,7 @@ impl Decoder {
             };
             let bytes = &bytes[noise..];
             match candidate(bytes) {
-                Candidate::Sound {
-                    end,
-                    ending: Ending::Right,
-                } => {
+                Candidate::Sound { end, ending: Ending::Right } => {
                     self.skip(noise);
                     break end;
                 }
@@ -158,12 +155,7 @@ impl Decoder {
 /// Offset of the first header, or of a last byte that may begin one.
 fn header_in(bytes: &[u8]) -> Option<usize> {
     let whole = bytes.windows(2).position(|pair| pair == HEADER);
-    whole.or_else(|| {
-        bytes
-            .last()
-            .is_some_and(|&last| last == HEADER[0])
-            .then(|| bytes.len() - 1)
-    })
+    whole.or_else(|| bytes.last().is_some_and(|&last| last == HEADER[0]).then(|| bytes.len() - 1))
 }
 
 /// Judge what stands at the start of `bytes`, which is a header or the beginning of one.
@@ -173,13 +165,10 @@ fn candidate(bytes: &[u8]) -> Candidate {
     };
     let crc_at = BEFORE_DATA + usize::from(len);
     match bytes.get(crc_at) {
-        None => Candidate::Half {
-            len: usize::from(len),
-        },
-        Some(&crc) if crc == crc8(&bytes[HEADER.len()..crc_at]) => Candidate::Sound {
-            end: crc_at + 1,
-            ending: is_end(&bytes[crc_at + 1..]),
-        },
+        None => Candidate::Half { len: usize::from(len) },
+        Some(&crc) if crc == crc8(&bytes[HEADER.len()..crc_at]) => {
+            Candidate::Sound { end: crc_at + 1, ending: is_end(&bytes[crc_at + 1..]) }
+        }
         Some(_) => Candidate::Broken,
     }
 }

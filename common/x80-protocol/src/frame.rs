@@ -110,11 +110,7 @@ impl SystemSignal {
         match data.first() {
             Some(0) => Ok(Self::Ping),
             Some(1) => Ok(Self::Ack),
-            Some(&value) => Err(MessageError::Value {
-                did: did::SYSTEM,
-                what: "signal",
-                value,
-            }),
+            Some(&value) => Err(MessageError::Value { did: did::SYSTEM, what: "signal", value }),
             None => Err(length(did::SYSTEM, data, "1")),
         }
     }
@@ -159,11 +155,7 @@ pub enum MessageError {
 }
 
 pub(super) const fn length(did: u8, data: &[u8], expected: &'static str) -> MessageError {
-    MessageError::Length {
-        did,
-        found: data.len(),
-        expected,
-    }
+    MessageError::Length { did, found: data.len(), expected }
 }
 
 #[cfg(test)]
@@ -173,12 +165,7 @@ mod tests {
     #[test]
     fn data_beyond_what_len_can_say_never_make_a_broken_frame() {
         let mut bytes = Vec::new();
-        let frame = Frame {
-            rid: 1,
-            sn: 0,
-            did: 9,
-            data: &[7; 300],
-        };
+        let frame = Frame { rid: 1, sn: 0, did: 9, data: &[7; 300] };
         frame.encode(&mut bytes);
         assert_eq!(bytes.len(), MAX_FRAME_BYTES);
         assert_eq!(bytes[5], 255);

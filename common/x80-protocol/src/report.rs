@@ -24,12 +24,7 @@ impl Report {
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
         let write = |did, data: &[u8], out: &mut Vec<u8>| {
             let rid = addressing.host();
-            let frame = Frame {
-                rid,
-                sn: 0,
-                did,
-                data,
-            };
+            let frame = Frame { rid, sn: 0, did, data };
             frame.encode(out);
         };
         match self {

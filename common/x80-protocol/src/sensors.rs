@@ -40,11 +40,7 @@ impl Encoder {
 pub fn counts_between(old: u16, new: u16) -> i32 {
     let cycle = i32::from(COUNT_CYCLE);
     let ahead = (i32::from(new) - i32::from(old)).rem_euclid(cycle);
-    if ahead >= cycle / 2 {
-        ahead - cycle
-    } else {
-        ahead
-    }
+    if ahead >= cycle / 2 { ahead - cycle } else { ahead }
 }
 
 /// A robot that has just booted stands: its counts are this near to 0.
@@ -57,9 +53,7 @@ const NOT_WORTH_TELLING: i32 = 32;
 /// those who have not seen it on the way.
 #[must_use]
 pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
-    let at_start = new
-        .iter()
-        .all(|&count| counts_between(0, count).abs() <= BOOTED_WITHIN);
+    let at_start = new.iter().all(|&count| counts_between(0, count).abs() <= BOOTED_WITHIN);
     let steps = old.iter().zip(new);
     let stood_elsewhere = steps
         .map(|(&old, new)| counts_between(old, new).abs())
@@ -164,11 +158,7 @@ impl MotorSensors {
         put(&mut bytes, 0, &self.pots);
         put(&mut bytes, 12, &self.currents);
         for (channel, encoder) in self.encoders.iter().enumerate() {
-            put(
-                &mut bytes,
-                24 + 4 * channel,
-                &[encoder.position, encoder.speed],
-            );
+            put(&mut bytes, 24 + 4 * channel, &[encoder.position, encoder.speed]);
             bytes[32] |= u8::from(encoder.positive) << channel;
         }
         bytes
@@ -204,12 +194,7 @@ impl StandardSensors {
         put(&mut bytes, 18, &self.overheat);
         put(&mut bytes, 22, &[self.temperature, self.infrared]);
         bytes[26..30].copy_from_slice(&self.infrared_code);
-        let supplies = [
-            self.board_battery,
-            self.motor_battery,
-            self.servo_battery,
-            self.reference,
-        ];
+        let supplies = [self.board_battery, self.motor_battery, self.servo_battery, self.reference];
         put(&mut bytes, 30, &supplies);
         bytes
     }
@@ -220,10 +205,7 @@ impl CustomSensors {
         if data.len() < CUSTOM_BYTES {
             return Err(length(did::CUSTOM, data, "17"));
         }
-        Ok(Self {
-            ad: Words(data).array(0),
-            io: data[16],
-        })
+        Ok(Self { ad: Words(data).array(0), io: data[16] })
     }
 
     pub(super) fn to_bytes(self) -> [u8; CUSTOM_BYTES] {

@@ -5,9 +5,7 @@ use proptest::prelude::*;
 use super::*;
 
 fn bytes(hex: &str) -> Vec<u8> {
-    hex.split_whitespace()
-        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
-        .collect()
+    hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
 }
 
 fn command(hex: &str) -> Result<Command, MessageError> {
@@ -22,41 +20,22 @@ fn wheels(first: i16, second: i16, limit_ms: Option<u16>) -> Command {
 
 #[test]
 fn every_worked_frame_is_written_and_read() {
-    let standard = |request| Command::Stream {
-        stream: Stream::Standard,
-        request,
-    };
+    let standard = |request| Command::Stream { stream: Stream::Standard, request };
     let pid = Command::Parameter {
         channel: 0,
-        parameter: Parameter::VelocityPid(Gains {
-            kp: Some(15),
-            kd: Some(0),
-            ki_x100: Some(0),
-        }),
+        parameter: Parameter::VelocityPid(Gains { kp: Some(15), kd: Some(0), ki_x100: Some(0) }),
     };
     let worked = [
-        (
-            Command::System(SystemSignal::Ack),
-            "5e 02 01 00 ff 01 01 85 5e 0d",
-        ),
-        (
-            Command::System(SystemSignal::Ping),
-            "5e 02 01 00 ff 01 00 db 5e 0d",
-        ),
+        (Command::System(SystemSignal::Ack), "5e 02 01 00 ff 01 01 85 5e 0d"),
+        (Command::System(SystemSignal::Ping), "5e 02 01 00 ff 01 00 db 5e 0d"),
         (standard(Request::Start), "5e 02 01 00 7d 00 b0 5e 0d"),
         (standard(Request::Stop), "5e 02 01 00 7d 01 00 f6 5e 0d"),
-        (
-            wheels(400, -400, None),
-            "5e 02 01 00 1b 0c 90 01 70 fe 00 80 00 80 00 80 00 80 3c 5e 0d",
-        ),
+        (wheels(400, -400, None), "5e 02 01 00 1b 0c 90 01 70 fe 00 80 00 80 00 80 00 80 3c 5e 0d"),
         (
             wheels(400, -400, Some(1000)),
             "5e 02 01 00 1b 0e 90 01 70 fe 00 80 00 80 00 80 00 80 e8 03 98 5e 0d",
         ),
-        (
-            pid,
-            "5e 02 01 00 07 0b 08 00 01 0f 00 02 00 00 03 00 00 27 5e 0d",
-        ),
+        (pid, "5e 02 01 00 07 0b 08 00 01 0f 00 02 00 00 03 00 00 27 5e 0d"),
     ];
     for (meant, hex) in worked {
         let mut out = Vec::new();
@@ -80,12 +59,7 @@ fn the_worked_acknowledgement_of_the_robot_is_written_and_read() {
 
 /// A command's data in a frame of `did`.
 fn parsed(did: u8, data: &[u8]) -> Result<Command, MessageError> {
-    Command::parse(&Frame {
-        rid: 1,
-        sn: 0,
-        did,
-        data,
-    })
+    Command::parse(&Frame { rid: 1, sn: 0, did, data })
 }
 
 #[test]
@@ -114,10 +88,7 @@ fn a_single_channel_is_set_with_and_without_time() {
     let meant = |limit_ms| {
         Ok(Command::Motion(Motion {
             quantity: Quantity::Position,
-            targets: Targets::One {
-                channel: 1,
-                value: -2,
-            },
+            targets: Targets::One { channel: 1, value: -2 },
             limit_ms,
         }))
     };
@@ -128,10 +99,7 @@ fn a_single_channel_is_set_with_and_without_time() {
 
 #[test]
 fn a_stream_asked_for_255_times_is_continuous() {
-    let start = Ok(Command::Stream {
-        stream: Stream::All,
-        request: Request::Start,
-    });
+    let start = Ok(Command::Stream { stream: Stream::All, request: Request::Start });
     assert_eq!(parsed(127, &[255]), start);
     assert_eq!(parsed(127, &[]), start);
 }
@@ -161,16 +129,8 @@ fn the_motor_frame_lies_as_the_notes_say() {
         pots: [0x0102, 0, 0, 0, 0, 0],
         currents: [0, 0, 0, 0, 0, 0x0304],
         encoders: [
-            Encoder {
-                position: 0x7ffe,
-                speed: 0x0506,
-                positive: true,
-            },
-            Encoder {
-                position: 0x0708,
-                speed: 0x090a,
-                positive: false,
-            },
+            Encoder { position: 0x7ffe, speed: 0x0506, positive: true },
+            Encoder { position: 0x0708, speed: 0x090a, positive: false },
         ],
     };
     let mut out = Vec::new();
@@ -185,12 +145,7 @@ fn the_motor_frame_lies_as_the_notes_say() {
 #[test]
 fn the_standard_frame_lies_as_the_notes_say_and_may_be_a_byte_longer() {
     let data: Vec<u8> = (1..=41).collect();
-    let frame = Frame {
-        rid: 0,
-        sn: 0,
-        did: 125,
-        data: &data,
-    };
+    let frame = Frame { rid: 0, sn: 0, did: 125, data: &data };
     let Ok(Report::Standard(sensors)) = Report::parse(&frame) else {
         panic!("41 bytes were refused");
     };
@@ -208,10 +163,7 @@ fn the_standard_frame_lies_as_the_notes_say_and_may_be_a_byte_longer() {
 
 #[test]
 fn wheel_counts_go_the_shorter_way_round_the_cycle() {
-    let at = |position| Encoder {
-        position,
-        ..Encoder::default()
-    };
+    let at = |position| Encoder { position, ..Encoder::default() };
     assert_eq!(at(3).counts_since(&at(32_766)), 5);
     assert_eq!(at(32_766).counts_since(&at(3)), -5);
     assert_eq!(at(700).counts_since(&at(100)), 600);
@@ -237,11 +189,7 @@ fn any_command() -> impl Strategy<Value = Command> {
     ];
     prop_oneof![
         (quantity, targets, prop::option::of(any::<u16>())).prop_map(
-            |(quantity, targets, limit_ms)| Command::Motion(Motion {
-                quantity,
-                targets,
-                limit_ms,
-            })
+            |(quantity, targets, limit_ms)| Command::Motion(Motion { quantity, targets, limit_ms })
         ),
         (0..6_u8, parameter)
             .prop_map(|(channel, parameter)| Command::Parameter { channel, parameter }),

@@ -15,12 +15,7 @@ use proptest::{
 fn corpus() -> Vec<Vec<u8>> {
     let byte = |digits: &str| u8::from_str_radix(digits, 16).expect("two hexadecimal digits");
     let lines = include_str!("../fuzz/decoder-corpus.hex").lines();
-    let input = |line: &str| {
-        (0..line.len())
-            .step_by(2)
-            .map(|at| byte(&line[at..at + 2]))
-            .collect()
-    };
+    let input = |line: &str| (0..line.len()).step_by(2).map(|at| byte(&line[at..at + 2])).collect();
     lines.map(input).collect()
 }
 

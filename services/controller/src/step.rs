@@ -33,10 +33,7 @@ pub struct Alignment {
 impl Alignment {
     /// (14): of a robot facing `axis` under the unit vector `guidance`.
     pub fn of(axis: DVec2, guidance: DVec2) -> Self {
-        Self {
-            cosine: axis.dot(guidance),
-            sine: axis.perp_dot(guidance),
-        }
+        Self { cosine: axis.dot(guidance), sine: axis.perp_dot(guidance) }
     }
 }
 
@@ -123,10 +120,7 @@ impl Step for Controller {
             ..CommandSample::default()
         };
         if self.arrived {
-            return CommandSample {
-                state: CommandState::Arrived.into(),
-                ..command
-            };
+            return CommandSample { state: CommandState::Arrived.into(), ..command };
         }
         let direction = DVec2::new(guidance.ex, guidance.ey);
         // Shared memory is outside too: only a direction is followed.
@@ -139,10 +133,7 @@ impl Step for Controller {
             None
         };
         let Some(twist) = twist else {
-            return CommandSample {
-                state: CommandState::Halt.into(),
-                ..command
-            };
+            return CommandSample { state: CommandState::Halt.into(), ..command };
         };
         let [left_rad_s, right_rad_s] = self.drive.inputs(twist);
         CommandSample {
@@ -165,10 +156,8 @@ impl Controller {
         distance: f64,
         limit: f64,
     ) -> Option<Twist> {
-        let on_the_spot = |controller: &mut Self| Twist {
-            v: 0.0,
-            omega: controller.turn_to(alignment),
-        };
+        let on_the_spot =
+            |controller: &mut Self| Twist { v: 0.0, omega: controller.turn_to(alignment) };
         match (status, self.law) {
             (_, SpeedLaw::Car) => self.car_motion(status, alignment, distance, limit),
             // The paper's method gives no direction where the target is unreachable.

@@ -36,10 +36,7 @@ impl ErrorModel {
         let variance = |spread: f64| spread * spread / 3.0;
         Self {
             slip: settings.slip_noise * settings.slip_noise,
-            systematic: [
-                variance(settings.diameter_spread),
-                variance(settings.track_spread),
-            ],
+            systematic: [variance(settings.diameter_spread), variance(settings.track_spread)],
             track_m: body.track_m,
             steers: body.steering.is_some(),
         }
@@ -48,22 +45,13 @@ impl ErrorModel {
     /// Where the mission starts, which is where its frame is: the pose is exact.
     pub(crate) fn start(&self) -> Covariance {
         let [ratio, track] = self.systematic;
-        Covariance(SMatrix::from_diagonal(&Error::from([
-            0.0, 0.0, 0.0, ratio, track,
-        ])))
+        Covariance(SMatrix::from_diagonal(&Error::from([0.0, 0.0, 0.0, ratio, track])))
     }
 
     /// The covariance after the arc `moved.v` and the turn `moved.omega`, metres and radians, that were integrated from `pose`.
     pub(crate) fn after(&self, before: &Covariance, pose: Pose2, moved: Twist) -> Covariance {
-        let Twist {
-            v: arc,
-            omega: turn,
-        } = moved;
-        let axis = Pose2 {
-            heading: pose.heading + turn / 2.0,
-            ..pose
-        }
-        .axis();
+        let Twist { v: arc, omega: turn } = moved;
+        let axis = Pose2 { heading: pose.heading + turn / 2.0, ..pose }.axis();
         // The error of the pose that follows from one of arc and turn; the turn's acts half way through the arc.
         let effect = |arc_error: f64, turn_error: f64| {
             let aside = 0.5 * arc * turn_error;
@@ -120,10 +108,7 @@ mod tests {
         ErrorModel::new(&mission.dead_reckoning, &mission.body())
     }
 
-    const AHEAD: Twist = Twist {
-        v: 0.002,
-        omega: 0.0,
-    };
+    const AHEAD: Twist = Twist { v: 0.002, omega: 0.0 };
 
     /// The covariance after `steps` times the same motion.
     fn drive(model: &ErrorModel, steps: usize, moved: Twist) -> [f64; 6] {
@@ -136,10 +121,7 @@ mod tests {
     }
 
     fn close(got: f64, want: f64) {
-        assert!(
-            (got - want).abs() <= 1e-3 * want.abs(),
-            "got {got}, want {want}"
-        );
+        assert!((got - want).abs() <= 1e-3 * want.abs(), "got {got}, want {want}");
     }
 
     #[test]
@@ -166,10 +148,7 @@ mod tests {
     #[test]
     fn an_uncertain_track_is_undone_by_turning_back() {
         let model = model("slip_noise = 0\ndiameter_spread = 0\ntrack_spread = 0.01");
-        let there = Twist {
-            v: 0.0,
-            omega: 0.02,
-        };
+        let there = Twist { v: 0.0, omega: 0.02 };
         let [.., heading] = drive(&model, 50, there);
         close(heading, 1e-4 / 3.0);
         let (mut covariance, mut pose) = (model.start(), Pose2::default());

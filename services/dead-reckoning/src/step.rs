@@ -112,19 +112,13 @@ impl Step for DeadReckoning {
         let mut rejected = false;
         if let Some(last) = self.state.last {
             if last.tick == wheels.stamp.tick {
-                return Reckoned {
-                    pose: self.sample(),
-                    rejected,
-                };
+                return Reckoned { pose: self.sample(), rejected };
             }
             let elapsed = now.since(last.time).as_secs_f64();
             let moved = self.moved(last, wheels, elapsed);
             rejected = moved.is_none();
             let motion = moved.unwrap_or_default();
-            let pose = Pose2 {
-                position: self.state.position,
-                heading: self.state.heading,
-            };
+            let pose = Pose2 { position: self.state.position, heading: self.state.heading };
             let moved = match self.integration {
                 Integration::Arc => pose.along_arc(motion.v, motion.omega),
                 Integration::Euler => pose.along_euler(motion.v, motion.omega),
@@ -147,10 +141,7 @@ impl Step for DeadReckoning {
             v,
             omega,
         });
-        Reckoned {
-            pose: self.sample(),
-            rejected,
-        }
+        Reckoned { pose: self.sample(), rejected }
     }
 }
 
@@ -170,33 +161,22 @@ impl DeadReckoning {
         // (20) is linear in the wheels: their angles give arc and turn as their speeds give v and omega.
         let wheel = f64::from(left) * per_count;
         Some(match &self.drive {
-            Drive::Differential(drive) => drive.twist(WheelSpeeds {
-                left: wheel,
-                right: f64::from(right) * per_count,
-            }),
+            Drive::Differential(drive) => {
+                drive.twist(WheelSpeeds { left: wheel, right: f64::from(right) * per_count })
+            }
             Drive::Ackermann(drive) => {
                 // On the way it steered by the mean of the two angles.
                 let middle = f64::from(counts_between(0, last.right)) + f64::from(right) / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
-                drive.twist(SteeredWheel {
-                    wheel,
-                    steering: angle.unwrap_or_default(),
-                })
+                drive.twist(SteeredWheel { wheel, steering: angle.unwrap_or_default() })
             }
         })
     }
 
     fn sample(&self) -> PoseSample {
-        let State {
-            position,
-            heading,
-            travelled,
-            covariance,
-            last,
-        } = self.state;
-        let (left_counts, right_counts, v, omega) = last.map_or((0, 0, 0.0, 0.0), |last| {
-            (last.left, last.right, last.v, last.omega)
-        });
+        let State { position, heading, travelled, covariance, last } = self.state;
+        let (left_counts, right_counts, v, omega) =
+            last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
         PoseSample {
             x_m: position.x,
             y_m: position.y,
@@ -220,10 +200,7 @@ fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
     }
     // A robot that turns back through its start while the link is killed looks the same, but for the time.
     elapsed >= BOOTS_IN_S
-        && counts_restarted(
-            [last.left, last.right],
-            [wheels.left_counts, wheels.right_counts],
-        )
+        && counts_restarted([last.left, last.right], [wheels.left_counts, wheels.right_counts])
 }
 
 #[cfg(test)]

@@ -34,9 +34,7 @@ impl ClearBeams {
 
     /// Take a reading after the wheels have rolled `rolled_m` metres, and drop the readings that are too old.
     pub(crate) fn take(&mut self, sonar: &SonarModel, reading: &Reading, rolled_m: f64) {
-        let clear_m = reading
-            .echo
-            .map_or(f64::INFINITY, |range| range - sonar.ahead_of_echo_m);
+        let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - sonar.ahead_of_echo_m);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(sonar.clear_m));
         let newest = Dated { beam, rolled_m };
         append(&mut self.beams, CLEAR_BEAMS, sonar, newest);

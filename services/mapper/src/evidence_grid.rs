@@ -71,9 +71,7 @@ pub(crate) struct EvidenceGrid {
 /// body whose centre is inside.
 pub(crate) fn lattice(sonar: &SonarModel, mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
-    let cells = (width / sonar.resolution_m)
-        .ceil()
-        .min(f64::from(MAX_CELLS));
+    let cells = (width / sonar.resolution_m).ceil().min(f64::from(MAX_CELLS));
     let resolution_m = (width / cells).max(sonar.resolution_m);
     let beyond = (beyond_m / resolution_m).ceil();
     GridFrame {
@@ -126,9 +124,7 @@ impl EvidenceGrid {
         let rows = self.looks.chunks_exact_mut(lattice.cells as usize);
         for (row, looks) in (0..).zip(rows) {
             if looks.iter().fold(false, |any, &looks| any | is_over(looks)) {
-                let over = (0..)
-                    .zip(looks.iter())
-                    .filter(|(_, looks)| is_over(**looks));
+                let over = (0..).zip(looks.iter()).filter(|(_, looks)| is_over(**looks));
                 for (col, _) in over {
                     window = window.including(Cell { col, row });
                 }
@@ -157,15 +153,11 @@ impl EvidenceGrid {
         let half_diagonal = half_cell * std::f64::consts::SQRT_2;
         let band = sonar.band_m.max(half_cell * 1.2);
         let echo = beam.echo.filter(|range| *range <= reach);
-        let passed_to = beam
-            .echo
-            .map_or(f64::INFINITY, |range| range - sonar.before_m);
+        let passed_to = beam.echo.map_or(f64::INFINITY, |range| range - sonar.before_m);
         let clear_to = passed_to.min(reach);
         let scanned_to = passed_to.min(sonar.scanned_m.max(reach));
         let known_to = echo.map_or(scanned_to, |range| range + sonar.behind_m);
-        let far = known_to
-            .max(sonar.pointed_m)
-            .max(echo.unwrap_or(0.0) + band);
+        let far = known_to.max(sonar.pointed_m).max(echo.unwrap_or(0.0) + band);
         let came_from = side_of(beam.axis);
         // Beyond `near`, half a cell's diagonal is narrower than the widest cone.
         let near = half_diagonal / sonar.arc.sin();
@@ -175,12 +167,7 @@ impl EvidenceGrid {
         let mut explained = false;
         // All cells that matter below lie within `near`, or in the triangle of the widest cone.
         let (end, aside) = (far * beam.axis, far * outside * beam.axis.perp());
-        let corners = [
-            DVec2::splat(near),
-            DVec2::splat(-near),
-            end + aside,
-            end - aside,
-        ];
+        let corners = [DVec2::splat(near), DVec2::splat(-near), end + aside, end - aside];
         let least = corners.into_iter().fold(DVec2::ZERO, DVec2::min);
         let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
         for cell in between(lattice, beam.origin + least, beam.origin + greatest) {
@@ -212,11 +199,8 @@ impl EvidenceGrid {
             }
             if range <= clear_to && off <= sonar.against_at_edge.max(slack.min(sonar.against * 2.0))
             {
-                let pass = if off <= sonar.against.max(slack) {
-                    sonar.pass
-                } else {
-                    sonar.pass_at_edge
-                };
+                let pass =
+                    if off <= sonar.against.max(slack) { sonar.pass } else { sonar.pass_at_edge };
                 let weight = self.weight_of(index);
                 let same = apart(self.side[index], came_from) <= sonar.same_side;
                 if weight <= 0 || same && self.occupied[index] & SEEN == 0 {

@@ -53,11 +53,7 @@ impl Evidential {
         let reach = radius + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         Self {
             sonar,
-            geometry: Geometry {
-                lattice: lattice(&sonar, mission, reach),
-                grid,
-                reach,
-            },
+            geometry: Geometry { lattice: lattice(&sonar, mission, reach), grid, reach },
             radius,
             map_within: mission.map_within_m(),
         }
@@ -94,8 +90,7 @@ impl Evidential {
                 let cell = Cell { col, row };
                 if map.evidence.is_occupied(lattice.index(cell)) {
                     let occupied = true;
-                    map.inflation
-                        .follow(&self.geometry, Flip { cell, occupied });
+                    map.inflation.follow(&self.geometry, Flip { cell, occupied });
                 }
             }
         }
@@ -119,27 +114,20 @@ impl Evidential {
         // Rays come first, because what they show explains echoes.
         for ray in rays {
             map.beams.take_ray(&self.sonar, ray, rolled_m);
-            let seen = map
-                .evidence
-                .take_ray(&self.sonar, lattice, ray, body, &mut flips);
+            let seen = map.evidence.take_ray(&self.sonar, lattice, ray, body, &mut flips);
             touched = touched.union(seen);
         }
         if let Some(reading) = reading {
             map.beams.take(&self.sonar, &reading, rolled_m);
             let beam = (&reading, self.map_within);
-            let heard = map
-                .evidence
-                .take(&self.sonar, lattice, beam, body, &mut flips);
+            let heard = map.evidence.take(&self.sonar, lattice, beam, body, &mut flips);
             touched = touched.union(heard);
         }
         let mut window = self.on_grid(touched);
         for flip in &flips {
             window = window.union(map.inflation.follow(&self.geometry, *flip));
         }
-        Observed {
-            window,
-            safety_event: flips.iter().any(|flip| flip.occupied),
-        }
+        Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
     }
 
     /// Let scanned ground grow stale as the wheels roll from `before` to `now`, metres since the start. Returns the window of
@@ -156,16 +144,11 @@ impl Evidential {
 
     /// Reset all evidence that is not near the robot. Every second reset drops that too, since it may be what is wrong.
     pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
-        let keep = if epoch % 2 == 1 {
-            self.sonar.near_m
-        } else {
-            0.0
-        };
+        let keep = if epoch % 2 == 1 { self.sonar.near_m } else { 0.0 };
         let mut flips = Vec::new();
         map.beams.clear();
         let lattice = &self.geometry.lattice;
-        map.evidence
-            .reset(&self.sonar, lattice, (robot, keep), &mut flips);
+        map.evidence.reset(&self.sonar, lattice, (robot, keep), &mut flips);
         for flip in &flips {
             map.inflation.follow(&self.geometry, *flip);
         }
@@ -198,22 +181,11 @@ impl Evidential {
         };
         // A cell of the lattice shows as far as half of it, and half a cell of the grid, beyond its centre.
         let more = 0.5 * lattice.resolution_m / grid.resolution_m + 0.5;
-        let from = (corner(window.col, window.row) - more)
-            .floor()
-            .max(DVec2::ZERO);
-        let to = corner(
-            window.col + window.width - 1,
-            window.row + window.height - 1,
-        ) + more;
+        let from = (corner(window.col, window.row) - more).floor().max(DVec2::ZERO);
+        let to = corner(window.col + window.width - 1, window.row + window.height - 1) + more;
         let to = to.ceil().min(last);
         Window::default()
-            .including(Cell {
-                col: from.x as u32,
-                row: from.y as u32,
-            })
-            .including(Cell {
-                col: to.x as u32,
-                row: to.y as u32,
-            })
+            .including(Cell { col: from.x as u32, row: from.y as u32 })
+            .including(Cell { col: to.x as u32, row: to.y as u32 })
     }
 }

@@ -24,9 +24,7 @@ pub(crate) struct Inflation {
 
 impl Inflation {
     pub(crate) fn new(geometry: &Geometry) -> Self {
-        Self {
-            count: vec![0; geometry.grid.area()],
-        }
+        Self { count: vec![0; geometry.grid.area()] }
     }
 
     pub(crate) fn is_hazard(&self, index: usize) -> bool {
@@ -35,11 +33,7 @@ impl Inflation {
 
     /// Follow one flip. Returns the window of the grid within its reach.
     pub(crate) fn follow(&mut self, geometry: &Geometry, flip: Flip) -> Window {
-        let Geometry {
-            lattice,
-            grid,
-            reach,
-        } = *geometry;
+        let Geometry { lattice, grid, reach } = *geometry;
         let centre = lattice.centre_of(flip.cell);
         let last = DVec2::splat(f64::from(grid.cells) - 1.0);
         let from = grid.to_cells(centre - reach).ceil().max(DVec2::ZERO);
@@ -55,11 +49,8 @@ impl Inflation {
                     continue;
                 }
                 let count = &mut self.count[grid.index(cell)];
-                *count = if flip.occupied {
-                    count.saturating_add(1)
-                } else {
-                    count.saturating_sub(1)
-                };
+                *count =
+                    if flip.occupied { count.saturating_add(1) } else { count.saturating_sub(1) };
                 window = window.including(cell);
             }
         }

@@ -64,12 +64,9 @@ mod tests {
 
     #[test]
     fn a_ray_is_free_to_less_than_the_reading_and_the_less_the_farther() {
-        for (range, clear, hit) in [
-            (0.2, 0.176, true),
-            (0.5, 0.454, true),
-            (0.7, 0.629, true),
-            (0.81, 0.722, false),
-        ] {
+        for (range, clear, hit) in
+            [(0.2, 0.176, true), (0.5, 0.454, true), (0.7, 0.629, true), (0.81, 0.722, false)]
+        {
             let seen = seen(infrared_ad(range)).unwrap();
             assert!((seen.clear_m - clear).abs() < 0.003, "{range} m: {seen:?}");
             let near = seen.hit_m.is_some_and(|hit| (hit - range).abs() < 0.002);

@@ -114,10 +114,7 @@ impl Shell {
 
     /// The range sample of `tick`; those before it are dropped, one after it waits for its pose.
     fn range_of(&mut self, tick: u64) -> Result<Option<RangeSample>, StageError> {
-        while self
-            .latest_range
-            .is_none_or(|range| range.stamp.tick < tick)
-        {
+        while self.latest_range.is_none_or(|range| range.stamp.tick < tick) {
             match self.range.take()? {
                 Some(range) => self.latest_range = Some(range),
                 None => break,

@@ -44,10 +44,7 @@ impl Stage for Mapper {
 
     fn start(&self, context: &mut Context) -> Result<Start, StageError> {
         let saved = context.saved_journal(self.saved_bytes())?;
-        Ok(Start {
-            belief: saved.state,
-            inputs: saved.entries,
-        })
+        Ok(Start { belief: saved.state, inputs: saved.entries })
     }
 
     fn begin(&mut self, start: Start) -> Result<(), ForeignState> {

@@ -295,18 +295,12 @@ impl Mapper {
             _ => safety_distance(range).map(Some),
         });
         let ranger = self.mount.on(robot);
-        let reading = echo.map(|echo| Reading {
-            origin: ranger.position,
-            axis: ranger.axis(),
-            echo,
-        });
-        let rays = range.map_or_else(Vec::new, |range| {
-            Ray::all(robot, self.footprint, self.sensors, range)
-        });
+        let reading =
+            echo.map(|echo| Reading { origin: ranger.position, axis: ranger.axis(), echo });
+        let rays = range
+            .map_or_else(Vec::new, |range| Ray::all(robot, self.footprint, self.sensors, range));
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        let news = self
-            .evidential
-            .take(map, robot.position, reading, &rays, self.belief.rolled);
+        let news = self.evidential.take(map, robot.position, reading, &rays, self.belief.rolled);
         let changed = self.redraw(stale.union(news.window));
         self.belief.safety_events += u64::from(news.safety_event);
         changed
@@ -341,10 +335,7 @@ impl Mapper {
         let margin = f64::from(self.margin);
         let middle = self.frame.to_cells(hit).round();
         let last = DVec2::splat(f64::from(self.frame.cells) - 1.0);
-        let (from, to) = (
-            (middle - margin).max(DVec2::ZERO),
-            (middle + margin).min(last),
-        );
+        let (from, to) = ((middle - margin).max(DVec2::ZERO), (middle + margin).min(last));
         if !middle.is_finite() || !from.cmple(to).all() {
             return changed;
         }

@@ -119,9 +119,7 @@ impl ActiveSensing {
         let on_arc = free as f64 * STEP_M / STOPS_WITHIN_S;
         let faces = pose.axis().dot(direction) > FACES_COSINE;
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
-        on_arc
-            .max(least)
-            .min(self.limit_before_echoes(belief, pose))
+        on_arc.max(least).min(self.limit_before_echoes(belief, pose))
     }
 }
 

@@ -63,11 +63,7 @@ fn around(frame: &GridFrame, middle: Cell, reach: u32) -> impl Iterator<Item = C
 mod tests {
     use super::*;
 
-    const FRAME: GridFrame = GridFrame {
-        cells: 41,
-        resolution_m: 0.05,
-        centre: DVec2::ZERO,
-    };
+    const FRAME: GridFrame = GridFrame { cells: 41, resolution_m: 0.05, centre: DVec2::ZERO };
 
     /// The map with hazard where `is_hazard` says so of a cell's middle.
     fn aim(target: DVec2, is_hazard: impl Fn(DVec2) -> bool) -> Option<DVec2> {
@@ -85,10 +81,7 @@ mod tests {
 
     #[test]
     fn a_free_target_is_aimed_at_itself() {
-        assert_eq!(
-            aim(DVec2::new(0.5, 0.0), |_| false),
-            Some(DVec2::new(0.5, 0.0))
-        );
+        assert_eq!(aim(DVec2::new(0.5, 0.0), |_| false), Some(DVec2::new(0.5, 0.0)));
     }
 
     #[test]

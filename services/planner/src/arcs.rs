@@ -66,19 +66,12 @@ impl Arcs {
             .filter(|arc| arc.free_m >= LEAST_FREE_M.min(distance))
             .max_by(|a, b| a.progress_m.total_cmp(&b.progress_m));
         best.map_or((pose.axis(), 0.0), |arc| {
-            (
-                self.direction(pose, arc.curvature, distance),
-                arc.free_m / STOPS_WITHIN_S,
-            )
+            (self.direction(pose, arc.curvature, distance), arc.free_m / STOPS_WITHIN_S)
         })
     }
 
     fn follow(view: &View<'_>, pose: &Pose2, curvature: f64, distance: f64) -> Followed {
-        let mut arc = Followed {
-            curvature,
-            free_m: 0.0,
-            progress_m: 0.0,
-        };
+        let mut arc = Followed { curvature, free_m: 0.0, progress_m: 0.0 };
         // A car that a new hazard was put around drives out of it.
         let mut inside = view.is_hazard(pose.position);
         let steps = (AHEAD_M.min(distance) / STEP_M).ceil().max(1.0) as usize;
@@ -101,11 +94,7 @@ impl Arcs {
         // With s the sine to the direction, the turn rate is wd s, the speed vd (1 - s/2), less near the target.
         let speed = self.speed * (distance / self.slow_radius).min(1.0);
         let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
-        let angle = if sine.abs() < 1.0 {
-            sine.asin()
-        } else {
-            FRAC_PI_2.copysign(sine)
-        };
+        let angle = if sine.abs() < 1.0 { sine.asin() } else { FRAC_PI_2.copysign(sine) };
         DVec2::from_angle(angle).rotate(pose.axis())
     }
 }

@@ -48,16 +48,8 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
                 let _ = wakeup.write(&[1]);
             }
         };
-        let thread = std::thread::Builder::new()
-            .name(name.to_owned())
-            .spawn(all)?;
-        Ok(Self {
-            jobs: Some(jobs),
-            results,
-            done,
-            unread: 0,
-            thread: Some(thread),
-        })
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(all)?;
+        Ok(Self { jobs: Some(jobs), results, done, unread: 0, thread: Some(thread) })
     }
 
     /// Have `job` done, after those before it.
@@ -135,11 +127,6 @@ mod tests {
     fn niceness_10_is_10() {
         let value = ThreadPriorityValue::try_from(NICENESS_10).unwrap();
         let policy = ThreadSchedulePolicy::Normal(Normal::Other);
-        assert_eq!(
-            ThreadPriority::Crossplatform(value)
-                .to_posix(policy)
-                .unwrap(),
-            10
-        );
+        assert_eq!(ThreadPriority::Crossplatform(value).to_posix(policy).unwrap(), 10);
     }
 }

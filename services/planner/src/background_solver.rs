@@ -30,10 +30,7 @@ impl BackgroundSolver {
         let mut worker = Worker::default();
         let cancellation = worker.cancellation.clone();
         let solve = move |job| worker.solve(job);
-        Ok(Self {
-            cancellation,
-            thread: Background::start("full-solve", solve)?,
-        })
+        Ok(Self { cancellation, thread: Background::start("full-solve", solve)? })
     }
 
     /// Begin `job`, after those before it.
@@ -69,11 +66,7 @@ impl Worker {
         };
         let field = field.map(Arc::new);
         self.last = field.as_ref().ok().cloned();
-        Solved {
-            number,
-            field,
-            took_ns: began.elapsed().as_nanos() as u64,
-        }
+        Solved { number, field, took_ns: began.elapsed().as_nanos() as u64 }
     }
 }
 

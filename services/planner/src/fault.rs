@@ -32,10 +32,7 @@ mod tests {
             let Guidance::Along([x, y]) = field.guidance(col, row) else {
                 panic!("no guidance at ({col}, {row})");
             };
-            assert!(
-                x * (6.0 - col) + y * (7.0 - row) > 0.0,
-                "({x}, {y}) at ({col}, {row})"
-            );
+            assert!(x * (6.0 - col) + y * (7.0 - row) > 0.0, "({x}, {y}) at ({col}, {row})");
         }
         let field = solver.solve(&domain, &Cancellation::new()).unwrap();
         assert!(matches!(field.guidance(20.0, 10.0), Guidance::Along([x, _]) if x > 0.9));

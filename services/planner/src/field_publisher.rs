@@ -58,13 +58,7 @@ impl Worker {
             frame.whole()
         };
         self.before = Arc::clone(&cells);
-        Policy {
-            header: snapshot.header,
-            frame,
-            at,
-            cells,
-            changed,
-        }
+        Policy { header: snapshot.header, frame, at, cells, changed }
     }
 }
 
@@ -160,14 +154,10 @@ impl FieldPublisher {
             return Ok(());
         };
         let Progress { tick, time } = at;
-        let header = FieldHeader {
-            part,
-            ..policy.header
-        };
+        let header = FieldHeader { part, ..policy.header };
         let (frame, cells) = (policy.frame, &policy.cells);
         if part.window() == frame.whole() {
-            self.writer
-                .publish_slice_quietly(tick, time, header, cells)?;
+            self.writer.publish_slice_quietly(tick, time, header, cells)?;
         } else {
             let window = frame.cells_of(part.window(), cells);
             self.writer.publish_quietly(tick, time, header, window)?;

@@ -36,10 +36,8 @@ mod tests {
 
     /// Readings of a sonar 0.19 m ahead, by a robot at the origin: bearing in degrees and how far nothing answered.
     fn belief(readings: &[(f32, f32)]) -> GridHeader {
-        let mut belief = GridHeader {
-            clear_beam_count: readings.len() as u64,
-            ..GridHeader::default()
-        };
+        let mut belief =
+            GridHeader { clear_beam_count: readings.len() as u64, ..GridHeader::default() };
         for (beam, &(bearing_deg, clear_m)) in belief.clear_beams.iter_mut().zip(readings) {
             let bearing_rad = bearing_deg.to_radians();
             *beam = ClearBeam {
@@ -53,31 +51,18 @@ mod tests {
     }
 
     fn clear(readings: &[(f32, f32)], radius: f64, x: f64) -> f64 {
-        let pose = Pose2 {
-            position: DVec2::new(x, 0.0),
-            heading: 0.0,
-        };
+        let pose = Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
         clear_ahead_m(&belief(readings), &pose, radius)
     }
 
     #[test]
     fn an_echo_that_comes_and_goes_is_there() {
-        let near = clear(
-            &[(0.0, 0.03), (0.0, 2.0), (0.0, 0.03), (0.0, 2.0)],
-            0.19,
-            0.0,
-        );
+        let near = clear(&[(0.0, 0.03), (0.0, 2.0), (0.0, 0.03), (0.0, 2.0)], 0.19, 0.0);
         assert!((near - 0.03).abs() < 1e-6, "{near}");
         let inside = clear(&[(0.0, 0.07)], 0.22, 0.0);
-        assert!(
-            (inside - 0.04).abs() < 1e-6,
-            "a sensor within the body's edge: {inside}"
-        );
+        assert!((inside - 0.04).abs() < 1e-6, "a sensor within the body's edge: {inside}");
         let nearer = clear(&[(0.0, 0.5)], 0.19, 0.4);
-        assert!(
-            (nearer - 0.1).abs() < 1e-6,
-            "the robot went on since: {nearer}"
-        );
+        assert!((nearer - 0.1).abs() < 1e-6, "the robot went on since: {nearer}");
     }
 
     #[test]

@@ -90,28 +90,17 @@ impl Generation {
                 return solved;
             }
         }
-        Solved {
-            number,
-            field: Err(SolveError::Cancelled),
-            took_ns: 0,
-        }
+        Solved { number, field: Err(SolveError::Cancelled), took_ns: 0 }
     }
 
     fn policy(&self) -> Option<Policy> {
         let snapshot = self.planner.snapshot().filter(|_| self.fields)?;
-        Some(Policy {
-            header: snapshot.header,
-            frame: snapshot.frame,
-            cells: snapshot.cells(),
-        })
+        Some(Policy { header: snapshot.header, frame: snapshot.frame, cells: snapshot.cells() })
     }
 
     fn field(&self, part: Part, at: Progress) -> Option<Output> {
         let policy = self.policy.as_ref()?;
-        let header = FieldHeader {
-            part,
-            ..policy.header
-        };
+        let header = FieldHeader { part, ..policy.header };
         let window = policy.frame.cells_of(part.window(), &policy.cells);
         let window: Vec<_> = window.collect();
         let (tick, time) = (at.tick, at.time);
@@ -132,17 +121,11 @@ impl Replay for Generation {
                 let (header, cells) = (&header, &cells[..]);
                 self.planner.step(Input::Grid { header, cells }, time)
             }
-            Taken::Pose {
-                pose,
-                full_solve_ns,
-            } => {
+            Taken::Pose { pose, full_solve_ns } => {
                 let outcome = self.planner.step(Input::Pose(&pose), time);
                 let guidance = outcome.ok().and_then(|outcome| outcome.guidance);
                 let published = guidance.map(|guidance| {
-                    let guidance = GuidanceSample {
-                        full_solve_ns,
-                        ..guidance
-                    };
+                    let guidance = GuidanceSample { full_solve_ns, ..guidance };
                     Output::of(&topics::GUIDANCE, tick, time, guidance)
                 });
                 return Ok(published.into_iter().collect());

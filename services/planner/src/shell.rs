@@ -196,10 +196,7 @@ impl Shell {
             self.inputs.note(&Entry { taken, at }, at)?;
             self.budget.end(Item::Persist);
             let began = Instant::now();
-            let work = self.work(Input::Grid {
-                header: grid.header(),
-                cells: &grid,
-            })?;
+            let work = self.work(Input::Grid { header: grid.header(), cells: &grid })?;
             let took_ns = began.elapsed().as_nanos() as u64;
             self.budget.end(Item::Step);
             match work {
@@ -215,10 +212,7 @@ impl Shell {
             }
             // A keyframe published again after its tick was answered needs no answer, unless it changes the field.
             asked |= part.keyframe == 0 || self.answered != Some(stamp.tick) || work != Work::None;
-            self.progress = Progress {
-                tick: stamp.tick,
-                time: stamp.time(),
-            };
+            self.progress = Progress { tick: stamp.tick, time: stamp.time() };
         }
         Ok(asked)
     }
@@ -236,18 +230,12 @@ impl Shell {
         let Progress { tick, time } = self.progress;
         let full_solve_ns = self.full_solve_ns;
         self.budget.end(Item::Read);
-        self.note(Taken::Pose {
-            pose,
-            full_solve_ns,
-        })?;
+        self.note(Taken::Pose { pose, full_solve_ns })?;
         self.budget.end(Item::Persist);
         let outcome = self.planner.step(Input::Pose(&pose), time);
         self.budget.end(Item::Step);
         if let Some(guidance) = outcome.map_err(no_field)?.guidance {
-            let guidance = GuidanceSample {
-                full_solve_ns,
-                ..guidance
-            };
+            let guidance = GuidanceSample { full_solve_ns, ..guidance };
             self.inputs.publish(self.progress)?;
             self.budget.end(Item::Persist);
             self.guidance.publish_quietly(tick, time, guidance)?;

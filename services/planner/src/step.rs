@@ -101,14 +101,8 @@ impl Step for Planner {
     fn step(&mut self, input: Input<'_>, _: MissionTime) -> Result<Outcome, SolveError> {
         Ok(match input {
             Input::Grid { header, cells } => self.take_grid(header, cells)?.into(),
-            Input::Pose(pose) => Outcome {
-                guidance: Some(self.guide(pose)),
-                ..Outcome::default()
-            },
-            Input::Idle => Outcome {
-                job: self.begin_job(),
-                ..Outcome::default()
-            },
+            Input::Pose(pose) => Outcome { guidance: Some(self.guide(pose)), ..Outcome::default() },
+            Input::Idle => Outcome { job: self.begin_job(), ..Outcome::default() },
             Input::Solved(solved) => self.swap_in(solved)?.into(),
             Input::Fault { fault, robot } => self.corrupt(fault, robot).into(),
         })
@@ -159,9 +153,7 @@ impl Planner {
             Work::None
         } else if live.is_solved_at_once() {
             let before = &live.field;
-            let field = self
-                .solver
-                .solve_near(&live.map, before, &Cancellation::default())?;
+            let field = self.solver.solve_near(&live.map, before, &Cancellation::default())?;
             live.field = Arc::new(field);
             self.full_solves += 1;
             Work::Solved
@@ -300,22 +292,16 @@ impl Planner {
             reachable: verification.reachable as u64,
             ..FieldHeader::default()
         };
-        Some(Snapshot {
-            header,
-            frame: live.frame,
-            field: Arc::clone(&live.field),
-        })
+        Some(Snapshot { header, frame: live.frame, field: Arc::clone(&live.field) })
     }
 }
 
 /// The mission's screening length, in the unit of its grid.
 fn screening(mission: &Mission) -> Screening {
-    mission
-        .screening_length_m()
-        .map_or(Screening::None, |length| Screening::Uniform {
-            length,
-            cell: mission.grid_frame().resolution_m,
-        })
+    mission.screening_length_m().map_or(Screening::None, |length| Screening::Uniform {
+        length,
+        cell: mission.grid_frame().resolution_m,
+    })
 }
 
 #[cfg(test)]

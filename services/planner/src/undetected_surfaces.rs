@@ -160,29 +160,19 @@ mod tests {
     fn undetected_by(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
         let surfaces = UndetectedSurfaces::new(&belief(beams, rays), BODY_M);
         let normals = surfaces.normals(DVec2::ZERO, DVec2::X);
-        normals
-            .map(|normal| normal.to_angle().to_degrees().round() as i32)
-            .collect()
+        normals.map(|normal| normal.to_angle().to_degrees().round() as i32).collect()
     }
 
     #[test]
     fn a_silent_beam_excludes_only_surfaces_square_to_it() {
         assert_eq!(undetected(&[]).len(), 11);
-        assert_eq!(
-            undetected(&[beam(0.0, 0.0, 2.0)]),
-            [-75, -60, -45, -30, 30, 45, 60, 75]
-        );
-        assert_eq!(
-            undetected(&[beam(0.0, 45.0, 2.0)]),
-            [-75, -60, -45, -30, -15, 0, 15, 75]
-        );
+        assert_eq!(undetected(&[beam(0.0, 0.0, 2.0)]), [-75, -60, -45, -30, 30, 45, 60, 75]);
+        assert_eq!(undetected(&[beam(0.0, 45.0, 2.0)]), [-75, -60, -45, -30, -15, 0, 15, 75]);
     }
 
     #[test]
     fn a_scan_to_both_sides_excludes_all_surfaces() {
-        let scan: Vec<_> = (-4..=4)
-            .map(|step| beam(-0.3, f64::from(step) * 16.0, 2.0))
-            .collect();
+        let scan: Vec<_> = (-4..=4).map(|step| beam(-0.3, f64::from(step) * 16.0, 2.0)).collect();
         assert_eq!(undetected(&scan), [0; 0]);
     }
 
@@ -221,10 +211,7 @@ mod tests {
     #[test]
     fn a_ray_does_not_exclude_a_surface_that_it_meets_far_from_the_body() {
         // The ray runs parallel to the way, 0.5 m beside it: it would meet the surface 0.5 m from where the body touches it.
-        let ray = ClearBeam {
-            y_m: 0.5,
-            ..beam(0.0, 0.0, 0.7)
-        };
+        let ray = ClearBeam { y_m: 0.5, ..beam(0.0, 0.0, 0.7) };
         assert!(undetected_by(&[], &[ray]).contains(&0));
     }
 

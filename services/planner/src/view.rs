@@ -42,9 +42,7 @@ impl View<'_> {
     }
 
     pub(crate) fn is_hazard(&self, at: DVec2) -> bool {
-        self.frame
-            .cell_at(at)
-            .is_none_or(|cell| self.state(cell).is_hazard())
+        self.frame.cell_at(at).is_none_or(|cell| self.state(cell).is_hazard())
     }
 
     /// Whether a cell within `radius` of `at` became a hazard, or free, after the field's map was taken.

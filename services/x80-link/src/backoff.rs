@@ -16,13 +16,7 @@ impl Backoff {
     /// The first attempt is due at once, the second a `first` pause later, and no pause is longer than
     /// `longest`.
     pub const fn new(first: Duration, longest: Duration) -> Self {
-        Self {
-            first,
-            longest,
-            pause: first,
-            attempts: 0,
-            next_ns: None,
-        }
+        Self { first, longest, pause: first, attempts: 0, next_ns: None }
     }
 
     /// Whether to try now, at `now_ns` of the monotonic clock.

@@ -48,16 +48,12 @@ impl Drive {
         let mut bytes = Vec::new();
         let mut say = |command: Command| command.encode(Addressing::default(), &mut bytes);
         for channel in [self.robot.left.channel, self.robot.right.channel] {
-            for parameter in [
-                Parameter::Feedback(Feedback::Encoder),
-                Parameter::Mode(Mode::Velocity),
-            ] {
+            for parameter in
+                [Parameter::Feedback(Feedback::Encoder), Parameter::Mode(Mode::Velocity)]
+            {
                 say(Command::Parameter { channel, parameter });
             }
-            say(Command::Enable {
-                on: true,
-                channel: Some(channel),
-            });
+            say(Command::Enable { on: true, channel: Some(channel) });
         }
         bytes.extend(self.streams());
         bytes
@@ -107,9 +103,7 @@ impl Drive {
         let Some(steering) = self.body.steering else {
             return [driven, self.counts_per_second(share * command.right_rad_s)];
         };
-        let angle = command
-            .right_rad_s
-            .clamp(-steering.limit_rad, steering.limit_rad);
+        let angle = command.right_rad_s.clamp(-steering.limit_rad, steering.limit_rad);
         let left = steering.counts(angle) - f64::from(counts_between(0, wheels.right_counts));
         let top = steering.counts(steering.rate_rad_s);
         let rate = (left * STEERING_GAIN * self.robot.rate_hz).clamp(-top, top);
@@ -185,15 +179,8 @@ mod tests {
     fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
         let text = "target = [3, 0]\nrobot.model = 'car'";
         let drive = Drive::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
-        let command = CommandSample {
-            left_rad_s,
-            right_rad_s: angle,
-            ..CommandSample::default()
-        };
-        let wheels = WheelSample {
-            right_counts: counts,
-            ..WheelSample::default()
-        };
+        let command = CommandSample { left_rad_s, right_rad_s: angle, ..CommandSample::default() };
+        let wheels = WheelSample { right_counts: counts, ..WheelSample::default() };
         drive.counts(&command, share, &wheels)
     }
 

@@ -163,9 +163,7 @@ pub const TABLE: &[Rule] = &[
         cause: Cause::OdometryImplausible,
         when: "0.55 s of commanded motion with less than a quarter of it in the encoders, until the robot restarts, or 3 jumps within 2 s; `x80-link.log` says which",
         action: Action::Stop,
-        clears: Clears::OnResume {
-            or_after: Some(odometry::CALM),
-        },
+        clears: Clears::OnResume { or_after: Some(odometry::CALM) },
         monitor: |all| &all.odometry,
     },
     Rule {
@@ -216,10 +214,7 @@ pub struct Decision {
 
 impl Decision {
     /// Nothing is wrong.
-    pub const GO: Self = Self {
-        action: Action::Go,
-        cause: Cause::None,
-    };
+    pub const GO: Self = Self { action: Action::Go, cause: Cause::None };
 
     /// Whether no command may pass.
     pub fn stops(self) -> bool {
@@ -253,10 +248,7 @@ pub(crate) struct Failsafe {
 
 impl Failsafe {
     pub(crate) fn new(mission: &Mission) -> Self {
-        Self {
-            monitors: Monitors::new(mission),
-            applied: [false; TABLE.len()],
-        }
+        Self { monitors: Monitors::new(mission), applied: [false; TABLE.len()] }
     }
 
     pub(crate) fn observe(&mut self, what: &Observation<'_>, now: Moment) {
@@ -278,9 +270,7 @@ impl Failsafe {
             if monitor.judges_frames() && !judges_frames {
                 return None;
             }
-            *applied = rule
-                .clears
-                .applies(*applied, monitor.condition(rule.cause, now));
+            *applied = rule.clears.applies(*applied, monitor.condition(rule.cause, now));
             applied.then_some(rule)
         }))
     }

@@ -80,15 +80,9 @@ mod tests {
     fn the_seven_infrared_rangers_come_from_two_frames() {
         let mut rangers =
             Rangers::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap());
-        let custom = CustomSensors {
-            ad: [9, 9, 1000, 0, 4095, 0, 0, 0],
-            io: 0,
-        };
+        let custom = CustomSensors { ad: [9, 9, 1000, 0, 4095, 0, 0, 0], io: 0 };
         assert_eq!(rangers.take_custom(&custom), None, "one is missing");
-        rangers.take_standard(&StandardSensors {
-            infrared: 1000,
-            ..StandardSensors::default()
-        });
+        rangers.take_standard(&StandardSensors { infrared: 1000, ..StandardSensors::default() });
         let infrared = rangers.take_custom(&custom).unwrap();
         assert_eq!(infrared.raw_ad, [1000, 1000, 0, 4095, 0, 0, 0]);
         assert_eq!(infrared.range_m[2..4], [0.81, 0.09]);

@@ -109,9 +109,7 @@ impl Process for Shell {
             let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
                 break;
             };
-            let now = self
-                .clock
-                .at(self.runner.stage.link.state().next_tick, now_ns);
+            let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
             let entry = Entry::Step(Taken::Datagram(bytes), now_ns, now);
             let effects = self.runner.take(entry)?;
             self.carry_out(effects)?;
@@ -161,24 +159,16 @@ fn wire_broke(error: TransportError) -> StageError {
 }
 
 fn log_battery(change: &BatteryChange) {
-    let BatteryChange {
-        pack,
-        volts,
-        charge,
-    } = *change;
+    let BatteryChange { pack, volts, charge } = *change;
     let volts = format!("{volts:.1}");
     let pack = pack.as_str();
     match charge {
-        Charge::Empty => tracing::error!(
-            pack,
-            volts,
-            "battery empty: charge it, or set robot.low_battery_v"
-        ),
-        Charge::Low => tracing::warn!(
-            pack,
-            volts,
-            "battery low: charge it, or set robot.low_battery_v"
-        ),
+        Charge::Empty => {
+            tracing::error!(pack, volts, "battery empty: charge it, or set robot.low_battery_v")
+        }
+        Charge::Low => {
+            tracing::warn!(pack, volts, "battery low: charge it, or set robot.low_battery_v")
+        }
         Charge::Enough => tracing::info!(pack, volts, "the battery gives enough again"),
     }
 }

@@ -95,11 +95,8 @@ impl LinkStage {
     }
 
     fn carry(&mut self, at: Progress, bytes: &[u8], machine_ns: u64, direction: Direction) {
-        let header = WireHeader {
-            machine_ns,
-            direction: direction.into(),
-            ..WireHeader::default()
-        };
+        let header =
+            WireHeader { machine_ns, direction: direction.into(), ..WireHeader::default() };
         self.wire.push((at, header, bytes.to_vec()));
     }
 
@@ -111,12 +108,7 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick {
-                tick,
-                time,
-                range,
-                wheels,
-            } => {
+            Effect::Tick { tick, time, range, wheels } => {
                 out.at = Progress { tick, time };
                 out.give(&RANGE, range)?;
                 out.answer(&WHEELS, wheels)?;

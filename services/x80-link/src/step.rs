@@ -125,10 +125,7 @@ impl Step for Link {
             newest_command: None,
             repeat: None,
             // Nothing has moved yet: no stop needs to be sent.
-            decision: Decision {
-                action: Action::Stop,
-                cause: Cause::NotOrdered,
-            },
+            decision: Decision { action: Action::Stop, cause: Cause::NotOrdered },
             stop_sent_ns: None,
             due: 0,
             tally: Tally::default(),
@@ -164,10 +161,7 @@ impl Step for Link {
         self.give_tick(now_ns, &mut effects);
         self.repeat_command(now_ns, &mut effects);
         self.guard(now_ns, &mut effects);
-        if effects
-            .iter()
-            .any(|effect| matches!(effect, Effect::Send(_)))
-        {
+        if effects.iter().any(|effect| matches!(effect, Effect::Send(_))) {
             self.observe(Observation::Sent, now_ns);
         }
         effects
@@ -234,10 +228,7 @@ impl Link {
     }
 
     const fn moment(&self, machine_ns: u64) -> Moment {
-        Moment {
-            time: self.now,
-            machine_ns,
-        }
+        Moment { time: self.now, machine_ns }
     }
 
     fn observe(&mut self, what: Observation<'_>, now_ns: u64) {
@@ -279,10 +270,8 @@ impl Link {
             // The number is taken whether the tick is answered or not.
             self.state.next_tick += 1;
         }
-        let wheels = WheelSample {
-            restarts: self.restart.restarts(),
-            ..self.drive.wheels(sensors)
-        };
+        let wheels =
+            WheelSample { restarts: self.restart.restarts(), ..self.drive.wheels(sensors) };
         self.wheels = wheels;
         self.open = Some(OpenTick {
             range: self.rangers.for_tick(),
@@ -294,21 +283,12 @@ impl Link {
     }
 
     fn tick_effect(&self, tick: u64, open: &OpenTick) -> Effect {
-        Effect::Tick {
-            tick,
-            time: self.time,
-            range: open.range,
-            wheels: open.wheels,
-        }
+        Effect::Tick { tick, time: self.time, range: open.range, wheels: open.wheels }
     }
 
     /// The number of the open tick.
     fn open_number(&self) -> u64 {
-        if self.in_ticks() {
-            self.state.next_tick
-        } else {
-            self.state.next_tick - 1
-        }
+        if self.in_ticks() { self.state.next_tick } else { self.state.next_tick - 1 }
     }
 
     fn take_command(&mut self, command: &CommandSample, now_ns: u64, effects: &mut Vec<Effect>) {
@@ -345,9 +325,7 @@ impl Link {
         self.tally.commands += 1;
         self.due += 1;
         if answers && let Some(open) = self.open.take() {
-            effects.push(Effect::Answered {
-                began_ns: open.began_ns,
-            });
+            effects.push(Effect::Answered { began_ns: open.began_ns });
             if self.in_ticks() {
                 self.state.next_tick += 1;
             }

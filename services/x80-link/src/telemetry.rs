@@ -57,10 +57,8 @@ mod tests {
     #[test]
     fn a_standard_frame_by_hand() {
         let mut telemetry = Telemetry::default();
-        telemetry.take_motor(&MotorSensors {
-            currents: [1, 2, 3, 4, 5, 6],
-            ..MotorSensors::default()
-        });
+        telemetry
+            .take_motor(&MotorSensors { currents: [1, 2, 3, 4, 5, 6], ..MotorSensors::default() });
         let standard = StandardSensors {
             human: [10, 20, 30, 40],
             tilt: [50, 60],
@@ -73,10 +71,7 @@ mod tests {
         };
         let low = [false, true, false];
         let (power, surroundings) = telemetry.take_standard(&standard, low);
-        assert_eq!(
-            (power.board_low, power.motor_low, power.servo_low),
-            (0, 1, 0)
-        );
+        assert_eq!((power.board_low, power.motor_low, power.servo_low), (0, 1, 0));
         assert!((power.board_v - 7.2).abs() < 1e-9);
         assert!((power.motor_v - 12.003).abs() < 1e-3);
         assert_eq!(power.driver_c, [60.0, 100.0]);

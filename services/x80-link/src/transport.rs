@@ -64,10 +64,7 @@ impl Transport {
             Address::Serial(path) => Stream::new(Serial::on(path)).map(Wire::Serial),
         };
         Ok(Self {
-            wire: wire.map_err(|source| TransportError {
-                address: address.clone(),
-                source,
-            })?,
+            wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
             address: address.clone(),
             reported: None,
             // The largest datagram.
@@ -146,10 +143,7 @@ impl Transport {
     }
 
     fn broken(&self, source: io::Error) -> TransportError {
-        TransportError {
-            address: self.address.clone(),
-            source,
-        }
+        TransportError { address: self.address.clone(), source }
     }
 }
 

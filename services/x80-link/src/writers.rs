@@ -20,14 +20,8 @@ impl Writers {
         context: &mut Context,
         command: &mut Reader<CommandSample>,
     ) -> Result<Self, StageError> {
-        command.follow(Author {
-            process: 0,
-            generation: 0,
-        });
-        Ok(Self {
-            roster: context.slice_reader(&topics::ROSTER)?,
-            ignored: Ignored::default(),
-        })
+        command.follow(Author { process: 0, generation: 0 });
+        Ok(Self { roster: context.slice_reader(&topics::ROSTER)?, ignored: Ignored::default() })
     }
 
     /// Make `command` read from the controller that the roster names.
@@ -37,10 +31,7 @@ impl Writers {
             let mut entries = entries.iter();
             let named = entries.find(|entry| name_str(&entry.stage) == writer);
             if let Some(entry) = named.filter(|entry| entry.pid != 0) {
-                command.follow(Author {
-                    process: entry.pid,
-                    generation: entry.generation,
-                });
+                command.follow(Author { process: entry.pid, generation: entry.generation });
             }
         }
         Ok(())

@@ -20,10 +20,7 @@ pub struct Wheels<T> {
 impl<T> Wheels<T> {
     /// Apply `change` to both.
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Wheels<U> {
-        Wheels {
-            left: change(self.left),
-            right: change(self.right),
-        }
+        Wheels { left: change(self.left), right: change(self.right) }
     }
 }
 
@@ -102,18 +99,12 @@ impl Body {
     /// what it touches, or halts. Returns how far the ground under either wheel has really gone by, metres.
     pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
         let turned = asked.map(|metres| metres / self.wheel_radius);
-        let step = self.drive.twist(WheelSpeeds {
-            right: turned.right,
-            left: turned.left,
-        });
+        let step = self.drive.twist(WheelSpeeds { right: turned.right, left: turned.left });
         let Some(arc) = self.go(step, world) else {
             return asked;
         };
         let half_turn = step.omega * self.track / 2.0;
-        Wheels {
-            left: arc - half_turn,
-            right: arc + half_turn,
-        }
+        Wheels { left: arc - half_turn, right: arc + half_turn }
     }
 
     /// Move by the arc and turn of `step` (metres, radians), and no farther than `world` lets it. Where it touched something,
@@ -165,30 +156,18 @@ mod tests {
     fn at_start(text: &str) -> (Body, World) {
         let text = format!("target = [0, -5]\n{text}");
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        (
-            Body::new(&mission, &World::new(&mission), 1.0),
-            World::new(&mission),
-        )
+        (Body::new(&mission, &World::new(&mission), 1.0), World::new(&mission))
     }
 
     fn both(metres: f64) -> Wheels<f64> {
-        Wheels {
-            left: metres,
-            right: metres,
-        }
+        Wheels { left: metres, right: metres }
     }
 
     #[test]
     fn wheels_turn_the_body_by_the_track() {
         let (mut body, world) = at_start("robot.track_m = 0.25");
         let quarter = FRAC_PI_2 * 0.25 / 2.0;
-        body.roll(
-            Wheels {
-                left: -quarter,
-                right: quarter,
-            },
-            &world,
-        );
+        body.roll(Wheels { left: -quarter, right: quarter }, &world);
         assert!((body.pose().heading - FRAC_PI_2).abs() < 1e-12);
         assert!(body.pose().position.length() < 1e-12);
     }

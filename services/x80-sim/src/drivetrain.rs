@@ -17,11 +17,7 @@ pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) ->
 /// The share by which wheels go with the ground. A wheel that slips turns all the same; one whose body is `held` turns as
 /// far as it slips at the contact.
 pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> f64 {
-    if held {
-        1.0 - physics.contact_slip
-    } else {
-        0.0
-    }
+    if held { 1.0 - physics.contact_slip } else { 0.0 }
 }
 
 /// The wheels of the robot and their motors.
@@ -38,10 +34,7 @@ pub(crate) struct Drivetrain {
 impl Drivetrain {
     /// The drivetrain of `mission`'s robot, its wheels `diameter` times the nominal one.
     pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
-        let wheels = Wheels {
-            left: mission.robot.left,
-            right: mission.robot.right,
-        };
+        let wheels = Wheels { left: mission.robot.left, right: mission.robot.right };
         Self {
             // A mission is checked: channels are 0 and 1.
             channel: wheels.map(|wheel| usize::from(wheel.channel.min(1))),
@@ -60,9 +53,7 @@ impl Drivetrain {
         noise: &mut Noise,
     ) -> Wheels<f64> {
         let mut asked = |channel: usize, sign: f64| {
-            let counts = motors
-                .get_mut(channel)
-                .map_or(0.0, |motor| motor.step(now, dt, noise));
+            let counts = motors.get_mut(channel).map_or(0.0, |motor| motor.step(now, dt, noise));
             sign * counts * self.metres_per_count
         };
         Wheels {
@@ -73,10 +64,7 @@ impl Drivetrain {
 
     /// How far the rims go when nominal wheels would go `metres`.
     pub(crate) fn rims(&self, metres: Wheels<f64>) -> Wheels<f64> {
-        Wheels {
-            left: metres.left * self.diameter.left,
-            right: metres.right * self.diameter.right,
-        }
+        Wheels { left: metres.left * self.diameter.left, right: metres.right * self.diameter.right }
     }
 
     /// The wheels have turned in `dt` seconds: by the share `grip` with the ground, which went by `went` metres, and by the rest
@@ -100,18 +88,8 @@ impl Drivetrain {
             }
         };
         let Wheels { left, right } = self.diameter;
-        turn(
-            self.channel.left,
-            self.sign.left,
-            asked.left,
-            went.left / left,
-        );
-        turn(
-            self.channel.right,
-            self.sign.right,
-            asked.right,
-            went.right / right,
-        );
+        turn(self.channel.left, self.sign.left, asked.left, went.left / left);
+        turn(self.channel.right, self.sign.right, asked.right, went.right / right);
     }
 
     /// Speeds of the rims, m/s, forward positive.
@@ -128,11 +106,7 @@ impl Drivetrain {
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> Wheels<u16> {
         let counts = |channel: usize, sign: f64| {
             let position = encoders[channel].position;
-            if sign < 0.0 {
-                (COUNT_CYCLE - position) % COUNT_CYCLE
-            } else {
-                position
-            }
+            if sign < 0.0 { (COUNT_CYCLE - position) % COUNT_CYCLE } else { position }
         };
         Wheels {
             left: counts(self.channel.left, self.sign.left),

@@ -38,11 +38,7 @@ pub struct PidGains {
 
 impl PidGains {
     /// The gains that a board boots with.
-    const BOOT: Self = Self {
-        kp: 50,
-        kd: 5,
-        ki_x100: 0,
-    };
+    const BOOT: Self = Self { kp: 50, kd: 5, ki_x100: 0 };
 
     fn set(&mut self, gains: Gains) {
         self.kp = gains.kp.unwrap_or(self.kp);
@@ -143,11 +139,7 @@ impl Motor {
             Quantity::Pwm => Mode::Pwm,
             Quantity::Velocity => Mode::Velocity,
         };
-        self.order = Some(Order {
-            quantity,
-            value,
-            until,
-        });
+        self.order = Some(Order { quantity, value, until });
     }
 
     /// Enable or suspend it. A suspended motor forgets its order.
@@ -192,10 +184,7 @@ impl Motor {
             self.order = self
                 .order
                 .filter(|order| order.quantity == Quantity::Position)
-                .map(|order| Order {
-                    until: None,
-                    ..order
-                });
+                .map(|order| Order { until: None, ..order });
         }
         let wanted = self.wanted(now);
         if self.pending.back().map_or(self.target, |last| last.1) != wanted {
@@ -211,11 +200,7 @@ impl Motor {
             self.target = target;
             self.pending.pop_front();
         }
-        let decay = if self.physics.lag_s > 0.0 {
-            (-dt / self.physics.lag_s).exp()
-        } else {
-            0.0
-        };
+        let decay = if self.physics.lag_s > 0.0 { (-dt / self.physics.lag_s).exp() } else { 0.0 };
         // The distance of an exponential approach is its integral, not its end times dt.
         let behind = self.speed - self.target;
         let counts = self.target * dt + behind * self.physics.lag_s * (1.0 - decay);
@@ -265,11 +250,7 @@ impl Motor {
                 // The loop pushes until the wheel is there: no dead band remains.
                 let least = self.physics.dead_band_counts;
                 let there = way.abs() < POSITION_REACHED;
-                if there {
-                    0.0
-                } else {
-                    asked.abs().max(least).copysign(way)
-                }
+                if there { 0.0 } else { asked.abs().max(least).copysign(way) }
             }
         };
         if asked.abs() < self.physics.dead_band_counts {

@@ -32,11 +32,7 @@ impl Fading {
         // Cutting the longest outages short makes their mean shorter; the share must stay.
         let cut_mean = mean * (1.0 - (-longest / mean).exp());
         let share = radio.outage_share;
-        let mean_good = if share > 0.0 {
-            cut_mean * (1.0 - share) / share
-        } else {
-            f64::INFINITY
-        };
+        let mean_good = if share > 0.0 { cut_mean * (1.0 - share) / share } else { f64::INFINITY };
         let mut fading = Self {
             mean_good,
             mean_out: mean,
@@ -59,9 +55,7 @@ impl Fading {
             self.since = self.until;
             self.until += if self.out {
                 // Without a floor, time would never pass where the mean is 0.
-                noise
-                    .exponential(self.mean_out)
-                    .clamp(1e-3, self.longest.max(1e-3))
+                noise.exponential(self.mean_out).clamp(1e-3, self.longest.max(1e-3))
             } else {
                 noise.exponential(self.mean_good).max(1e-3)
             };
@@ -203,11 +197,7 @@ impl<W: Copy + PartialEq> Radio<W> {
             .position(|flight| flight.way == way && flight.held.is_some())
             .and_then(|at| self.in_flight.remove(at));
         let (bytes, behind) = match waiting {
-            Some(Flight {
-                held: Some(Hold::Joined),
-                bytes: mut first,
-                ..
-            }) => {
+            Some(Flight { held: Some(Hold::Joined), bytes: mut first, .. }) => {
                 first.extend(bytes);
                 (first, None)
             }
@@ -230,12 +220,7 @@ impl<W: Copy + PartialEq> Radio<W> {
             return;
         }
         let at = self.in_flight.partition_point(|flight| flight.due <= due);
-        let flight = Flight {
-            due,
-            way,
-            bytes,
-            held,
-        };
+        let flight = Flight { due, way, bytes, held };
         self.in_flight.insert(at, flight);
     }
 

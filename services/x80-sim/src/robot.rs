@@ -274,8 +274,7 @@ impl Robot {
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
             if self.listens_at().is_some_and(|moment| moment <= self.time) {
-                self.ranging
-                    .listen(&self.world, &self.body, &self.physics.sonar);
+                self.ranging.listen(&self.world, &self.body, &self.physics.sonar);
             }
             let ends = self.motors.iter().filter_map(Motor::ends_at);
             let until = ends
@@ -296,9 +295,7 @@ impl Robot {
 
     /// One short step of `dt` seconds.
     fn step(&mut self, dt: f64) {
-        let silent = self
-            .stops_when_silent
-            .is_some_and(|limit| self.time >= self.heard_at + limit);
+        let silent = self.stops_when_silent.is_some_and(|limit| self.time >= self.heard_at + limit);
         if silent {
             self.motors.iter_mut().for_each(Motor::halt);
         }
@@ -310,19 +307,11 @@ impl Robot {
         let wheels = self.physics.wheels;
         if let Some(car) = &self.car {
             let world = &self.world;
-            car.step(
-                &mut self.motors,
-                &mut self.body,
-                world,
-                &wheels,
-                (now, dt),
-                noise,
-            );
+            car.step(&mut self.motors, &mut self.body, world, &wheels, (now, dt), noise);
         } else {
             let asked = drivetrain.step(&mut self.motors, now, dt, noise);
-            let ground = drivetrain
-                .rims(asked)
-                .map(|metres| drivetrain::slipped(metres, &wheels, noise));
+            let ground =
+                drivetrain.rims(asked).map(|metres| drivetrain::slipped(metres, &wheels, noise));
             let went = self.body.roll(ground, &self.world);
             let grip = drivetrain::grip(went != ground, &wheels);
             drivetrain.turn(&mut self.motors, asked, went, grip, dt);
@@ -339,10 +328,7 @@ impl Robot {
         match &self.car {
             Some(car) => {
                 let driven = car.twist(&self.motors).v;
-                Wheels {
-                    left: driven,
-                    right: driven,
-                }
+                Wheels { left: driven, right: driven }
             }
             None => self.drivetrain.rim_speeds(&self.motors),
         }
@@ -354,10 +340,7 @@ impl Robot {
             return car.twist(&self.motors);
         }
         let Wheels { left, right } = self.rims();
-        Twist {
-            v: (left + right) / 2.0,
-            omega: (right - left) / self.body.track(),
-        }
+        Twist { v: (left + right) / 2.0, omega: (right - left) / self.body.track() }
     }
 
     /// Let mission time pass until the next tick and measure there.
@@ -377,8 +360,7 @@ impl Robot {
         self.motor.currents = sensors::currents(&self.motors);
         self.motor.pots = [sensors::MIDDLE; 6];
         (self.standard, self.custom) =
-            self.ranging
-                .measure(&self.world, &self.body, self.time, &self.physics);
+            self.ranging.measure(&self.world, &self.body, self.time, &self.physics);
     }
 
     /// Append the frames of this tick to `out`, one of every stream that runs, the motor frame last. They

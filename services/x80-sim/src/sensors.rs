@@ -55,10 +55,7 @@ impl Ranging {
         });
         let last = [(front, mission.sonar.forward_m, ahead)];
         for (index, forward_m, bearing_deg) in sides.into_iter().chain(written).chain(last) {
-            mounts[index] = Some(Mount {
-                forward_m,
-                bearing_rad: f64::to_radians(bearing_deg),
-            });
+            mounts[index] = Some(Mount { forward_m, bearing_rad: f64::to_radians(bearing_deg) });
         }
         Self {
             front,

@@ -57,24 +57,15 @@ pub struct SimOptions {
 
 /// Run a simulated robot until `stop` becomes readable (or its other end is closed).
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
-    let SimOptions {
-        mission,
-        pace,
-        listen,
-        transport,
-        keep,
-        ground_truth,
-    } = options;
+    let SimOptions { mission, pace, listen, transport, keep, ground_truth } = options;
     let way = Way::open(transport, listen)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
     let (robot, checkpoint, _lock) = match keep {
         None => (Robot::new(&mission), None, None),
         Some(file) => {
             // The process before may still be coming to rest.
-            let lock = lock(&file).map_err(|source| SimError::Lock {
-                file: file.clone(),
-                source,
-            })?;
+            let lock =
+                lock(&file).map_err(|source| SimError::Lock { file: file.clone(), source })?;
             let (checkpoint, saved) = Checkpoint::open::<SavedState>(&file, saved_state::CAPACITY)?;
             let robot = match saved {
                 None => Robot::new(&mission),
@@ -176,19 +167,12 @@ mod tests {
 
     #[test]
     fn mission_time_runs_at_its_rate_and_waits_for_a_process_that_was_held_up() {
-        let mut clock = SimClock {
-            runs: Some((1_000_000_000, 2.0)),
-            period_s: 0.1,
-        };
+        let mut clock = SimClock { runs: Some((1_000_000_000, 2.0)), period_s: 0.1 };
         assert_eq!(clock.now(2_500_000_000), Some(3.0));
         let wait = clock.wait_for(3.5, 2_500_000_000).unwrap();
         assert_eq!(wait, Duration::from_millis(250));
         clock.forgive(2.95, 2_500_000_000);
-        assert_eq!(
-            clock.now(2_500_000_000),
-            Some(3.0),
-            "half a period is caught up"
-        );
+        assert_eq!(clock.now(2_500_000_000), Some(3.0), "half a period is caught up");
         clock.forgive(1.0, 2_500_000_000);
         assert!((clock.now(2_500_000_000).unwrap() - 1.0).abs() < 1e-6);
     }

@@ -103,11 +103,8 @@ pub fn listen(
         return 0.0;
     }
     let receiver = Receiver::new(pose, height, physics);
-    let mut candidates: Vec<Candidate> = world
-        .solids()
-        .flat_map(|solid| receiver.candidates(&solid))
-        .flatten()
-        .collect();
+    let mut candidates: Vec<Candidate> =
+        world.solids().flat_map(|solid| receiver.candidates(&solid)).flatten().collect();
     candidates.sort_by(|a, b| a.range.total_cmp(&b.range));
     let answer = candidates.into_iter().find(|candidate| {
         let hidden = world
@@ -174,11 +171,7 @@ impl<'a> Receiver<'a> {
         let half = physics.cone_deg.to_radians();
         Self {
             physics,
-            cone: Sector {
-                origin: pose.position,
-                axis: pose.axis(),
-                half,
-            },
+            cone: Sector { origin: pose.position, axis: pose.axis(), half },
             lobe: physics.lobe_deg.to_radians().max(half),
             height,
             threshold: amplitude(physics.post_reach_m, Some(POST_RADIUS_M)),
@@ -270,11 +263,7 @@ impl<'a> Receiver<'a> {
         };
         let foot = from + along * (origin - from).dot(along) - origin;
         let limit = self.physics.wall_limit_deg.to_radians();
-        let off = if foot.length_squared() > 1e-18 {
-            off_axis(self.cone.axis, foot)
-        } else {
-            0.0
-        };
+        let off = if foot.length_squared() > 1e-18 { off_axis(self.cone.axis, foot) } else { 0.0 };
         // A rough wall answers even where the cone only grazes it.
         if off <= limit + 1e-12 || self.is_rough() {
             let share = (foot + origin - from).dot(along) / (to - from).length();
@@ -290,10 +279,7 @@ impl<'a> Receiver<'a> {
             let offset = end - origin;
             let near = offset.length() <= self.physics.edge_reach_m && self.cone.contains(offset);
             let share = self.physics.edge_share;
-            (near && share > 0.0).then(|| Candidate {
-                share,
-                ..heard(offset, true)
-            })
+            (near && share > 0.0).then(|| Candidate { share, ..heard(offset, true) })
         })
     }
 }

@@ -47,11 +47,7 @@ pub(crate) struct Due {
 
 impl Default for Streams {
     fn default() -> Self {
-        Self {
-            motor: Run::ForEver,
-            custom: Run::ForEver,
-            standard: Run::ForEver,
-        }
+        Self { motor: Run::ForEver, custom: Run::ForEver, standard: Run::ForEver }
     }
 }
 
@@ -69,11 +65,9 @@ impl Streams {
             Stream::Standard => (false, false, true),
             Stream::All => (true, true, true),
         };
-        for (named, slot) in [
-            (motor, &mut self.motor),
-            (custom, &mut self.custom),
-            (standard, &mut self.standard),
-        ] {
+        for (named, slot) in
+            [(motor, &mut self.motor), (custom, &mut self.custom), (standard, &mut self.standard)]
+        {
             if named {
                 *slot = run;
             }
@@ -82,19 +76,11 @@ impl Streams {
 
     /// The streams that run, one frame of each counted as sent.
     pub(crate) fn take(&mut self) -> Due {
-        Due {
-            motor: self.motor.take(),
-            custom: self.custom.take(),
-            standard: self.standard.take(),
-        }
+        Due { motor: self.motor.take(), custom: self.custom.take(), standard: self.standard.take() }
     }
 
     /// The streams that run.
     pub(crate) const fn running(&self) -> Due {
-        Due {
-            motor: self.motor.runs(),
-            custom: self.custom.runs(),
-            standard: self.standard.runs(),
-        }
+        Due { motor: self.motor.runs(), custom: self.custom.runs(), standard: self.standard.runs() }
     }
 }

@@ -48,10 +48,7 @@ impl Way {
             Self::Tcp(tcp) => tcp.connected(),
             Self::Pty(_) => Ok(Some(Source::Line)),
         };
-        connected.map_err(|source| SimError::Lost {
-            address: self.address(),
-            source,
-        })
+        connected.map_err(|source| SimError::Lost { address: self.address(), source })
     }
 
     /// The address it listens on: `address:port`, or the path of the line.
@@ -85,10 +82,7 @@ impl Way {
         match received {
             Ok(Some((source, length))) => Ok(buffer.get(..length).map(|bytes| (source, bytes))),
             Ok(None) => Ok(None),
-            Err(source) => Err(SimError::Lost {
-                address: self.address(),
-                source,
-            }),
+            Err(source) => Err(SimError::Lost { address: self.address(), source }),
         }
     }
 

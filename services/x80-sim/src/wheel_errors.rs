@@ -22,21 +22,13 @@ pub struct WheelErrors {
 impl WheelErrors {
     /// The errors of `mission`'s robot.
     pub fn of(mission: &Mission) -> Self {
-        let WheelPhysics {
-            diameter_ratio,
-            diameter_spread,
-            track_scale,
-            track_spread,
-            ..
-        } = mission.simulation.physics().wheels;
+        let WheelPhysics { diameter_ratio, diameter_spread, track_scale, track_spread, .. } =
+            mission.simulation.physics().wheels;
         let mut noise = Noise::new(mission.seed, Source::WheelErrors);
         let mut off = |spread: f64| 1.0 + spread * (2.0 * noise.uniform() - 1.0);
         let ratio = diameter_ratio * off(diameter_spread);
         Self {
-            diameter: Wheels {
-                left: 2.0 / (1.0 + ratio),
-                right: 2.0 * ratio / (1.0 + ratio),
-            },
+            diameter: Wheels { left: 2.0 / (1.0 + ratio), right: 2.0 * ratio / (1.0 + ratio) },
             track: track_scale * off(track_spread),
         }
     }
@@ -54,13 +46,7 @@ mod tests {
 
     #[test]
     fn wheels_in_the_laboratory_are_exactly_the_nominal_ones() {
-        let exact = WheelErrors {
-            diameter: Wheels {
-                left: 1.0,
-                right: 1.0,
-            },
-            track: 1.0,
-        };
+        let exact = WheelErrors { diameter: Wheels { left: 1.0, right: 1.0 }, track: 1.0 };
         assert_eq!(errors("seed = 7"), exact);
     }
 

@@ -75,14 +75,8 @@ impl Surface {
 
     fn moved(self, by: DVec2) -> Self {
         match self {
-            Self::Drum { at, radius } => Self::Drum {
-                at: at + by,
-                radius,
-            },
-            Self::Face { from, to } => Self::Face {
-                from: from + by,
-                to: to + by,
-            },
+            Self::Drum { at, radius } => Self::Drum { at: at + by, radius },
+            Self::Face { from, to } => Self::Face { from: from + by, to: to + by },
         }
     }
 }
@@ -98,25 +92,14 @@ pub struct Solid {
 
 fn solids_of(shapes: &Shapes) -> Vec<Solid> {
     let drums = shapes.drums.iter().map(|drum| Solid {
-        surface: Surface::Drum {
-            at: drum.at,
-            radius: drum.radius_m,
-        },
+        surface: Surface::Drum { at: drum.at, radius: drum.radius_m },
         profile: drum.profile(),
     });
-    let face = |profile| {
-        move |(from, to)| Solid {
-            surface: Surface::Face { from, to },
-            profile,
-        }
-    };
+    let face = |profile| move |(from, to)| Solid { surface: Surface::Face { from, to }, profile };
     let walls = |wall: &'_ Wall| wall.edges().map(face(wall.profile())).collect::<Vec<_>>();
     let boxes = |block: &Box2| block.edges().map(face(block.profile())).collect::<Vec<_>>();
     let walls = shapes.walls.iter().flat_map(walls);
-    drums
-        .chain(walls)
-        .chain(shapes.boxes.iter().flat_map(boxes))
-        .collect()
+    drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
 }
 
 /// Everything that stands, at one time.
@@ -175,19 +158,12 @@ impl World {
     /// Everything that is there now.
     pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
-        self.standing
-            .iter()
-            .copied()
-            .chain(visiting.flat_map(Visitor::now))
+        self.standing.iter().copied().chain(visiting.flat_map(Visitor::now))
     }
 
     /// Every surface that the body can touch.
     pub fn touchable(&self) -> impl Iterator<Item = Surface> + '_ {
-        let Heights {
-            ground_clearance_m,
-            body_top_m,
-            ..
-        } = self.heights;
+        let Heights { ground_clearance_m, body_top_m, .. } = self.heights;
         self.solids()
             .filter(move |solid| solid.profile.is_between(ground_clearance_m, body_top_m))
             .map(|solid| solid.surface)
@@ -195,9 +171,7 @@ impl World {
 
     /// Distance from `point` to the nearest surface that the body can touch, metres; infinite where nothing stands.
     pub fn clearance(&self, point: DVec2) -> f64 {
-        self.touchable()
-            .map(|surface| surface.distance(point))
-            .fold(f64::INFINITY, f64::min)
+        self.touchable().map(|surface| surface.distance(point)).fold(f64::INFINITY, f64::min)
     }
 
     /// Distance along the level ray at `height_m` from `origin` in the unit direction `along` to the first surface,
@@ -224,10 +198,9 @@ impl World {
 
 impl Visitor {
     fn now(&self) -> impl Iterator<Item = Solid> + '_ {
-        self.solids.iter().map(|solid| Solid {
-            surface: solid.surface.moved(self.offset),
-            ..*solid
-        })
+        self.solids
+            .iter()
+            .map(|solid| Solid { surface: solid.surface.moved(self.offset), ..*solid })
     }
 
     fn is_clear_of(&self, centre: DVec2, radius: f64) -> bool {
@@ -274,9 +247,7 @@ mod tests {
         );
         let (range, _) = world.first_hit(DVec2::ZERO, DVec2::X, 0.2).unwrap();
         assert_eq!(range, 2.0, "the wall hides the drum");
-        let (range, _) = world
-            .first_hit(DVec2::new(4.0, 0.0), DVec2::NEG_X, 0.2)
-            .unwrap();
+        let (range, _) = world.first_hit(DVec2::new(4.0, 0.0), DVec2::NEG_X, 0.2).unwrap();
         assert_eq!(range, 0.5, "from behind, the drum");
         assert_eq!(world.first_hit(DVec2::ZERO, DVec2::Y, 0.2), None);
         assert_eq!(
@@ -316,10 +287,8 @@ mod tests {
     #[test]
     fn what_is_low_or_hangs_over_is_touched_only_where_the_body_is_as_high() {
         let clearance = |heights: &str| {
-            world(&format!(
-                "world.box = [{{ at = [1, 0], size_m = [1, 1], {heights} }}]"
-            ))
-            .clearance(DVec2::ZERO)
+            world(&format!("world.box = [{{ at = [1, 0], size_m = [1, 1], {heights} }}]"))
+                .clearance(DVec2::ZERO)
         };
         assert_eq!(clearance("top_m = 0.1"), 0.5, "a low box");
         assert_eq!(clearance("top_m = 0.02"), f64::INFINITY, "a door sill");

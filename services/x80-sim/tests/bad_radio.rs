@@ -57,21 +57,11 @@ fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
     // Also when commands come earlier than they must: they wait until time has passed.
     for (rounds, at_once) in [(400, 1), (200, 2)] {
         let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, rounds, at_once);
-        assert!(
-            bytes == again && ground_truth == truth_again,
-            "the same seed gave another run"
-        );
+        assert!(bytes == again && ground_truth == truth_again, "the same seed gave another run");
     }
-    assert!(
-        ground_truth.len() > 600,
-        "400 commands and {} ticks",
-        ground_truth.len()
-    );
+    assert!(ground_truth.len() > 600, "400 commands and {} ticks", ground_truth.len());
     let radio = ground_truth.last().unwrap().radio.unwrap();
-    assert!(
-        radio.lost > 200 && radio.longest_outage_s > 0.5,
-        "{radio:?}"
-    );
+    assert!(radio.lost > 200 && radio.longest_outage_s > 0.5, "{radio:?}");
     let numbers: Vec<u64> = ground_truth.iter().map(|tick| tick.tick).collect();
     assert_eq!(numbers, (0..ground_truth.len() as u64).collect::<Vec<_>>());
 }
@@ -87,16 +77,10 @@ fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
     while let Some(frame) = decoder.next_frame() {
         acks += u16::from(matches!(Report::parse(&frame), Ok(Report::System(_))));
     }
-    assert!(
-        (120..160).contains(&acks),
-        "{acks} of 200 commands were acknowledged"
-    );
+    assert!((120..160).contains(&acks), "{acks} of 200 commands were acknowledged");
     // 400 counts/s for the period of 1/7 s, or for all of the 150 ms where no command comes behind.
     let counts = ground_truth.last().unwrap().right_counts;
-    assert!(
-        (acks * 57..=acks * 60).contains(&counts),
-        "{counts} counts for {acks} commands"
-    );
+    assert!((acks * 57..=acks * 60).contains(&counts), "{counts} counts for {acks} commands");
 }
 
 #[test]
@@ -113,10 +97,7 @@ fn in_lock_step_a_slow_radio_makes_commands_late() {
 
 #[test]
 fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
-    let own_limits = [
-        "",
-        "\n[simulation]\nignores_time = true\nstops_when_silent_s = 0.15",
-    ];
+    let own_limits = ["", "\n[simulation]\nignores_time = true\nstops_when_silent_s = 0.15"];
     for own in own_limits {
         let radio =
             OUT_HALF_THE_TIME.replace("[simulation.radio]", &format!("{own}\n[simulation.radio]"));
@@ -135,10 +116,7 @@ fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
                 assert_eq!(tick.v, 0.0, "it still moves: {tick:?}");
             }
         }
-        assert!(
-            outages_at_rest > 5,
-            "only {outages_at_rest} ticks of long outages"
-        );
+        assert!(outages_at_rest > 5, "only {outages_at_rest} ticks of long outages");
     }
 }
 
@@ -153,8 +131,7 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
     let mut motor_frames = 0;
     while motor_frames < 100 {
         // Until one of them comes through there is no peer, and nothing is sent.
-        host.set_read_timeout(Some(std::time::Duration::from_millis(20)))
-            .unwrap();
+        host.set_read_timeout(Some(std::time::Duration::from_millis(20))).unwrap();
         host.send(&forward(0)).unwrap();
         let mut buffer = [0; 4096];
         let Ok(length) = host.recv(&mut buffer) else {

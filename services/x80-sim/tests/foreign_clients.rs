@@ -137,8 +137,7 @@ impl<W: Wire> Host<W> {
                 assert_eq!(frame[6], 1, "an ACK");
                 self.acks += 1;
             } else {
-                self.frames
-                    .push_back((frame[4], frame[6..length - 3].to_vec()));
+                self.frames.push_back((frame[4], frame[6..length - 3].to_vec()));
             }
         }
     }
@@ -162,10 +161,7 @@ impl<W: Wire> Host<W> {
 }
 
 fn words(values: &[i16]) -> Vec<u8> {
-    values
-        .iter()
-        .flat_map(|value| value.to_le_bytes())
-        .collect()
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
 const QUICK: &str = "robot.rate_hz = 20\nperimeter.width_m = 200";
@@ -180,16 +176,10 @@ fn one_that_only_sends_velocities_and_expects_the_streams() {
     for _ in 0..60 {
         seen[usize::from(host.next().0)] += 1;
     }
-    assert!(
-        [123, 124, 125].iter().all(|&did| seen[did] >= 19),
-        "streams are missing"
-    );
+    assert!([123, 124, 125].iter().all(|&did| seen[did] >= 19), "streams are missing");
     let [left, right] = host.counts();
     assert!((200..20_000).contains(&right), "it moved {right} counts");
-    assert!(
-        (32_768 - 20_000..32_768 - 200).contains(&left),
-        "it moved {left} counts"
-    );
+    assert!((32_768 - 20_000..32_768 - 200).contains(&left), "it moved {left} counts");
 }
 
 #[test]
@@ -222,9 +212,7 @@ fn one_that_waits_for_an_ack_of_each_command() {
 fn one_that_acks_every_motor_frame_and_gives_up_after_two_seconds_of_silence() {
     let sim = Sim::start(QUICK, Pace::Rate(5.0));
     let socket = sim.host();
-    socket
-        .set_read_timeout(Some(Duration::from_secs(2)))
-        .unwrap();
+    socket.set_read_timeout(Some(Duration::from_secs(2))).unwrap();
     let mut host = Host::new(socket);
     host.send(255, &[0]);
     for _ in 0..40 {
@@ -291,11 +279,7 @@ fn one_on_a_connection_and_one_on_a_serial_line() {
     drive(Host::new(TcpStream::connect(&sim.listening).unwrap()));
 
     let sim = Sim::start_on(QUICK, Pace::Rate(5.0), Transport::Pty);
-    let line = OpenOptions::new()
-        .read(true)
-        .write(true)
-        .open(&sim.listening)
-        .unwrap();
+    let line = OpenOptions::new().read(true).write(true).open(&sim.listening).unwrap();
     drive(Host::new(line));
 }
 

@@ -156,9 +156,7 @@ fn the_stream_goes_to_whoever_spoke_last_and_noise_is_no_speech() {
     let (first, second) = (sim.host(), sim.host());
     first.send(&encoded(PING)).unwrap();
     receive(&first);
-    second
-        .send(&[0x5e, 0x02, 1, 0, 0xff, 1, 0, 0, 0x5e, 0x0d])
-        .unwrap();
+    second.send(&[0x5e, 0x02, 1, 0, 0xff, 1, 0, 0, 0x5e, 0x0d]).unwrap();
     for _ in 0..5 {
         receive(&first);
     }
@@ -198,10 +196,7 @@ fn a_port_in_use_is_named_with_its_remedy() {
     let error = run(options, stop).expect_err("the port was free after all");
     assert!(matches!(error, SimError::Bind { address, .. } if address == listen));
     let text = error.to_string();
-    assert!(
-        text.contains(&listen.to_string()) && text.contains("port 0"),
-        "{text}"
-    );
+    assert!(text.contains(&listen.to_string()) && text.contains("port 0"), "{text}");
 }
 
 #[test]
@@ -225,8 +220,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
     let sim = std::thread::spawn(move || run(options, stopped));
     let host = UdpSocket::bind("127.0.0.1:0").unwrap();
     host.connect(listen).unwrap();
-    host.set_read_timeout(Some(std::time::Duration::from_millis(50)))
-        .unwrap();
+    host.set_read_timeout(Some(std::time::Duration::from_millis(50))).unwrap();
     let deadline = std::time::Instant::now() + support::PATIENCE;
     let mut answered = false;
     while !answered && std::time::Instant::now() < deadline {

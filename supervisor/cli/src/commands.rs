@@ -152,9 +152,7 @@ pub(crate) fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error
     let executable = OsString::from("firsthand");
     let words = std::iter::once(executable).chain(renamed::words(words));
     let arguments = Arguments::try_parse_from(words)?;
-    Ok(arguments
-        .command
-        .unwrap_or_else(|| Command::Run(run::Arguments::default())))
+    Ok(arguments.command.unwrap_or_else(|| Command::Run(run::Arguments::default())))
 }
 
 impl Command {
@@ -179,9 +177,7 @@ fn listed() -> String {
         let _ = writeln!(text, "{heading}:");
         for name in *names {
             let name = name.to_lowercase();
-            let about = all
-                .find_subcommand(&name)
-                .and_then(clap::Command::get_about);
+            let about = all.find_subcommand(&name).and_then(clap::Command::get_about);
             let about = about.map(ToString::to_string).unwrap_or_default();
             let about = about.split([';', ':']).next().unwrap_or_default();
             let about = about.split(". ").next().unwrap_or_default();

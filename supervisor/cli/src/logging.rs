@@ -45,13 +45,8 @@ pub(crate) fn to_stderr(default: &str) {
 /// Log to the end of `file`, and to the journal if there is one.
 pub(crate) fn to_file(file: &Path, default: &str) -> io::Result<()> {
     let log = Mutex::new(File::options().create(true).append(true).open(file)?);
-    let mut layers: Vec<AnyLayer> = vec![
-        fmt::layer()
-            .with_writer(log)
-            .log_internal_errors(false)
-            .with_ansi(false)
-            .boxed(),
-    ];
+    let mut layers: Vec<AnyLayer> =
+        vec![fmt::layer().with_writer(log).log_internal_errors(false).with_ansi(false).boxed()];
     if to_journal() {
         layers.push(stderr_layer());
     }
@@ -65,9 +60,7 @@ fn stderr_layer() -> AnyLayer {
         let lines = lines.log_internal_errors(false);
         lines.with_writer(Journal).with_ansi(false).boxed()
     } else {
-        let lines = fmt::layer()
-            .with_writer(io::stderr)
-            .log_internal_errors(false);
+        let lines = fmt::layer().with_writer(io::stderr).log_internal_errors(false);
         lines.with_ansi(false).boxed()
     }
 }
@@ -75,10 +68,7 @@ fn stderr_layer() -> AnyLayer {
 fn start(layers: Vec<AnyLayer>, default: &str) {
     let filter =
         EnvFilter::try_from_env("FIRSTHAND_LOG").unwrap_or_else(|_| EnvFilter::new(default));
-    tracing_subscriber::registry()
-        .with(layers)
-        .with(filter)
-        .init();
+    tracing_subscriber::registry().with(layers).with(filter).init();
 }
 
 /// Standard error with a priority before each line.
@@ -97,9 +87,7 @@ impl<'writer> MakeWriter<'writer> for Journal {
     }
 
     fn make_writer_for(&'writer self, event: &Metadata<'_>) -> Entry {
-        Entry {
-            priority: priority(*event.level()),
-        }
+        Entry { priority: priority(*event.level()) }
     }
 }
 

@@ -25,15 +25,11 @@ pub(crate) static RENAMED: [(&str, &[&str]); 16] = [
 /// The words after the executable, with an old name replaced.
 pub(crate) fn words<T: AsRef<OsStr>>(given: &[T]) -> Vec<OsString> {
     let given: Vec<_> = given.iter().map(|word| word.as_ref().to_owned()).collect();
-    let new = given
-        .first()
-        .and_then(|name| RENAMED.iter().find(|(old, _)| name == old));
+    let new = given.first().and_then(|name| RENAMED.iter().find(|(old, _)| name == old));
     match new {
-        Some((_, new)) => new
-            .iter()
-            .map(OsString::from)
-            .chain(given[1..].iter().cloned())
-            .collect(),
+        Some((_, new)) => {
+            new.iter().map(OsString::from).chain(given[1..].iter().cloned()).collect()
+        }
         None => given,
     }
 }

@@ -113,10 +113,7 @@ impl BusEndpoints {
     ) -> Result<(), BusError> {
         self.published = Some(Instant::now());
         self.directive.publish(tick, time, directive)?;
-        let header = RosterHeader {
-            last_request: self.last_request,
-            ..header
-        };
+        let header = RosterHeader { last_request: self.last_request, ..header };
         self.roster.publish(tick, time, header, entries.into_iter())
     }
 

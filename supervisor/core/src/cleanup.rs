@@ -23,11 +23,7 @@ pub(crate) struct Cleanup {
 impl Cleanup {
     pub(crate) fn new() -> Self {
         let now = Instant::now();
-        Self {
-            done: now,
-            deaths: (0, now),
-            pending: Vec::new(),
-        }
+        Self { done: now, deaths: (0, now), pending: Vec::new() }
     }
 
     /// These stages died. Their successors are started already.

@@ -78,10 +78,7 @@ impl Death {
     pub fn sample(&self) -> DeathSample {
         let (cause, code) = match self.cause {
             ExitCause::Exited(code) => (DeathCause::Exited, code),
-            ExitCause::Signalled {
-                signal,
-                core: false,
-            } => (DeathCause::Signalled, signal),
+            ExitCause::Signalled { signal, core: false } => (DeathCause::Signalled, signal),
             ExitCause::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
             ExitCause::Unknown => (DeathCause::Unknown, 0),
         };
@@ -118,9 +115,7 @@ pub(crate) fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;
         let end = file.metadata()?.len();
-        file.seek(SeekFrom::Start(
-            end.saturating_sub(LOG_TAIL_BYTES).max(since),
-        ))?;
+        file.seek(SeekFrom::Start(end.saturating_sub(LOG_TAIL_BYTES).max(since)))?;
         let mut bytes = Vec::new();
         file.take(LOG_TAIL_BYTES).read_to_end(&mut bytes)?;
         Ok(bytes)
@@ -146,10 +141,7 @@ mod tests {
         let lines: String = (0..100).map(|line| format!("line {line}\n")).collect();
         std::fs::write(&log, &lines).unwrap();
         let words = log_tail(&log, 0);
-        assert!(
-            words.starts_with("line ") && words.ends_with("line 99"),
-            "{words}"
-        );
+        assert!(words.starts_with("line ") && words.ends_with("line 99"), "{words}");
         assert!(words.len() as u64 <= LOG_TAIL_BYTES);
         assert_eq!(log_tail(&log, lines.len() as u64 - 8), "line 99");
         assert_eq!(log_tail(&directory.path().join("none"), 0), "");
@@ -161,10 +153,7 @@ mod tests {
             stage: "mapper",
             pid: 77,
             generation: 3,
-            cause: ExitCause::Signalled {
-                signal: 9,
-                core: false,
-            },
+            cause: ExitCause::Signalled { signal: 9, core: false },
             hung: false,
             noticed_after_s: None,
             beat_age_s: Some(0.02),

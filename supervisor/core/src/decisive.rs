@@ -55,20 +55,14 @@ pub(crate) fn first(
     timeout: Timeout,
     stall: Option<(u64, Ending)>,
 ) -> Decided {
-    let undecided = |ending| Decided {
-        ending,
-        last_tick: None,
-        truth_ticks: truth.len(),
-    };
+    let undecided = |ending| Decided { ending, last_tick: None, truth_ticks: truth.len() };
     if ending.outcome == Outcome::Aborted {
         return undecided(ending);
     }
     let poses = &record.poses;
     let contact = first_contact(truth)
         .map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
-    let arrival = record
-        .arrival
-        .map(|command| (command.stamp.tick, reached(command.distance_m)));
+    let arrival = record.arrival.map(|command| (command.stamp.tick, reached(command.distance_m)));
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
     // Of two events at one tick the first of the list counts.
@@ -91,20 +85,14 @@ pub(crate) fn first(
             .and_then(|pose| truth_of(pose, truth))
             .map_or(truth.len(), |index| index + 1),
     };
-    Decided {
-        ending,
-        last_tick: Some(last_tick),
-        truth_ticks,
-    }
+    Decided { ending, last_tick: Some(last_tick), truth_ticks }
 }
 
 /// The index in the ground truth of the tick that `pose` was computed from. A robot at rest measures the same for many
 /// ticks; then it is the tick with the nearest number.
 fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
-    shown
-        .min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick))
-        .map(|(index, _)| index)
+    shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
 }
 
 /// The tick of the pose that was computed from the measurement at `truth`; if there is none, the number that it would have.
@@ -123,13 +111,8 @@ mod tests {
 
     use super::*;
 
-    const TIMEOUT: Timeout = Timeout {
-        deadline: Deadline {
-            timeout_s: 20.0,
-            stopped_s: 0.0,
-        },
-        by_robot: true,
-    };
+    const TIMEOUT: Timeout =
+        Timeout { deadline: Deadline { timeout_s: 20.0, stopped_s: 0.0 }, by_robot: true };
 
     fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
         GroundTruthTick {
@@ -156,11 +139,7 @@ mod tests {
         arrival: Option<u64>,
         contact: Option<u64>,
     ) -> (Record, Vec<GroundTruthTick>) {
-        let stamp = |tick| Stamp {
-            tick,
-            stamp_ns: tick * 1_000_000_000,
-            ..Stamp::default()
-        };
+        let stamp = |tick| Stamp { tick, stamp_ns: tick * 1_000_000_000, ..Stamp::default() };
         let pose = |tick| PoseSample {
             stamp: stamp(tick),
             left_counts: tick as u16,
@@ -169,10 +148,8 @@ mod tests {
         };
         let mut record = Record::default();
         record.poses = (0..ticks).map(pose).collect();
-        record.arrival = arrival.map(|tick| CommandSample {
-            stamp: stamp(tick),
-            ..CommandSample::default()
-        });
+        record.arrival =
+            arrival.map(|tick| CommandSample { stamp: stamp(tick), ..CommandSample::default() });
         let touched = |tick| u64::from(contact.is_some_and(|contact| tick >= contact));
         let truth = (0..ticks).map(|tick| truth(tick, touched(tick))).collect();
         (record, truth)
@@ -203,11 +180,7 @@ mod tests {
                 TIMEOUT,
                 (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
             );
-            let Decided {
-                ending,
-                last_tick,
-                truth_ticks,
-            } = decided;
+            let Decided { ending, last_tick, truth_ticks } = decided;
             assert_eq!((ending.outcome, last_tick, truth_ticks), want, "{what}");
         }
     }

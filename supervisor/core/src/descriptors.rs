@@ -21,10 +21,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
     let Some([_, hard]) = limits() else {
         return Ok(());
     };
-    let limit = Rlimit {
-        current: Some(hard),
-        maximum: Some(hard),
-    };
+    let limit = Rlimit { current: Some(hard), maximum: Some(hard) };
     // Under the service's unit the limit cannot be raised; then the present one counts.
     let _ = setrlimit(Resource::Nofile, limit);
     match limits() {
@@ -37,9 +34,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
 /// system call may be forbidden to a service.
 fn limits() -> Option<[u64; 2]> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
-    let line = limits
-        .lines()
-        .find_map(|line| line.strip_prefix("Max open files"))?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;
     let mut numbers = line.split_ascii_whitespace().map(str::parse);
     Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
 }

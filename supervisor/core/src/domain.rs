@@ -51,14 +51,8 @@ impl DomainLock {
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         let lock = lock(&domain)?;
-        let mut acquired = Self {
-            domain,
-            bus: None,
-            stages_lock: None,
-            joining_lock: None,
-            cells,
-            _lock: lock,
-        };
+        let mut acquired =
+            Self { domain, bus: None, stages_lock: None, joining_lock: None, cells, _lock: lock };
         acquired.recreate_bus()?;
         Ok(acquired)
     }
@@ -66,10 +60,7 @@ impl DomainLock {
     /// Make the bus. It replaces an old one, whose endpoints must be closed before.
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
-        check_shared_memory(
-            SHARED_MEMORY,
-            SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64,
-        )?;
+        check_shared_memory(SHARED_MEMORY, SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64)?;
         let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));
         (self.stages_lock, self.joining_lock) = (None, None);
@@ -99,11 +90,7 @@ impl Drop for DomainLock {
         // The lock is removed last, with its directory; a process that waits for it then makes its own.
         let _ = self.clear();
         let domain = &self.domain;
-        for file in [
-            domain.stages_lock_file(),
-            domain.joining_lock_file(),
-            domain.lock_file(),
-        ] {
+        for file in [domain.stages_lock_file(), domain.joining_lock_file(), domain.lock_file()] {
             let _ = fs::remove_file(file);
         }
         let _ = fs::remove_dir(self.domain.directory());
@@ -126,9 +113,7 @@ fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     }
     let found = fs::symlink_metadata(path).map_err(failed("look at", path))?;
     if !found.is_dir() || found.uid() != rustix::process::geteuid().as_raw() {
-        return Err(DomainError::Foreign {
-            path: path.to_path_buf(),
-        });
+        return Err(DomainError::Foreign { path: path.to_path_buf() });
     }
     if found.mode() & 0o077 != 0 {
         let own = fs::Permissions::from_mode(0o700);
@@ -143,12 +128,8 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
     let began = Instant::now();
     loop {
         make_directory(domain)?;
-        let opened = OpenOptions::new()
-            .create(true)
-            .truncate(false)
-            .read(true)
-            .write(true)
-            .open(&path);
+        let opened =
+            OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path);
         let file = match opened {
             Ok(file) => file,
             // The previous holder has just removed the directory.
@@ -262,11 +243,7 @@ fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
     let free = space.f_bavail * space.f_frsize;
     if free < needed {
         return Err(DomainError::SharedMemory {
-            problem: format!(
-                "has {} MiB free of the {} MiB needed",
-                free >> 20,
-                needed >> 20
-            ),
+            problem: format!("has {} MiB free of the {} MiB needed", free >> 20, needed >> 20),
             remedy: "remove what fills it, enlarge it (docker: --shm-size), or lower perimeter.cells",
         });
     }
@@ -345,9 +322,7 @@ mod tests {
         let full = check_shared_memory(SHARED_MEMORY, u64::MAX).unwrap_err();
         let missing = check_shared_memory("/no/such/mount", 1).unwrap_err();
         for (error, expected) in [(full, "--shm-size"), (missing, "mount a tmpfs")] {
-            let DomainError::SharedMemory { remedy, .. } = error else {
-                panic!("{error}")
-            };
+            let DomainError::SharedMemory { remedy, .. } = error else { panic!("{error}") };
             assert!(remedy.contains(expected), "{remedy}");
         }
     }

@@ -24,10 +24,7 @@ pub enum DomainError {
     )]
     Orphans { robot: String, holders: String },
     #[error("{SHARED_MEMORY} {problem}; {remedy}")]
-    SharedMemory {
-        problem: String,
-        remedy: &'static str,
-    },
+    SharedMemory { problem: String, remedy: &'static str },
     #[error(
         "a process may have {limit} descriptors here, and a supervisor needs 256; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
     )]
@@ -35,11 +32,7 @@ pub enum DomainError {
     #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
     Foreign { path: PathBuf },
     #[error("cannot {action} {path}: {source}; is it writable and not full?", path = path.display())]
-    File {
-        action: &'static str,
-        path: PathBuf,
-        source: io::Error,
-    },
+    File { action: &'static str, path: PathBuf, source: io::Error },
     #[error(transparent)]
     Bus(#[from] BusError),
 }
@@ -47,9 +40,5 @@ pub enum DomainError {
 /// `action` on the file or directory `path` failed.
 pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
     let path = path.to_path_buf();
-    move |source| DomainError::File {
-        action,
-        path,
-        source,
-    }
+    move |source| DomainError::File { action, path, source }
 }

@@ -25,9 +25,7 @@ pub fn find(named: &Path) -> Result<PathBuf, ExecutableError> {
     let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
     let found = if is_name {
         let mut found = folders().map(|folder| folder.join(named));
-        found
-            .find(|candidate| check(candidate).is_ok())
-            .ok_or(ExecutableError::Nowhere)?
+        found.find(|candidate| check(candidate).is_ok()).ok_or(ExecutableError::Nowhere)?
     } else {
         let absolute = std::path::absolute(named)?;
         check(&absolute)?;
@@ -44,9 +42,7 @@ fn folders() -> impl Iterator<Item = PathBuf> {
     let own = env::current_exe().ok();
     let beside = own.and_then(|own| Some(own.parent()?.to_path_buf()));
     let path = env::var_os("PATH").unwrap_or_default();
-    let path: Vec<_> = env::split_paths(&path)
-        .filter(|folder| folder.is_absolute())
-        .collect();
+    let path: Vec<_> = env::split_paths(&path).filter(|folder| folder.is_absolute()).collect();
     beside.into_iter().chain(path)
 }
 

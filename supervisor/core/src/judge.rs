@@ -83,10 +83,7 @@ impl Deadline {
     }
 
     pub(crate) fn timed_out(self) -> Ending {
-        let Self {
-            timeout_s,
-            stopped_s,
-        } = self;
+        let Self { timeout_s, stopped_s } = self;
         let mut reason = format!("not there after {timeout_s} s");
         if stopped_s > 0.0 {
             reason += &format!(", {stopped_s:.0} s of an operator's stop not counted");
@@ -109,10 +106,7 @@ fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
     let rule = failsafe::rule(link.cause())?;
     let name = rule.cause.name();
     let reason = format!("{name}: {}", rule.when);
-    Some(Ending {
-        cause: Some(name),
-        ..Ending::failed(Outcome::Aborted, reason)
-    })
+    Some(Ending { cause: Some(name), ..Ending::failed(Outcome::Aborted, reason) })
 }
 
 fn collided(snapshot: &Snapshot<'_>) -> Option<Ending> {
@@ -181,10 +175,7 @@ pub(crate) struct TickProgress {
 
 impl TickProgress {
     pub(crate) const fn new(now: Instant) -> Self {
-        Self {
-            tick: None,
-            since: now,
-        }
+        Self { tick: None, since: now }
     }
 
     /// Record the newest `tick` at `now`. Returns when it was first seen.

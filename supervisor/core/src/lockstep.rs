@@ -57,10 +57,7 @@ pub(crate) struct Lockstep {
 impl Lockstep {
     /// A run whose ticks from `first_tick` on are not checked yet.
     pub(crate) fn new(first_tick: u64) -> Self {
-        let limit = TickLimitSample {
-            last_tick: first_tick + AHEAD,
-            ..TickLimitSample::default()
-        };
+        let limit = TickLimitSample { last_tick: first_tick + AHEAD, ..TickLimitSample::default() };
         Self { limit, step: None }
     }
 
@@ -135,10 +132,7 @@ mod tests {
 
     fn stall(recovery: RecoveryStep) -> StallSample {
         StallSample {
-            stamp: Stamp {
-                tick: 10,
-                ..Stamp::default()
-            },
+            stamp: Stamp { tick: 10, ..Stamp::default() },
             epoch: 1,
             recovery: recovery.into(),
             ..StallSample::default()
@@ -149,30 +143,12 @@ mod tests {
     fn a_recovery_step_begins_after_a_determined_tick_and_holds_from_the_next_once_it_was_answered()
     {
         let now = Instant::now();
-        let at_rest = Published {
-            tick: Some(14),
-            commands: 15,
-            planner: (1, 14),
-            ..Published::default()
-        };
-        let replanned = Published {
-            planner: (2, 14),
-            ..at_rest
-        };
-        let reset = Published {
-            grid_epoch: 1,
-            grid_changed: true,
-            ..at_rest
-        };
-        let steered = Published {
-            commands: 16,
-            epoch: 1,
-            ..reset
-        };
-        let unchanged = Published {
-            grid_changed: false,
-            ..reset
-        };
+        let at_rest =
+            Published { tick: Some(14), commands: 15, planner: (1, 14), ..Published::default() };
+        let replanned = Published { planner: (2, 14), ..at_rest };
+        let reset = Published { grid_epoch: 1, grid_changed: true, ..at_rest };
+        let steered = Published { commands: 16, epoch: 1, ..reset };
+        let unchanged = Published { grid_changed: false, ..reset };
         use RecoveryStep::{Replan, Reset};
         #[rustfmt::skip]
         let rows = [
@@ -185,25 +161,14 @@ mod tests {
             lockstep.stalled(stall(recovery));
             assert_eq!(lockstep.limit().last_tick, 14);
             assert_eq!(lockstep.withholds(1), recovery == Reset);
-            let early = Published {
-                tick: Some(13),
-                ..at_rest
-            };
+            let early = Published { tick: Some(13), ..at_rest };
             assert_eq!(lockstep.next(early, now), Next::Wait);
             assert_eq!(lockstep.next(at_rest, now), Next::Begin(recovery));
             assert!(!lockstep.withholds(1));
             let next = if answered { Next::Look } else { Next::Wait };
-            assert_eq!(
-                lockstep.next(published, now),
-                next,
-                "{recovery:?} {published:?}"
-            );
+            assert_eq!(lockstep.next(published, now), next, "{recovery:?} {published:?}");
             assert_eq!(lockstep.next(published, now + ANSWERED), Next::Look);
-            let TickLimitSample {
-                holds_from_tick,
-                epoch,
-                ..
-            } = lockstep.limit();
+            let TickLimitSample { holds_from_tick, epoch, .. } = lockstep.limit();
             assert_eq!((holds_from_tick, epoch), (15, 1));
         }
     }

@@ -18,10 +18,7 @@ pub(crate) struct ObservedTime {
 
 impl ObservedTime {
     pub(crate) const fn new(now: Instant) -> Self {
-        Self {
-            observed: Now::ZERO,
-            until: now,
-        }
+        Self { observed: Now::ZERO, until: now }
     }
 
     pub(crate) fn at(&self, now: Instant) -> Now {
@@ -32,11 +29,7 @@ impl ObservedTime {
     /// still, so only a little of it counts; some must count, or a supervisor that is always late would never notice anything.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
         let took = self.since(now);
-        self.observed += if took <= planned + TOLERANCE {
-            took
-        } else {
-            TOLERANCE
-        };
+        self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };
         self.until = now;
     }
 

@@ -89,10 +89,7 @@ impl Observer {
     /// Read only samples that the stages of `roster` write.
     fn follow(&mut self, roster: &[RosterEntry]) {
         for entry in roster.iter().filter(|entry| entry.pid != 0) {
-            let author = Author {
-                process: entry.pid,
-                generation: entry.generation,
-            };
+            let author = Author { process: entry.pid, generation: entry.generation };
             let stage = name_str(&entry.stage);
             let writes = |topic: &dyn AnyTopic| topic.spec().writer == stage;
             if writes(&topics::LINK) {
@@ -179,16 +176,13 @@ impl Observer {
 
 impl Record {
     fn take_guidance(&mut self, guidance: GuidanceSample) {
-        let GuidanceSample {
-            stamp, full_solves, ..
-        } = guidance;
+        let GuidanceSample { stamp, full_solves, .. } = guidance;
         let before = self.planners.insert(stamp.generation, full_solves);
         // If a sample covers several solves, only the last one's time is known.
         if full_solves > before.unwrap_or_default() {
             self.full_solves.record(guidance.full_solve_ns);
         }
-        self.looks
-            .add(guidance.stamp.tick, |totals| totals.with(&guidance));
+        self.looks.add(guidance.stamp.tick, |totals| totals.with(&guidance));
         if self.guidance.len() == MOST_GUIDANCE {
             self.guidance.pop_front();
         }
@@ -197,10 +191,7 @@ impl Record {
 
     /// The newest guidance at or before `tick`.
     pub fn guidance_at(&self, tick: u64) -> Option<&GuidanceSample> {
-        self.guidance
-            .iter()
-            .rev()
-            .find(|guidance| guidance.stamp.tick <= tick)
+        self.guidance.iter().rev().find(|guidance| guidance.stamp.tick <= tick)
     }
 
     /// The pose and the guidance of every tick after `last` that has both, oldest first.

@@ -28,15 +28,9 @@ pub(crate) struct Decision {
 
 impl Decision {
     /// The first decision on a bus.
-    pub(crate) const STARTING: Self = Self {
-        ready: false,
-        reason: HoldReason::Starting,
-    };
+    pub(crate) const STARTING: Self = Self { ready: false, reason: HoldReason::Starting };
     /// The last decision of a run.
-    pub(crate) const ENDING: Self = Self {
-        ready: false,
-        reason: HoldReason::Ending,
-    };
+    pub(crate) const ENDING: Self = Self { ready: false, reason: HoldReason::Ending };
 
     pub(crate) const fn order(self) -> Order {
         match self.reason {

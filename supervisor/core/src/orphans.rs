@@ -45,10 +45,7 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
         return Ok(lock);
     }
     let holders: Vec<_> = holders.iter().map(u32::to_string).collect();
-    Err(DomainError::Orphans {
-        robot: domain.robot.to_string(),
-        holders: holders.join(", "),
-    })
+    Err(DomainError::Orphans { robot: domain.robot.to_string(), holders: holders.join(", ") })
 }
 
 /// Wait until no consumer is joining the bus of the domain, which takes milliseconds; but not longer than [`JOINED_WITHIN`],

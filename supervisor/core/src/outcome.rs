@@ -49,19 +49,13 @@ pub struct Ending {
 
 impl Ending {
     pub(crate) fn failed(outcome: Outcome, reason: impl Into<String>) -> Self {
-        Self {
-            outcome,
-            reason: reason.into(),
-            cause: None,
-            asked_for: false,
-        }
+        Self { outcome, reason: reason.into(), cause: None, asked_for: false }
     }
 
     /// This ending; or the wrong place, if the ground truth `ended` shows that a robot did not reach its target.
     pub(crate) fn checked(self, mission: &Mission, ended: Option<&GroundTruthTick>) -> Self {
-        let distance_m = ended.map_or(0.0, |ended| {
-            (ended.x - mission.target.x).hypot(ended.y - mission.target.y)
-        });
+        let distance_m = ended
+            .map_or(0.0, |ended| (ended.x - mission.target.x).hypot(ended.y - mission.target.y));
         let allowed_m = RIGHT_PLACE_M.max(mission.arrival_tolerance_m);
         if self.outcome != Outcome::Reached || distance_m <= allowed_m {
             return self;
@@ -75,10 +69,7 @@ impl Ending {
 
     /// An end that the user asked for.
     pub(crate) fn asked_for(outcome: Outcome, reason: impl Into<String>) -> Self {
-        Self {
-            asked_for: true,
-            ..Self::failed(outcome, reason)
-        }
+        Self { asked_for: true, ..Self::failed(outcome, reason) }
     }
 }
 

@@ -72,11 +72,7 @@ impl OutputWatchdog {
 
     /// The first stage, in the order of the pipeline, whose input is unanswered for too long.
     pub(crate) fn stale(&mut self, now: Now) -> Option<&'static str> {
-        let published: Vec<_> = self
-            .0
-            .iter()
-            .map(|it| (it.stage.name, it.published))
-            .collect();
+        let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
         let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
         for output in &mut self.0 {
             let input = output.reads.iter().map(|writer| published(writer)).min();
@@ -87,9 +83,7 @@ impl OutputWatchdog {
             }
         }
         let stale = |output: &&StageOutput| {
-            let waited = output
-                .unanswered_since
-                .map(|since| now.saturating_sub(since));
+            let waited = output.unanswered_since.map(|since| now.saturating_sub(since));
             waited.is_some_and(|waited| waited >= output.patience)
         };
         self.0.iter().find(stale).map(|output| output.stage.name)
@@ -116,17 +110,12 @@ mod tests {
 
     /// The stage that is blamed when nothing further is published for a minute.
     fn blamed(watchdog: &mut OutputWatchdog) -> Option<&'static str> {
-        watchdog
-            .stale(Duration::ZERO)
-            .or_else(|| watchdog.stale(MINUTE))
+        watchdog.stale(Duration::ZERO).or_else(|| watchdog.stale(MINUTE))
     }
 
     #[test]
     fn the_stage_where_a_tick_ends_is_blamed_and_nobody_behind_it() {
-        let tick = TABLE
-            .iter()
-            .map(|stage| (stage.name, 7))
-            .collect::<Vec<_>>();
+        let tick = TABLE.iter().map(|stage| (stage.name, 7)).collect::<Vec<_>>();
         for (until, _) in tick.iter().enumerate().skip(1) {
             let outputs: Vec<_> = tick
                 .iter()
@@ -155,12 +144,7 @@ mod tests {
             let mut watchdog = published(&[("x80-link", 1), ("dead-reckoning", 1), ("mapper", 1)]);
             watchdog.on_output("planner", 1);
             watchdog.on_output("controller", 1);
-            for reads in OutputWatchdog::new(0)
-                .find(stage.name)
-                .unwrap()
-                .reads
-                .clone()
-            {
+            for reads in OutputWatchdog::new(0).find(stage.name).unwrap().reads.clone() {
                 watchdog.on_output(reads, 2);
             }
             assert_eq!(watchdog.stale(MINUTE), None, "{}", stage.name);
@@ -190,12 +174,8 @@ mod tests {
 
     #[test]
     fn a_new_generation_need_not_answer_ticks_from_before_it() {
-        let mut watchdog = published(
-            &TABLE
-                .iter()
-                .map(|stage| (stage.name, 6))
-                .collect::<Vec<_>>(),
-        );
+        let mut watchdog =
+            published(&TABLE.iter().map(|stage| (stage.name, 6)).collect::<Vec<_>>());
         watchdog.on_output("x80-link", 7);
         watchdog.stale(Duration::ZERO);
         watchdog.on_start("dead-reckoning");

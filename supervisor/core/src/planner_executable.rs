@@ -41,10 +41,8 @@ pub fn find(named: &Path) -> Result<PathBuf, PlannerExecutableError> {
     if let Some(baseline) = baseline(named) {
         return Ok(baseline.into());
     }
-    executable::find(named).map_err(|problem| PlannerExecutableError {
-        named: named.to_path_buf(),
-        problem,
-    })
+    executable::find(named)
+        .map_err(|problem| PlannerExecutableError { named: named.to_path_buf(), problem })
 }
 
 #[cfg(test)]
@@ -69,19 +67,13 @@ mod tests {
         let relative = up.join(shell.strip_prefix("/").unwrap());
         let found = resolved(&relative).unwrap();
         assert!(found.is_absolute(), "{found:?}");
-        assert_eq!(
-            fs::canonicalize(found).unwrap(),
-            fs::canonicalize(shell).unwrap()
-        );
+        assert_eq!(fs::canonicalize(found).unwrap(), fs::canonicalize(shell).unwrap());
     }
 
     #[test]
     fn a_baseline_is_found_by_its_name_and_by_that_of_its_former_executable() {
-        for (named, found) in [
-            ("bug", "bug"),
-            ("wavefront", "wavefront"),
-            ("firsthand-bug", "bug"),
-        ] {
+        for (named, found) in [("bug", "bug"), ("wavefront", "wavefront"), ("firsthand-bug", "bug")]
+        {
             assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(found));
         }
         assert_eq!(baseline(Path::new("./bug")), None);

@@ -118,11 +118,7 @@ pub enum Stability {
 impl Stability {
     /// The stability of a generation that was ready from `since` to its last sign, at `until`.
     fn of(since: Now, until: Now) -> Self {
-        if until.saturating_sub(since) >= STABLE_AFTER {
-            Self::Stable
-        } else {
-            Self::Brief
-        }
+        if until.saturating_sub(since) >= STABLE_AFTER { Self::Stable } else { Self::Brief }
     }
 }
 
@@ -239,10 +235,7 @@ impl Policy {
 
             (Phase::Starting { .. }, Event::Refused)
             | (
-                Phase::Aborted {
-                    stability: Stability::NeverReady,
-                    ..
-                },
+                Phase::Aborted { stability: Stability::NeverReady, .. },
                 Event::Exited | Event::Refused,
             ) => self.record_blocked_start(now),
             (Phase::Starting { .. }, Event::Exited) => {
@@ -300,8 +293,7 @@ impl Policy {
             self.deaths = 0;
         }
         self.deaths += 1;
-        self.recent
-            .retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
+        self.recent.retain(|then| now.saturating_sub(*then) < HOLD_WINDOW);
         self.recent.push_back(now);
         // A held stage that is stopped and started again can exceed the number that matters.
         if self.recent.len() > HOLD_AFTER {
@@ -316,9 +308,7 @@ impl Policy {
         }
         let doublings = (self.deaths - 2).min(10) as u32;
         let backoff = (FIRST_BACKOFF * 2_u32.pow(doublings)).min(LONGEST_BACKOFF);
-        self.phase = Phase::BackingOff {
-            until: now + backoff,
-        };
+        self.phase = Phase::BackingOff { until: now + backoff };
         None
     }
 }

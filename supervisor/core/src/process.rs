@@ -94,10 +94,9 @@ impl From<ExitStatus> for ExitCause {
     fn from(status: ExitStatus) -> Self {
         match (status.code(), status.signal()) {
             (Some(code), _) => Self::Exited(code),
-            (None, signal) => Self::Signalled {
-                signal: signal.unwrap_or_default(),
-                core: status.core_dumped(),
-            },
+            (None, signal) => {
+                Self::Signalled { signal: signal.unwrap_or_default(), core: status.core_dumped() }
+            }
         }
     }
 }
@@ -107,10 +106,7 @@ impl From<&DeathSample> for ExitCause {
         let signal = death.code;
         match DeathCause::from_byte(death.cause) {
             DeathCause::Exited => Self::Exited(death.code),
-            DeathCause::Signalled => Self::Signalled {
-                signal,
-                core: false,
-            },
+            DeathCause::Signalled => Self::Signalled { signal, core: false },
             DeathCause::SignalledWithCore => Self::Signalled { signal, core: true },
             DeathCause::Unknown => Self::Unknown,
         }
@@ -136,11 +132,7 @@ impl Process {
         descriptors::close_all_on_exec()?;
         let mut child = command.spawn()?;
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
-            Ok(pidfd) => Ok(Self {
-                id: child.id(),
-                child: Some(child),
-                pidfd,
-            }),
+            Ok(pidfd) => Ok(Self { id: child.id(), child: Some(child), pidfd }),
             Err(error) => {
                 // It must not run without being watched.
                 let _ = child.kill();
@@ -160,11 +152,7 @@ impl Process {
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());
         }
-        Ok(Self {
-            child: None,
-            id,
-            pidfd,
-        })
+        Ok(Self { child: None, id, pidfd })
     }
 
     pub const fn id(&self) -> u32 {

@@ -117,11 +117,7 @@ impl RecoveredRun {
         let newest = saved_state(directory)?.and_then(|state| state.newest());
         let (first_tick, time) =
             newest.map_or((0, MissionTime::default()), |(tick, time)| (tick + 1, time));
-        Ok(Self {
-            run,
-            first_tick,
-            time,
-        })
+        Ok(Self { run, first_tick, time })
     }
 
     /// Its clock from now on.

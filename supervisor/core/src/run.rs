@@ -81,18 +81,13 @@ pub fn run(
         ending,
         &record,
         &truth,
-        Timeout {
-            deadline,
-            by_robot: supervisor.clock.in_ticks(),
-        },
+        Timeout { deadline, by_robot: supervisor.clock.in_ticks() },
         end_by_stall,
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
     Ok(Finished {
-        duration_s: supervisor
-            .clock
-            .duration_s(decided.last_tick, &record, &truth),
+        duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
         ending: decided.ending.checked(&options.mission, truth.last()),
         last_tick: decided.last_tick,
         record,

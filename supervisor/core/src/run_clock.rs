@@ -21,19 +21,13 @@ pub(crate) struct RunClock {
 impl RunClock {
     /// The clock of a resumed run.
     pub(crate) fn recovered(run: &RecoveredRun) -> Self {
-        Self {
-            clock: run.clock(),
-            first_tick: run.first_tick,
-            start: run.time,
-        }
+        Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
     /// The clock of a new run. Only a `simulated` robot's time can pass at another pace than the wall clock's.
     pub(crate) fn begin(pace: Pace, rate_hz: f64, simulated: bool) -> Self {
         let clock = match pace {
-            Pace::Max if simulated => MissionClock::Ticks {
-                period_ns: (1e9 / rate_hz) as u64,
-            },
+            Pace::Max if simulated => MissionClock::Ticks { period_ns: (1e9 / rate_hz) as u64 },
             _ => MissionClock::Wall {
                 epoch_ns: monotonic_ns(),
                 rate: match pace {
@@ -42,11 +36,7 @@ impl RunClock {
                 },
             },
         };
-        Self {
-            clock,
-            first_tick: 0,
-            start: MissionTime::default(),
-        }
+        Self { clock, first_tick: 0, start: MissionTime::default() }
     }
 
     /// Whether mission time advances with ticks, not with the wall clock.

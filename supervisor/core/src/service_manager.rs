@@ -21,12 +21,7 @@ pub(crate) struct ServiceManager {
 impl ServiceManager {
     /// The one named by the environment of this process.
     pub(crate) fn of_environment() -> Self {
-        Self {
-            watchdog: sd_notify::watchdog_enabled(),
-            fed: None,
-            shown: None,
-            ready: false,
-        }
+        Self { watchdog: sd_notify::watchdog_enabled(), fed: None, shown: None, ready: false }
     }
 
     /// The service is up. It is notified once.
@@ -44,9 +39,7 @@ impl ServiceManager {
 
     /// Show a status line, unless that was done a moment ago.
     pub(crate) fn show(&mut self, status: impl FnOnce() -> String) {
-        let due = self
-            .shown
-            .is_none_or(|shown| shown.elapsed() >= STATUS_EVERY);
+        let due = self.shown.is_none_or(|shown| shown.elapsed() >= STATUS_EVERY);
         if due {
             self.shown = Some(Instant::now());
             notify(&[NotifyState::Status(&status())]);

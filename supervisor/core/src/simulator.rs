@@ -88,21 +88,13 @@ impl Simulator {
         let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
         fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
             .map_err(|errno| system("listen to")(errno.into()))?;
-        let mut truth = GroundTruth {
-            pipe,
-            unfinished: Vec::new(),
-            listening: None,
-            ticks: Vec::new(),
-        };
+        let mut truth =
+            GroundTruth { pipe, unfinished: Vec::new(), listening: None, ticks: Vec::new() };
         let began = Instant::now();
         loop {
             truth.take()?;
             if let Some(address) = truth.listening {
-                return Ok(Self {
-                    process,
-                    truth,
-                    address,
-                });
+                return Ok(Self { process, truth, address });
             }
             if process.try_reap().map_err(system("watch"))?.is_some() || began.elapsed() > STARTUP {
                 let words = fs::read_to_string(&log_path).unwrap_or_default();
@@ -157,9 +149,7 @@ impl GroundTruth {
     fn take_lines(&mut self) -> Result<(), SimulatorError> {
         let Some(end) = self.unfinished.iter().rposition(|&byte| byte == b'\n') else {
             if self.unfinished.len() > LONGEST_LINE {
-                return Err(SimulatorError::Startup(
-                    "it writes a line without end".into(),
-                ));
+                return Err(SimulatorError::Startup("it writes a line without end".into()));
             }
             return Ok(());
         };

@@ -172,11 +172,7 @@ impl StageProcess {
         let log = self.log(directory);
         let named =
             |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log.display()));
-        let log = File::options()
-            .create(true)
-            .append(true)
-            .open(&log)
-            .map_err(named)?;
+        let log = File::options().create(true).append(true).open(&log).map_err(named)?;
         let generation = Generation {
             stage: self.stage.name,
             directory: directory.to_path_buf(),
@@ -209,10 +205,9 @@ impl StageProcess {
         let Some(process) = &mut self.process else {
             return Ok(None);
         };
-        let cause = process.try_reap().map_err(|source| StageProcessError {
-            stage: self.stage.name,
-            source,
-        })?;
+        let cause = process
+            .try_reap()
+            .map_err(|source| StageProcessError { stage: self.stage.name, source })?;
         let found_before = std::mem::replace(&mut self.found_ended, cause.is_some());
         let is_known = process.is_child() || self.stopping || found_before;
         Ok(cause.filter(|_| is_known))
@@ -244,9 +239,9 @@ impl StageProcess {
     pub(crate) fn record_next(&self, death: &mut Death, now: Now) {
         death.deaths_in_window = self.policy.recent_deaths() as u32;
         death.next = match self.phase() {
-            Phase::BackingOff { until } => Next::StartLater {
-                after_s: until.saturating_sub(now).as_secs_f64(),
-            },
+            Phase::BackingOff { until } => {
+                Next::StartLater { after_s: until.saturating_sub(now).as_secs_f64() }
+            }
             Phase::Held => Next::Hold,
             Phase::Down | Phase::Stopping { .. } => Next::Nothing,
             Phase::Starting { .. }

@@ -52,9 +52,7 @@ impl StageProcesses {
         let cells = mission.grid_frame().area();
         let stages = start_order().into_iter();
         Self {
-            stages: stages
-                .map(|stage| StageProcess::new(stage, mission))
-                .collect(),
+            stages: stages.map(|stage| StageProcess::new(stage, mission)).collect(),
             watchdog: OutputWatchdog::new(cells),
             directory,
             clock: ObservedTime::new(Instant::now()),
@@ -150,10 +148,8 @@ impl StageProcesses {
             if let Some(cause) = self.stages[index].try_reap()? {
                 let now = self.now();
                 let stage = &mut self.stages[index];
-                let by_us = matches!(
-                    stage.phase(),
-                    Phase::Replaced { .. } | Phase::Stopping { .. }
-                );
+                let by_us =
+                    matches!(stage.phase(), Phase::Replaced { .. } | Phase::Stopping { .. });
                 // Systemd stops external stages before their supervisor.
                 let by_starter = self.starter == Starter::External && stage.is_stopping();
                 let asked = by_us || by_starter;
@@ -161,11 +157,7 @@ impl StageProcesses {
                 if let Err(error) = bus.remove_unfinished(death.pid) {
                     tracing::warn!(stage = death.stage, %error, "cannot prepare the bus for its successor");
                 }
-                let event = if death.was_refused() {
-                    Event::Refused
-                } else {
-                    Event::Exited
-                };
+                let event = if death.was_refused() { Event::Refused } else { Event::Exited };
                 self.apply(index, event, self.now(), first_tick);
                 self.stages[index].record_next(&mut death, self.now());
                 // A stage that stopped on request is no death.
@@ -246,10 +238,7 @@ impl StageProcesses {
     /// Whether a stage is being started, or soon will be.
     pub fn any_starting(&self) -> bool {
         let starting = |stage: &StageProcess| {
-            matches!(
-                stage.phase(),
-                Phase::Starting { .. } | Phase::BackingOff { .. }
-            )
+            matches!(stage.phase(), Phase::Starting { .. } | Phase::BackingOff { .. })
         };
         self.stages.iter().any(starting)
     }

@@ -86,11 +86,7 @@ const STARTUP: Duration = Duration::from_secs(3);
 const HEARTBEAT: Duration = Duration::from_millis(750);
 /// The slowest answers take a hundredth of it.
 const ANSWERS: Duration = Duration::from_secs(1);
-const DEADLINES: Deadlines = Deadlines {
-    startup: STARTUP,
-    heartbeat: HEARTBEAT,
-    answers: ANSWERS,
-};
+const DEADLINES: Deadlines = Deadlines { startup: STARTUP, heartbeat: HEARTBEAT, answers: ANSWERS };
 /// The planner beats between solves, and leaves ticks unanswered while it solves.
 const PLANNER_DEADLINES: Deadlines = Deadlines {
     startup: STARTUP,
@@ -189,11 +185,8 @@ mod tests {
             let spec = topic.spec();
             if ![SUPERVISOR, EVERY_STAGE, OPERATOR].contains(&spec.writer) {
                 let writer = find(spec.writer).unwrap();
-                let writes = writer
-                    .wiring
-                    .outputs
-                    .iter()
-                    .any(|output| output.spec().name == spec.name);
+                let writes =
+                    writer.wiring.outputs.iter().any(|output| output.spec().name == spec.name);
                 assert!(writes, "{} does not write {}", spec.writer, spec.name);
             }
         }

@@ -65,15 +65,7 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
 
 pub(crate) fn log(stall: &StallSample) {
     let (cause, recovery) = (stall.cause(), stall.recovery());
-    let StallSample {
-        stamp,
-        x_m,
-        y_m,
-        epoch,
-        replans,
-        resets,
-        ..
-    } = stall;
+    let StallSample { stamp, x_m, y_m, epoch, replans, resets, .. } = stall;
     tracing::warn!(
         tick = stamp.tick,
         x_m,
@@ -217,9 +209,8 @@ impl StallWatch {
             (self.anchor, self.place) = (None, None);
             return None;
         }
-        let cause = self
-            .without_policy(pose, guidance)
-            .or_else(|| self.without_motion(pose, guidance))?;
+        let cause =
+            self.without_policy(pose, guidance).or_else(|| self.without_motion(pose, guidance))?;
         let recovery = match cause {
             StallCause::Still | StallCause::Pinned if self.replans_here < MOST_REPLANS => {
                 self.replans_here += 1;
@@ -300,32 +291,22 @@ impl StallWatch {
         guidance: &GuidanceSample,
     ) -> Option<StallCause> {
         let now = pose.stamp.time();
-        let here = Anchor {
-            time: now,
-            travelled: pose.travelled_m,
-            heading: pose.heading_rad,
-        };
+        let here = Anchor { time: now, travelled: pose.travelled_m, heading: pose.heading_rad };
         let anchor = *self.anchor.get_or_insert(here);
         if (here.travelled - anchor.travelled).abs() >= self.moved_m
             || (here.heading - anchor.heading).abs() >= self.turned_rad
         {
             self.anchor = Some(here);
         }
-        let arrived = Place {
-            since: now,
-            middle: pose.pose().position,
-            nearest_m: guidance.distance_m,
-        };
+        let arrived =
+            Place { since: now, middle: pose.pose().position, nearest_m: guidance.distance_m };
         let place = *self.place.get_or_insert(arrived);
         if arrived.middle.distance(place.middle) >= self.place_m {
             self.place = Some(arrived);
             self.replans_here = 0;
         } else if arrived.nearest_m <= place.nearest_m - self.moved_m {
             // A robot that crawls to its target makes progress, too.
-            self.place = Some(Place {
-                middle: place.middle,
-                ..arrived
-            });
+            self.place = Some(Place { middle: place.middle, ..arrived });
         }
         // The planner looks around first; that has a timeout of its own.
         if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {

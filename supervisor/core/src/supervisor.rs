@@ -58,16 +58,10 @@ impl Robot {
     fn start(options: &Options) -> Result<Self, SupervisorError> {
         if let Some(address) = &options.mission.robot.address {
             let address = address.parse::<Address<String>>()?.resolve()?;
-            return Ok(Self {
-                simulator: None,
-                address,
-            });
+            return Ok(Self { simulator: None, address });
         }
         let simulator = Simulator::start(&options.directory, &options.mission, options.pace)?;
-        Ok(Self {
-            address: Address::Udp(simulator.address()),
-            simulator: Some(simulator),
-        })
+        Ok(Self { address: Address::Udp(simulator.address()), simulator: Some(simulator) })
     }
 
     /// Read the ground truth. Returns whether a simulated robot's process still runs.
@@ -120,11 +114,7 @@ impl<'a> Supervisor<'a> {
                 tracing::warn!(tick, seconds, "the run is resumed");
                 RunClock::recovered(run)
             }
-            None => RunClock::begin(
-                options.pace,
-                mission.robot.rate_hz,
-                robot.simulator.is_some(),
-            ),
+            None => RunClock::begin(options.pace, mission.robot.rate_hz, robot.simulator.is_some()),
         };
         let run = Run {
             robot: options.robot.clone(),
@@ -181,10 +171,7 @@ impl<'a> Supervisor<'a> {
         self.bus.waiter.on_readable(&*signals)?;
         loop {
             if signals.came() {
-                return Ok(Some(Ending::asked_for(
-                    Outcome::Aborted,
-                    "stopped by a signal",
-                )));
+                return Ok(Some(Ending::asked_for(Outcome::Aborted, "stopped by a signal")));
             }
             if let Some(ending) = self.iterate()? {
                 return Ok(Some(ending));
@@ -327,8 +314,7 @@ impl<'a> Supervisor<'a> {
 
     /// The tick that a new generation of a stage starts from.
     pub(crate) fn first_tick(&self) -> u64 {
-        self.clock
-            .first_tick(self.bus.observer.record.newest_tick())
+        self.clock.first_tick(self.bus.observer.record.newest_tick())
     }
 
     /// The epoch that is in force.
@@ -373,8 +359,7 @@ impl<'a> Supervisor<'a> {
             ..RosterHeader::default()
         };
         let entries = self.stages.roster();
-        self.bus
-            .publish_state(tick, time, directive, header, entries)?;
+        self.bus.publish_state(tick, time, directive, header, entries)?;
         Ok(())
     }
 

@@ -17,9 +17,7 @@ pub struct Totals<T> {
 
 impl<T> Default for Totals<T> {
     fn default() -> Self {
-        Self {
-            newest: VecDeque::new(),
-        }
+        Self { newest: VecDeque::new() }
     }
 }
 
@@ -60,9 +58,7 @@ impl WheelTotals {
         }
         let (left, right) = (command.left_rad_s, command.right_rad_s);
         let [least, greatest] = self.extremes.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
-        Self {
-            extremes: Some([least.min(left).min(right), greatest.max(left).max(right)]),
-        }
+        Self { extremes: Some([least.min(left).min(right), greatest.max(left).max(right)]) }
     }
 
     /// Dynamic range of the wheel signals: greatest commanded speed of either wheel minus the least, rad/s.

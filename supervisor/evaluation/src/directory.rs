@@ -45,9 +45,7 @@ pub fn claim(directory: &Path, command: &str, resume: bool) -> Result<PathBuf, D
             });
         }
         Ok(_) => {
-            return Err(DirectoryError::Taken {
-                directory: directory.to_path_buf(),
-            });
+            return Err(DirectoryError::Taken { directory: directory.to_path_buf() });
         }
         Err(_) => {
             fs::create_dir_all(directory).map_err(system(directory))?;

@@ -30,11 +30,7 @@ impl Latency {
     /// The latencies of the mission of `row`, from its `summary`.
     pub(crate) fn new(row: &Row, summary: &Summary) -> Self {
         let (world, seed, setting) = row.key();
-        let Summary {
-            tick_latency_us: tick,
-            full_solve_us: full,
-            ..
-        } = summary;
+        let Summary { tick_latency_us: tick, full_solve_us: full, .. } = summary;
         Self {
             world,
             seed,
@@ -66,14 +62,7 @@ pub(crate) fn medians(setting: &str, latencies: &[Latency]) -> [Line; 2] {
         median(its.filter_map(column))
     };
     [
-        (
-            "tick",
-            [
-                over(|it| it.tick_p50_us),
-                over(|it| it.tick_p99_us),
-                over(|it| it.tick_max_us),
-            ],
-        ),
+        ("tick", [over(|it| it.tick_p50_us), over(|it| it.tick_p99_us), over(|it| it.tick_max_us)]),
         (
             "full solve",
             [

@@ -25,18 +25,14 @@ pub use ros::load_placed;
 
 /// The map in `file`. The ending of its name says its format.
 pub fn load(file: &Path) -> Result<Map, MapError> {
-    let extension = file
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase());
+    let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("yaml" | "yml") => ros::load(file),
         Some("pgm" | "png" | "pbm" | "ppm" | "pnm") => {
             image::load(file, image::Lightness::default())
         }
         Some("map") => moving_ai::load(file),
-        _ => Err(MapError::UnknownFormat {
-            file: file.to_owned(),
-        }),
+        _ => Err(MapError::UnknownFormat { file: file.to_owned() }),
     }
 }
 
@@ -55,9 +51,6 @@ mod tests {
         let missing = directory.path().join("missing.png");
         assert!(matches!(load(&missing), Err(MapError::Unreadable { .. })));
         let nameless = directory.path().join("map");
-        assert!(matches!(
-            load(&nameless),
-            Err(MapError::UnknownFormat { .. })
-        ));
+        assert!(matches!(load(&nameless), Err(MapError::UnknownFormat { .. })));
     }
 }

@@ -26,9 +26,7 @@ impl Report {
         let comparisons = names.iter().skip(1);
         Self {
             totals: names.iter().map(|name| Totals::of(name, rows)).collect(),
-            comparisons: comparisons
-                .map(|name| Comparison::of(names[0], name, rows))
-                .collect(),
+            comparisons: comparisons.map(|name| Comparison::of(names[0], name, rows)).collect(),
         }
     }
 }
@@ -49,9 +47,7 @@ impl fmt::Display for Report {
                 writeln!(f, "  {name:<26} {value:.digits$}")?;
             }
         }
-        self.comparisons
-            .iter()
-            .try_for_each(|comparison| writeln!(f, "{comparison}"))
+        self.comparisons.iter().try_for_each(|comparison| writeln!(f, "{comparison}"))
     }
 }
 
@@ -86,12 +82,7 @@ pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
     }
     page.push_str("<th>metrics of the successes</th></tr>\n");
     for totals in &report.totals {
-        let _ = write!(
-            page,
-            "<tr><td>{}</td><td>{}</td>",
-            escaped(&totals.setting),
-            totals.count
-        );
+        let _ = write!(page, "<tr><td>{}</td><td>{}</td>", escaped(&totals.setting), totals.count);
         for outcome in Outcome::ALL {
             let share = totals.share(outcome);
             let share = share.map_or(String::new(), |share| share.to_string());
@@ -126,10 +117,8 @@ pub fn html(plan: &Plan, results: &Results, command: &str) -> String {
             let picture = plan.picture(row);
             if let (true, Some(name)) = (picture.exists(), picture.file_name()) {
                 let name = escaped(&name.to_string_lossy());
-                let _ = write!(
-                    page,
-                    "<img loading=\"lazy\" src=\"failures/{name}\" alt=\"{name}\">"
-                );
+                let _ =
+                    write!(page, "<img loading=\"lazy\" src=\"failures/{name}\" alt=\"{name}\">");
             }
             page.push_str("</figure>\n");
         }
@@ -149,11 +138,7 @@ fn add_latencies(page: &mut String, plan: &Plan, latencies: &[Latency]) {
     );
     for setting in &plan.settings {
         for (name, values) in latency::medians(&setting.name, latencies) {
-            let _ = write!(
-                page,
-                "<tr><td>{}</td><td>{name}</td>",
-                escaped(&setting.name)
-            );
+            let _ = write!(page, "<tr><td>{}</td><td>{name}</td>", escaped(&setting.name));
             for value in values {
                 let value = value.map_or(String::new(), |value| format!("{value:.0}"));
                 let _ = write!(page, "<td>{value}</td>");

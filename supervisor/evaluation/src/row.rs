@@ -109,20 +109,13 @@ impl Row {
         let straight_m = trial.mission.target.length();
         let outcome = outcome(summary, rules.success_within_m);
         let success = outcome == Outcome::Success;
-        let started_s = if rules.clock_after_departure {
-            summary.departed_s.unwrap_or_default()
-        } else {
-            0.0
-        };
+        let started_s =
+            if rules.clock_after_departure { summary.departed_s.unwrap_or_default() } else { 0.0 };
         let time_s = (summary.mission_time_s - started_s).max(0.0);
         let spl = trial.shortest_m / summary.path_length_m.max(trial.shortest_m);
         let barn_score = rules.optimal_time_s.map(|optimal| {
             let [least, most] = BARN_CLIP.map(|times| times * optimal);
-            if success {
-                optimal / time_s.clamp(least, most)
-            } else {
-                0.0
-            }
+            if success { optimal / time_s.clamp(least, most) } else { 0.0 }
         });
         Self {
             world: trial.world.clone(),
@@ -188,9 +181,7 @@ impl Record for Row {
 
 /// The outcome by the ground truth.
 fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
-    let there = summary
-        .true_distance_m
-        .is_some_and(|distance| distance <= success_within_m);
+    let there = summary.true_distance_m.is_some_and(|distance| distance <= success_within_m);
     match summary.outcome.as_str() {
         "reached" | "wrong_place" if there => Outcome::Success,
         "reached" | "wrong_place" => Outcome::WrongPlace,
@@ -209,11 +200,7 @@ mod tests {
     use std::path::Path;
 
     fn setting() -> Setting {
-        Setting {
-            name: "a".to_owned(),
-            planner: "harmonic".to_owned(),
-            set: Vec::new(),
-        }
+        Setting { name: "a".to_owned(), planner: "harmonic".to_owned(), set: Vec::new() }
     }
 
     fn trial(optimal_time_s: Option<f64>) -> Trial {
@@ -271,25 +258,11 @@ mod tests {
 
     #[test]
     fn the_barn_clock_starts_with_the_motion_and_the_score_is_clipped() {
-        let row = |optimal| {
-            Row::new(
-                &trial(Some(optimal)),
-                1,
-                &setting(),
-                &summary("reached", 0.1),
-            )
-        };
+        let row =
+            |optimal| Row::new(&trial(Some(optimal)), 1, &setting(), &summary("reached", 0.1));
         assert_eq!(row(6.0).time_s, 24.0);
         assert_eq!(row(6.0).barn_score, Some(0.25));
-        assert_eq!(
-            row(1.0).barn_score,
-            Some(0.125),
-            "eight optimal times and more"
-        );
-        assert_eq!(
-            row(20.0).barn_score,
-            Some(0.5),
-            "two optimal times and less"
-        );
+        assert_eq!(row(1.0).barn_score, Some(0.125), "eight optimal times and more");
+        assert_eq!(row(20.0).barn_score, Some(0.5), "two optimal times and less");
     }
 }

@@ -124,11 +124,7 @@ impl Plan {
             (0..self.repeats).flat_map(move |repeat| {
                 let seed = self.noise.seed(number, self.repeats, repeat);
                 let settings = self.settings.iter();
-                settings.map(move |setting| Job {
-                    trial,
-                    setting,
-                    seed,
-                })
+                settings.map(move |setting| Job { trial, setting, seed })
             })
         })
     }
@@ -141,10 +137,8 @@ pub fn picture(row: &Row) -> PathBuf {
         _ => "failures",
     };
     let name = format!("{}-{}-{}.svg", row.world, row.seed, row.setting);
-    Path::new(folder).join(name.replace(
-        |c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)),
-        "_",
-    ))
+    Path::new(folder)
+        .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
 }
 
 /// Run all missions of `plan` whose rows are not in `results` yet. `watch` is called after each.
@@ -171,11 +165,7 @@ pub fn run(
         !done.contains(&key)
     });
     let left: Vec<Job<'_>> = left.collect();
-    let mut progress = Progress {
-        ended: all - left.len(),
-        all,
-        ended_now: 0,
-    };
+    let mut progress = Progress { ended: all - left.len(), all, ended_now: 0 };
     let queue = Mutex::new(left.into_iter());
     let (give, rows) = channel::<Result<_, RunnerError>>();
     thread::scope(|scope| {
@@ -213,11 +203,7 @@ fn mission(
     job: &Job<'_>,
     worker: usize,
 ) -> Result<(Row, Option<Latency>), RunnerError> {
-    let Job {
-        trial,
-        setting,
-        seed,
-    } = job;
+    let Job { trial, setting, seed } = job;
     let own = std::process::id();
     let directory = plan.directory.join(format!("run-{worker}"));
     let mut command = firsthand(&["run", "--json", "--no-record"]);
@@ -241,12 +227,7 @@ fn mission(
         }
         Err(_) => {
             let said = String::from_utf8_lossy(&output.stderr);
-            let reason = said
-                .trim()
-                .lines()
-                .last()
-                .unwrap_or("no summary")
-                .to_owned();
+            let reason = said.trim().lines().last().unwrap_or("no summary").to_owned();
             (Row::aborted(trial, *seed, setting, reason), None)
         }
     };

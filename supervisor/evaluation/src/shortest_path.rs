@@ -36,12 +36,8 @@ pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) 
     if !grid.is_free(from) || !grid.is_free(to) {
         return ShortestPath::None;
     }
-    let found = astar(
-        &from,
-        |&cell| grid.neighbours(cell),
-        |&cell| octile(cell, to),
-        |&cell| cell == to,
-    );
+    let found =
+        astar(&from, |&cell| grid.neighbours(cell), |&cell| octile(cell, to), |&cell| cell == to);
     found.map_or(ShortestPath::None, |(cells, _)| {
         ShortestPath::Found(grid.straightened(&cells, start, target))
     })
@@ -64,10 +60,10 @@ struct Grid {
 impl Grid {
     fn new(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) -> Option<Self> {
         let all = shapes.pieces().map(|piece| piece.bounds());
-        let (least, greatest) = all.fold(
-            (start.min(target), start.max(target)),
-            |(least, greatest), (from, to)| (least.min(from), greatest.max(to)),
-        );
+        let (least, greatest) = all
+            .fold((start.min(target), start.max(target)), |(least, greatest), (from, to)| {
+                (least.min(from), greatest.max(to))
+            });
         let rim = DVec2::splat(radius + RIM_M);
         let origin = least - rim;
         let size = ((greatest + rim - origin) / CELL_M).ceil() + 1.0;
@@ -126,11 +122,7 @@ impl Grid {
             let open = step != IVec2::ZERO
                 && self.is_free(next)
                 && sides.iter().all(|&side| self.is_free(cell + side));
-            let length = if step.x == 0 || step.y == 0 {
-                STRAIGHT
-            } else {
-                DIAGONAL
-            };
+            let length = if step.x == 0 || step.y == 0 { STRAIGHT } else { DIAGONAL };
             open.then_some((next, length))
         })
     }
@@ -203,13 +195,8 @@ mod tests {
     #[test]
     fn a_gap_narrower_than_the_body_is_no_way_and_a_wider_one_is() {
         let room = |gap: f64| {
-            let mut shapes = wall(&[
-                [-1.0, -1.0],
-                [3.0, -1.0],
-                [3.0, 1.0],
-                [-1.0, 1.0],
-                [-1.0, -1.0],
-            ]);
+            let mut shapes =
+                wall(&[[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]);
             for side in [-1.0, 1.0] {
                 shapes.walls.push(Wall {
                     points: vec![DVec2::new(1.0, side), DVec2::new(1.0, side * gap / 2.0)],

@@ -16,41 +16,25 @@ pub struct Estimate {
 /// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
 pub fn share(hits: usize, n: usize) -> Estimate {
     if n == 0 {
-        return Estimate {
-            value: f64::NAN,
-            low: 0.0,
-            high: 1.0,
-        };
+        return Estimate { value: f64::NAN, low: 0.0, high: 1.0 };
     }
     let (hits, n) = (hits as f64, n as f64);
     let value = hits / n;
     let z2 = Z * Z;
     let middle = (value + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z / (1.0 + z2 / n) * (value * (1.0 - value) / n + z2 / (4.0 * n * n)).sqrt();
-    Estimate {
-        value,
-        low: (middle - half).max(0.0),
-        high: (middle + half).min(1.0),
-    }
+    Estimate { value, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
 }
 
 /// The difference of two shares on the same `n` worlds: `gained` worlds count only in the second setting, `lost` only in the
 /// first. Wald's interval with half a pair added to each cell (Agresti and Min 2005).
 pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     let (gained, lost, n) = (gained as f64, lost as f64, n as f64);
-    let value = if n > 0.0 {
-        (gained - lost) / n
-    } else {
-        f64::NAN
-    };
+    let value = if n > 0.0 { (gained - lost) / n } else { f64::NAN };
     let (gained, lost, n) = (gained + 0.5, lost + 0.5, n + 2.0);
     let middle = (gained - lost) / n;
     let half = Z * (gained + lost - (gained - lost).powi(2) / n).sqrt() / n;
-    Estimate {
-        value,
-        low: (middle - half).max(-1.0),
-        high: (middle + half).min(1.0),
-    }
+    Estimate { value, low: (middle - half).max(-1.0), high: (middle + half).min(1.0) }
 }
 
 /// The median; none without values.
@@ -74,17 +58,10 @@ impl Spread {
         let last = values.len().checked_sub(1)?;
         let at = |share: f64| {
             let place = share * last as f64;
-            let (below, above) = (
-                values[place.floor() as usize],
-                values[place.ceil() as usize],
-            );
+            let (below, above) = (values[place.floor() as usize], values[place.ceil() as usize]);
             below + (above - below) * place.fract()
         };
-        Some(Self {
-            low: at(0.25),
-            median: at(0.5),
-            high: at(0.75),
-        })
+        Some(Self { low: at(0.25), median: at(0.5), high: at(0.75) })
     }
 }
 

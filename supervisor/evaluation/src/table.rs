@@ -37,10 +37,7 @@ pub struct Table<R> {
 impl<R: Record> Table<R> {
     /// The table in `file`: with its rows, or empty.
     pub fn open(file: &Path) -> Result<Self, TableError> {
-        let mut table = Self {
-            file: file.to_path_buf(),
-            rows: Vec::new(),
-        };
+        let mut table = Self { file: file.to_path_buf(), rows: Vec::new() };
         if file.exists() {
             let mut reader = csv::Reader::from_path(file).map_err(table.failed("read"))?;
             let whole = reader.deserialize().map_while(Result::ok);
@@ -64,9 +61,8 @@ impl<R: Record> Table<R> {
     pub fn add(&mut self, row: R) -> Result<(), TableError> {
         let opened = File::options().append(true).open(&self.file);
         let opened = opened.map_err(|error| self.failed("append to")(error.into()))?;
-        let mut writer = csv::WriterBuilder::new()
-            .has_headers(self.rows.is_empty())
-            .from_writer(opened);
+        let mut writer =
+            csv::WriterBuilder::new().has_headers(self.rows.is_empty()).from_writer(opened);
         let written = writer.serialize(&row).and_then(|()| Ok(writer.flush()?));
         written.map_err(self.failed("append to"))?;
         self.rows.push(row);

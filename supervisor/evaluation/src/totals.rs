@@ -102,10 +102,8 @@ impl Comparison {
             rows.map(|row| (key(row), row)).collect()
         };
         let (first, second) = (of(from), of(to));
-        let pairs: Vec<(&Row, &Row)> = first
-            .iter()
-            .filter_map(|(key, row)| Some((*row, *second.get(key)?)))
-            .collect();
+        let pairs: Vec<(&Row, &Row)> =
+            first.iter().filter_map(|(key, row)| Some((*row, *second.get(key)?))).collect();
         let change = |outcome: Outcome| {
             let only = |has: fn(&(&Row, &Row)) -> (Outcome, Outcome)| {
                 let has_it = pairs.iter().map(has);

@@ -28,11 +28,7 @@ pub struct Rules {
 
 impl Default for Rules {
     fn default() -> Self {
-        Self {
-            success_within_m: RIGHT_PLACE_M,
-            clock_after_departure: false,
-            optimal_time_s: None,
-        }
+        Self { success_within_m: RIGHT_PLACE_M, clock_after_departure: false, optimal_time_s: None }
     }
 }
 
@@ -74,12 +70,7 @@ impl Trial {
             return Ok(None);
         };
         let mission = mission(&world, scene, shortest_m)?;
-        Ok(Some(Self {
-            world,
-            mission,
-            shortest_m,
-            rules,
-        }))
+        Ok(Some(Self { world, mission, shortest_m, rules }))
     }
 }
 
@@ -88,12 +79,9 @@ impl Trial {
     pub fn of_mission(world: String, mission: Mission, body: &BodySize) -> Option<Self> {
         let start = mission.start_pose().position;
         match shortest_path(&mission.obstacles(), start, mission.target, body.swept_m()) {
-            ShortestPath::Found(shortest_m) => Some(Self {
-                world,
-                mission,
-                shortest_m,
-                rules: Rules::default(),
-            }),
+            ShortestPath::Found(shortest_m) => {
+                Some(Self { world, mission, shortest_m, rules: Rules::default() })
+            }
             ShortestPath::None | ShortestPath::TooLarge => None,
         }
     }
@@ -144,9 +132,7 @@ fn mission(world: &str, scene: &Scene, shortest_m: f64) -> Result<Mission, Missi
 fn bounds(shapes: &Shapes, target: DVec2) -> (DVec2, DVec2) {
     let all = shapes.pieces().map(|piece| piece.bounds());
     let ends = (DVec2::ZERO.min(target), DVec2::ZERO.max(target));
-    all.fold(ends, |(least, greatest), (from, to)| {
-        (least.min(from), greatest.max(to))
-    })
+    all.fold(ends, |(least, greatest), (from, to)| (least.min(from), greatest.max(to)))
 }
 
 /// `shapes` moved by `by`, metres.

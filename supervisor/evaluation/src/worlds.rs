@@ -84,26 +84,24 @@ pub fn find(
         draw_until(count.unwrap_or(100), seed, kind, name, body, draw)
     };
     let found = match worlds {
-        Worlds::Rooms => drawn(1, "rooms", &|random, number| {
-            rooms::draw(random, number, Doors::Some)
-        })?,
-        Worlds::Doors => drawn(2, "doors", &|random, number| {
-            rooms::draw(random, number, Doors::All)
-        })?,
+        Worlds::Rooms => {
+            drawn(1, "rooms", &|random, number| rooms::draw(random, number, Doors::Some))?
+        }
+        Worlds::Doors => {
+            drawn(2, "doors", &|random, number| rooms::draw(random, number, Doors::All))?
+        }
         Worlds::Traps => drawn(3, "traps", &traps::draw)?,
-        Worlds::Corridors => drawn(4, "corridors", &|random, _| {
-            corridors::draw(random, Bends::Oblique)
-        })?,
-        Worlds::StraightCorridors => drawn(5, "straight-corridors", &|random, _| {
-            corridors::draw(random, Bends::None)
-        })?,
+        Worlds::Corridors => {
+            drawn(4, "corridors", &|random, _| corridors::draw(random, Bends::Oblique))?
+        }
+        Worlds::StraightCorridors => {
+            drawn(5, "straight-corridors", &|random, _| corridors::draw(random, Bends::None))?
+        }
         Worlds::Furnished => drawn(6, "furnished", &furnished::draw)?,
         Worlds::Path(path) => files::read(path, Asked { count, seed, ends }, body)?,
     };
     if found.trials.is_empty() {
-        return Err(WorldError::Unsolvable {
-            swept_m: body.swept_m(),
-        });
+        return Err(WorldError::Unsolvable { swept_m: body.swept_m() });
     }
     Ok(found)
 }
@@ -135,10 +133,7 @@ mod tests {
 
     use super::*;
 
-    const BODY: BodySize = BodySize {
-        radius_m: 0.19,
-        margin_m: 0.05,
-    };
+    const BODY: BodySize = BodySize { radius_m: 0.19, margin_m: 0.05 };
 
     #[test]
     fn a_seed_gives_the_same_worlds_and_another_others() {
@@ -152,11 +147,7 @@ mod tests {
         ] {
             let missions = |seed| -> Vec<Mission> {
                 let found = find(&worlds, Some(6), seed, None, &BODY).unwrap();
-                found
-                    .trials
-                    .into_iter()
-                    .map(|trial| trial.mission)
-                    .collect()
+                found.trials.into_iter().map(|trial| trial.mission).collect()
             };
             assert_eq!(missions(1), missions(1), "{worlds:?}");
             assert_ne!(missions(1), missions(2), "{worlds:?}");
@@ -165,13 +156,9 @@ mod tests {
 
     #[test]
     fn every_world_can_be_crossed_and_nothing_stands_in_the_robot() {
-        for worlds in [
-            Worlds::Rooms,
-            Worlds::Doors,
-            Worlds::Traps,
-            Worlds::Corridors,
-            Worlds::Furnished,
-        ] {
+        for worlds in
+            [Worlds::Rooms, Worlds::Doors, Worlds::Traps, Worlds::Corridors, Worlds::Furnished]
+        {
             for trial in find(&worlds, Some(20), 3, None, &BODY).unwrap().trials {
                 let mission = &trial.mission;
                 let name = &trial.world;

@@ -208,12 +208,7 @@ impl Samples {
                 None => mean(&sum_around(&sums, across, at)).unwrap_or(nowhere),
             })
             .collect();
-        Self {
-            across,
-            down,
-            block,
-            values,
-        }
+        Self { across, down, block, values }
     }
 
     /// The area where log2 u is above `level`.
@@ -321,17 +316,11 @@ mod tests {
     #[test]
     fn level_sets_close_around_the_whole_map_whatever_the_blocks() {
         for cells in [10, 160, 161, 500] {
-            let frame = GridFrame {
-                cells,
-                resolution_m: 8.0 / f64::from(cells),
-                centre: DVec2::ZERO,
-            };
+            let frame =
+                GridFrame { cells, resolution_m: 8.0 / f64::from(cells), centre: DVec2::ZERO };
             let lattice = Lattice::of_mission(&frame, &View::of(&frame));
             let field: Vec<FieldCell> = (0..frame.area())
-                .map(|at| FieldCell {
-                    log2_u: -((at % 7) as f32),
-                    ..FieldCell::default()
-                })
+                .map(|at| FieldCell { log2_u: -((at % 7) as f32), ..FieldCell::default() })
                 .collect();
             let bands = Bands::of(&lattice, &field, &MISSION).unwrap();
             let lowest = bands.areas(MISSION.finest).swap_remove(0).element("");
@@ -345,10 +334,7 @@ mod tests {
             assert!(corners.len() > 3);
             for corner in corners {
                 let beyond = (corner - middle).abs().max_element();
-                assert!(
-                    beyond >= 400.0,
-                    "{corner} is inside the plot of N = {cells}"
-                );
+                assert!(beyond >= 400.0, "{corner} is inside the plot of N = {cells}");
             }
         }
     }

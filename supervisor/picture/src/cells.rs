@@ -32,11 +32,7 @@ impl BelievedHazard {
     }
 
     fn in_blocks(lattice: &Lattice, cells: &[u8], block: usize) -> Self {
-        let blocks = Blocks {
-            lattice,
-            side: block,
-            kinds: coarsened(lattice, cells, block),
-        };
+        let blocks = Blocks { lattice, side: block, kinds: coarsened(lattice, cells, block) };
         Self {
             sensed: blocks.area(CellState::Sensed),
             known: blocks.area(CellState::Known),
@@ -64,13 +60,9 @@ impl BelievedHazard {
     }
 
     pub(super) fn layer(&self) -> String {
-        [
-            (&self.perimeter, ink::PERIMETER),
-            (&self.known, ink::KNOWN),
-            (&self.sensed, ink::SENSED),
-        ]
-        .map(|(area, colour)| area.element(&format!("fill=\"{colour}\"")))
-        .concat()
+        [(&self.perimeter, ink::PERIMETER), (&self.known, ink::KNOWN), (&self.sensed, ink::SENSED)]
+            .map(|(area, colour)| area.element(&format!("fill=\"{colour}\"")))
+            .concat()
     }
 }
 
@@ -199,11 +191,7 @@ mod tests {
     use super::{super::page::View, *};
 
     fn lattice(cells: u32) -> Lattice {
-        let frame = GridFrame {
-            cells,
-            resolution_m: 8.0 / f64::from(cells),
-            centre: DVec2::ZERO,
-        };
+        let frame = GridFrame { cells, resolution_m: 8.0 / f64::from(cells), centre: DVec2::ZERO };
         Lattice::of_mission(&frame, &View::of(&frame))
     }
 
@@ -224,9 +212,8 @@ mod tests {
     #[test]
     fn a_belief_in_shreds_stays_within_its_budget() {
         let lattice = lattice(1024);
-        let cells: Vec<u8> = (0..1024 * 1024)
-            .map(|at| ((at / 1024 + at % 1024) % 2) as u8)
-            .collect();
+        let cells: Vec<u8> =
+            (0..1024 * 1024).map(|at| ((at / 1024 + at % 1024) % 2) as u8).collect();
         let hazard = BelievedHazard::of(&lattice, &cells);
         assert!(hazard.has_sensed() && hazard.len() <= BUDGET);
     }

@@ -122,10 +122,7 @@ fn style(mark: Mark) -> String {
         Mark::Dashed => line(ink::BELIEVED, "5 3"),
         Mark::Discs => format!("fill=\"{}\"", ink::TRUTH),
         Mark::Crosses => line(ink::FAILURE, "none"),
-        Mark::Bars => format!(
-            "fill=\"#9fb3c8\" stroke=\"{}\" stroke-width=\"0.8\"",
-            ink::TEXT
-        ),
+        Mark::Bars => format!("fill=\"#9fb3c8\" stroke=\"{}\" stroke-width=\"0.8\"", ink::TEXT),
     }
 }
 
@@ -201,16 +198,8 @@ mod tests {
             x: Axis::linear("time, s"),
             y: Axis::linear("v, m/s"),
             series: vec![
-                Series {
-                    name: "commanded".to_owned(),
-                    mark: Mark::Solid,
-                    points: points.clone(),
-                },
-                Series {
-                    name: "</text><script>".to_owned(),
-                    mark: Mark::Dashed,
-                    points,
-                },
+                Series { name: "commanded".to_owned(), mark: Mark::Solid, points: points.clone() },
+                Series { name: "</text><script>".to_owned(), mark: Mark::Dashed, points },
             ],
         }
     }

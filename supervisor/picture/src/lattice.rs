@@ -35,10 +35,7 @@ impl Lattice {
             rows: frame.cells as usize,
             width: PLOT_SIDE,
             height: PLOT_SIDE,
-            placing: Placing::Mission {
-                frame: *frame,
-                view: *view,
-            },
+            placing: Placing::Mission { frame: *frame, view: *view },
         }
     }
 

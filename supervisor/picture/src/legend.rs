@@ -92,10 +92,7 @@ impl Legend<'_> {
             column.row("believed trajectory", line(motion::believed_line()));
         }
         if let Some(seconds) = self.motion.period_s() {
-            column.row(
-                &format!("robot, every {seconds} s"),
-                body(motion::BODY.to_owned()),
-            );
+            column.row(&format!("robot, every {seconds} s"), body(motion::BODY.to_owned()));
         }
         if self.motion.has_truth() || self.motion.has_belief() {
             column.row("robot at the end", body(motion::final_body()));
@@ -128,10 +125,7 @@ impl Legend<'_> {
         }
         if !self.world.is_empty() {
             column.heading("Really there");
-            for outline in Outline::ALL
-                .into_iter()
-                .filter(|outline| outline.is_in(self.world))
-            {
+            for outline in Outline::ALL.into_iter().filter(|outline| outline.is_in(self.world)) {
                 column.row(outline.name(), |at| patch(at, &outline.solid()));
             }
         }
@@ -146,14 +140,12 @@ impl Legend<'_> {
         bar.line_to(DVec2::new(COLUMN, y));
         bar.line_to(DVec2::new(right, y));
         bar.line_to(DVec2::new(right, y - 8.0));
-        bar.element(&format!(
-            "fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"",
-            ink::TEXT
-        )) + &format!(
-            "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{length} m</text>\n",
-            Px((COLUMN + right) / 2.0),
-            Px(y - 7.0)
-        )
+        bar.element(&format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"", ink::TEXT))
+            + &format!(
+                "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{length} m</text>\n",
+                Px((COLUMN + right) / 2.0),
+                Px(y - 7.0)
+            )
     }
 }
 
@@ -168,11 +160,7 @@ pub(super) struct Column {
 impl Column {
     /// An empty one.
     pub(super) const fn at(corner: DVec2) -> Self {
-        Self {
-            x: corner.x,
-            y: corner.y,
-            text: String::new(),
-        }
+        Self { x: corner.x, y: corner.y, text: String::new() }
     }
 
     fn heading(&mut self, words: &str) {
@@ -190,11 +178,8 @@ impl Column {
 
     fn row(&mut self, words: &str, symbol: impl FnOnce(DVec2) -> String) {
         self.text += &symbol(DVec2::new(self.x + SYMBOL, self.y - 4.0));
-        self.text += &format!(
-            "<text x=\"{}\" y=\"{}\">{words}</text>\n",
-            Px(self.x + WORDS),
-            Px(self.y)
-        );
+        self.text +=
+            &format!("<text x=\"{}\" y=\"{}\">{words}</text>\n", Px(self.x + WORDS), Px(self.y));
         self.y += ROW;
     }
 }
@@ -231,14 +216,8 @@ fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
          <tspan dx=\"3\" dy=\"-3\">u, where u is the chance that</tspan></text>\n",
         Px(y)
     );
-    for (nth, words) in [
-        (1.0, "a random walk meets the"),
-        (2.0, "target before a hazard"),
-    ] {
-        text += &format!(
-            "<text x=\"{left}\" y=\"{}\">{words}</text>\n",
-            Px(y + nth * 17.0)
-        );
+    for (nth, words) in [(1.0, "a random walk meets the"), (2.0, "target before a hazard")] {
+        text += &format!("<text x=\"{left}\" y=\"{}\">{words}</text>\n", Px(y + nth * 17.0));
     }
     let top = y + 45.0;
     for nth in 0..bands {

@@ -97,29 +97,21 @@ pub fn svg(scene: &Scene<'_>) -> String {
 
 /// `scene` as a figure: no title, no captions, the legend below, and text that is read where the figure is small.
 pub fn figure_svg(scene: &Scene<'_>) -> String {
-    drawn(scene, |view, plot, legend| {
-        margin::figure(scene, &plot, view, legend)
-    })
+    drawn(scene, |view, plot, legend| margin::figure(scene, &plot, view, legend))
 }
 
 /// Plots side by side, two in a row, each below its title. Without axes and legend: those of [`figure_svg`] of the same mission
 /// stand for them.
 pub fn panels_svg(title: &str, panels: &[(String, Scene<'_>)]) -> String {
-    let plots = panels
-        .iter()
-        .map(|(title, scene)| (&title[..], drawn(scene, |_, plot, _| plot)));
+    let plots = panels.iter().map(|(title, scene)| (&title[..], drawn(scene, |_, plot, _| plot)));
     margin::panels(title, &plots.collect::<Vec<_>>())
 }
 
 /// The plot of `scene` and what explains it, put together by `sheet`.
 fn drawn(scene: &Scene<'_>, sheet: impl FnOnce(&View, String, &Legend<'_>) -> String) -> String {
     let view = View::of(&scene.mission.grid_frame());
-    let field = scene
-        .field
-        .filter(|(frame, cells)| cells.len() == frame.area());
-    let grid = scene
-        .grid
-        .filter(|(frame, cells)| cells.len() == frame.area());
+    let field = scene.field.filter(|(frame, cells)| cells.len() == frame.area());
+    let grid = scene.grid.filter(|(frame, cells)| cells.len() == frame.area());
 
     let lattice = |frame| Lattice::of_mission(&frame, &view);
     let bands = field.and_then(|(frame, cells)| Bands::of(&lattice(frame), cells, &bands::MISSION));

@@ -76,33 +76,23 @@ enum Kind {
 pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     let lattice = Lattice::of_image(map.size, DVec2::splat(FRAME), cell_size(map.size));
     let bands = Bands::of(&lattice, map.cells, &BANDS);
-    let bands = bands.map_or(String::new(), |bands| {
-        bands.layer() + &flat_cells(map, &lattice, bands.levels())
-    });
+    let bands = bands
+        .map_or(String::new(), |bands| bands.layer() + &flat_cells(map, &lattice, bands.levels()));
     let lines = streamlines::layer(&lattice, map.cells, &LINES);
-    let kinds = Blocks {
-        lattice: &lattice,
-        side: 1,
-        kinds: kinds(map),
-    };
+    let kinds = Blocks { lattice: &lattice, side: 1, kinds: kinds(map) };
     // Anti-aliased, neighbouring rectangles would show a seam.
     let crisp = "shape-rendering=\"crispEdges\"";
     let cut_off = kinds.area(Kind::CutOff);
     let squares = [
         cut_off.element(&format!("fill=\"{CUT_OFF}\" {crisp}")),
         cut_off.element(&format!("fill=\"url(#hatch)\" {crisp}")),
-        kinds
-            .area(Kind::Blocked)
-            .element(&format!("fill=\"{WALL}\" {crisp}")),
+        kinds.area(Kind::Blocked).element(&format!("fill=\"{WALL}\" {crisp}")),
     ]
     .concat();
     let (width, height) = (lattice.width, lattice.height);
     let sheet = [width, height].map(|side| (side + 2.0 * FRAME).ceil());
-    let inside = format!(
-        "x=\"{FRAME}\" y=\"{FRAME}\" width=\"{}\" height=\"{}\"",
-        Px(width),
-        Px(height)
-    );
+    let inside =
+        format!("x=\"{FRAME}\" y=\"{FRAME}\" width=\"{}\" height=\"{}\"", Px(width), Px(height));
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\">\n\
          <defs><clipPath id=\"map\"><rect {inside}/></clipPath>{HATCH}</defs>\n\
@@ -122,11 +112,7 @@ const HATCH: &str = "<pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits
 fn cell_size((cols, rows): (usize, usize)) -> f64 {
     let longest = cols.max(rows).max(1);
     let room = if longest < SMALL { SMALL_SIDE } else { LARGEST };
-    if longest <= room {
-        (room / longest) as f64
-    } else {
-        1.0 / longest.div_ceil(LARGEST) as f64
-    }
+    if longest <= room { (room / longest) as f64 } else { 1.0 / longest.div_ceil(LARGEST) as f64 }
 }
 
 fn kinds(map: &FieldOnMap<'_>) -> Vec<Kind> {
@@ -153,17 +139,11 @@ fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String
             is_beside_thin_wall(map, at, levels.step).then(|| levels.band(map.cells[at].log2_u))
         })
         .collect();
-    let flat = Blocks {
-        lattice,
-        side: 1,
-        kinds: colours,
-    };
+    let flat = Blocks { lattice, side: 1, kinds: colours };
     (0..=levels.count)
         .map(|nth| {
-            flat.area(Some(nth)).element(&format!(
-                "fill=\"{}\" shape-rendering=\"crispEdges\"",
-                levels.colour(nth)
-            ))
+            flat.area(Some(nth))
+                .element(&format!("fill=\"{}\" shape-rendering=\"crispEdges\"", levels.colour(nth)))
         })
         .collect()
 }
@@ -208,9 +188,7 @@ mod tests {
 
     #[test]
     fn the_longer_side_of_a_picture_is_900_to_2400_pixels_whatever_the_map() {
-        for longest in [
-            1, 10, 50, 99, 100, 604, 1184, 1185, 1674, 2368, 2369, 4096, 16_384,
-        ] {
+        for longest in [1, 10, 50, 99, 100, 604, 1184, 1185, 1674, 2368, 2369, 4096, 16_384] {
             let side = longest as f64 * cell_size((longest, 1));
             assert!((900.0..=2400.0).contains(&side), "{longest} became {side}");
         }
@@ -221,10 +199,7 @@ mod tests {
         // Two corridors of 100 cells, one cell of wall between them, 600 powers of two apart.
         let log2_u = [0.0, f32::NEG_INFINITY, -600.0];
         let cells: Vec<FieldCell> = (0..300)
-            .map(|at| FieldCell {
-                log2_u: log2_u[at / 100],
-                ..FieldCell::default()
-            })
+            .map(|at| FieldCell { log2_u: log2_u[at / 100], ..FieldCell::default() })
             .collect();
         let blocked: Vec<bool> = (0..300).map(|at| at / 100 == 1).collect();
         let svg = map_svg(&FieldOnMap {
@@ -244,24 +219,12 @@ mod tests {
         let mut blocked = vec![false; 900];
         blocked[7] = true;
         let mut cells: Vec<FieldCell> = (0..900)
-            .map(|at| FieldCell {
-                ex: -1.0,
-                ey: 0.0,
-                log2_u: -((at % 90) as f32),
-            })
+            .map(|at| FieldCell { ex: -1.0, ey: 0.0, log2_u: -((at % 90) as f32) })
             .collect();
         for hidden in [7, 819] {
-            cells[hidden] = FieldCell {
-                log2_u: f32::NEG_INFINITY,
-                ..FieldCell::default()
-            };
+            cells[hidden] = FieldCell { log2_u: f32::NEG_INFINITY, ..FieldCell::default() };
         }
-        let svg = map_svg(&FieldOnMap {
-            size,
-            blocked: &blocked,
-            cells: &cells,
-            target: (0, 9),
-        });
+        let svg = map_svg(&FieldOnMap { size, blocked: &blocked, cells: &cells, target: (0, 9) });
         assert!(svg.contains("width=\"1202\" height=\"162\""));
         assert!(svg.contains("<path d=\"M107 16h13v13h-13z\" fill=\"#1d2430\""));
         assert!(svg.contains("<path d=\"M133 133h13v13h-13z\" fill=\"#c9ccd1\""));

@@ -40,11 +40,7 @@ pub(super) fn open(scene: &Scene<'_>) -> String {
 
 /// Mission and outcome, and below them how it went.
 pub(super) fn title(scene: &Scene<'_>) -> String {
-    let colour = if scene.facts.reached {
-        ink::TARGET
-    } else {
-        ink::FAILURE
-    };
+    let colour = if scene.facts.reached { ink::TARGET } else { ink::FAILURE };
     format!(
         "<text x=\"{PLOT_LEFT}\" y=\"42\" font-size=\"25\" font-weight=\"700\">{}\
          <tspan dx=\"14\" font-weight=\"600\" fill=\"{colour}\">{}</tspan></text>\n\
@@ -59,11 +55,7 @@ pub(super) fn title(scene: &Scene<'_>) -> String {
 fn facts(scene: &Scene<'_>) -> String {
     let facts = &scene.facts;
     let number = |value: f64, digits: usize| {
-        if value.is_finite() {
-            format!("{value:.digits$}")
-        } else {
-            "?".to_owned()
-        }
+        if value.is_finite() { format!("{value:.digits$}") } else { "?".to_owned() }
     };
     let ratio = facts.path_length_m / facts.straight_m;
     let times = if ratio.is_finite() {
@@ -101,10 +93,7 @@ fn axes_in(view: &View, size: f64) -> String {
         let first = (low[axis] / step).ceil();
         let last = ((low[axis] + view.side_m()) / step).floor();
         // Twelve steps by construction; the bound holds however far from 0 the perimeter lies.
-        for nth in (0..=20)
-            .map(|nth| first + f64::from(nth))
-            .take_while(|nth| *nth <= last)
-        {
+        for nth in (0..=20).map(|nth| first + f64::from(nth)).take_while(|nth| *nth <= last) {
             let mut at = low;
             at[axis] = nth * step;
             let mark = view.place(at);
@@ -126,10 +115,7 @@ fn axes_in(view: &View, size: f64) -> String {
         }
     }
     let middle = PLOT_TOP + PLOT_SIDE / 2.0;
-    let style = format!(
-        "fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"",
-        ink::TEXT
-    );
+    let style = format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"", ink::TEXT);
     format!(
         "{}<rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\" {style}/>\n\
          <g fill=\"{quiet}\" font-size=\"{}\">\n{labels}\

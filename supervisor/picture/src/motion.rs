@@ -48,11 +48,7 @@ impl<'a> Motion<'a> {
 
     /// The true trajectory, or the believed one if nobody knows the true one.
     fn way(&self) -> &'a [Pose2] {
-        if self.truth.is_empty() {
-            self.believed
-        } else {
-            self.truth
-        }
+        if self.truth.is_empty() { self.believed } else { self.truth }
     }
 
     /// Whether the true trajectory is known.
@@ -79,10 +75,7 @@ impl<'a> Motion<'a> {
         let radius = view.px(self.mission.body().radius_m);
         let start = self.mission.start_pose();
         [
-            target(
-                view.place(self.mission.target),
-                view.px(self.mission.arrival_tolerance_m),
-            ),
+            target(view.place(self.mission.target), view.px(self.mission.arrival_tolerance_m)),
             halo(&trajectory(view, self.truth)),
             halo(&trajectory(view, self.believed)),
             self.bodies(view, radius),
@@ -163,10 +156,7 @@ pub(super) const BODY: &str = "fill=\"#fff\" fill-opacity=\"0.45\" stroke=\"#0b0
 
 /// Attributes of the body at the end.
 pub(super) fn final_body() -> String {
-    format!(
-        "fill=\"{0}\" fill-opacity=\"0.35\" stroke=\"{0}\" stroke-width=\"1.8\"",
-        ink::TRUTH
-    )
+    format!("fill=\"{0}\" fill-opacity=\"0.35\" stroke=\"{0}\" stroke-width=\"1.8\"", ink::TRUTH)
 }
 
 /// Attributes of the body at the end, where it was believed.
@@ -255,9 +245,7 @@ pub(super) fn start_mark(at: DVec2) -> String {
 
 /// The least period people count in that is not below `least` seconds.
 fn whole_period(least: f64) -> f64 {
-    const PERIODS: [f64; 12] = [
-        0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0,
-    ];
+    const PERIODS: [f64; 12] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0];
     PERIODS
         .into_iter()
         .find(|period| *period >= least)

@@ -66,10 +66,7 @@ impl View {
             return Self { low, side_m };
         }
         // No mission that was validated comes here; a picture must come out all the same.
-        Self {
-            low: DVec2::splat(-0.5),
-            side_m: 1.0,
-        }
+        Self { low: DVec2::splat(-0.5), side_m: 1.0 }
     }
 
     /// The corner of least x and y, metres.
@@ -224,9 +221,7 @@ impl Path {
     pub(super) fn circle(&mut self, centre: DVec2, radius: f64) {
         let (x, y) = (Px(centre.x - radius), Px(centre.y));
         let (r, there, back) = (Px(radius), Px(2.0 * radius), Px(-2.0 * radius));
-        self.write(format_args!(
-            "M{x} {y}a{r} {r} 0 1 0 {there} 0a{r} {r} 0 1 0 {back} 0z"
-        ));
+        self.write(format_args!("M{x} {y}a{r} {r} 0 1 0 {there} 0a{r} {r} 0 1 0 {back} 0z"));
         self.pen = None;
     }
 
@@ -291,13 +286,7 @@ mod tests {
 
     #[test]
     fn steps_round_up_to_one_two_five() {
-        for (least, step) in [
-            (0.2, 0.2),
-            (0.21, 0.5),
-            (1.0, 1.0),
-            (6.0, 10.0),
-            (130.0, 200.0),
-        ] {
+        for (least, step) in [(0.2, 0.2), (0.21, 0.5), (1.0, 1.0), (6.0, 10.0), (130.0, 200.0)] {
             assert!((round_up(least) - step).abs() < 1e-9, "{least}");
         }
         assert_eq!(round_up(f64::NAN), 1.0);
@@ -313,10 +302,7 @@ mod tests {
 
     #[test]
     fn a_line_that_leaves_and_returns_is_cut_in_two() {
-        let view = View {
-            low: DVec2::ZERO,
-            side_m: 8.0,
-        };
+        let view = View { low: DVec2::ZERO, side_m: 8.0 };
         let away = [(4.0, 4.0), (1e6, 4.0), (1e6, 5.0), (4.0, 5.0)];
         let path = view.line(away.map(|(x, y)| DVec2::new(x, y)));
         assert_eq!(path.data, "M462 492L882 492M882 392L462 392");
@@ -324,10 +310,7 @@ mod tests {
 
     #[test]
     fn a_line_is_broken_at_a_pose_that_is_no_place() {
-        let view = View {
-            low: DVec2::ZERO,
-            side_m: 8.0,
-        };
+        let view = View { low: DVec2::ZERO, side_m: 8.0 };
         let holed = [1.0, 2.0, f64::NAN, 3.0, 4.0].map(|x| DVec2::new(x, 8.0));
         assert_eq!(view.line(holed).data, "M162 92L262 92M362 92L462 92");
     }

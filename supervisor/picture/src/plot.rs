@@ -45,18 +45,12 @@ pub struct Axis {
 impl Axis {
     /// A linear axis.
     pub fn linear(label: &str) -> Self {
-        Self {
-            label: label.to_owned(),
-            scale: Scale::Linear,
-        }
+        Self { label: label.to_owned(), scale: Scale::Linear }
     }
 
     /// A logarithmic axis.
     pub fn logarithmic(label: &str) -> Self {
-        Self {
-            label: label.to_owned(),
-            scale: Scale::Logarithmic,
-        }
+        Self { label: label.to_owned(), scale: Scale::Logarithmic }
     }
 }
 
@@ -72,9 +66,7 @@ pub(super) struct Range {
 impl Range {
     /// Round numbers around `values`; 0 to 1 around none.
     pub(super) fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
-        let placed = values
-            .map(|value| scaled(scale, value))
-            .filter(|value| value.is_finite());
+        let placed = values.map(|value| scaled(scale, value)).filter(|value| value.is_finite());
         let bounds = placed.fold(None, |bounds: Option<(f64, f64)>, value| {
             let (low, high) = bounds.unwrap_or((value, value));
             Some((low.min(value), high.max(value)))
@@ -87,37 +79,19 @@ impl Range {
         };
         let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
         let high = if high > low { high } else { low + step };
-        Self {
-            scale,
-            low,
-            high,
-            step,
-        }
+        Self { scale, low, high, step }
     }
 
     /// From 0 to exactly `high`.
     pub(super) fn to(high: f64) -> Self {
-        let high = if high.is_finite() && high > 0.0 {
-            high
-        } else {
-            1.0
-        };
-        Self {
-            scale: Scale::Linear,
-            low: 0.0,
-            high,
-            step: round_up(high / 6.0),
-        }
+        let high = if high.is_finite() && high > 0.0 { high } else { 1.0 };
+        Self { scale: Scale::Linear, low: 0.0, high, step: round_up(high / 6.0) }
     }
 
     /// The place of `value`: 0 at the low end, 1 at the high one; NaN if it has none.
     pub(super) fn part(&self, value: f64) -> f64 {
         let part = (scaled(self.scale, value) - self.low) / (self.high - self.low);
-        if part.is_finite() {
-            part.clamp(0.0, 1.0)
-        } else {
-            f64::NAN
-        }
+        if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
     }
 
     /// The least value.
@@ -183,29 +157,17 @@ impl Plot {
                 at = DVec2::new(LEFT, at.y + ROW);
             }
             legend += &symbol(at + DVec2::new(SYMBOL / 2.0 - 4.0, -5.0));
-            legend += &format!(
-                "<text x=\"{}\" y=\"{}\">{words}</text>\n",
-                Px(at.x + SYMBOL),
-                Px(at.y)
-            );
+            legend +=
+                &format!("<text x=\"{}\" y=\"{}\">{words}</text>\n", Px(at.x + SYMBOL), Px(at.y));
             at.x += wide + APART;
         }
         let below = if entries.is_empty() { 0.0 } else { 12.0 };
-        Self {
-            title: title.to_owned(),
-            left,
-            top: at.y + below,
-            height,
-            legend,
-        }
+        Self { title: title.to_owned(), left, top: at.y + below, height, legend }
     }
 
     /// The point on the sheet at these shares of both ranges.
     pub(super) fn place(&self, x: f64, y: f64) -> DVec2 {
-        DVec2::new(
-            self.left + x * (RIGHT - self.left),
-            self.top + (1.0 - y) * self.height,
-        )
+        DVec2::new(self.left + x * (RIGHT - self.left), self.top + (1.0 - y) * self.height)
     }
 
     /// The file: `drawn` between axes. Without a range along y there are no ticks there.

@@ -29,7 +29,5 @@ pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     let (width, height) = (size.width(), size.height());
     let mut pixels = Pixmap::new(width, height).ok_or(RasterError::Size { width, height })?;
     resvg::render(&tree, usvg::Transform::identity(), &mut pixels.as_mut());
-    pixels
-        .encode_png()
-        .map_err(|error| RasterError::Encoding(error.to_string()))
+    pixels.encode_png().map_err(|error| RasterError::Encoding(error.to_string()))
 }

@@ -26,11 +26,8 @@ struct Run {
 impl Run {
     fn scene(&self) -> Scene<'_> {
         let frame = self.mission.grid_frame();
-        let path_length_m = self
-            .truth
-            .windows(2)
-            .map(|pair| pair[0].position.distance(pair[1].position))
-            .sum();
+        let path_length_m =
+            self.truth.windows(2).map(|pair| pair[0].position.distance(pair[1].position)).sum();
         Scene {
             mission: &self.mission,
             grid: Some((frame, &self.grid)),
@@ -91,10 +88,7 @@ fn belief(mission: &Mission) -> Vec<u8> {
     let margin = 0.25;
     (0..frame.area() as u32)
         .map(|at| {
-            let cell = Cell {
-                col: at % frame.cells,
-                row: at / frame.cells,
-            };
+            let cell = Cell { col: at % frame.cells, row: at / frame.cells };
             let point = frame.centre_of(cell);
             let faces_start = |centre: DVec2| (point - centre).dot(centre) < 0.0;
             let at_wall = |nth: usize| {
@@ -133,22 +127,11 @@ fn harmonic(mission: &Mission, grid: &[u8], sweeps: usize) -> Vec<FieldCell> {
     }
     let cell = |at: usize| {
         if grid[at] != 0 {
-            return FieldCell {
-                log2_u: f32::NEG_INFINITY,
-                ..FieldCell::default()
-            };
+            return FieldCell { log2_u: f32::NEG_INFINITY, ..FieldCell::default() };
         }
         let rise = DVec2::new(u[at + 1] - u[at - 1], u[at + across] - u[at - across]);
-        let e = if at == target {
-            DVec2::ZERO
-        } else {
-            rise.normalize_or_zero()
-        };
-        FieldCell {
-            ex: e.x as f32,
-            ey: e.y as f32,
-            log2_u: u[at].log2() as f32,
-        }
+        let e = if at == target { DVec2::ZERO } else { rise.normalize_or_zero() };
+        FieldCell { ex: e.x as f32, ey: e.y as f32, log2_u: u[at].log2() as f32 }
     };
     (0..grid.len()).map(cell).collect()
 }
@@ -199,10 +182,8 @@ struct Dice(u64);
 impl Dice {
     fn next(&mut self) -> u64 {
         // Knuth's MMIX generator; its low bits are poor.
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 >> 33
     }
 
@@ -331,10 +312,9 @@ fn a_field_of_1024_cells_a_side_stays_below_400_kb_even_in_shreds() {
 #[test]
 fn far_poses_leave_no_far_coordinates() {
     let mut run = three_drums();
-    run.truth.extend([1e3, -1e9, 1e300].map(|x| Pose2 {
-        position: DVec2::new(x, 2.0 * x),
-        heading: 0.0,
-    }));
+    run.truth.extend(
+        [1e3, -1e9, 1e300].map(|x| Pose2 { position: DVec2::new(x, 2.0 * x), heading: 0.0 }),
+    );
     let picture = svg(&run.scene());
     let far = picture
         .split('#')
@@ -361,11 +341,7 @@ fn what_is_low_is_dashed_what_is_soft_dotted_and_the_legend_says_so() {
         let text =
             format!("target = [3, 0]\nworld.drum = [{{ at = [1, 1], radius_m = 0.3{profile} }}]");
         run.mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        let picture = svg(&Scene {
-            grid: None,
-            field: None,
-            ..run.scene()
-        });
+        let picture = svg(&Scene { grid: None, field: None, ..run.scene() });
         assert_well_formed(&picture);
         ["drum, box, wall", "low or overhanging", "absorbs sound"]
             .map(|words| picture.contains(words))
@@ -386,10 +362,7 @@ fn the_region_of_the_believed_end_is_the_covariances_ellipse_of_95_percent() {
     let axes = format!("<ellipse rx=\"{long:.1}\" ry=\"{short:.1}\"");
     scene.covariance = Some([0.04, 0.0, 0.01]);
     let along_x = svg(&scene);
-    assert!(
-        along_x.contains(&axes) && along_x.contains("rotate(0)"),
-        "{axes}"
-    );
+    assert!(along_x.contains(&axes) && along_x.contains("rotate(0)"), "{axes}");
     // The sheet's y axis points down.
     scene.covariance = Some([0.025, 0.015, 0.025]);
     let diagonal = svg(&scene);

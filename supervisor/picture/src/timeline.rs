@@ -63,9 +63,7 @@ impl Symbol {
             Self::Event => (ink::SENSED, ink::TEXT, 1.0),
             Self::Request => ("#fff", ink::TEXT, 1.4),
         };
-        path.element(&format!(
-            "fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\""
-        ))
+        path.element(&format!("fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\""))
     }
 }
 
@@ -104,9 +102,7 @@ impl Timeline {
         let mut entries: Vec<Entry> = Symbol::ALL
             .into_iter()
             .filter(|symbol| {
-                lanes
-                    .iter()
-                    .any(|lane| lane.marks.iter().any(|(_, its)| its == symbol))
+                lanes.iter().any(|lane| lane.marks.iter().any(|(_, its)| its == symbol))
             })
             .map(|symbol| {
                 let drawn = move |at| symbol.drawn([at].into_iter());
@@ -158,10 +154,7 @@ fn span(ends: &[[DVec2; 2]]) -> String {
             path.rectangle(corner, DVec2::new((to.x - from.x).max(1.5), 8.0));
         }
     }
-    path.element(&format!(
-        "fill=\"#cbd2d9\" stroke=\"{}\" stroke-width=\"0.8\"",
-        ink::QUIET
-    ))
+    path.element(&format!("fill=\"#cbd2d9\" stroke=\"{}\" stroke-width=\"0.8\"", ink::QUIET))
 }
 
 #[cfg(test)]

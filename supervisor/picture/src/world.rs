@@ -41,10 +41,7 @@ impl Outline {
         let drums = world.drums.iter().map(|drum| drum.profile());
         let walls = world.walls.iter().map(|wall| wall.profile());
         let boxes = world.boxes.iter().map(|block| block.profile());
-        drums
-            .chain(walls)
-            .chain(boxes)
-            .any(|profile| Self::of(profile) == self)
+        drums.chain(walls).chain(boxes).any(|profile| Self::of(profile) == self)
     }
 
     /// Its line of the legend.
@@ -86,12 +83,8 @@ impl Outline {
 }
 
 pub(super) fn layer(view: &View, world: &Shapes) -> String {
-    let outlines = Outline::ALL
-        .into_iter()
-        .filter(|outline| outline.is_in(world));
-    outlines
-        .map(|outline| outlined(view, world, outline))
-        .collect()
+    let outlines = Outline::ALL.into_iter().filter(|outline| outline.is_in(world));
+    outlines.map(|outline| outlined(view, world, outline)).collect()
 }
 
 /// Everything of `world` that has this outline.
@@ -109,11 +102,7 @@ fn outlined(view: &View, world: &Shapes, outline: Outline) -> String {
         }
     }
     let walls = world.walls.iter().filter(|wall| has_it(wall.profile()));
-    let walls: String = walls
-        .map(|wall| {
-            view.line(wall.points.iter().copied())
-                .element(&outline.line())
-        })
-        .collect();
+    let walls: String =
+        walls.map(|wall| view.line(wall.points.iter().copied()).element(&outline.line())).collect();
     bodies.element(&outline.solid()) + &walls
 }

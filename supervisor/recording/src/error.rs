@@ -9,11 +9,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum RecordingError {
     #[error("cannot {action} recording {file}: {source}")]
-    File {
-        action: &'static str,
-        file: PathBuf,
-        source: io::Error,
-    },
+    File { action: &'static str, file: PathBuf, source: io::Error },
     #[error("cannot write recording {file}: {problem}; is the disk full?")]
     Write { file: PathBuf, problem: String },
     #[error("{0} holds no recording.mcap; give a recorded run or a recording")]

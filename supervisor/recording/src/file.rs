@@ -50,11 +50,8 @@ impl RecordingFile {
         topics: &[&'static dyn EncodedTopic],
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
-        let named = |source| RecordingError::File {
-            action: "make",
-            file: path.to_path_buf(),
-            source,
-        };
+        let named =
+            |source| RecordingError::File { action: "make", file: path.to_path_buf(), source };
         if path.exists() {
             return Err(named(io::ErrorKind::AlreadyExists.into()));
         }
@@ -149,12 +146,7 @@ impl RecordingFile {
         let Some(&channel_id) = self.channels.get(topic) else {
             return Ok(());
         };
-        let header = MessageHeader {
-            channel_id,
-            sequence,
-            log_time: now_ns(),
-            publish_time,
-        };
+        let header = MessageHeader { channel_id, sequence, log_time: now_ns(), publish_time };
         let written = self.writer.write_to_known_channel(&header, message);
         written.map_err(failed(&self.path))
     }

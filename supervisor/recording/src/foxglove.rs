@@ -135,10 +135,8 @@ impl Drawn {
             return None;
         }
         let entity = |id: &str, points: Vec<[f64; 2]>, [r, g, b]: [f64; 3]| {
-            let points: Vec<_> = points
-                .iter()
-                .map(|[x, y]| json!({"x": x, "y": y, "z": 0.0}))
-                .collect();
+            let points: Vec<_> =
+                points.iter().map(|[x, y]| json!({"x": x, "y": y, "z": 0.0})).collect();
             json!({
                 "timestamp": time(began_ns + stamp_ns),
                 "frame_id": FRAME,
@@ -156,11 +154,7 @@ impl Drawn {
                 }],
             })
         };
-        let mut entities = vec![entity(
-            "trajectory",
-            self.trajectory.clone(),
-            [0.0, 0.3, 0.8],
-        )];
+        let mut entities = vec![entity("trajectory", self.trajectory.clone(), [0.0, 0.3, 0.8])];
         if let Some(mission) = &self.mission {
             let cone = cone(mission, self.pose, range);
             entities.push(entity("sonar", cone, [0.9, 0.5, 0.0]));
@@ -185,10 +179,7 @@ fn cone(mission: &Mission, robot: Pose2, range: &RangeSample) -> Vec<[f64; 2]> {
     let half = HALF_CONE_DEG.to_radians();
     let arc = (-PIECES / 2..=PIECES / 2).map(|piece| {
         let bearing = at.heading + half * 2.0 * f64::from(piece) / f64::from(PIECES);
-        [
-            at.position.x + reach * bearing.cos(),
-            at.position.y + reach * bearing.sin(),
-        ]
+        [at.position.x + reach * bearing.cos(), at.position.y + reach * bearing.sin()]
     });
     let sensor = [at.position.x, at.position.y];
     [sensor].into_iter().chain(arc).chain([sensor]).collect()
@@ -239,11 +230,7 @@ fn base64(bytes: &[u8]) -> String {
         for digit in 0..4 {
             let past_the_end = digit > three.len();
             let index = (bits >> (18 - 6 * digit)) as usize & 63;
-            text.push(if past_the_end {
-                '='
-            } else {
-                char::from(ALPHABET[index])
-            });
+            text.push(if past_the_end { '=' } else { char::from(ALPHABET[index]) });
         }
     }
     text
@@ -267,10 +254,7 @@ mod tests {
     fn a_long_trajectory_is_thinned_and_stays_bounded() {
         let mut drawn = Drawn::new(None);
         for tick in 0..10_000_u64 {
-            let sample = PoseSample {
-                x_m: tick as f64,
-                ..PoseSample::default()
-            };
+            let sample = PoseSample { x_m: tick as f64, ..PoseSample::default() };
             drawn.pose(&sample, 0);
             assert!(drawn.trajectory.len() < TRAJECTORY);
         }

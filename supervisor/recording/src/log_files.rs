@@ -22,10 +22,7 @@ pub(crate) struct LogFiles {
 impl LogFiles {
     /// Follow logs from their beginning, or only lines from now on.
     pub(crate) fn follow(directory: &Path, from_the_beginning: bool) -> Self {
-        let mut files = Self {
-            directory: directory.to_path_buf(),
-            read: HashMap::new(),
-        };
+        let mut files = Self { directory: directory.to_path_buf(), read: HashMap::new() };
         if !from_the_beginning {
             for file in files.files() {
                 let length = file.metadata().map_or(0, |file| file.len());
@@ -36,22 +33,15 @@ impl LogFiles {
     }
 
     fn files(&self) -> Vec<PathBuf> {
-        let entries = fs::read_dir(&self.directory)
-            .into_iter()
-            .flatten()
-            .flatten();
+        let entries = fs::read_dir(&self.directory).into_iter().flatten().flatten();
         let files = entries.map(|entry| entry.path());
-        files
-            .filter(|file| file.extension().is_some_and(|extension| extension == "log"))
-            .collect()
+        files.filter(|file| file.extension().is_some_and(|extension| extension == "log")).collect()
     }
 
     /// Call `each` with the process and the text of every new line. A log that cannot be read is tried again later.
     pub(crate) fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
         for file in self.files() {
-            let process = file
-                .file_stem()
-                .map(|name| name.to_string_lossy().into_owned());
+            let process = file.file_stem().map(|name| name.to_string_lossy().into_owned());
             let (at, partial) = self.read.entry(file.clone()).or_default();
             let Ok(log) = File::open(&file) else {
                 continue;
@@ -77,11 +67,7 @@ impl LogFiles {
 /// The text of `file`, at most `most` bytes.
 pub(crate) fn text(file: &Path, most: u64) -> Option<String> {
     let mut text = String::new();
-    File::open(file)
-        .ok()?
-        .take(most)
-        .read_to_string(&mut text)
-        .ok()?;
+    File::open(file).ok()?.take(most).read_to_string(&mut text).ok()?;
     Some(text)
 }
 
@@ -94,11 +80,7 @@ mod tests {
     fn each_whole_line_is_given_once() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("mapper.log");
-        let mut log = File::options()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .unwrap();
+        let mut log = File::options().create(true).append(true).open(&path).unwrap();
         let mut files = LogFiles::follow(directory.path(), true);
         let mut take = || {
             let mut lines = Vec::new();

@@ -39,16 +39,8 @@ impl Losses {
         }
         let stage = message.get(STAMP.end..).and_then(|rest| rest.first_chunk());
         let stage = stage.filter(|_| spec.writer == EVERY_STAGE);
-        let key = (
-            spec.name,
-            stage.copied().unwrap_or_default(),
-            stamp.generation,
-        );
-        let now = Last {
-            sequence: stamp.sequence,
-            crc32: crc32fast::hash(message),
-            bus: self.bus,
-        };
+        let key = (spec.name, stage.copied().unwrap_or_default(), stamp.generation);
+        let now = Last { sequence: stamp.sequence, crc32: crc32fast::hash(message), bus: self.bus };
         // Samples before the first one read are not lost.
         let Some(last) = self.last.insert(key, now) else {
             return true;
@@ -87,11 +79,7 @@ mod tests {
     use super::*;
 
     fn stamp(sequence: u32) -> Stamp {
-        Stamp {
-            sequence,
-            generation: 1,
-            ..Stamp::default()
-        }
+        Stamp { sequence, generation: 1, ..Stamp::default() }
     }
 
     #[test]

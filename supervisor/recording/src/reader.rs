@@ -91,10 +91,7 @@ pub fn places(run: &Path) -> impl Iterator<Item = PathBuf> {
 
 /// The recordings in a run's directory, in order.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
-    places(run)
-        .take(MOST_PARTS)
-        .take_while(|file| file.is_file())
-        .collect()
+    places(run).take(MOST_PARTS).take_while(|file| file.is_file()).collect()
 }
 
 impl Recording {
@@ -137,10 +134,8 @@ impl Recording {
                 Err(Stop::Error(error)) => return Err(error),
             }
         };
-        let foreign = |problem: String| RecordingError::Foreign {
-            file: path.to_path_buf(),
-            problem,
-        };
+        let foreign =
+            |problem: String| RecordingError::Foreign { file: path.to_path_buf(), problem };
         let Some(about) = about else {
             let problem =
                 problem.unwrap_or_else(|| "it does not say of which run it is".to_owned());
@@ -241,11 +236,7 @@ impl Recording {
     > {
         self.decoded(topic.spec().name, |log_ns, data| {
             let (header, elements) = decode_slice(data)?;
-            Some(SliceSample {
-                log_ns,
-                header,
-                elements,
-            })
+            Some(SliceSample { log_ns, header, elements })
         })
     }
 
@@ -258,12 +249,7 @@ impl Recording {
         let file = self.path.clone();
         let messages = self.messages(&[topic])?;
         Ok(messages.map(move |message| {
-            let Message {
-                log_ns,
-                data,
-                topic,
-                ..
-            } = message?;
+            let Message { log_ns, data, topic, .. } = message?;
             decode(log_ns, &data).ok_or_else(|| RecordingError::Message {
                 file: file.clone(),
                 topic: topic.to_string(),
@@ -348,9 +334,7 @@ struct Records {
 
 impl std::fmt::Debug for Records {
     fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        to.debug_struct("Records")
-            .field("path", &self.path)
-            .finish_non_exhaustive()
+        to.debug_struct("Records").field("path", &self.path).finish_non_exhaustive()
     }
 }
 

@@ -290,10 +290,7 @@ fn build() -> String {
 /// The machine: name, system and processors.
 fn machine() -> String {
     let text = |file| fs::read_to_string(file).unwrap_or_default();
-    let (name, system) = (
-        text("/proc/sys/kernel/hostname"),
-        text("/proc/sys/kernel/osrelease"),
-    );
+    let (name, system) = (text("/proc/sys/kernel/hostname"), text("/proc/sys/kernel/osrelease"));
     let processors = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
     format!(
         "{}, Linux {} {}, {processors} processors",

@@ -24,11 +24,7 @@ pub fn of(topic: &dyn AnyTopic) -> Schema {
     let (name, text) = match (header, element) {
         (Kind::Struct(sample), None) => (
             sample.name.to_owned(),
-            format!(
-                "# {}\n{}",
-                topic.spec().meaning.trim(),
-                fields(&sample, &mut parts)
-            ),
+            format!("# {}\n{}", topic.spec().meaning.trim(), fields(&sample, &mut parts)),
         ),
         (header, element) => {
             let name = match &header {
@@ -53,17 +49,12 @@ pub fn of(topic: &dyn AnyTopic) -> Schema {
         let body = fields(&part, &mut parts);
         text += &format!("{RULE}MSG: {}\n{body}", part.name.replace('.', "/"));
     }
-    Schema {
-        name: name.replacen('.', "/msg/", 1),
-        text,
-    }
+    Schema { name: name.replacen('.', "/msg/", 1), text }
 }
 
 fn fields(structure: &Structure, parts: &mut Vec<Structure>) -> String {
     let fields = structure.fields.iter();
-    fields
-        .map(|field| format!("{} {}\n", kind(&field.kind, parts), field.name))
-        .collect()
+    fields.map(|field| format!("{} {}\n", kind(&field.kind, parts), field.name)).collect()
 }
 
 fn kind(of: &Kind, parts: &mut Vec<Structure>) -> String {
@@ -104,10 +95,7 @@ mod tests {
         let schema = of(&topics::STALLS);
         assert_eq!(schema.name, "firsthand/msg/Stall");
         let first: Vec<_> = schema.text.lines().skip(1).take(3).collect();
-        assert_eq!(
-            first,
-            ["firsthand/Stamp stamp", "float64 x_m", "float64 y_m"]
-        );
+        assert_eq!(first, ["firsthand/Stamp stamp", "float64 x_m", "float64 y_m"]);
         assert!(schema.text.contains("MSG: firsthand/Stamp\nuint64 tick\n"));
     }
 
@@ -115,11 +103,7 @@ mod tests {
     fn a_schema_of_slices_has_the_header_and_the_elements() {
         let schema = of(&topics::GRID);
         assert_eq!(schema.name, "firsthand/msg/Grid");
-        assert!(
-            schema
-                .text
-                .contains("firsthand/GridHeader header\nuint8[] elements\n")
-        );
+        assert!(schema.text.contains("firsthand/GridHeader header\nuint8[] elements\n"));
         assert_eq!(schema.text.matches("MSG: firsthand/ClearBeam").count(), 1);
     }
 

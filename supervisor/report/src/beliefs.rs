@@ -47,10 +47,7 @@ impl Belief {
             return None;
         }
         let mut planner = Planner::new(mission);
-        let input = Input::Grid {
-            header: &self.header,
-            cells: &self.cells,
-        };
+        let input = Input::Grid { header: &self.header, cells: &self.cells };
         planner.step(input, MissionTime::default()).ok()?;
         planner.snapshot().map(|snapshot| snapshot.cells())
     }
@@ -65,10 +62,7 @@ pub(crate) struct Beliefs {
 
 impl Default for Beliefs {
     fn default() -> Self {
-        Self {
-            kept: Vec::new(),
-            apart_s: FIRST_APART_S,
-        }
+        Self { kept: Vec::new(), apart_s: FIRST_APART_S }
     }
 }
 
@@ -76,10 +70,7 @@ impl Beliefs {
     /// The map is now `grid`.
     pub(crate) fn push(&mut self, header: &GridHeader, grid: &Replica<u8>) {
         let time_s = header.stamp.time().seconds();
-        let is_due = self
-            .kept
-            .last()
-            .is_none_or(|last| time_s >= last.time_s + self.apart_s);
+        let is_due = self.kept.last().is_none_or(|last| time_s >= last.time_s + self.apart_s);
         if !is_due || grid.cells().len() > LARGEST {
             return;
         }
@@ -95,16 +86,13 @@ impl Beliefs {
         let mut chosen: Vec<&Belief> = Vec::new();
         for share in [0.25, 0.5, 0.75] {
             let off = |belief: &&Belief| (belief.time_s - share * end_s).abs();
-            let nearest = self
-                .kept
-                .iter()
-                .min_by(|one, other| off(one).total_cmp(&off(other)));
+            let nearest = self.kept.iter().min_by(|one, other| off(one).total_cmp(&off(other)));
             // In a short run one map may be nearest twice.
-            chosen.extend(nearest.filter(|nearest| {
-                chosen
-                    .last()
-                    .is_none_or(|last| last.time_s < nearest.time_s)
-            }));
+            chosen.extend(
+                nearest.filter(|nearest| {
+                    chosen.last().is_none_or(|last| last.time_s < nearest.time_s)
+                }),
+            );
         }
         chosen
     }
@@ -125,20 +113,14 @@ mod tests {
         let mut beliefs = Beliefs::default();
         for second in 0..1000_u64 {
             let header = GridHeader {
-                stamp: Stamp {
-                    stamp_ns: second * 1_000_000_000,
-                    ..Stamp::default()
-                },
+                stamp: Stamp { stamp_ns: second * 1_000_000_000, ..Stamp::default() },
                 ..GridHeader::default()
             };
             beliefs.push(&header, &grid);
             assert!(beliefs.kept.len() <= MOST);
         }
-        let times: Vec<f64> = beliefs
-            .on_the_way(1000.0)
-            .iter()
-            .map(|belief| belief.time_s)
-            .collect();
+        let times: Vec<f64> =
+            beliefs.on_the_way(1000.0).iter().map(|belief| belief.time_s).collect();
         assert_eq!(times.len(), 3, "{times:?}");
         for (time, wanted) in times.iter().zip([250.0, 500.0, 750.0]) {
             assert!((time - wanted).abs() <= 130.0, "{times:?}");

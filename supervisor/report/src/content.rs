@@ -55,10 +55,8 @@ impl Content {
     fn of(recording: &Recording) -> Self {
         let run = recording.run();
         let simulated = run.mission.robot.address.is_none();
-        let mut about = vec![
-            ("mission", run.mission.name.clone()),
-            ("robot", run.robot.to_string()),
-        ];
+        let mut about =
+            vec![("mission", run.mission.name.clone()), ("robot", run.robot.to_string())];
         if simulated {
             about.push(("seed", run.mission.seed.to_string()));
         }
@@ -93,8 +91,7 @@ impl Content {
         }
         let lost: u64 = recording.lost().values().sum();
         if lost > 0 {
-            self.remarks
-                .push(format!("The recorder of {name} lost {lost} samples."));
+            self.remarks.push(format!("The recorder of {name} lost {lost} samples."));
         }
         for message in recording.messages(&TOPICS.map(|topic| topic.spec().name))? {
             let message = message?;

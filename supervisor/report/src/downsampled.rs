@@ -22,11 +22,7 @@ pub(crate) struct Downsampled<T> {
 
 impl<T> Default for Downsampled<T> {
     fn default() -> Self {
-        Self {
-            items: Vec::new(),
-            seen: 0,
-            stride: 1,
-        }
+        Self { items: Vec::new(), seen: 0, stride: 1 }
     }
 }
 
@@ -62,10 +58,6 @@ mod tests {
         (0..1_000_000).for_each(|nth| kept.push(nth));
         assert!((MOST / 2..=MOST).contains(&kept.items().len()));
         let step = kept.stride();
-        assert!(
-            kept.items()
-                .windows(2)
-                .all(|pair| pair[1] - pair[0] == step)
-        );
+        assert!(kept.items().windows(2).all(|pair| pair[1] - pair[0] == step));
     }
 }

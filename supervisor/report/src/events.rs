@@ -81,12 +81,7 @@ impl Events {
             return;
         }
         self.of_failsafe += usize::from(is_failsafe);
-        self.all.push(Event {
-            time_s: self.time_s(stamp),
-            lane: lane.to_owned(),
-            symbol,
-            text,
-        });
+        self.all.push(Event { time_s: self.time_s(stamp), lane: lane.to_owned(), symbol, text });
     }
 
     fn time_s(&self, stamp: &Stamp) -> f64 {
@@ -182,11 +177,8 @@ impl Events {
     }
 
     pub(crate) fn request(&mut self, request: &RequestSample) {
-        let text = format!(
-            "{} {}",
-            words(RequestKind::from_byte(request.kind)),
-            name_str(&request.stage)
-        );
+        let text =
+            format!("{} {}", words(RequestKind::from_byte(request.kind)), name_str(&request.stage));
         self.add(&request.stamp, OPERATOR, Symbol::Request, text);
     }
 
@@ -219,10 +211,7 @@ impl Events {
     /// The lanes of a run that took `duration_s`.
     pub(crate) fn lanes(&self, duration_s: f64) -> Vec<Lane> {
         let others = [FAILSAFE, SUPERVISOR, OPERATOR, STALLS, MAP];
-        let open = self
-            .down
-            .iter()
-            .map(|(stage, (since, _))| (&**stage, since));
+        let open = self.down.iter().map(|(stage, (since, _))| (&**stage, since));
         let open = open.chain(self.stopped.iter().map(|since| (FAILSAFE, since)));
         let open: Vec<_> = open.collect();
         let lane = |name: &str| Lane {
@@ -271,11 +260,7 @@ mod tests {
     use common::samples::{DeathCause, name};
 
     fn stamp(seconds: u64, generation: u32) -> Stamp {
-        Stamp {
-            stamp_ns: seconds * 1_000_000_000,
-            generation,
-            ..Stamp::default()
-        }
+        Stamp { stamp_ns: seconds * 1_000_000_000, generation, ..Stamp::default() }
     }
 
     fn health(seconds: u64, generation: u32) -> HealthSample {
@@ -301,10 +286,7 @@ mod tests {
         // The last heartbeat of the dead one, read after its death.
         events.health(&health(3, 1));
         // A process that has just started knows no mission time yet.
-        events.pose(&PoseSample {
-            stamp: stamp(5, 1),
-            ..PoseSample::default()
-        });
+        events.pose(&PoseSample { stamp: stamp(5, 1), ..PoseSample::default() });
         events.health(&health(0, 2));
         events.health(&health(6, 2));
         let lanes = events.lanes(9.0);

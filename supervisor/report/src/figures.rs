@@ -25,9 +25,7 @@ pub(crate) struct Figure {
 pub(crate) fn all(content: &Content) -> Vec<Figure> {
     let [first, second] = wheels(content);
     let end = Belief::of(&content.grid_header, &content.grid);
-    let field = end
-        .as_ref()
-        .and_then(|belief| belief.field(&content.mission));
+    let field = end.as_ref().and_then(|belief| belief.field(&content.mission));
     let mut all = vec![trajectory(content, end.as_ref(), field.as_ref())];
     all.extend(map_and_field(content, end.as_ref(), field.as_ref()));
     all.extend([
@@ -47,11 +45,7 @@ fn seconds(stamp: &Stamp) -> f64 {
 }
 
 fn series(name: &str, mark: Mark, points: Vec<[f64; 2]>) -> Series {
-    Series {
-        name: name.to_owned(),
-        mark,
-        points,
-    }
+    Series { name: name.to_owned(), mark, points }
 }
 
 fn over_time(
@@ -68,11 +62,7 @@ fn over_time(
         y: Axis::linear(unit),
         series,
     };
-    Figure {
-        name,
-        caption,
-        svg: chart.svg(),
-    }
+    Figure { name, caption, svg: chart.svg() }
 }
 
 /// The scene of `belief`, its `field` and the `poses` until then.
@@ -85,9 +75,7 @@ fn scene<'a>(
     Scene {
         mission: &content.mission,
         grid: belief.map(|belief| (belief.frame, &belief.cells[..])),
-        field: belief
-            .zip(field)
-            .map(|(belief, field)| (belief.frame, &field[..])),
+        field: belief.zip(field).map(|(belief, field)| (belief.frame, &field[..])),
         believed: poses,
         covariance: None,
         truth: &[],
@@ -116,11 +104,7 @@ fn trajectory(content: &Content, end: Option<&Belief>, field: Option<&Vec<FieldC
         let [xx, xy, _, yy, ..] = pose.covariance;
         [xx, xy, yy]
     });
-    let over = if field.is_some() {
-        " over the guidance field of the map at the end"
-    } else {
-        ""
-    };
+    let over = if field.is_some() { " over the guidance field of the map at the end" } else { "" };
     Figure {
         name: "trajectory",
         caption: format!(
@@ -146,9 +130,7 @@ fn map_and_field(
         let end = samples.partition_point(|pose| seconds(&pose.stamp) <= belief.time_s);
         path(&samples[..end])
     };
-    let solved = on_the_way
-        .iter()
-        .map(|belief| belief.field(&content.mission));
+    let solved = on_the_way.iter().map(|belief| belief.field(&content.mission));
     let solved: Vec<_> = solved.collect();
     let fields = solved.iter().map(Option::as_ref).chain([field]);
     let beliefs: Vec<_> = on_the_way.into_iter().chain(end).collect();
@@ -182,22 +164,14 @@ fn timeline(content: &Content) -> Figure {
         span: "no process; failsafe: robot stopped".to_owned(),
         lanes,
     };
-    Figure {
-        name: "timeline",
-        caption: caption.to_owned(),
-        svg: timeline.svg(),
-    }
+    Figure { name: "timeline", caption: caption.to_owned(), svg: timeline.svg() }
 }
 
 fn sonar(content: &Content) -> Figure {
     let ranges = content.ranges.items();
     let of = |is_shown: fn(RangeStatus) -> bool, metres: fn(f64, u8) -> f64| -> Vec<[f64; 2]> {
-        let shown = ranges
-            .iter()
-            .filter(|range| is_shown(RangeStatus::from_byte(range.status)));
-        shown
-            .map(|range| [seconds(&range.stamp), metres(range.range_m, range.raw_cm)])
-            .collect()
+        let shown = ranges.iter().filter(|range| is_shown(RangeStatus::from_byte(range.status)));
+        shown.map(|range| [seconds(&range.stamp), metres(range.range_m, range.raw_cm)]).collect()
     };
     let is_distance = |status| matches!(status, RangeStatus::Measured | RangeStatus::AtContact);
     let is_none = |status| matches!(status, RangeStatus::Nothing | RangeStatus::Invalid);
@@ -243,10 +217,7 @@ fn speed(content: &Content) -> Figure {
         "Tangential speed",
         "v, m/s",
         "Tangential speed v: commanded, (16), and by dead reckoning.".to_owned(),
-        vec![
-            commanded(content, |command| command.v_m_s),
-            believed(content, |pose| pose.v_m_s),
-        ],
+        vec![commanded(content, |command| command.v_m_s), believed(content, |pose| pose.v_m_s)],
     )
 }
 
@@ -275,9 +246,7 @@ fn wheels(content: &Content) -> [Figure; 2] {
     let per_count = std::f64::consts::TAU / body.counts_per_turn;
     let left = vec![
         commanded(content, |command| command.left_rad_s),
-        measured(content, |wheels| {
-            f64::from(wheels.left_counts_per_s) * per_count
-        }),
+        measured(content, |wheels| f64::from(wheels.left_counts_per_s) * per_count),
     ];
     if body.steering.is_some() {
         let angle = vec![commanded(content, |command| command.right_rad_s)];
@@ -300,9 +269,7 @@ fn wheels(content: &Content) -> [Figure; 2] {
     }
     let right = vec![
         commanded(content, |command| command.right_rad_s),
-        measured(content, |wheels| {
-            f64::from(wheels.right_counts_per_s) * per_count
-        }),
+        measured(content, |wheels| f64::from(wheels.right_counts_per_s) * per_count),
     ];
     [
         over_time(
@@ -342,9 +309,5 @@ fn latency(content: &Content) -> Figure {
         y: Axis::linear("ticks, count"),
         series: vec![series("ticks", Mark::Bars, bars)],
     };
-    Figure {
-        name: "tick-latency",
-        caption: caption.to_owned(),
-        svg: chart.svg(),
-    }
+    Figure { name: "tick-latency", caption: caption.to_owned(), svg: chart.svg() }
 }

@@ -78,8 +78,7 @@ impl Measured {
     pub(crate) fn link(&mut self, link: &LinkSample) {
         let last = self.link.replace(*link);
         if let Some(last) = last.filter(|last| last.stamp.generation != link.stamp.generation) {
-            self.latency
-                .add(&last.latency_histogram, last.latency_max_ns);
+            self.latency.add(&last.latency_histogram, last.latency_max_ns);
         }
     }
 

@@ -51,9 +51,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
     let quantile = |field: &str, share: f64| {
         let summed = content.summary.get("tick_latency_us");
         let summed = summed.and_then(|tick| tick.get(field)?.as_f64());
-        summed
-            .or_else(|| latency.quantile_us(share))
-            .map(|us| us / 1e3)
+        summed.or_else(|| latency.quantile_us(share)).map(|us| us / 1e3)
     };
     let success = match content.outcome() {
         Some("reached") => "1 (reached)".to_owned(),
@@ -67,11 +65,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
         row("mission time", "mission_time_s", shown(time, 1, "s")),
         row("path length", "path_length_m", shown(path, 2, "m")),
         row("straight distance", "straight_m", shown(straight, 2, "m")),
-        row(
-            "K, path / straight",
-            "path_length_m / straight_m",
-            shown(ratio, 3, ""),
-        ),
+        row("K, path / straight", "path_length_m / straight_m", shown(ratio, 3, "")),
         row(
             "SPL, success weighted by path length",
             "success × shortest / max(path, shortest)",
@@ -87,11 +81,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
             "range below mapper.map_within_m",
             shown(measured.near(), 3, ""),
         ),
-        row(
-            "mean |dv/dt|",
-            "v of pose",
-            shown(measured.speed_change(), 3, "m/s²"),
-        ),
+        row("mean |dv/dt|", "v of pose", shown(measured.speed_change(), 3, "m/s²")),
         row(
             "safety events",
             "safety_events",
@@ -107,65 +97,26 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
             "wheel_range_rad_s",
             shown(wheel_range(content), 2, "rad/s"),
         ),
-        row(
-            "pose error at the end",
-            "pose_error_m",
-            shown(content.summed("pose_error_m"), 3, "m"),
-        ),
+        row("pose error at the end", "pose_error_m", shown(content.summed("pose_error_m"), 3, "m")),
         row(
             "pose error expected",
             "pose_error_expected_m",
             shown(
-                of(
-                    "pose_error_expected_m",
-                    measured.last_pose().map(|pose| pose.position_rms_m()),
-                ),
+                of("pose_error_expected_m", measured.last_pose().map(|pose| pose.position_rms_m())),
                 3,
                 "m",
             ),
         ),
-        row(
-            "collisions",
-            "collisions",
-            shown(content.summed("collisions"), 0, ""),
-        ),
-        row(
-            "full solves",
-            "full_solves",
-            shown(of("full_solves", count(full)), 0, ""),
-        ),
+        row("collisions", "collisions", shown(content.summed("collisions"), 0, "")),
+        row("full solves", "full_solves", shown(of("full_solves", count(full)), 0, "")),
         row("looks", "looks", shown(content.summed("looks"), 0, "")),
-        row(
-            "tick latency, median",
-            "tick_latency_us.p50",
-            shown(quantile("p50", 0.5), 2, "ms"),
-        ),
-        row(
-            "tick latency, 99 %",
-            "tick_latency_us.p99",
-            shown(quantile("p99", 0.99), 2, "ms"),
-        ),
-        row(
-            "tick latency, longest",
-            "tick_latency_us.max",
-            shown(quantile("max", 1.0), 2, "ms"),
-        ),
-        row(
-            "ticks",
-            "ticks",
-            shown(of("ticks", count(measured.ticks)), 0, ""),
-        ),
+        row("tick latency, median", "tick_latency_us.p50", shown(quantile("p50", 0.5), 2, "ms")),
+        row("tick latency, 99 %", "tick_latency_us.p99", shown(quantile("p99", 0.99), 2, "ms")),
+        row("tick latency, longest", "tick_latency_us.max", shown(quantile("max", 1.0), 2, "ms")),
+        row("ticks", "ticks", shown(of("ticks", count(measured.ticks)), 0, "")),
         row("restarts of stages", "restarts", restarts(content)),
-        row(
-            "replans after stalls",
-            "replans",
-            shown(content.summed("replans"), 0, ""),
-        ),
-        row(
-            "resets of the map",
-            "resets",
-            shown(content.summed("resets"), 0, ""),
-        ),
+        row("replans after stalls", "replans", shown(content.summed("replans"), 0, "")),
+        row("resets of the map", "resets", shown(content.summed("resets"), 0, "")),
     ]
 }
 

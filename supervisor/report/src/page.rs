@@ -45,10 +45,7 @@ pub(crate) fn html(content: &Content, figures: &[Figure]) -> String {
     }
     let stride = content.poses.stride();
     if stride > 1 {
-        let _ = writeln!(
-            page,
-            "<p>Curves show one of {stride} samples; metrics count all.</p>"
-        );
+        let _ = writeln!(page, "<p>Curves show one of {stride} samples; metrics count all.</p>");
     }
     page.push_str("<h2>Metrics</h2>\n<table><thead><tr><th>metric</th><th>value</th><th>field or source</th></tr></thead><tbody>\n");
     for metric in metrics::table(content) {
@@ -87,11 +84,7 @@ fn events(page: &mut String, content: &Content) {
     let told = told.filter(|event| !event.text.is_empty());
     let (failsafe, others): (Vec<&Event>, Vec<_>) = told.partition(|event| event.lane == FAILSAFE);
     let count = failsafe.len() + others.len();
-    let mut listed: Vec<_> = others
-        .into_iter()
-        .chain(failsafe)
-        .take(MOST_EVENTS)
-        .collect();
+    let mut listed: Vec<_> = others.into_iter().chain(failsafe).take(MOST_EVENTS).collect();
     listed.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     page.push_str(
         "<table><thead><tr><th>time, s</th><th>of</th><th>what</th></tr></thead><tbody>\n",

@@ -25,19 +25,13 @@ impl Source {
     /// The recordings of `run`: a run's directory, or one recording.
     pub(crate) fn find(run: &Path) -> Result<Self, ReportError> {
         if !run.is_dir() {
-            return Ok(Self {
-                files: vec![run.to_path_buf()],
-                is_run: false,
-            });
+            return Ok(Self { files: vec![run.to_path_buf()], is_run: false });
         }
         let files = recording::parts(run);
         if files.is_empty() {
             return Err(RecordingError::NoRecording(run.to_path_buf()).into());
         }
-        Ok(Self {
-            files,
-            is_run: true,
-        })
+        Ok(Self { files, is_run: true })
     }
 
     /// The default directory of the report.

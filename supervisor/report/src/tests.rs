@@ -13,10 +13,7 @@ use recording::Recording;
 use crate::{content::Content, figures, page, source::Source};
 
 fn golden() -> Content {
-    let file = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/golden/open-room.mcap"
-    );
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
     Content::read(&Source::find(Path::new(file)).unwrap()).unwrap()
 }
 
@@ -24,27 +21,15 @@ fn golden() -> Content {
 fn every_figure_has_its_axes_with_units_and_a_legend() {
     let figures = figures::all(&golden());
     let expected = [
-        (
-            "trajectory",
-            ["x, metres", "guidance E", "target, tolerance"],
-        ),
+        ("trajectory", ["x, metres", "guidance E", "target, tolerance"]),
         ("map-and-field", ["2 s", "4 s", "6 s"]),
         ("timeline", ["mission time, s", "planner", "event"]),
         ("sonar", ["mission time, s", "range, m", "no distance"]),
         ("speed", ["mission time, s", "v, m/s", "commanded"]),
-        (
-            "turning",
-            ["mission time, s", "ω, rad/s", "by dead reckoning"],
-        ),
-        (
-            "wheel-left",
-            ["mission time, s", "ωL, rad/s", "by the encoder"],
-        ),
+        ("turning", ["mission time, s", "ω, rad/s", "by dead reckoning"]),
+        ("wheel-left", ["mission time, s", "ωL, rad/s", "by the encoder"]),
         ("wheel-right", ["mission time, s", "ωR, rad/s", "commanded"]),
-        (
-            "tick-latency",
-            ["tick latency, ms", "ticks, count", "ticks"],
-        ),
+        ("tick-latency", ["tick latency, ms", "ticks, count", "ticks"]),
     ];
     assert_eq!(figures.len(), expected.len());
     for (figure, (name, texts)) in figures.iter().zip(expected) {
@@ -85,10 +70,7 @@ fn text_of_a_recording_is_never_markup() {
 
 #[test]
 fn a_recording_that_is_cut_off_gives_a_report_that_says_so() {
-    let whole = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/golden/open-room.mcap"
-    );
+    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
     let bytes = std::fs::read(whole).unwrap();
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("cut.mcap");
@@ -120,17 +102,11 @@ fn metrics_count_every_generation_and_every_sample() {
             latency_max_ns: histogram.max_ns(),
             ..LinkSample::default()
         });
-        let pose = PoseSample {
-            stamp: stamp(tick, 1),
-            v_m_s: tick as f64 * 0.5,
-            ..PoseSample::default()
-        };
+        let pose =
+            PoseSample { stamp: stamp(tick, 1), v_m_s: tick as f64 * 0.5, ..PoseSample::default() };
         content.measured.pose(&pose, &content.mission);
-        let range = RangeSample {
-            range_m: 0.2,
-            status: u8::from(tick == 0),
-            ..RangeSample::default()
-        };
+        let range =
+            RangeSample { range_m: 0.2, status: u8::from(tick == 0), ..RangeSample::default() };
         content.measured.range(&range, &content.mission);
         content.measured.command(&CommandSample {
             left_rad_s: -1.0,
@@ -139,11 +115,7 @@ fn metrics_count_every_generation_and_every_sample() {
         });
     }
     // This pose came a microsecond after the last one.
-    let mut late = PoseSample {
-        stamp: stamp(2, 1),
-        v_m_s: 900.0,
-        ..PoseSample::default()
-    };
+    let mut late = PoseSample { stamp: stamp(2, 1), v_m_s: 900.0, ..PoseSample::default() };
     late.stamp.stamp_ns += 1000;
     assert!(!content.measured.pose(&late, &content.mission));
     let counts: u32 = content.measured.latency().counts().iter().sum();

@@ -61,11 +61,7 @@ static BYTES: SliceTopic<Test, u8> = SliceTopic::new(&spec("bytes"));
 /// A bus of these topics, removed at the end.
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
     let domain = Domain::of(robot.parse().unwrap());
-    fs::DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(domain.directory())
-        .unwrap();
+    fs::DirBuilder::new().recursive(true).mode(0o700).create(domain.directory()).unwrap();
     let table: [&dyn AnyTopic; 3] = [&STRUCTS, &SLICES, &BYTES];
     let (bus, services) = Bus::make(&domain, robot, &table).unwrap();
     test(&bus);
@@ -84,11 +80,7 @@ fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() 
         let structs = structs.publish_subscribe::<Test>().open().unwrap();
         let typed = structs.subscriber_builder().create().unwrap();
         let mut reader = bus.reader(&STRUCTS).unwrap();
-        let mut sent = Test {
-            number: 0.5,
-            rest: 9,
-            ..Test::default()
-        };
+        let mut sent = Test { number: 0.5, rest: 9, ..Test::default() };
         let mut writer = bus.writer(&STRUCTS, 3).unwrap();
         writer.publish(5, TIME, sent).unwrap();
         (sent.stamp.tick, sent.stamp.stamp_ns, sent.stamp.generation) = (5, 7, 3);
@@ -101,25 +93,14 @@ fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() 
         assert_eq!((author.process, taken), (std::process::id(), sent));
 
         let slices = bus.node.service_builder(&name("slices"));
-        let slices = slices
-            .publish_subscribe::<[Cell]>()
-            .user_header::<Test>()
-            .open()
-            .unwrap();
+        let slices = slices.publish_subscribe::<[Cell]>().user_header::<Test>().open().unwrap();
         let typed = slices.subscriber_builder().create().unwrap();
         let mut reader = bus.slice_reader(&SLICES).unwrap();
-        let cells = [1.0, 2.0, 3.0].map(|first| Cell {
-            first,
-            second: 8,
-            third: -first,
-        });
+        let cells = [1.0, 2.0, 3.0].map(|first| Cell { first, second: 8, third: -first });
         let mut writer = bus.slice_writer(&SLICES, 3, 4).unwrap();
         writer.publish(5, TIME, sent, cells.into_iter()).unwrap();
         let sample = typed.receive().unwrap().unwrap();
-        assert_eq!(
-            (sample.payload(), sample.user_header().rest),
-            (&cells[..], 9)
-        );
+        assert_eq!((sample.payload(), sample.user_header().rest), (&cells[..], 9));
         let slice = reader.take().unwrap().unwrap();
         assert_eq!((&*slice, slice.header().number), (&cells[..], 0.5));
         let publisher = slices.publisher_builder().initial_max_slice_len(2);
@@ -138,17 +119,12 @@ fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
         let mut reader = bus.slice_reader(&BYTES).unwrap();
         let mut writer = bus.slice_writer(&BYTES, 1, 3).unwrap();
         for sent in [&[][..], &[1], &[1, 2, 3]] {
-            writer
-                .publish_slice_quietly(1, TIME, Test::default(), sent)
-                .unwrap();
+            writer.publish_slice_quietly(1, TIME, Test::default(), sent).unwrap();
             assert_eq!(&*reader.take().unwrap().unwrap(), sent);
         }
         let long = [0; 4];
         let refused = writer.publish_slice_quietly(1, TIME, Test::default(), &long);
-        assert!(matches!(
-            refused,
-            Err(BusError::Refused { topic: "bytes", .. })
-        ));
+        assert!(matches!(refused, Err(BusError::Refused { topic: "bytes", .. })));
     });
 }
 

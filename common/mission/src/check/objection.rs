@@ -13,11 +13,7 @@ pub(super) fn objection(
     problem: impl Into<String>,
     remedy: impl Into<String>,
 ) -> Objection {
-    Objection {
-        key,
-        problem: problem.into(),
-        remedy: remedy.into(),
-    }
+    Objection { key, problem: problem.into(), remedy: remedy.into() }
 }
 
 /// `value` must lie in `range`; NaN lies in none.

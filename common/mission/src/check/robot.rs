@@ -19,33 +19,13 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
         return Err(objection("robot.address", problem, FORMS));
     }
     within("robot.rate_hz", robot.rate_hz, 0.5..=200.0, "Hz")?;
-    within(
-        "robot.wheel_radius_m",
-        body.wheel_radius_m,
-        0.005..=2.0,
-        "m",
-    )?;
+    within("robot.wheel_radius_m", body.wheel_radius_m, 0.005..=2.0, "m")?;
     within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
-    within(
-        "robot.counts_per_turn",
-        body.counts_per_turn,
-        1.0..=100_000.0,
-        "counts",
-    )?;
+    within("robot.counts_per_turn", body.counts_per_turn, 1.0..=100_000.0, "counts")?;
     steering(mission)?;
     within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
-    within(
-        "robot.top_speed_m_s",
-        body.top_speed_m_s,
-        0.01..=10.0,
-        "m/s",
-    )?;
-    within(
-        "robot.command_limit_s",
-        robot.command_limit_s,
-        0.02..=5.0,
-        "s",
-    )?;
+    within("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s")?;
+    within("robot.command_limit_s", robot.command_limit_s, 0.02..=5.0, "s")?;
     let limits = robot.low_battery_v;
     for limit in [limits.board, limits.motor, limits.servo] {
         within("robot.low_battery_v", limit, 0.0..=MOTOR_SCALE_V, "V")?;
@@ -82,20 +62,12 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     if mission.sonar.index > 5 {
         return Err(objection(
             "sonar.index",
-            format!(
-                "the standard frame has sonars 0 to 5, not {}",
-                mission.sonar.index
-            ),
+            format!("the standard frame has sonars 0 to 5, not {}", mission.sonar.index),
             "give 1 for the front one of an X80",
         ));
     }
     within("sonar.forward_m", mission.sonar.forward_m, -5.0..=5.0, "m")?;
-    within(
-        "sonar.bearing_deg",
-        mission.sonar.bearing_deg,
-        -180.0..=180.0,
-        "degrees",
-    )
+    within("sonar.bearing_deg", mission.sonar.bearing_deg, -180.0..=180.0, "degrees")
 }
 
 fn steering(mission: &Mission) -> Result<(), Objection> {
@@ -105,10 +77,7 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
             ("robot.wheelbase_m", robot.wheelbase_m),
             ("robot.steering_limit_deg", robot.steering_limit_deg),
             ("robot.steering_rate_deg_s", robot.steering_rate_deg_s),
-            (
-                "robot.steering_counts_per_turn",
-                robot.steering_counts_per_turn,
-            ),
+            ("robot.steering_counts_per_turn", robot.steering_counts_per_turn),
         ];
         let unread = written.into_iter().find(|(_, value)| value.is_some());
         return unread.map_or(Ok(()), |(key, _)| {
@@ -120,12 +89,7 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
         });
     };
     within("robot.wheelbase_m", steering.wheelbase_m, 0.01..=5.0, "m")?;
-    within(
-        "robot.steering_limit_deg",
-        steering.limit_rad.to_degrees(),
-        1.0..=80.0,
-        "degrees",
-    )?;
+    within("robot.steering_limit_deg", steering.limit_rad.to_degrees(), 1.0..=80.0, "degrees")?;
     within(
         "robot.steering_rate_deg_s",
         steering.rate_rad_s.to_degrees(),
@@ -133,10 +97,5 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
         "degrees/s",
     )?;
     // A whole turn fits twice into the counter's cycle, so an angle is never ambiguous.
-    within(
-        "robot.steering_counts_per_turn",
-        steering.counts_per_turn,
-        36.0..=16_384.0,
-        "counts",
-    )
+    within("robot.steering_counts_per_turn", steering.counts_per_turn, 36.0..=16_384.0, "counts")
 }

@@ -17,11 +17,7 @@ impl Checker {
         }
         for wall in &shapes.walls {
             if wall.points.len() < 2 {
-                return Err(objection(
-                    key,
-                    "a wall has fewer than two points",
-                    "give two or more",
-                ));
+                return Err(objection(key, "a wall has fewer than two points", "give two or more"));
             }
             for point in &wall.points {
                 self.point(key, *point)?;
@@ -49,11 +45,7 @@ impl Checker {
 }
 
 fn profile(key: &'static str, profile: Profile) -> Result<(), Objection> {
-    let Profile {
-        bottom_m,
-        top_m,
-        echo,
-    } = profile;
+    let Profile { bottom_m, top_m, echo } = profile;
     within(key, bottom_m, 0.0..=HIGHEST_M, "m of bottom_m")?;
     if top_m <= bottom_m || top_m.is_nan() {
         return Err(objection(

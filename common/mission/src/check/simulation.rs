@@ -10,22 +10,15 @@ const MAX_MOVES: usize = 1000;
 
 impl Checker {
     pub(super) fn simulation(&mut self, simulation: &Simulation) -> Result<(), Objection> {
-        simulation
-            .check_physics()
-            .map_err(|OutOfRange { key, value, range }| {
-                objection(
-                    key,
-                    format!("{value} is out of range"),
-                    format!("give {} to {}", range.start(), range.end()),
-                )
-            })?;
+        simulation.check_physics().map_err(|OutOfRange { key, value, range }| {
+            objection(
+                key,
+                format!("{value} is out of range"),
+                format!("give {} to {}", range.start(), range.end()),
+            )
+        })?;
         if let Some(silence) = simulation.stops_when_silent_s {
-            within(
-                "simulation.stops_when_silent_s",
-                silence,
-                0.01..=3600.0,
-                "s",
-            )?;
+            within("simulation.stops_when_silent_s", silence, 0.01..=3600.0, "s")?;
         }
         for ranger in &simulation.ring {
             self::ranger(ranger)?;
@@ -59,12 +52,7 @@ impl Checker {
         }
         let mut earliest = 0.0;
         for station in &thing.moves {
-            within(
-                KEY,
-                station.at_s,
-                earliest..=MAX_TIMEOUT_S,
-                "s of at_s, in order,",
-            )?;
+            within(KEY, station.at_s, earliest..=MAX_TIMEOUT_S, "s of at_s, in order,")?;
             self.point(KEY, station.by)?;
             earliest = station.at_s;
         }
@@ -106,35 +94,17 @@ mod tests {
     #[test]
     fn a_good_day_in_the_laboratory_is_the_default() {
         let sonar = parse("").unwrap().simulation.physics().sonar;
-        assert_eq!(
-            (sonar.cone_deg, sonar.noise_m, sonar.noise_per_m),
-            (15.0, 0.01, 0.005)
-        );
+        assert_eq!((sonar.cone_deg, sonar.noise_m, sonar.noise_per_m), (15.0, 0.01, 0.005));
     }
 
     #[test]
     fn every_refusal_names_line_and_key() {
         let cases = [
-            (
-                "[simulation.sonar]\ncone_deg = 80",
-                "m.toml:3: simulation.sonar.cone_deg: ",
-            ),
-            (
-                "[simulation.wheels]\nlag_s = nan",
-                "m.toml:3: simulation.wheels.lag_s: ",
-            ),
-            (
-                "[simulation.radio]\noutage_share = 1",
-                "m.toml:3: simulation.radio.outage_share: ",
-            ),
-            (
-                "[simulation.sonar]\ncone = 8",
-                "m.toml:3: unknown field `cone`",
-            ),
-            (
-                "[simulation]\nstops_when_silent_s = 0",
-                "m.toml:3: simulation.stops_when_silent_s: ",
-            ),
+            ("[simulation.sonar]\ncone_deg = 80", "m.toml:3: simulation.sonar.cone_deg: "),
+            ("[simulation.wheels]\nlag_s = nan", "m.toml:3: simulation.wheels.lag_s: "),
+            ("[simulation.radio]\noutage_share = 1", "m.toml:3: simulation.radio.outage_share: "),
+            ("[simulation.sonar]\ncone = 8", "m.toml:3: unknown field `cone`"),
+            ("[simulation]\nstops_when_silent_s = 0", "m.toml:3: simulation.stops_when_silent_s: "),
             (
                 "[[simulation.thing]]\nfrom_s = 3\nuntil_s = 2\nshape = {}",
                 "m.toml:2: simulation.thing: 2 s of until_s is out of range",

@@ -29,22 +29,10 @@ fn every_refusal_names_line_and_key() {
     let cases = [
         ("target = [30, 0]", "m.toml:1: target: "),
         ("target = [nan, 0]", "m.toml:1: target: "),
-        (
-            "target = [3, 0]\n[perimeter]\ncells = 4",
-            "m.toml:3: perimeter.cells: ",
-        ),
-        (
-            "target = [3, 0]\n[perimeter]\ncells = 100000",
-            "m.toml:3: perimeter.cells: ",
-        ),
-        (
-            "target = [3, 0]\nspeeed = 3",
-            "m.toml:2: unknown field `speeed`",
-        ),
-        (
-            "target = [3, 0]\n\n[controller]\nspeed_m_s = nan",
-            "m.toml:4: controller.speed_m_s: ",
-        ),
+        ("target = [3, 0]\n[perimeter]\ncells = 4", "m.toml:3: perimeter.cells: "),
+        ("target = [3, 0]\n[perimeter]\ncells = 100000", "m.toml:3: perimeter.cells: "),
+        ("target = [3, 0]\nspeeed = 3", "m.toml:2: unknown field `speeed`"),
+        ("target = [3, 0]\n\n[controller]\nspeed_m_s = nan", "m.toml:4: controller.speed_m_s: "),
         ("target = 3", "m.toml:1: invalid type"),
         ("target = [3, 0", "m.toml:1: "),
         (
@@ -55,10 +43,7 @@ fn every_refusal_names_line_and_key() {
             "target = [3, 0]\n[robot]\nleft = { channel = 1, reversed = true }",
             "m.toml:3: robot.left: ",
         ),
-        (
-            "target = [3, 0]\n[robot]\naddress = 'http://x80:80'",
-            "m.toml:3: robot.address: ",
-        ),
+        ("target = [3, 0]\n[robot]\naddress = 'http://x80:80'", "m.toml:3: robot.address: "),
         (
             "target = [3, 0]\n[robot]\nwheelbase_m = 0.2",
             "m.toml:3: robot.wheelbase_m: this robot has two driven wheels",
@@ -67,10 +52,7 @@ fn every_refusal_names_line_and_key() {
             "target = [3, 0]\n[robot]\nmodel = 'car'\nsteering_limit_deg = 90",
             "m.toml:4: robot.steering_limit_deg: ",
         ),
-        (
-            "description = 'no target'",
-            "m.toml:1: missing field `target`",
-        ),
+        ("description = 'no target'", "m.toml:1: missing field `target`"),
     ];
     for (text, start) in cases {
         let refusal = refusal(text);
@@ -84,11 +66,7 @@ fn the_former_name_of_a_method_is_accepted_with_a_remark() {
     let former = parse(text, Path::new("m.toml")).unwrap();
     assert_eq!(former.method, Method::Evidential);
     assert!(former.remarks[0].starts_with("m.toml:2: method: "));
-    let today = parse(
-        "target = [3, 0]\nmethod = 'evidential'",
-        Path::new("m.toml"),
-    )
-    .unwrap();
+    let today = parse("target = [3, 0]\nmethod = 'evidential'", Path::new("m.toml")).unwrap();
     assert_eq!((today.method, today.remarks), (former.method, vec![]));
 }
 
@@ -99,16 +77,9 @@ fn a_car_has_the_presets_of_its_model_and_what_the_mission_overrides() {
     let mission = parse(text, Path::new("m.toml")).unwrap();
     let car = mission.body().ackermann().unwrap();
     assert!((car.least_turning_radius() - 0.3).abs() < 1e-12);
-    assert_eq!(
-        mission.body().steering.unwrap().counts_per_turn,
-        3600.0,
-        "the preset's"
-    );
+    assert_eq!(mission.body().steering.unwrap().counts_per_turn, 3600.0, "the preset's");
     let written = toml::to_string(&mission).unwrap();
-    assert_eq!(
-        parse(&written, Path::new("m.toml")).unwrap().robot,
-        mission.robot
-    );
+    assert_eq!(parse(&written, Path::new("m.toml")).unwrap().robot, mission.robot);
 }
 
 #[test]

@@ -33,13 +33,7 @@ impl Ackermann {
         top_wheel_speed: f64,
         creep: f64,
     ) -> Self {
-        Self {
-            wheel_radius,
-            wheelbase,
-            steering_limit,
-            top_wheel_speed,
-            creep,
-        }
+        Self { wheel_radius, wheelbase, steering_limit, top_wheel_speed, creep }
     }
 
     /// Radius of the tightest circle that the middle of the driven axle can go, metres.
@@ -52,10 +46,7 @@ impl Ackermann {
     #[must_use]
     pub fn twist(&self, input: SteeredWheel) -> Twist {
         let v = self.wheel_radius * input.wheel;
-        Twist {
-            v,
-            omega: input.steering.tan() / self.wheelbase * v,
-        }
+        Twist { v, omega: input.steering.tan() / self.wheelbase * v }
     }
 
     /// (17): omega_h = v/r, phi = atan(L omega / v), clipped to the limit. A car cannot turn on the spot: it creeps
@@ -69,11 +60,7 @@ impl Ackermann {
         } else {
             twist.v
         };
-        let steering = if v == 0.0 {
-            0.0
-        } else {
-            (self.wheelbase * twist.omega / v).atan()
-        };
+        let steering = if v == 0.0 { 0.0 } else { (self.wheelbase * twist.omega / v).atan() };
         let top = self.top_wheel_speed;
         SteeredWheel {
             wheel: (v / self.wheel_radius).clamp(-top, top),
@@ -108,10 +95,7 @@ mod tests {
     #[test]
     fn equation_3_by_hand_and_back() {
         // phi = 45 degrees, 4 rad/s: v = 0.4, omega = 0.4 / 0.5 = 0.8.
-        let input = SteeredWheel {
-            wheel: 4.0,
-            steering: FRAC_PI_4,
-        };
+        let input = SteeredWheel { wheel: 4.0, steering: FRAC_PI_4 };
         let twist = car(1.0).twist(input);
         close(twist.v, 0.4);
         close(twist.omega, 0.8);
@@ -128,10 +112,7 @@ mod tests {
 
     #[test]
     fn a_car_asked_to_turn_at_rest_creeps_forward_at_full_steering() {
-        let input = car(0.5).wheel(Twist {
-            v: 0.0,
-            omega: -1.0,
-        });
+        let input = car(0.5).wheel(Twist { v: 0.0, omega: -1.0 });
         close(input.wheel, 0.5);
         close(input.steering, -0.5);
         assert_eq!(car(0.5).wheel(Twist::default()), SteeredWheel::default());
@@ -174,10 +155,7 @@ mod tests {
     fn an_infeasible_turn_is_made_to_the_side_that_was_asked_for() {
         for twist in twists().filter(|twist| twist.v >= 0.0 && twist.omega != 0.0) {
             let got = car(0.5).twist(car(0.5).wheel(twist));
-            assert!(
-                got.omega * twist.omega > 0.0 && got.v > 0.0,
-                "{twist:?}: {got:?}"
-            );
+            assert!(got.omega * twist.omega > 0.0 && got.v > 0.0, "{twist:?}: {got:?}");
         }
     }
 }

@@ -43,10 +43,7 @@ impl DifferentialDrive {
     #[must_use]
     pub fn twist(&self, wheels: WheelSpeeds) -> Twist {
         let body = self.g * Vector2::new(wheels.right, wheels.left);
-        Twist {
-            v: body.x,
-            omega: body.y,
-        }
+        Twist { v: body.x, omega: body.y }
     }
 
     /// (17): the wheel speeds that give `twist`; both scaled by one factor when a wheel would exceed
@@ -55,15 +52,8 @@ impl DifferentialDrive {
     pub fn wheels(&self, twist: Twist) -> WheelSpeeds {
         let wheels = self.inverse * Vector2::new(twist.v, twist.omega);
         let fastest = wheels.amax();
-        let scale = if fastest > self.rim_limit {
-            self.rim_limit / fastest
-        } else {
-            1.0
-        };
-        WheelSpeeds {
-            right: wheels.x * scale,
-            left: wheels.y * scale,
-        }
+        let scale = if fastest > self.rim_limit { self.rim_limit / fastest } else { 1.0 };
+        WheelSpeeds { right: wheels.x * scale, left: wheels.y * scale }
     }
 }
 
@@ -79,10 +69,7 @@ mod tests {
     fn equation_2_by_hand() {
         // r = 0.1, W = 0.4: v = 0.05 (3 + 1) = 0.2, omega = 0.25 (3 - 1) = 0.5.
         let drive = DifferentialDrive::new(0.1, 0.4, 100.0);
-        let twist = drive.twist(WheelSpeeds {
-            right: 3.0,
-            left: 1.0,
-        });
+        let twist = drive.twist(WheelSpeeds { right: 3.0, left: 1.0 });
         close(twist.v, 0.2);
         close(twist.omega, 0.5);
     }

@@ -35,26 +35,16 @@ impl Pose2 {
     pub fn along_arc(&self, arc: f64, turn: f64) -> Self {
         // sin(h)/h, stable through h = 0: the chord of the arc over its length.
         let half = turn / 2.0;
-        let chord = if half.abs() < 1e-6 {
-            1.0 - half * half / 6.0
-        } else {
-            half.sin() / half
-        };
+        let chord = if half.abs() < 1e-6 { 1.0 - half * half / 6.0 } else { half.sin() / half };
         let step = Rotation2::new(self.heading + half) * Vector2::new(arc * chord, 0.0);
-        Self {
-            position: self.position + DVec2::new(step.x, step.y),
-            heading: self.heading + turn,
-        }
+        Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
     }
 
     /// One forward Euler step of (21): along the heading held before the turn.
     #[must_use]
     pub fn along_euler(&self, arc: f64, turn: f64) -> Self {
         let step = Rotation2::new(self.heading) * Vector2::new(arc, 0.0);
-        Self {
-            position: self.position + DVec2::new(step.x, step.y),
-            heading: self.heading + turn,
-        }
+        Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
     }
 }
 
@@ -78,11 +68,7 @@ mod tests {
 
     #[test]
     fn equation_21_moves_along_the_old_heading() {
-        let end = Pose2 {
-            heading: FRAC_PI_2,
-            ..Pose2::default()
-        }
-        .along_euler(0.3, 0.2);
+        let end = Pose2 { heading: FRAC_PI_2, ..Pose2::default() }.along_euler(0.3, 0.2);
         close(end.position.x, 0.0);
         close(end.position.y, 0.3);
         close(end.heading, FRAC_PI_2 + 0.2);

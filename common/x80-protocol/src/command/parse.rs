@@ -30,14 +30,10 @@ fn command(frame: &Frame<'_>) -> Result<Command, MessageError> {
         did::VELOCITY_ALL => all(frame, Quantity::Velocity),
         did::PARAMETER => parameter(data),
         did::ENABLE => match *data {
-            [on] => Ok(Command::Enable {
-                on: on != 0,
-                channel: None,
-            }),
-            [on, number, ..] => Ok(Command::Enable {
-                on: on != 0,
-                channel: Some(channel(did::ENABLE, number)?),
-            }),
+            [on] => Ok(Command::Enable { on: on != 0, channel: None }),
+            [on, number, ..] => {
+                Ok(Command::Enable { on: on != 0, channel: Some(channel(did::ENABLE, number)?) })
+            }
             [] => Err(length(did::ENABLE, data, "1 or 2")),
         },
         did::MOTOR => Ok(stream(Stream::Motor, data)),
@@ -53,11 +49,7 @@ fn channel(did: u8, number: u8) -> Result<u8, MessageError> {
     if usize::from(number) < CHANNELS {
         return Ok(number);
     }
-    Err(MessageError::Value {
-        did,
-        what: "channel",
-        value: number,
-    })
+    Err(MessageError::Value { did, what: "channel", value: number })
 }
 
 fn target(low: u8, high: u8) -> Option<i16> {
@@ -82,11 +74,7 @@ fn one(frame: &Frame<'_>, quantity: Quantity) -> Result<Command, MessageError> {
         Some(value) => Targets::One { channel, value },
         None => Targets::All([None; CHANNELS]),
     };
-    Ok(Command::Motion(Motion {
-        quantity,
-        targets,
-        limit_ms,
-    }))
+    Ok(Command::Motion(Motion { quantity, targets, limit_ms }))
 }
 
 fn all(frame: &Frame<'_>, quantity: Quantity) -> Result<Command, MessageError> {
@@ -105,19 +93,11 @@ fn all(frame: &Frame<'_>, quantity: Quantity) -> Result<Command, MessageError> {
     for (slot, pair) in targets.iter_mut().zip(values.chunks_exact(2)) {
         *slot = target(pair[0], pair[1]);
     }
-    Ok(Command::Motion(Motion {
-        quantity,
-        targets: Targets::All(targets),
-        limit_ms,
-    }))
+    Ok(Command::Motion(Motion { quantity, targets: Targets::All(targets), limit_ms }))
 }
 
 fn parameter(data: &[u8]) -> Result<Command, MessageError> {
-    let invalid = |what, value| MessageError::Value {
-        did: did::PARAMETER,
-        what,
-        value,
-    };
+    let invalid = |what, value| MessageError::Value { did: did::PARAMETER, what, value };
     let (sub, number, rest) = match data {
         [sub, number, rest @ ..] => (*sub, *number, rest),
         _ => return Err(length(did::PARAMETER, data, "2 or more")),
@@ -140,16 +120,10 @@ fn parameter(data: &[u8]) -> Result<Command, MessageError> {
         (13 | 14, []) => return Err(length(did::PARAMETER, data, "3")),
         // Not every parameter has a channel in second place: do not judge the byte.
         (sub, _) => {
-            return Ok(Command::Parameter {
-                channel: number,
-                parameter: Parameter::Other { sub },
-            });
+            return Ok(Command::Parameter { channel: number, parameter: Parameter::Other { sub } });
         }
     };
-    Ok(Command::Parameter {
-        channel: channel(did::PARAMETER, number)?,
-        parameter,
-    })
+    Ok(Command::Parameter { channel: channel(did::PARAMETER, number)?, parameter })
 }
 
 fn gains(terms: &[u8]) -> Result<Gains, MessageError> {
@@ -163,11 +137,7 @@ fn gains(terms: &[u8]) -> Result<Gains, MessageError> {
             2 => &mut gains.kd,
             3 => &mut gains.ki_x100,
             value => {
-                return Err(MessageError::Value {
-                    did: did::PARAMETER,
-                    what: "gain",
-                    value,
-                });
+                return Err(MessageError::Value { did: did::PARAMETER, what: "gain", value });
             }
         };
         *slot = Some(u16::from_le_bytes([low, high]));

@@ -26,12 +26,7 @@ fn decode(pieces: &[&[u8]]) -> Vec<Owned> {
 
 fn encoded(did: u8, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let frame = Frame {
-        rid: 1,
-        sn: 0,
-        did,
-        data,
-    };
+    let frame = Frame { rid: 1, sn: 0, did, data };
     frame.encode(&mut bytes);
     bytes
 }
@@ -77,25 +72,14 @@ fn a_client_that_begins_with_zeros_and_ends_wrong_is_heard() {
 fn end_bytes_that_are_none_at_all_do_not_spoil_a_frame() {
     let bare = &PING[..8];
     assert_eq!(decode(&[bare]), vec![ping()], "missing");
-    assert_eq!(
-        decode(&[bare, &PING]),
-        vec![ping(); 2],
-        "header follows at once"
-    );
-    assert_eq!(
-        decode(&[bare, &[0xff, 0x5e], &PING]),
-        vec![ping(); 2],
-        "wrong"
-    );
+    assert_eq!(decode(&[bare, &PING]), vec![ping(); 2], "header follows at once");
+    assert_eq!(decode(&[bare, &[0xff, 0x5e], &PING]), vec![ping(); 2], "wrong");
 }
 
 #[test]
 fn end_bytes_inside_data_end_nothing() {
     let data = [0x5e, 0x0d, 0x5e, 0x02, 0x5e, 0x0d];
-    assert_eq!(
-        decode(&[&encoded(9, &data)]),
-        vec![(1, 0, 9, data.to_vec())]
-    );
+    assert_eq!(decode(&[&encoded(9, &data)]), vec![(1, 0, 9, data.to_vec())]);
 }
 
 #[test]
@@ -178,19 +162,9 @@ fn every_byte_is_accounted_for() {
 /// One piece of a stream under test.
 #[derive(Clone, Debug)]
 enum Piece {
-    Untouched {
-        did: u8,
-        data: Vec<u8>,
-    },
-    Flipped {
-        data: Vec<u8>,
-        at: prop::sample::Index,
-        mask: u8,
-    },
-    Truncated {
-        data: Vec<u8>,
-        at: prop::sample::Index,
-    },
+    Untouched { did: u8, data: Vec<u8> },
+    Flipped { data: Vec<u8>, at: prop::sample::Index, mask: u8 },
+    Truncated { data: Vec<u8>, at: prop::sample::Index },
     Noise(Vec<u8>),
 }
 

@@ -81,10 +81,8 @@ mod tests {
         for method in ["paper", "evidential"] {
             let mission = car(&format!("method = '{method}'"));
             let body = mission.body();
-            let (limit, top) = (
-                body.steering.unwrap().limit_rad,
-                body.top_speed_m_s / body.wheel_radius_m,
-            );
+            let (limit, top) =
+                (body.steering.unwrap().limit_rad, body.top_speed_m_s / body.wheel_radius_m);
             for degrees in -180..=180 {
                 let angle = f64::from(degrees).to_radians();
                 let command = command(&mission, GuidanceStatus::Along, angle, f64::INFINITY);
@@ -111,22 +109,14 @@ mod tests {
         let twist = |limit| {
             let command = command(&mission, GuidanceStatus::Along, 0.3, limit);
             assert!(drives(&command));
-            drive.twist(SteeredWheel {
-                wheel: command.left_rad_s,
-                steering: command.right_rad_s,
-            })
+            drive.twist(SteeredWheel { wheel: command.left_rad_s, steering: command.right_rad_s })
         };
         let (free, limited) = (twist(f64::INFINITY), twist(0.1));
         assert!((limited.v - 0.1).abs() < 1e-12, "{limited:?}");
         let curvature = free.omega / free.v;
         assert!((limited.omega / limited.v - curvature).abs() < 1e-12);
         for limit in [0.0, f64::NAN] {
-            assert!(!drives(&command(
-                &mission,
-                GuidanceStatus::Along,
-                0.3,
-                limit
-            )));
+            assert!(!drives(&command(&mission, GuidanceStatus::Along, 0.3, limit)));
         }
     }
 }

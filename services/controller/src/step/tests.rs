@@ -33,10 +33,7 @@ impl At for Controller {
 }
 
 fn facing(heading: f64) -> Pose2 {
-    Pose2 {
-        position: DVec2::ZERO,
-        heading,
-    }
+    Pose2 { position: DVec2::ZERO, heading }
 }
 
 /// Guidance along x.
@@ -80,10 +77,7 @@ fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
     let mut controller = controller("");
     close(controller.at(facing(PI - 0.01), &ahead()).omega_rad_s, 0.8);
     controller.at(facing(2.0), &ahead());
-    close(
-        controller.at(facing(-PI + 0.01), &ahead()).omega_rad_s,
-        -0.8,
-    );
+    close(controller.at(facing(-PI + 0.01), &ahead()).omega_rad_s, -0.8);
 }
 
 #[test]
@@ -106,10 +100,7 @@ fn equation_16_is_continuous_where_its_cases_meet() {
 #[test]
 fn near_the_target_slowing_down_multiplies_alignment() {
     // 0.25 m away, Rc = 0.5: half of what alignment allows.
-    let pose = Pose2 {
-        position: DVec2::new(2.75, 0.0),
-        heading: FRAC_PI_3,
-    };
+    let pose = Pose2 { position: DVec2::new(2.75, 0.0), heading: FRAC_PI_3 };
     let command = controller("").at(pose, &ahead());
     close(command.v_m_s, 0.2 * (1.0 - 3_f64.sqrt() / 4.0));
 }
@@ -136,19 +127,13 @@ fn evidential() -> Controller {
 }
 
 fn limited(speed_limit_m_s: f64) -> GuidanceSample {
-    GuidanceSample {
-        speed_limit_m_s,
-        ..ahead()
-    }
+    GuidanceSample { speed_limit_m_s, ..ahead() }
 }
 
 #[test]
 fn a_look_turns_on_the_spot_and_ends_where_it_should() {
-    let look = GuidanceSample {
-        status: GuidanceStatus::Look.into(),
-        speed_limit_m_s: 0.0,
-        ..ahead()
-    };
+    let look =
+        GuidanceSample { status: GuidanceStatus::Look.into(), speed_limit_m_s: 0.0, ..ahead() };
     let far = evidential().at(facing(-2.0), &look);
     assert_eq!((far.v_m_s, far.omega_rad_s), (0.0, 1.4));
     let near = evidential().at(facing(0.2), &look);
@@ -158,10 +143,7 @@ fn a_look_turns_on_the_spot_and_ends_where_it_should() {
 #[test]
 fn an_evidential_robot_stands_until_it_faces_within_45_degrees_of_its_way() {
     let guidance = ahead();
-    close(
-        evidential().at(facing(FRAC_PI_4 + 0.01), &guidance).v_m_s,
-        0.0,
-    );
+    close(evidential().at(facing(FRAC_PI_4 + 0.01), &guidance).v_m_s, 0.0);
     assert!(evidential().at(facing(FRAC_PI_4 - 0.1), &guidance).v_m_s > 0.0);
     close(evidential().at(facing(0.0), &guidance).v_m_s, 0.4);
 }
@@ -178,11 +160,7 @@ fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
     for limit in [0.0, f64::NAN, -1.0, 0.01, 0.039] {
         let command = evidential().at(facing(0.0), &limited(limit));
         assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);
-        assert_eq!(
-            (command.left_rad_s, command.right_rad_s),
-            (0.0, 0.0),
-            "{limit}"
-        );
+        assert_eq!((command.left_rad_s, command.right_rad_s), (0.0, 0.0), "{limit}");
         let turning = evidential().at(facing(0.4), &limited(limit));
         assert_eq!(turning.v_m_s, 0.0, "{limit}");
         assert!(turning.omega_rad_s < 0.0, "{limit}");
@@ -210,33 +188,18 @@ fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
 #[test]
 fn arrival_is_final() {
     let mut controller = controller("");
-    let there = Pose2 {
-        position: DVec2::new(2.95, 0.0),
-        heading: 0.0,
-    };
+    let there = Pose2 { position: DVec2::new(2.95, 0.0), heading: 0.0 };
     let command = controller.at(there, &ahead());
-    assert_eq!(
-        CommandState::from_byte(command.state),
-        CommandState::Arrived
-    );
+    assert_eq!(CommandState::from_byte(command.state), CommandState::Arrived);
     let back_off = controller.at(facing(0.0), &ahead());
-    assert_eq!(
-        CommandState::from_byte(back_off.state),
-        CommandState::Arrived
-    );
+    assert_eq!(CommandState::from_byte(back_off.state), CommandState::Arrived);
     close(back_off.v_m_s, 0.0);
 }
 
 #[test]
 fn without_guidance_the_robot_stands() {
-    let nan = GuidanceSample {
-        ex: f64::NAN,
-        ..ahead()
-    };
-    let unreachable = GuidanceSample {
-        status: GuidanceStatus::Unreachable.into(),
-        ..ahead()
-    };
+    let nan = GuidanceSample { ex: f64::NAN, ..ahead() };
+    let unreachable = GuidanceSample { status: GuidanceStatus::Unreachable.into(), ..ahead() };
     for guidance in [GuidanceSample::default(), unreachable, nan] {
         let command = controller("").at(facing(0.0), &guidance);
         assert_eq!(CommandState::from_byte(command.state), CommandState::Halt);

@@ -12,11 +12,7 @@ fn reckoning(extra: &str) -> DeadReckoning {
 
 fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {
     WheelSample {
-        stamp: Stamp {
-            tick,
-            stamp_ns: tick * 500_000_000,
-            ..Stamp::default()
-        },
+        stamp: Stamp { tick, stamp_ns: tick * 500_000_000, ..Stamp::default() },
         left_counts: left,
         right_counts: right,
         ..WheelSample::default()
@@ -131,16 +127,10 @@ fn a_robot_that_restarted_while_it_was_away_does_not_move() {
     let mut reckoning = reckoning("");
     reckoning.take(&wheels(0, 600, 700));
     // In the 5 s since, wheels could have turned so far.
-    let after = WheelSample {
-        restarts: 1,
-        ..wheels(10, 0, 1)
-    };
+    let after = WheelSample { restarts: 1, ..wheels(10, 0, 1) };
     assert!(reckoning.rejects(&after));
     close(reckoning.take(&after).x_m, 0.0);
-    let on = WheelSample {
-        restarts: 1,
-        ..wheels(11, 500, 501)
-    };
+    let on = WheelSample { restarts: 1, ..wheels(11, 500, 501) };
     close(reckoning.take(&on).x_m, 0.1 * PI);
 }
 
@@ -212,10 +202,7 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     assert_eq!(again.take(&wheels(2, 190, 200)), published);
     assert_eq!(again.state(), killed.state());
     // The next one has come meanwhile: nothing of the way is lost, but 127 mm are one arc in place of two.
-    let (got, want) = (
-        successor().take(&wheels(3, 280, 310)),
-        killed.take(&wheels(3, 280, 310)),
-    );
+    let (got, want) = (successor().take(&wheels(3, 280, 310)), killed.take(&wheels(3, 280, 310)));
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);
     assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 2e-3);

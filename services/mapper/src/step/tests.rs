@@ -41,10 +41,7 @@ fn of(set: &str, cell_m: f64) -> Mapper {
 
 fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
     PoseSample {
-        stamp: Stamp {
-            tick,
-            ..Stamp::default()
-        },
+        stamp: Stamp { tick, ..Stamp::default() },
         x_m: x,
         y_m: y,
         heading_rad: heading,
@@ -53,11 +50,7 @@ fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
 }
 
 fn reading(status: RangeStatus, range_m: f64) -> RangeSample {
-    RangeSample {
-        range_m,
-        status: status.into(),
-        ..RangeSample::default()
-    }
+    RangeSample { range_m, status: status.into(), ..RangeSample::default() }
 }
 
 fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
@@ -79,18 +72,11 @@ fn equation_18_blocks_the_border_and_nothing_else() {
 fn equation_19_by_hand() {
     // From (0.3, -0.2) facing y: S + offset = 0.5 + 0.2: the hit is at (0.3, 0.5), cell (28, 30).
     let mut mapper = mapper("");
-    let window = mapper.hear(
-        &at(0, 0.3, -0.2, FRAC_PI_2),
-        Some(&reading(RangeStatus::Measured, 0.5)),
-    );
-    let want: Vec<_> = (29..=31)
-        .flat_map(|row| (27..=29).map(move |col| (col, row)))
-        .collect();
+    let window =
+        mapper.hear(&at(0, 0.3, -0.2, FRAC_PI_2), Some(&reading(RangeStatus::Measured, 0.5)));
+    let want: Vec<_> = (29..=31).flat_map(|row| (27..=29).map(move |col| (col, row))).collect();
     assert_eq!(sensed(&mapper), want);
-    assert_eq!(
-        (window.col, window.row, window.width, window.height),
-        (27, 29, 3, 3)
-    );
+    assert_eq!((window.col, window.row, window.width, window.height), (27, 29, 3, 3));
     assert_eq!(mapper.state().safety_events(), 1);
     assert_eq!(mapper.state().version(), 2);
 }
@@ -99,11 +85,9 @@ fn equation_19_by_hand() {
 fn equation_19_takes_the_sensors_offset_along_its_bearing() {
     // From the origin facing x: S + offset = 0.8 + 0.2 along the bearing.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    for (bearing_deg, hit) in [
-        (0, DVec2::new(1.0, 0.0)),
-        (45, DVec2::new(half, half)),
-        (-90, DVec2::new(0.0, -1.0)),
-    ] {
+    for (bearing_deg, hit) in
+        [(0, DVec2::new(1.0, 0.0)), (45, DVec2::new(half, half)), (-90, DVec2::new(0.0, -1.0))]
+    {
         let set = format!("sonar.bearing_deg = {bearing_deg}\nmapper.margin_m = 0.0");
         let mut mapper = of(&set, 0.02);
         let heard = reading(RangeStatus::Measured, 0.8);
@@ -130,21 +114,13 @@ fn a_hit_just_outside_the_map_marks_the_part_of_its_margin_that_is_inside() {
 #[test]
 fn a_reading_that_shows_nothing_leaves_the_map_alone() {
     let mut mapper = mapper("");
-    for (tick, status) in [
-        RangeStatus::Nothing,
-        RangeStatus::Invalid,
-        RangeStatus::Absent,
-    ]
-    .into_iter()
-    .enumerate()
+    for (tick, status) in
+        [RangeStatus::Nothing, RangeStatus::Invalid, RangeStatus::Absent].into_iter().enumerate()
     {
         mapper.hear(&at(tick as u64, 0.0, 0.0, 0.0), Some(&reading(status, 0.5)));
     }
     mapper.hear(&at(8, 0.0, 0.0, 0.0), None);
-    mapper.hear(
-        &at(9, 0.0, 0.0, 0.0),
-        Some(&reading(RangeStatus::Measured, 2.1)),
-    );
+    mapper.hear(&at(9, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 2.1)));
     assert_eq!(sensed(&mapper), []);
     assert_eq!(mapper.state().version(), 1);
 }
@@ -152,51 +128,33 @@ fn a_reading_that_shows_nothing_leaves_the_map_alone() {
 #[test]
 fn four_centimetres_or_nearer_is_mapped_just_ahead() {
     let mut mapper = mapper("");
-    mapper.hear(
-        &at(0, 0.0, 0.0, 0.0),
-        Some(&reading(RangeStatus::AtContact, 0.0)),
-    );
+    mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::AtContact, 0.0)));
     assert!(sensed(&mapper).contains(&(27, 25)), "{:?}", sensed(&mapper));
 }
 
 #[test]
 fn the_targets_cell_is_never_marked() {
     let mut mapper = mapper("");
-    mapper.hear(
-        &at(0, 0.8, 0.0, 0.0),
-        Some(&reading(RangeStatus::Measured, 0.5)),
-    );
+    mapper.hear(&at(0, 0.8, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 0.5)));
     let marked = sensed(&mapper);
-    assert!(
-        marked.contains(&(39, 25)) && !marked.contains(&(40, 25)),
-        "{marked:?}"
-    );
+    assert!(marked.contains(&(39, 25)) && !marked.contains(&(40, 25)), "{marked:?}");
 }
 
 #[test]
 fn the_robots_own_cells_are_never_marked() {
     let mut mapper = mapper("");
-    mapper.hear(
-        &at(0, 0.0, 0.0, 0.0),
-        Some(&reading(RangeStatus::AtContact, 0.0)),
-    );
+    mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::AtContact, 0.0)));
     let radius = 0.19;
     for (col, row) in sensed(&mapper) {
         let centre = mapper.frame().centre_of(Cell { col, row });
-        assert!(
-            centre.length() > radius,
-            "({col}, {row}) lies under the robot"
-        );
+        assert!(centre.length() > radius, "({col}, {row}) lies under the robot");
     }
 }
 
 #[test]
 fn the_border_stays_border_when_a_margin_falls_on_it() {
     let mut mapper = mapper("");
-    mapper.hear(
-        &at(0, 1.9, 0.0, 0.0),
-        Some(&reading(RangeStatus::Measured, 0.2)),
-    );
+    mapper.hear(&at(0, 1.9, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 0.2)));
     let cells = mapper.state().cells();
     assert_eq!(cells[25 * 50 + 49], CellState::Perimeter as u8);
 }
@@ -206,18 +164,12 @@ fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
     let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
     let known = |mapper: &Mapper| {
         let cells = mapper.state().cells();
-        cells
-            .iter()
-            .filter(|&&cell| cell == CellState::Known as u8)
-            .count()
+        cells.iter().filter(|&&cell| cell == CellState::Known as u8).count()
     };
     let before = known(&mapper);
     // A disc of 0.2 + 0.15 m has about pi 3.5^2 = 38 cells.
     assert!((34..=42).contains(&before), "{before} cells");
-    mapper.hear(
-        &at(0, 0.0, 0.0, 0.0),
-        Some(&reading(RangeStatus::Measured, 0.5)),
-    );
+    mapper.hear(&at(0, 0.0, 0.0, 0.0), Some(&reading(RangeStatus::Measured, 0.5)));
     assert!(mapper.reset(1) && !mapper.reset(1));
     assert_eq!((known(&mapper), sensed(&mapper).len()), (before, 0));
 }

@@ -23,10 +23,6 @@ impl Cancellation {
     }
 
     pub(crate) fn check(&self) -> Result<(), SolveError> {
-        if self.0.load(Ordering::Relaxed) {
-            Err(SolveError::Cancelled)
-        } else {
-            Ok(())
-        }
+        if self.0.load(Ordering::Relaxed) { Err(SolveError::Cancelled) } else { Ok(()) }
     }
 }

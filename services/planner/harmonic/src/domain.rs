@@ -42,13 +42,7 @@ impl Domain {
                 expected,
             });
         }
-        let domain = Self {
-            width,
-            height,
-            blocked,
-            screening: Coefficients::NONE,
-            target,
-        };
+        let domain = Self { width, height, blocked, screening: Coefficients::NONE, target };
         if domain.blocked[domain.checked_index(target, "the target")?] {
             return Err(SolveError::TargetBlocked { target });
         }
@@ -97,9 +91,7 @@ impl Domain {
         for change in changes {
             self.checked_index(change.cell, "a changed cell")?;
             if change.blocked && change.cell == self.target {
-                return Err(SolveError::TargetBlocked {
-                    target: self.target,
-                });
+                return Err(SolveError::TargetBlocked { target: self.target });
             }
         }
         for change in changes {
@@ -160,12 +152,7 @@ impl Domain {
 
     fn checked_index(&self, cell: Cell, what: &'static str) -> Result<usize, SolveError> {
         if cell.col >= self.width || cell.row >= self.height {
-            return Err(SolveError::Outside {
-                what,
-                cell,
-                width: self.width,
-                height: self.height,
-            });
+            return Err(SolveError::Outside { what, cell, width: self.width, height: self.height });
         }
         Ok(self.index(cell))
     }

@@ -21,19 +21,10 @@ pub enum SolveError {
     #[error(
         "{what} has {found} values, the map {expected} cells: give one value a cell, row by row"
     )]
-    WrongLength {
-        what: &'static str,
-        found: usize,
-        expected: usize,
-    },
+    WrongLength { what: &'static str, found: usize, expected: usize },
     /// A cell was named that the map does not have.
     #[error("{what} (column {}, row {}) lies outside the map of {width} x {height} cells", cell.col, cell.row)]
-    Outside {
-        what: &'static str,
-        cell: Cell,
-        width: usize,
-        height: usize,
-    },
+    Outside { what: &'static str, cell: Cell, width: usize, height: usize },
     /// The target is on a blocked cell.
     #[error("the target (column {}, row {}) is blocked: choose a free cell or free that one", target.col, target.row)]
     TargetBlocked { target: Cell },

@@ -44,10 +44,7 @@ impl Field {
         if self.u_at(here.0, here.1).is_zero() {
             return Guidance::Unreachable;
         }
-        let cell = Cell {
-            col: here.0 as usize,
-            row: here.1 as usize,
-        };
+        let cell = Cell { col: here.0 as usize, row: here.1 as usize };
         if cell == self.target() {
             return Guidance::AtTarget;
         }
@@ -64,10 +61,7 @@ impl Field {
                 self.steepest_ascent(c, r).map(|step| step as f64)
             });
             let ascent = self.without_wall_component(here, position, ascent);
-            total = [
-                allowed[0] + removed * ascent[0],
-                allowed[1] + removed * ascent[1],
-            ];
+            total = [allowed[0] + removed * ascent[0], allowed[1] + removed * ascent[1]];
         }
         unit(total, SADDLE)
             .or_else(|| self.toward_best_neighbour(here, position))
@@ -170,26 +164,13 @@ impl Field {
         let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
         let blocked = |dc: i64, dr: i64| self.blocked_at(here.0 + dc, here.1 + dr);
         let mut allowed = gradient;
-        for (dc, dr) in [
-            (1, 0),
-            (-1, 0),
-            (0, 1),
-            (0, -1),
-            (1, 1),
-            (-1, 1),
-            (1, -1),
-            (-1, -1),
-        ] {
+        for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
             let diagonal = dc != 0 && dr != 0;
             if !blocked(dc, dr) || (diagonal && (blocked(dc, 0) || blocked(0, dr))) {
                 continue;
             }
             let component = |step: i64, o: f64| {
-                if step == 0 {
-                    0.0
-                } else {
-                    step as f64 * 0.5 - o
-                }
+                if step == 0 { 0.0 } else { step as f64 * 0.5 - o }
             };
             let toward = [component(dc, offset[0]), component(dr, offset[1])];
             let distance = toward[0].hypot(toward[1]);
@@ -205,10 +186,7 @@ impl Field {
             let inward = allowed[0] * normal[0] + allowed[1] * normal[1];
             if inward > 0.0 {
                 let share = inward * (1.0 - distance / WALL_REACH);
-                allowed = [
-                    allowed[0] - share * normal[0],
-                    allowed[1] - share * normal[1],
-                ];
+                allowed = [allowed[0] - share * normal[0], allowed[1] - share * normal[1]];
             }
         }
         allowed
@@ -218,23 +196,14 @@ impl Field {
     /// there is free from anywhere in this one, and leads away from every wall it touches.
     fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
         let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
-        unit(
-            [
-                here.0 as f64 + dc - position[0],
-                here.1 as f64 + dr - position[1],
-            ],
-            0.0,
-        )
+        unit([here.0 as f64 + dc - position[0], here.1 as f64 + dr - position[1]], 0.0)
     }
 
     /// The direction to the centre of the nearest reachable cell, by rings of growing distance.
     fn way_out(&self, col: f64, row: f64) -> Guidance {
         let (width, height) = (self.width() as i64, self.height() as i64);
         // Far outside, the search starts at the map's own rim.
-        let from = (
-            (col.round() as i64).clamp(-1, width),
-            (row.round() as i64).clamp(-1, height),
-        );
+        let from = ((col.round() as i64).clamp(-1, width), (row.round() as i64).clamp(-1, height));
         let mut best: Option<(f64, (i64, i64))> = None;
         for ring in 1..=width.max(height) + 1 {
             // Every cell of this ring and beyond is at least `ring` away.
@@ -264,22 +233,17 @@ fn ring_cells(
 ) -> impl Iterator<Item = (i64, i64)> {
     let columns = (centre.0 - ring).max(0)..=(centre.0 + ring).min(width - 1);
     let rows = (centre.1 - ring + 1).max(0)..=(centre.1 + ring - 1).min(height - 1);
-    let edges = [centre.1 - ring, centre.1 + ring]
-        .into_iter()
-        .filter(move |r| (0..height).contains(r));
-    let sides = [centre.0 - ring, centre.0 + ring]
-        .into_iter()
-        .filter(move |c| (0..width).contains(c));
+    let edges =
+        [centre.1 - ring, centre.1 + ring].into_iter().filter(move |r| (0..height).contains(r));
+    let sides =
+        [centre.0 - ring, centre.0 + ring].into_iter().filter(move |c| (0..width).contains(c));
     edges
         .flat_map(move |r| columns.clone().map(move |c| (c, r)))
         .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
 }
 
 fn toward(cell: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
-    unit(
-        [cell.0 as f64 - position[0], cell.1 as f64 - position[1]],
-        0.0,
-    )
+    unit([cell.0 as f64 - position[0], cell.1 as f64 - position[1]], 0.0)
 }
 
 /// `vector` at unit length, or `None` if it is no longer than `least`.

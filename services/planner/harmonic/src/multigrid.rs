@@ -162,12 +162,7 @@ impl<R: Real> Multigrid<R> {
     pub(crate) fn start(&mut self, target: Cell) {
         let (plane, at) = self.finest.grid.locate(target.col, target.row);
         let value = R::of(pow2(R::TOP));
-        self.finest.sources = vec![Source {
-            plane,
-            row: target.row / 2,
-            at,
-            value,
-        }];
+        self.finest.sources = vec![Source { plane, row: target.row / 2, at, value }];
         self.start_from_sources();
     }
 
@@ -194,12 +189,7 @@ impl<R: Real> Multigrid<R> {
         let around = around + u(Some(col), row.checked_sub(1)) + u(Some(col), Some(row + 1));
         let (plane, at) = grid.locate(col, row);
         let value = finest.inverse[plane][at].inverse() * finest.u[plane][at] - around;
-        finest.sources = vec![Source {
-            plane,
-            row: row / 2,
-            at,
-            value,
-        }];
+        finest.sources = vec![Source { plane, row: row / 2, at, value }];
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
         }
@@ -252,16 +242,9 @@ impl<R: Real> Multigrid<R> {
         finest.sources.clear();
         finest.sources.extend(inflow.map(|(cell, value)| {
             let (plane, at) = grid.locate(cell.col, cell.row);
-            Source {
-                plane,
-                row: cell.row / 2,
-                at,
-                value,
-            }
+            Source { plane, row: cell.row / 2, at, value }
         }));
-        finest
-            .sources
-            .sort_unstable_by_key(|source| (source.plane, source.row));
+        finest.sources.sort_unstable_by_key(|source| (source.plane, source.row));
         self.set_up_levels(0..height);
         for plane in &mut self.coarse[0].u {
             plane.fill(R::default());
@@ -281,11 +264,7 @@ impl<R: Real> Multigrid<R> {
     /// One cycle; a cell whose direction its correction turns by more than `tolerance`, radians, counts as unsettled. None
     /// are counted without one.
     pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> Progress {
-        let sweeps = if self.corrects && self.is_large() {
-            SWEEPS
-        } else {
-            1
-        };
+        let sweeps = if self.corrects && self.is_large() { SWEEPS } else { 1 };
         let progress = self.pass(sweeps, true, tolerance);
         self.correct();
         progress
@@ -313,11 +292,7 @@ impl<R: Real> Multigrid<R> {
         }
         self.descend(level);
         self.solve_level(level + 1);
-        let overcorrection = if self.is_large() {
-            COARSE_OVERCORRECTION
-        } else {
-            1.0
-        };
+        let overcorrection = if self.is_large() { COARSE_OVERCORRECTION } else { 1.0 };
         self.ascend(level, R::of(overcorrection));
     }
 
@@ -357,12 +332,7 @@ impl<R: Real> Multigrid<R> {
     fn pass(&mut self, sweeps: usize, descend: bool, tolerance: Option<f64>) -> Progress {
         let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
         let share = if self.corrects { OVERCORRECTION } else { 1.0 };
-        let work = Work {
-            share: R::of(share),
-            sweeps,
-            descend,
-            tolerance: tolerance.map(R::of),
-        };
+        let work = Work { share: R::of(share), sweeps, descend, tolerance: tolerance.map(R::of) };
         self.simd.run(
             #[inline(always)]
             || finest.pass(next, work),
@@ -394,11 +364,7 @@ impl<R: Real> Multigrid<R> {
             grid::join_row(grid, &self.finest.inverse, row, R::ONE, &mut inverse);
             for ((out, u), inverse) in out.iter_mut().zip(&u).zip(&inverse) {
                 // Cells that have not converged may be below zero; the verification finds a zero there.
-                let u = if *u > R::default() {
-                    *u * scale
-                } else {
-                    R::default()
-                };
+                let u = if *u > R::default() { *u * scale } else { R::default() };
                 *out = if *inverse > R::default() { u } else { blocked };
             }
         }

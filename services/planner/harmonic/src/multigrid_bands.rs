@@ -35,16 +35,9 @@ pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Stor
     while let Some((top, inflow)) = inflow(domain, &u) {
         for (index, inverse) in inverse.iter_mut().enumerate() {
             let open = !domain.blocked()[index] && u[index].is_zero();
-            *inverse = if open {
-                0.25 / (1.0 + domain.screening_coefficient(index))
-            } else {
-                0.0
-            };
+            *inverse = if open { 0.25 / (1.0 + domain.screening_coefficient(index)) } else { 0.0 };
         }
-        levels.load(
-            |row| (&inverse[row * width..(row + 1) * width], &guess),
-            inflow.into_iter(),
-        );
+        levels.load(|row| (&inverse[row * width..(row + 1) * width], &guess), inflow.into_iter());
         levels.start_from_sources();
         for cycle in 0..CYCLES {
             cancellation.check()?;
@@ -91,11 +84,8 @@ fn inflow(domain: &Domain, u: &[Scaled]) -> Option<(i32, Vec<(Cell, f64)>)> {
     }
     let top = edges.iter().map(|(_, u)| u.exponent).max()?;
     let scale = pow2(f64::TOP);
-    let inflow = edges.into_iter().map(|(to, u)| {
-        (
-            Cell::new(to % width, to / width),
-            u.relative_to(top) * scale,
-        )
-    });
+    let inflow = edges
+        .into_iter()
+        .map(|(to, u)| (Cell::new(to % width, to / width), u.relative_to(top) * scale));
     Some((top, inflow.filter(|(_, value)| *value > 0.0).collect()))
 }

@@ -50,10 +50,7 @@ impl Field {
 
     /// The policy of any cell.
     fn policy(&self, cell: Cell) -> Policy {
-        Policy {
-            direction: self.direction(cell).unwrap_or_default(),
-            log2_u: self.u(cell).log2(),
-        }
+        Policy { direction: self.direction(cell).unwrap_or_default(), log2_u: self.u(cell).log2() }
     }
 
     /// The policy of `cell`; `rows` are that above it, its own and that below, as stored.
@@ -69,10 +66,7 @@ impl Field {
         }
         // Blocked cells are negative, and count as 0.
         let u = |there: T| -> f64 { Into::<f64>::into(there).max(0.0) / own };
-        let gradient = [
-            0.5 * (u(*right) - u(row[col - 1])),
-            0.5 * (u(below[col]) - u(above[col])),
-        ];
+        let gradient = [0.5 * (u(*right) - u(row[col - 1])), 0.5 * (u(below[col]) - u(above[col]))];
         let square = gradient[0] * gradient[0] + gradient[1] * gradient[1];
         let plain = square > SADDLE * SADDLE && square.is_finite() && cell != self.target();
         if !plain {
@@ -87,10 +81,7 @@ impl Field {
 }
 
 /// The policy of a cell that is blocked or cut off.
-const NONE: Policy = Policy {
-    direction: [0.0; 2],
-    log2_u: f64::NEG_INFINITY,
-};
+const NONE: Policy = Policy { direction: [0.0; 2], log2_u: f64::NEG_INFINITY };
 
 #[cfg(test)]
 mod tests {
@@ -102,9 +93,7 @@ mod tests {
         let mut blocked = Vec::new();
         for row in 0..side {
             for col in 0..side {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1);
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                 let rim = row == 0 || col == 0 || row == side - 1 || col == side - 1;
                 let cut_off = row < 7 && col < 7 && (row == 6 || col == 6);
                 let some = (state >> 33) % 100 < 12;

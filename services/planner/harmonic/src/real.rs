@@ -31,32 +31,20 @@ pub(crate) trait Real:
     /// 1 / self where positive, 0 elsewhere: how inactive cells drop out of every sum.
     #[inline(always)]
     fn inverse(self) -> Self {
-        if self > Self::default() {
-            Self::ONE / self
-        } else {
-            Self::default()
-        }
+        if self > Self::default() { Self::ONE / self } else { Self::default() }
     }
 
     /// The number, or 0 for one so small that it, or its product with a weight, would be subnormal: those cost a hundred
     /// times as much as others, and the first cycles are full of them.
     #[inline(always)]
     fn flushed(self) -> Self {
-        if self.size() > Self::TINY {
-            self
-        } else {
-            Self::default()
-        }
+        if self.size() > Self::TINY { self } else { Self::default() }
     }
 
     /// 1 where positive, 0 elsewhere.
     #[inline(always)]
     fn is_active(self) -> Self {
-        if self > Self::default() {
-            Self::ONE
-        } else {
-            Self::default()
-        }
+        if self > Self::default() { Self::ONE } else { Self::default() }
     }
 }
 

@@ -8,14 +8,8 @@ pub struct Scaled {
 }
 
 impl Scaled {
-    pub const ZERO: Self = Self {
-        mantissa: 0.0,
-        exponent: 0,
-    };
-    pub const ONE: Self = Self {
-        mantissa: 1.0,
-        exponent: 0,
-    };
+    pub const ZERO: Self = Self { mantissa: 0.0, exponent: 0 };
+    pub const ONE: Self = Self { mantissa: 1.0, exponent: 0 };
 
     /// `value` * 2^`exponent`. Whatever is not a positive finite number becomes zero.
     pub fn new(value: f64, exponent: i32) -> Self {
@@ -31,10 +25,7 @@ impl Scaled {
         let bits = value.to_bits();
         let own = ((bits >> 52) & 0x7ff) as i32 - 1023;
         let mantissa = f64::from_bits((bits & 0x000f_ffff_ffff_ffff) | (1023 << 52));
-        Self {
-            mantissa,
-            exponent: exponent.saturating_add(own),
-        }
+        Self { mantissa, exponent: exponent.saturating_add(own) }
     }
 
     pub fn is_zero(self) -> bool {

@@ -50,9 +50,7 @@ impl Coefficients {
             Screening::None => Self::NONE,
             Screening::Uniform { length, cell } => Self::Uniform(coefficient(*length, *cell)),
             Screening::PerCell(lengths) => {
-                let k = lengths
-                    .iter()
-                    .map(|&length| coefficient(f64::from(length), 1.0) as f32);
+                let k = lengths.iter().map(|&length| coefficient(f64::from(length), 1.0) as f32);
                 Self::PerCell(k.collect())
             }
         }
@@ -95,9 +93,6 @@ mod tests {
             assert!((decay * length - 1.0).abs() < 1e-3, "{decay} a metre");
         }
         assert_eq!(Coefficients::of(&Screening::None).at(0), 0.0);
-        assert_eq!(
-            Coefficients::of(&Screening::cells(f64::INFINITY)).at(0),
-            0.0
-        );
+        assert_eq!(Coefficients::of(&Screening::cells(f64::INFINITY)).at(0), 0.0);
     }
 }

@@ -61,10 +61,7 @@ pub struct Settings {
 impl Default for Settings {
     /// One thread, 2 GiB.
     fn default() -> Self {
-        Self {
-            threads: NonZeroUsize::MIN,
-            memory_limit: 2 << 30,
-        }
+        Self { threads: NonZeroUsize::MIN, memory_limit: 2 << 30 }
     }
 }
 
@@ -95,10 +92,7 @@ pub struct Solver {
 impl Solver {
     /// A solver without a set-up.
     pub fn new(settings: Settings) -> Self {
-        Self {
-            settings,
-            ..Self::default()
-        }
+        Self { settings, ..Self::default() }
     }
 
     /// The verified field of `domain`.
@@ -161,12 +155,7 @@ pub(super) struct Prepared<R> {
 
 impl<R> Default for Prepared<R> {
     fn default() -> Self {
-        Self {
-            levels: None,
-            width: 0,
-            blocked: Vec::new(),
-            screening: Coefficients::NONE,
-        }
+        Self { levels: None, width: 0, blocked: Vec::new(), screening: Coefficients::NONE }
     }
 }
 
@@ -180,11 +169,7 @@ impl Solver {
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
         let threads = self.settings.threads;
-        let task = Task {
-            threads,
-            domain,
-            cancellation,
-        };
+        let task = Task { threads, domain, cancellation };
         cancellation.check()?;
         let budget = Budget::of(domain, self.settings.memory_limit);
         if let Some(near) = near.filter(|near| near.fits(domain)) {
@@ -272,11 +257,7 @@ where
         most_cycles: usize,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<(Store, Check), SolveError> {
-        let Task {
-            threads,
-            domain,
-            cancellation,
-        } = task;
+        let Task { threads, domain, cancellation } = task;
         let levels = self.prepare(domain);
         observe(Phase::SetUp);
         let mut next_check = FIRST_CHECK;
@@ -330,9 +311,8 @@ where
         if !same_size {
             self.levels = None;
         }
-        let levels = self
-            .levels
-            .get_or_insert_with(|| Multigrid::new(domain.width(), domain.height()));
+        let levels =
+            self.levels.get_or_insert_with(|| Multigrid::new(domain.width(), domain.height()));
         if let Some(rows) = changed {
             levels.set_up_rows(domain, rows);
             self.width = domain.width();

@@ -16,10 +16,7 @@ pub(crate) enum Store {
     /// All of u fits an `f64` with one common exponent.
     Double { values: Vec<f64>, exponent: i32 },
     /// A mantissa and an exponent a cell.
-    Extended {
-        mantissas: Vec<f64>,
-        exponents: Vec<i32>,
-    },
+    Extended { mantissas: Vec<f64>, exponents: Vec<i32> },
 }
 
 /// From u times 2^TOP.
@@ -44,10 +41,7 @@ impl Store {
         match self {
             Self::Single { values, exponent } => (f64::from(values[index]), *exponent),
             Self::Double { values, exponent } => (values[index], *exponent),
-            Self::Extended {
-                mantissas,
-                exponents,
-            } => (mantissas[index], exponents[index]),
+            Self::Extended { mantissas, exponents } => (mantissas[index], exponents[index]),
         }
     }
 
@@ -56,34 +50,20 @@ impl Store {
         let u = Scaled::new(value, exponent);
         // 0 and BLOCKED have no exponent to fit.
         let plain = |common: i32| {
-            if value > 0.0 {
-                u.relative_to(common)
-            } else {
-                value
-            }
+            if value > 0.0 { u.relative_to(common) } else { value }
         };
         match self {
-            Self::Single {
-                values,
-                exponent: common,
-            } if fits(
-                plain(*common),
-                f64::from(f32::MIN_POSITIVE),
-                f64::from(f32::MAX),
-            ) =>
+            Self::Single { values, exponent: common }
+                if fits(plain(*common), f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) =>
             {
                 values[index] = plain(*common) as f32;
             }
-            Self::Double {
-                values,
-                exponent: common,
-            } if fits(plain(*common), f64::MIN_POSITIVE, f64::MAX) => {
+            Self::Double { values, exponent: common }
+                if fits(plain(*common), f64::MIN_POSITIVE, f64::MAX) =>
+            {
                 values[index] = plain(*common);
             }
-            Self::Extended {
-                mantissas,
-                exponents,
-            } => {
+            Self::Extended { mantissas, exponents } => {
                 mantissas[index] = if value > 0.0 { u.mantissa } else { value };
                 exponents[index] = u.exponent;
             }
@@ -125,10 +105,7 @@ impl Store {
             Self::Extended { .. } => return,
         };
         let (mantissas, exponents) = (0..len).map(|index| self.raw(index)).unzip();
-        *self = Self::Extended {
-            mantissas,
-            exponents,
-        };
+        *self = Self::Extended { mantissas, exponents };
     }
 }
 

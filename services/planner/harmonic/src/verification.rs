@@ -54,12 +54,9 @@ pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Ch
         Store::Double { values, .. } => {
             in_strips(domain, threads, |rows| check_plain(domain, values, rows))
         }
-        Store::Extended {
-            mantissas,
-            exponents,
-        } => in_strips(domain, threads, |rows| {
-            check_extended(domain, mantissas, exponents, rows)
-        }),
+        Store::Extended { mantissas, exponents } => {
+            in_strips(domain, threads, |rows| check_extended(domain, mantissas, exponents, rows))
+        }
     };
     // The target is positive by construction and was left out.
     found.reachable += 1;
@@ -73,10 +70,7 @@ fn in_strips(
     check: impl Fn(Range<usize>) -> Check + Sync,
 ) -> Check {
     let height = domain.height();
-    let strips = threads
-        .get()
-        .min(domain.blocked().len() / CELLS_PER_THREAD)
-        .max(1);
+    let strips = threads.get().min(domain.blocked().len() / CELLS_PER_THREAD).max(1);
     if strips == 1 {
         return check(0..height);
     }
@@ -85,19 +79,12 @@ fn in_strips(
     let rows = |strip: usize| start(strip)..start(strip + 1);
     let check = &check;
     std::thread::scope(|scope| {
-        let others: Vec<_> = (1..strips)
-            .map(|strip| scope.spawn(move || check(rows(strip))))
-            .collect();
+        let others: Vec<_> =
+            (1..strips).map(|strip| scope.spawn(move || check(rows(strip)))).collect();
         let first = check(rows(0));
         // A thread that panicked has verified nothing.
-        let failed = Check {
-            worst_residual: f64::INFINITY,
-            ..Check::default()
-        };
-        others
-            .into_iter()
-            .map(|other| other.join().unwrap_or(failed))
-            .fold(first, Check::and)
+        let failed = Check { worst_residual: f64::INFINITY, ..Check::default() };
+        others.into_iter().map(|other| other.join().unwrap_or(failed)).fold(first, Check::and)
     })
 }
 
@@ -176,19 +163,12 @@ mod tests {
     {
         for (side, k) in [(512, 1.9e-4_f64), (512, 2e-5), (128, 1.9e-4)] {
             let domain = hall(side);
-            let screened = domain
-                .clone()
-                .with_screening(&Screening::cells(0.5 / k.sqrt()));
+            let screened = domain.clone().with_screening(&Screening::cells(0.5 / k.sqrt()));
             let mut solver = Solver::default();
-            let wrong = solver
-                .solve(&screened.unwrap(), &Cancellation::new())
-                .unwrap();
+            let wrong = solver.solve(&screened.unwrap(), &Cancellation::new()).unwrap();
             let threads = NonZeroUsize::MIN;
             let found = check(&domain, wrong.store(), threads);
-            assert!(
-                found.worst_residual < RESIDUAL_LIMIT || k > 1.8e-4,
-                "{found:?}"
-            );
+            assert!(found.worst_residual < RESIDUAL_LIMIT || k > 1.8e-4, "{found:?}");
             assert!(found.worst_tile > TILE_LIMIT, "{found:?}");
             let right = solver.solve(&domain, &Cancellation::new()).unwrap();
             let found = check(&domain, right.store(), threads);
@@ -199,9 +179,7 @@ mod tests {
     #[test]
     fn a_field_with_an_exponent_a_cell_is_checked_as_one_with_a_common_exponent_is() {
         let domain = hall(128);
-        let field = Solver::default()
-            .solve(&domain, &Cancellation::new())
-            .unwrap();
+        let field = Solver::default().solve(&domain, &Cancellation::new()).unwrap();
         let place = domain.index(Cell::new(90, 70));
         for factor in [1.0, 1.001, 3.0, 0.0, f64::NAN, f64::INFINITY] {
             let u = |index: usize| field.store().u(index);
@@ -209,15 +187,7 @@ mod tests {
             let factor = |index: usize| if index == place { factor } else { 1.0 };
             let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
                 let cells = 0..domain.blocked().len();
-                cells
-                    .map(|index| {
-                        if blocked(index) {
-                            BLOCKED
-                        } else {
-                            value(index)
-                        }
-                    })
-                    .collect()
+                cells.map(|index| if blocked(index) { BLOCKED } else { value(index) }).collect()
             };
             let common = Store::Double {
                 values: of(&|index| u(index).relative_to(0) * factor(index)),
@@ -225,9 +195,7 @@ mod tests {
             };
             let extended = Store::Extended {
                 mantissas: of(&|index| u(index).mantissa * factor(index)),
-                exponents: (0..domain.blocked().len())
-                    .map(|index| u(index).exponent)
-                    .collect(),
+                exponents: (0..domain.blocked().len()).map(|index| u(index).exponent).collect(),
             };
             let [common, extended] =
                 [common, extended].map(|store| check(&domain, &store, NonZeroUsize::MIN));

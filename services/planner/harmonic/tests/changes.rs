@@ -1,8 +1,5 @@
 //! Directions after cells changed, where each solve starts from the field before: those of a solve from scratch.
-#![allow(
-    clippy::expect_used,
-    reason = "helpers of tests may stop at the first broken promise"
-)]
+#![allow(clippy::expect_used, reason = "helpers of tests may stop at the first broken promise")]
 
 use harmonic::testing::{Angles, Kind, Map, Random, exact, follow};
 use harmonic::{Cancellation, Cell, Change, Domain, Field, Solver};
@@ -18,14 +15,8 @@ impl Case {
     fn new(map: &Map) -> Self {
         let domain = map.domain().expect("a valid map");
         let mut solver = Solver::default();
-        let field = solver
-            .solve(&domain, &Cancellation::new())
-            .expect("the map has a field");
-        Self {
-            solver,
-            domain,
-            field,
-        }
+        let field = solver.solve(&domain, &Cancellation::new()).expect("the map has a field");
+        Self { solver, domain, field }
     }
 
     fn change(&mut self, changes: &[Change]) {
@@ -44,10 +35,7 @@ impl Case {
                 (col.max(1)..(col + width).min(right)).map(move |col| Cell::new(col, row))
             })
             .filter(|&cell| cell != self.domain.target() && !self.domain.is_blocked(cell))
-            .map(|cell| Change {
-                cell,
-                blocked: true,
-            })
+            .map(|cell| Change { cell, blocked: true })
             .collect()
     }
 

@@ -9,9 +9,7 @@ use harmonic::testing::{Kind, Map, Reference, follow};
 use harmonic::{Cancellation, Cell, Domain, Field, Method, Screening, SolveError, Solver};
 
 fn solve(domain: &Domain) -> Field {
-    Solver::default()
-        .solve(domain, &Cancellation::new())
-        .expect("the map has a field")
+    Solver::default().solve(domain, &Cancellation::new()).expect("the map has a field")
 }
 
 /// The screening of coefficient `k`: u is the mean of the four neighbours over 1 + k.
@@ -29,20 +27,10 @@ fn assert_right(map: &Map, name: &str) {
         "{name}: the reference itself is off by {}",
         reference.worst_residual
     );
-    assert_eq!(
-        follow(&field),
-        1.0,
-        "{name}: some cell does not lead to the target"
-    );
+    assert_eq!(follow(&field), 1.0, "{name}: some cell does not lead to the target");
     let (off, worst) = reference.compare(&field);
-    assert!(
-        off <= 1e-3,
-        "{name}: {off} of the directions are off by more than a degree"
-    );
-    assert!(
-        worst <= 1.0,
-        "{name}: a clear direction is off by {worst} degrees"
-    );
+    assert!(off <= 1e-3, "{name}: {off} of the directions are off by more than a degree");
+    assert!(worst <= 1.0, "{name}: a clear direction is off by {worst} degrees");
 }
 
 #[test]
@@ -58,10 +46,7 @@ fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
             Kind::Trap,
             Kind::Noise { density: 0.3 },
         ] {
-            assert_right(
-                &Map::generate(kind, 60, 75, seed),
-                &format!("{kind:?}, seed {seed}"),
-            );
+            assert_right(&Map::generate(kind, 60, 75, seed), &format!("{kind:?}, seed {seed}"));
         }
     }
 }
@@ -69,10 +54,7 @@ fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
 #[test]
 fn directions_are_within_a_degree_on_maps_large_enough_to_solve_coarse_levels_twice() {
     for kind in [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap] {
-        assert_right(
-            &Map::generate(kind, 100, 260, 1),
-            &format!("{kind:?} of 260 rows"),
-        );
+        assert_right(&Map::generate(kind, 100, 260, 1), &format!("{kind:?} of 260 rows"));
     }
 }
 
@@ -81,9 +63,7 @@ fn directions_are_within_a_degree_in_mazes_with_enough_passages_to_factorise_in_
     for corridor in [1, 2, 4] {
         let map = Map::generate(Kind::Maze { corridor }, 170, 150, 2);
         assert_eq!(
-            solve(&map.domain().expect("a valid map"))
-                .verification()
-                .method,
+            solve(&map.domain().expect("a valid map")).verification().method,
             Method::Multifrontal
         );
         assert_right(&map, &format!("a maze with corridors of {corridor}"));
@@ -94,11 +74,7 @@ fn directions_are_within_a_degree_in_mazes_with_enough_passages_to_factorise_in_
 fn the_field_holds_down_to_ten_to_the_minus_twenty_thousand() {
     let map = Map::generate(Kind::Serpentine { corridor: 2 }, 40, 4200, 0);
     let field = solve(&map.domain().expect("a valid map"));
-    assert!(
-        field.log10_u_min() < -20_000.0,
-        "only down to 1e{}",
-        field.log10_u_min()
-    );
+    assert!(field.log10_u_min() < -20_000.0, "only down to 1e{}", field.log10_u_min());
     assert_right(&map, "a serpentine of 4200 rows");
 }
 
@@ -114,26 +90,14 @@ fn a_strip_of_one_cell_falls_by_two_minus_root_three_a_cell() {
 #[test]
 fn invalid_domains_are_refused_with_the_reason() {
     let at = Cell::new(0, 0);
-    assert!(matches!(
-        Domain::new(0, 3, vec![], at),
-        Err(SolveError::MapEmpty { .. })
-    ));
-    assert!(matches!(
-        Domain::new(20_000, 1, vec![], at),
-        Err(SolveError::MapTooLarge { .. })
-    ));
-    assert!(matches!(
-        Domain::new(2, 2, vec![false; 3], at),
-        Err(SolveError::WrongLength { .. })
-    ));
+    assert!(matches!(Domain::new(0, 3, vec![], at), Err(SolveError::MapEmpty { .. })));
+    assert!(matches!(Domain::new(20_000, 1, vec![], at), Err(SolveError::MapTooLarge { .. })));
+    assert!(matches!(Domain::new(2, 2, vec![false; 3], at), Err(SolveError::WrongLength { .. })));
     assert!(matches!(
         Domain::new(2, 2, vec![false; 4], Cell::new(2, 0)),
         Err(SolveError::Outside { .. })
     ));
-    assert!(matches!(
-        Domain::new(1, 1, vec![true], at),
-        Err(SolveError::TargetBlocked { .. })
-    ));
+    assert!(matches!(Domain::new(1, 1, vec![true], at), Err(SolveError::TargetBlocked { .. })));
     for length in [0.0, -3.0, 1e-4, f64::NAN] {
         let domain = Domain::new(2, 2, vec![false; 4], at).expect("a valid map");
         assert!(
@@ -151,19 +115,14 @@ fn a_cancelled_solve_says_so() {
     let cancellation = Cancellation::new();
     cancellation.clone().cancel();
     let domain = Domain::new(3, 3, vec![false; 9], Cell::new(1, 1)).expect("a valid map");
-    assert_eq!(
-        Solver::default().solve(&domain, &cancellation).err(),
-        Some(SolveError::Cancelled)
-    );
+    assert_eq!(Solver::default().solve(&domain, &cancellation).err(), Some(SolveError::Cancelled));
 }
 
 #[test]
 fn a_screened_strip_falls_as_its_difference_equation_does() {
     // u_i = (u_(i-1) + u_(i+1)) / (4 (1 + k)) has the decaying solution (a - sqrt(a^2 - 1))^i, a = 2 (1 + k).
     let domain = Domain::new(600, 1, vec![false; 600], Cell::new(0, 0)).expect("a valid map");
-    let domain = domain
-        .with_screening(&screening(0.3))
-        .expect("a valid screening");
+    let domain = domain.with_screening(&screening(0.3)).expect("a valid screening");
     let a = 2.6_f64;
     let expected = 300.0 * (a - (a * a - 1.0).sqrt()).log10();
     assert!((solve(&domain).u(Cell::new(300, 0)).log10() - expected).abs() < 1e-3);
@@ -173,9 +132,7 @@ fn a_screened_strip_falls_as_its_difference_equation_does() {
 fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() {
     let (n, centre, radius) = (161_usize, 80.0, 75.0);
     let from_centre = |i: usize| ((i % n) as f64 - centre, (i / n) as f64 - centre);
-    let blocked = (0..n * n)
-        .map(|i| from_centre(i).0.hypot(from_centre(i).1) >= radius)
-        .collect();
+    let blocked = (0..n * n).map(|i| from_centre(i).0.hypot(from_centre(i).1) >= radius).collect();
     let domain = Domain::new(n, n, blocked, Cell::new(80, 80)).expect("a valid map");
     let field = solve(&domain);
     let u = |r: usize| field.u(Cell::new(80 + r, 80)).relative_to(0);
@@ -186,13 +143,8 @@ fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() 
     for i in 0..n * n {
         let (x, y) = from_centre(i);
         if (10.0..60.0).contains(&x.hypot(y)) {
-            let direction = field
-                .direction(Cell::new(i % n, i / n))
-                .expect("free space");
-            assert!(
-                harmonic::testing::angle(direction, [-x, -y]) < 1.5,
-                "at {x}, {y}"
-            );
+            let direction = field.direction(Cell::new(i % n, i / n)).expect("free space");
+            assert!(harmonic::testing::angle(direction, [-x, -y]) < 1.5, "at {x}, {y}");
         }
     }
 }
@@ -200,18 +152,9 @@ fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() 
 #[test]
 fn screening_keeps_directions_within_a_degree_of_the_reference() {
     for k in [0.002, 0.02, 0.5] {
-        for kind in [
-            Kind::Drums,
-            Kind::Office,
-            Kind::Trap,
-            Kind::Maze { corridor: 4 },
-        ] {
-            let domain = Map::generate(kind, 60, 75, 1)
-                .domain()
-                .expect("a valid map");
-            let domain = domain
-                .with_screening(&screening(k))
-                .expect("a valid screening");
+        for kind in [Kind::Drums, Kind::Office, Kind::Trap, Kind::Maze { corridor: 4 }] {
+            let domain = Map::generate(kind, 60, 75, 1).domain().expect("a valid map");
+            let domain = domain.with_screening(&screening(k)).expect("a valid screening");
             let (off, worst) = Reference::solve(&domain).compare(&solve(&domain));
             assert!(
                 off <= 1e-3 && worst <= 1.0,
@@ -225,22 +168,13 @@ fn screening_keeps_directions_within_a_degree_of_the_reference() {
 fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
     let map = Map::generate(Kind::Empty, 60, 800, 1);
     let domain = map.domain().expect("a valid map");
-    let domain = domain
-        .with_screening(&screening(5.0))
-        .expect("a valid screening");
+    let domain = domain.with_screening(&screening(5.0)).expect("a valid screening");
     let field = solve(&domain);
-    assert!(
-        field.log10_u_min() < -700.0,
-        "only down to 1e{}",
-        field.log10_u_min()
-    );
+    assert!(field.log10_u_min() < -700.0, "only down to 1e{}", field.log10_u_min());
     assert_eq!(field.verification().method, Method::MultigridBands);
     assert_eq!(follow(&field), 1.0);
     let (off, worst) = Reference::solve(&domain).compare(&field);
-    assert!(
-        off <= 1e-3 && worst <= 1.0,
-        "{off} off, worst {worst} degrees"
-    );
+    assert!(off <= 1e-3 && worst <= 1.0, "{off} off, worst {worst} degrees");
 }
 
 #[test]
@@ -256,9 +190,7 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
     assert_eq!(follow(&field), 1.0);
     let toward = |col: usize| field.direction(Cell::new(col, 22)).expect("a direction")[0].signum();
     assert_eq!((toward(100), toward(1400)), (-1.0, 1.0));
-    let turn = (100..1400)
-        .find(|&col| toward(col) > 0.0)
-        .expect("a turning point");
+    let turn = (100..1400).find(|&col| toward(col) > 0.0).expect("a turning point");
     // Where both ways cost the same: 0.572 x = 0.0647 * 1500 + 0.572 (1490 - x), roughly.
     assert!((780..900).contains(&turn), "the way turns at column {turn}");
 }

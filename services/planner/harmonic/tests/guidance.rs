@@ -9,15 +9,11 @@ use harmonic::testing::{Kind, Map, Random, angle};
 use harmonic::{Cancellation, Cell, Domain, Field, Guidance, Solver};
 
 fn solve(domain: &Domain) -> Field {
-    Solver::default()
-        .solve(domain, &Cancellation::new())
-        .expect("the map has a field")
+    Solver::default().solve(domain, &Cancellation::new()).expect("the map has a field")
 }
 
 fn generated(kind: Kind, seed: u64) -> (Domain, Field) {
-    let domain = Map::generate(kind, 40, 30, seed)
-        .domain()
-        .expect("a valid map");
+    let domain = Map::generate(kind, 40, 30, seed).domain().expect("a valid map");
     let field = solve(&domain);
     (domain, field)
 }
@@ -49,10 +45,7 @@ fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell(
                     Guidance::AtTarget => break,
                     other => panic!("{kind:?}: {other:?} at {at:?}, from {start:?}"),
                 }
-                assert!(
-                    step < 200_000,
-                    "{kind:?}: no arrival from {start:?}, stuck at {at:?}"
-                );
+                assert!(step < 200_000, "{kind:?}: no arrival from {start:?}, stuck at {at:?}");
                 assert!(
                     !domain.is_blocked(Cell::new(at[0].round() as usize, at[1].round() as usize)),
                     "{kind:?} {at:?}"
@@ -108,17 +101,10 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
         // Just left and just right of the border between two cells, and of a line of centres.
         for border in [col as f64 + 0.5, col as f64] {
             let y = row as f64 + random.between(-0.49, 0.49);
-            let (a, b) = (
-                field.guidance(border - 1e-7, y),
-                field.guidance(border + 1e-7, y),
-            );
+            let (a, b) = (field.guidance(border - 1e-7, y), field.guidance(border + 1e-7, y));
             if let (Guidance::Along(a), Guidance::Along(b)) = (a, b) {
                 compared += 1;
-                assert!(
-                    angle(a, b) < 0.5,
-                    "a jump of {} degrees at ({border}, {y})",
-                    angle(a, b)
-                );
+                assert!(angle(a, b) < 0.5, "a jump of {} degrees at ({border}, {y})", angle(a, b));
             }
         }
     }
@@ -161,9 +147,7 @@ fn every_position_gets_its_typed_answer() {
 #[test]
 fn the_direction_of_a_cell_is_the_guidance_at_its_centre() {
     for kind in KINDS {
-        let domain = Map::generate(kind, 60, 45, 3)
-            .domain()
-            .expect("a valid map");
+        let domain = Map::generate(kind, 60, 45, 3).domain().expect("a valid map");
         let field = solve(&domain);
         for row in 0..45 {
             for col in 0..60 {

@@ -24,9 +24,8 @@ fn any_domain() -> impl Strategy<Value = Domain> {
         |(width, height, density, seed, lengths)| {
             let mut random = harmonic::testing::Random::new(seed);
             let target = Cell::new(random.below(width), random.below(height));
-            let mut blocked: Vec<bool> = (0..width * height)
-                .map(|_| random.unit() < density)
-                .collect();
+            let mut blocked: Vec<bool> =
+                (0..width * height).map(|_| random.unit() < density).collect();
             blocked[target.row * width + target.col] = false;
             let domain = Domain::new(width, height, blocked, target).expect("a valid map");
             let screening = match lengths.len() {
@@ -34,9 +33,7 @@ fn any_domain() -> impl Strategy<Value = Domain> {
                 1 => Screening::cells(f64::from(lengths[0])),
                 _ => Screening::PerCell(lengths[..width * height].to_vec()),
             };
-            domain
-                .with_screening(&screening)
-                .expect("a valid screening")
+            domain.with_screening(&screening).expect("a valid screening")
         },
     )
 }
@@ -139,12 +136,8 @@ fn a_set_up_that_was_patched_gives_the_same_field_bit_for_bit() {
         map.fill(40 + 9 * step..43 + 9 * step, 60..64, step % 3 != 0);
         map.aim((30 + 5 * step, 100));
         let domain = map.domain().expect("a valid map");
-        let patched = solver
-            .solve(&domain, &Cancellation::new())
-            .expect("a field");
-        let fresh = Solver::default()
-            .solve(&domain, &Cancellation::new())
-            .expect("a field");
+        let patched = solver.solve(&domain, &Cancellation::new()).expect("a field");
+        let fresh = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
         assert_eq!(patched.verification(), fresh.verification());
         for index in 0..200 * 170 {
             let cell = Cell::new(index % 200, index / 200);
@@ -155,17 +148,12 @@ fn a_set_up_that_was_patched_gives_the_same_field_bit_for_bit() {
 
 #[test]
 fn more_threads_give_the_same_field_and_verification() {
-    let domain = Map::generate(Kind::Drums, 900, 800, 3)
-        .domain()
-        .expect("a valid map");
+    let domain = Map::generate(Kind::Drums, 900, 800, 3).domain().expect("a valid map");
     let solve = |threads| {
         let threads = std::num::NonZeroUsize::new(threads).expect("at least one");
-        Solver::new(Settings {
-            threads,
-            ..Settings::default()
-        })
-        .solve(&domain, &Cancellation::new())
-        .expect("a field")
+        Solver::new(Settings { threads, ..Settings::default() })
+            .solve(&domain, &Cancellation::new())
+            .expect("a field")
     };
     let (one, three) = (solve(1), solve(3));
     assert_eq!(one.verification(), three.verification());
@@ -181,31 +169,20 @@ fn starting_from_the_field_of_a_similar_map_gives_the_same_directions() {
         let mut map = Map::generate(Kind::Office, 200, 200, 2);
         let domain = |map: &Map| {
             let domain = map.domain().expect("a valid map");
-            domain
-                .with_screening(&Screening::cells(length))
-                .expect("a valid screening")
+            domain.with_screening(&Screening::cells(length)).expect("a valid screening")
         };
         let mut solver = Solver::default();
-        let before = solver
-            .solve(&domain(&map), &Cancellation::new())
-            .expect("a field");
+        let before = solver.solve(&domain(&map), &Cancellation::new()).expect("a field");
         map.fill(90..96, 110..114, true);
         map.fill(20..23, 150..156, false);
         let domain = domain(&map);
-        let near = solver
-            .solve_near(&domain, &before, &Cancellation::new())
-            .expect("a field");
-        let fresh = Solver::default()
-            .solve(&domain, &Cancellation::new())
-            .expect("a field");
+        let near = solver.solve_near(&domain, &before, &Cancellation::new()).expect("a field");
+        let fresh = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
         assert_sound(&domain, &near);
         for index in 0..200 * 200 {
             let cell = Cell::new(index % 200, index / 200);
             if let (Some(a), Some(b)) = (near.direction(cell), fresh.direction(cell)) {
-                assert!(
-                    harmonic::testing::angle(a, b) < 2.0,
-                    "{cell:?}: {a:?}, {b:?}"
-                );
+                assert!(harmonic::testing::angle(a, b) < 2.0, "{cell:?}: {a:?}, {b:?}");
             }
         }
     }

@@ -12,10 +12,7 @@ fn advice(heading: f64, hazard: impl Fn(DVec2) -> bool) -> (f64, f64) {
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let frame = mission.grid_frame();
     let cells: Vec<u8> = (0..frame.area() as u32)
-        .map(|index| Cell {
-            col: index % frame.cells,
-            row: index / frame.cells,
-        })
+        .map(|index| Cell { col: index % frame.cells, row: index / frame.cells })
         .map(|cell| {
             if frame.is_rim(cell) {
                 CellState::Perimeter as u8
@@ -26,24 +23,13 @@ fn advice(heading: f64, hazard: impl Fn(DVec2) -> bool) -> (f64, f64) {
             }
         })
         .collect();
-    let blocked = cells
-        .iter()
-        .map(|&cell| CellState::from_byte(cell).is_hazard());
+    let blocked = cells.iter().map(|&cell| CellState::from_byte(cell).is_hazard());
     let target = frame.cell_at(mission.target).unwrap();
     let target = harmonic::Cell::new(target.col as usize, target.row as usize);
     let domain = Domain::new(80, 80, blocked.collect(), target).unwrap();
-    let field = Solver::default()
-        .solve(&domain, &Cancellation::default())
-        .unwrap();
-    let view = View {
-        frame,
-        cells: &cells,
-        field: &field,
-    };
-    let pose = Pose2 {
-        heading,
-        ..Pose2::default()
-    };
+    let field = Solver::default().solve(&domain, &Cancellation::default()).unwrap();
+    let view = View { frame, cells: &cells, field: &field };
+    let pose = Pose2 { heading, ..Pose2::default() };
     let (direction, limit) = Arcs::new(&mission).unwrap().advise(&view, &pose, 1.5);
     (limit, pose.axis().perp_dot(direction))
 }
@@ -59,9 +45,7 @@ fn a_car_drives_straight_to_a_target_ahead_and_turns_to_one_at_its_side() {
 #[test]
 fn an_arc_that_a_hazard_cuts_off_is_not_driven() {
     // From y = -0.2 to 0.9: it is passed on the right.
-    let (limit, turn) = advice(0.0, |at| {
-        (at.x - 0.5).abs() < 0.1 && at.y > -0.2 && at.y < 0.9
-    });
+    let (limit, turn) = advice(0.0, |at| (at.x - 0.5).abs() < 0.1 && at.y > -0.2 && at.y < 0.9);
     assert!(limit > 0.0 && turn < 0.0, "{limit} m/s, {turn}");
 }
 

@@ -46,10 +46,7 @@ pub struct Outcome {
 
 impl From<Work> for Outcome {
     fn from(work: Work) -> Self {
-        Self {
-            work,
-            ..Self::default()
-        }
+        Self { work, ..Self::default() }
     }
 }
 

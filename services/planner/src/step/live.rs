@@ -44,11 +44,7 @@ enum State {
     Stale,
     /// The map changed since, and the background solver runs `job`, which has the map of version `version`. `changed` tells
     /// whether the map changed again since then.
-    Solving {
-        job: u64,
-        version: u64,
-        changed: bool,
-    },
+    Solving { job: u64, version: u64, changed: bool },
 }
 
 /// The newest map and a field.
@@ -65,13 +61,7 @@ pub(super) struct Live {
 
 impl Live {
     pub(super) fn new(frame: GridFrame, map: Domain, field: Field) -> Self {
-        Self {
-            frame,
-            map,
-            field: Arc::new(field),
-            field_version: 0,
-            state: State::Current,
-        }
+        Self { frame, map, field: Arc::new(field), field_version: 0, state: State::Current }
     }
 
     pub(super) fn is_solved_at_once(&self) -> bool {
@@ -95,11 +85,7 @@ impl Live {
         if self.state != State::Stale {
             return None;
         }
-        self.state = State::Solving {
-            job: number,
-            version,
-            changed: false,
-        };
+        self.state = State::Solving { job: number, version, changed: false };
         let domain = self.map.clone();
         Some(Job { number, domain })
     }
@@ -110,19 +96,12 @@ impl Live {
 
     /// Take the field of the job that runs.
     pub(super) fn solved(&mut self, field: Arc<Field>) {
-        let State::Solving {
-            version, changed, ..
-        } = self.state
-        else {
+        let State::Solving { version, changed, .. } = self.state else {
             return;
         };
         self.field = field;
         self.field_version = version;
-        self.state = if changed {
-            State::Stale
-        } else {
-            State::Current
-        };
+        self.state = if changed { State::Stale } else { State::Current };
     }
 
     /// The version of the grid that the field is of, where the newest is `newest`.
@@ -165,28 +144,17 @@ impl Live {
                 !points.any(|at| view.has_changed(at, robot.radius_m))
             }
         };
-        if follow {
-            (status, direction)
-        } else {
-            (GuidanceStatus::Waiting, DVec2::ZERO)
-        }
+        if follow { (status, direction) } else { (GuidanceStatus::Waiting, DVec2::ZERO) }
     }
 
     pub(super) fn view<'a>(&'a self, cells: &'a [u8]) -> View<'a> {
-        View {
-            frame: self.frame,
-            cells,
-            field: &self.field,
-        }
+        View { frame: self.frame, cells, field: &self.field }
     }
 
     /// Whether the field leads to a cell beside `target`, and the robot has come there.
     fn is_beside(&self, target: DVec2, robot: DVec2) -> bool {
         let Cell { col, row } = self.field.target();
-        let aim = grid::Cell {
-            col: col as u32,
-            row: row as u32,
-        };
+        let aim = grid::Cell { col: col as u32, row: row as u32 };
         let own = self.frame.cell_at(target) == Some(aim);
         !own && self.frame.centre_of(aim).distance(robot) <= AT_CELL_M
     }
@@ -217,10 +185,7 @@ pub(super) struct Robot {
 
 impl Robot {
     pub(super) fn new(mission: &Mission) -> Self {
-        Self {
-            radius_m: mission.body().radius_m,
-            ahead_m: mission.speed_m_s() * AHEAD_S,
-        }
+        Self { radius_m: mission.body().radius_m, ahead_m: mission.speed_m_s() * AHEAD_S }
     }
 }
 

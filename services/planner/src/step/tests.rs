@@ -28,16 +28,10 @@ fn keyframe_of(
     hazard: impl Fn(DVec2) -> bool,
 ) -> (GridHeader, Vec<u8>) {
     let cells = (0..frame.area() as u32).map(|index| {
-        let cell = grid::Cell {
-            col: index % frame.cells,
-            row: index / frame.cells,
-        };
+        let cell = grid::Cell { col: index % frame.cells, row: index / frame.cells };
         u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell)))
     });
-    let header = GridHeader {
-        part: Part::whole(frame, version),
-        ..GridHeader::default()
-    };
+    let header = GridHeader { part: Part::whole(frame, version), ..GridHeader::default() };
     (header, cells.collect())
 }
 
@@ -46,21 +40,13 @@ fn status(sample: &GuidanceSample) -> GuidanceStatus {
 }
 
 fn at(x_m: f64, y_m: f64) -> PoseSample {
-    PoseSample {
-        x_m,
-        y_m,
-        ..PoseSample::default()
-    }
+    PoseSample { x_m, y_m, ..PoseSample::default() }
 }
 
 /// The result of a job.
 fn solve(job: &Job) -> Solved {
     let field = Solver::default().solve(&job.domain, &Cancellation::default());
-    Solved {
-        number: job.number,
-        field: field.map(Arc::new),
-        took_ns: 0,
-    }
+    Solved { number: job.number, field: field.map(Arc::new), took_ns: 0 }
 }
 
 #[test]
@@ -77,10 +63,7 @@ fn a_screening_length_in_metres_is_the_same_on_any_grid() {
 #[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
     let planner = Planner::new(&mission());
-    assert_eq!(
-        status(&planner.guide(&at(0.0, 0.0))),
-        GuidanceStatus::Waiting
-    );
+    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Waiting);
     assert!(planner.snapshot().is_none());
 }
 
@@ -91,10 +74,7 @@ fn an_empty_room_is_crossed_straight() {
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     let guidance = planner.guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Along);
-    assert!(
-        guidance.ex > 0.999 && guidance.ey.abs() < 0.03,
-        "{guidance:?}"
-    );
+    assert!(guidance.ex > 0.999 && guidance.ey.abs() < 0.03, "{guidance:?}");
     assert_eq!(guidance.distance_m, 1.5);
 }
 
@@ -118,10 +98,7 @@ fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
     let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
     let (header, cells) = keyframe(1, ring);
     planner.take_grid(&header, &cells).unwrap();
-    assert_eq!(
-        status(&planner.guide(&at(0.0, 0.0))),
-        GuidanceStatus::Unreachable
-    );
+    assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
 }
 
 #[test]
@@ -132,10 +109,7 @@ fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
     planner.take_grid(&header, &cells).unwrap();
     let guidance = planner.guide(&at(-0.15, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::WayOut);
-    assert!(
-        guidance.ex < -0.9,
-        "the nearest free cell lies to the left: {guidance:?}"
-    );
+    assert!(guidance.ex < -0.9, "the nearest free cell lies to the left: {guidance:?}");
 }
 
 #[test]
@@ -149,31 +123,20 @@ fn in_the_targets_cell_the_rest_is_straight() {
 
 /// An evidential planner in a room where only the cells for which `scanned` says so were scanned.
 fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
-    let mission = Mission {
-        method: Method::Evidential,
-        ..mission()
-    };
+    let mission = Mission { method: Method::Evidential, ..mission() };
     let (mut header, mut cells) = keyframe(1, |_| false);
     // A scan to both sides had no echo.
     header.clear_beam_count = 11;
     for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
         let bearing = (index as f32 - 5.0) * 15.0_f32.to_radians();
         let (x_m, y_m, clear_m) = (0.0, 0.0, 2.0);
-        *beam = ClearBeam {
-            x_m,
-            y_m,
-            bearing_rad: bearing,
-            clear_m,
-        };
+        *beam = ClearBeam { x_m, y_m, bearing_rad: bearing, clear_m };
     }
     // The first of them looked ahead.
     header.clear_beams.swap(0, 5);
     let frame = mission.grid_frame();
     for (index, state) in cells.iter_mut().enumerate() {
-        let cell = grid::Cell {
-            col: index as u32 % frame.cells,
-            row: index as u32 / frame.cells,
-        };
+        let cell = grid::Cell { col: index as u32 % frame.cells, row: index as u32 / frame.cells };
         if *state == CellState::Free as u8 && scanned(frame.centre_of(cell)) {
             *state = CellState::Scanned as u8;
         }
@@ -195,11 +158,7 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
 
 #[test]
 fn an_evidential_robot_without_sensing_does_not_look_first() {
-    let mission = Mission {
-        method: Method::Evidential,
-        sensing: false,
-        ..mission()
-    };
+    let mission = Mission { method: Method::Evidential, sensing: false, ..mission() };
     let mut planner = Planner::new(&mission);
     let (header, cells) = keyframe(1, |_| false);
     planner.take_grid(&header, &cells).unwrap();
@@ -240,11 +199,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
         let limit = guidance.speed_limit_m_s;
         assert_eq!(limit > 0.0, may_go, "{clear_m} m: {guidance:?}");
         let ahead = planner.advise(&Pose2::default(), GuidanceStatus::WayOut, DVec2::X);
-        assert_eq!(
-            ahead.2 > 0.0,
-            may_go,
-            "on the way out of a hazard, {clear_m} m"
-        );
+        assert_eq!(ahead.2 > 0.0, may_go, "on the way out of a hazard, {clear_m} m");
     }
 }
 
@@ -253,10 +208,7 @@ fn a_scan_goes_on_in_a_planner_that_was_restarted() {
     let scanned = |at: DVec2| at.x < 0.2 || at.y < 0.1;
     let (one, other) = (evidential(scanned), evidential(scanned));
     for heading in [0.0, 0.2, 0.4] {
-        let pose = PoseSample {
-            heading_rad: heading,
-            ..at(0.0, 0.0)
-        };
+        let pose = PoseSample { heading_rad: heading, ..at(0.0, 0.0) };
         assert_eq!(one.guide(&pose), other.guide(&pose));
     }
 }
@@ -277,21 +229,14 @@ const NEAR_GAP: [f64; 2] = [-0.2, 0.2];
 impl LargeRoom {
     fn new() -> Self {
         let mission = mission_of(LARGE);
-        let in_gap = |y: f64| {
-            [FAR_GAP, NEAR_GAP]
-                .iter()
-                .any(|[from, to]| (*from..*to).contains(&y))
-        };
+        let in_gap =
+            |y: f64| [FAR_GAP, NEAR_GAP].iter().any(|[from, to]| (*from..*to).contains(&y));
         let hazard = |at: DVec2| (at.x - 0.8).abs() < 0.03 && !in_gap(at.y);
         let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
         let mut planner = Planner::new(&mission);
         assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
         assert!(planner.begin_job().is_none(), "the field is current");
-        Self {
-            planner,
-            header,
-            cells,
-        }
+        Self { planner, header, cells }
     }
 
     /// The cells for whose centres `becomes` says so become hazard.
@@ -344,16 +289,8 @@ fn on_a_large_map_a_robot_goes_on_where_nothing_changed_on_its_way_ahead() {
     let before = room.planner.guide(&at(0.0, 0.0));
     room.close_near_gap();
     let after = room.planner.guide(&at(0.0, 0.0));
-    assert_eq!(
-        (after.ex, after.ey),
-        (before.ex, before.ey),
-        "far from the gap"
-    );
-    assert_eq!(
-        room.status_at(0.5, 0.0),
-        GuidanceStatus::Waiting,
-        "at the gap"
-    );
+    assert_eq!((after.ex, after.ey), (before.ex, before.ey), "far from the gap");
+    assert_eq!(room.status_at(0.5, 0.0), GuidanceStatus::Waiting, "at the gap");
     room.solve();
     let guidance = room.planner.guide(&at(0.5, 0.0));
     assert!(guidance.ey > 0.4, "to the other gap: {guidance:?}");
@@ -421,10 +358,6 @@ fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
         let length = f64::from(cell.ex).hypot(f64::from(cell.ey));
         let directed = (length - 1.0).abs() < 1e-6;
         let target = cell.log2_u == 0.0;
-        assert_eq!(
-            directed || target,
-            state == 0,
-            "{cell:?} where the grid says {state}"
-        );
+        assert_eq!(directed || target, state == 0, "{cell:?} where the grid says {state}");
     }
 }

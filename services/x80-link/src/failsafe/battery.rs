@@ -84,11 +84,7 @@ impl Gauge {
         let sunk = fitted && volts < limit * EMPTY_SHARE;
         let since = self.sunk_since.unwrap_or(now);
         self.sunk_since = sunk.then_some(since);
-        let ends = if self.charge == Charge::Enough {
-            limit
-        } else {
-            limit + RECOVERED_V
-        };
+        let ends = if self.charge == Charge::Enough { limit } else { limit + RECOVERED_V };
         self.charge = if self.charge == Charge::Empty || sunk && now.since(since) >= EMPTY_AFTER {
             // Its voltage comes back when the robot stands, but nothing to drive on does.
             Charge::Empty
@@ -129,28 +125,15 @@ impl Batteries {
 
     fn read(&mut self, standard: &StandardSensors, now: MissionTime) {
         let readings = [
-            (
-                volts(standard.board_battery, LOGIC_SCALE_V),
-                self.limits.board,
-            ),
-            (
-                volts(standard.motor_battery, MOTOR_SCALE_V),
-                self.limits.motor,
-            ),
-            (
-                volts(standard.servo_battery, LOGIC_SCALE_V),
-                self.limits.servo,
-            ),
+            (volts(standard.board_battery, LOGIC_SCALE_V), self.limits.board),
+            (volts(standard.motor_battery, MOTOR_SCALE_V), self.limits.motor),
+            (volts(standard.servo_battery, LOGIC_SCALE_V), self.limits.servo),
         ];
         for ((gauge, pack), (volts, limit)) in self.gauges.iter_mut().zip(Pack::ALL).zip(readings) {
             let before = gauge.charge;
             let charge = gauge.read(volts, limit, now);
             if charge != before {
-                self.changes.push(BatteryChange {
-                    pack,
-                    volts,
-                    charge,
-                });
+                self.changes.push(BatteryChange { pack, volts, charge });
             }
         }
     }
@@ -172,11 +155,7 @@ impl Monitor for Batteries {
     }
 
     fn condition(&self, cause: Cause, _: Moment) -> Condition {
-        let charge = if cause == Cause::BatteryEmpty {
-            Charge::Empty
-        } else {
-            Charge::Low
-        };
+        let charge = if cause == Cause::BatteryEmpty { Charge::Empty } else { Charge::Low };
         (self.charge() == charge).into()
     }
 

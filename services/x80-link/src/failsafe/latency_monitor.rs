@@ -58,11 +58,7 @@ impl LatencyMonitor {
     fn pass(&mut self, now_ns: u64) {
         match self.state {
             State::Testing(since) if now_ns.saturating_sub(since) >= self.window_ns => {
-                self.state = if self.came_late {
-                    State::Late(now_ns)
-                } else {
-                    State::Timely
-                };
+                self.state = if self.came_late { State::Late(now_ns) } else { State::Timely };
             }
             State::Late(since) if now_ns.saturating_sub(since) >= self.again_ns => {
                 self.test(now_ns);
@@ -133,10 +129,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     fn observe(monitor: &mut LatencyMonitor, what: Observation<'_>, at_ms: u64) {
-        let now = Moment {
-            machine_ns: at_ms * MS,
-            ..Moment::default()
-        };
+        let now = Moment { machine_ns: at_ms * MS, ..Moment::default() };
         monitor.observe(&what, now);
     }
 

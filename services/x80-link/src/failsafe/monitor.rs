@@ -77,11 +77,7 @@ pub enum Condition {
 
 impl From<bool> for Condition {
     fn from(holds: bool) -> Self {
-        if holds {
-            Self::Holds
-        } else {
-            Self::OverFor(Duration::MAX)
-        }
+        if holds { Self::Holds } else { Self::OverFor(Duration::MAX) }
     }
 }
 

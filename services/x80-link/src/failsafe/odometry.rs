@@ -112,11 +112,7 @@ impl Evidence {
         if asked < least || gap_s <= 0.0 {
             return;
         }
-        self.still_s = if counts.abs() <= 1.0 {
-            self.still_s + gap_s
-        } else {
-            0.0
-        };
+        self.still_s = if counts.abs() <= 1.0 { self.still_s + gap_s } else { 0.0 };
         let share = counts * newest.signum() / (gap_s * asked);
         let opposite = share <= -LEAST_SHARE;
         let settled = if opposite { TURNS_AFTER } else { SETTLE };

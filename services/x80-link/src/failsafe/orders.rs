@@ -35,13 +35,11 @@ impl Orders {
 
     /// Whether the reason of the newest directive is an operator's stop.
     pub fn by_operator(&self) -> bool {
-        self.newest
-            .is_some_and(|directive| directive.reason == HoldReason::Operator)
+        self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
     }
 
     fn is(&self, order: Order) -> bool {
-        self.newest
-            .is_some_and(|directive| directive.order == order)
+        self.newest.is_some_and(|directive| directive.order == order)
     }
 
     fn held(&self) -> Option<HoldReason> {
@@ -57,11 +55,7 @@ impl Monitor for Orders {
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
         if let Observation::Directive(order, reason) = *what {
-            self.newest = Some(Directive {
-                order,
-                reason,
-                heard_ns: now.machine_ns,
-            });
+            self.newest = Some(Directive { order, reason, heard_ns: now.machine_ns });
         }
     }
 

@@ -39,10 +39,7 @@ pub(crate) struct Silence {
 impl Silence {
     pub(crate) fn new(mission: &Mission) -> Self {
         let limit = Duration::from_secs_f64(mission.robot.command_limit_s) * SILENT_LIMITS;
-        Self {
-            mission: limit,
-            machine: limit,
-        }
+        Self { mission: limit, machine: limit }
     }
 
     pub(crate) fn set_pace(&mut self, pace: Pace) {
@@ -91,8 +88,7 @@ impl Presence {
 
     /// Whether it has sent nothing for longer than a robot that is there does.
     pub fn is_silent(&self, now_ns: u64) -> bool {
-        self.heard_ns
-            .is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
+        self.heard_ns.is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
     }
 
     /// Take it for lost. Returns whether that is new.
@@ -133,9 +129,7 @@ impl Presence {
             return Absence::default();
         }
         Absence {
-            lost_ns: self
-                .lost_since_ns
-                .map_or(0, |since| now_ns.saturating_sub(since)),
+            lost_ns: self.lost_since_ns.map_or(0, |since| now_ns.saturating_sub(since)),
             pings: self.pings.attempts(),
             next_ping_ns: self.pings.wait_ns(now_ns),
         }

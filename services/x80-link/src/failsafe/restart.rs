@@ -122,21 +122,10 @@ mod tests {
     #[test]
     fn counts_that_begin_anew_after_an_absence_are_a_restart() {
         let mut watch = watch();
-        assert_eq!(
-            watch.step([32_168, 600], false, at(0.0)),
-            Counts::Follow,
-            "the first frame"
-        );
+        assert_eq!(watch.step([32_168, 600], false, at(0.0)), Counts::Follow, "the first frame");
         watch.lost();
-        assert_eq!(
-            watch.step([0, 1], false, at(3.0)),
-            Counts::Restarted { was_away: false }
-        );
-        assert_eq!(
-            watch.step([32_700, 68], false, at(3.1)),
-            Counts::Follow,
-            "it drives on"
-        );
+        assert_eq!(watch.step([0, 1], false, at(3.0)), Counts::Restarted { was_away: false });
+        assert_eq!(watch.step([32_700, 68], false, at(3.1)), Counts::Follow, "it drives on");
         assert_eq!(watch.restarts(), 1);
     }
 
@@ -173,10 +162,7 @@ mod tests {
             let now = at(0.143 * f64::from(tick));
             watch.step([1000 + 112 * tick as u16, 5000], false, now);
         }
-        assert_eq!(
-            watch.step([31_000, 2000], false, at(0.95)),
-            Counts::Implausible
-        );
+        assert_eq!(watch.step([31_000, 2000], false, at(0.95)), Counts::Implausible);
         assert_eq!(watch.step([1784, 5000], false, at(1.0)), Counts::Follow);
         assert_eq!(watch.restarts(), 0);
     }
@@ -185,18 +171,9 @@ mod tests {
     fn counts_that_go_on_elsewhere_are_plausible_from_the_third_on() {
         let mut watch = watch();
         watch.step([1000, 1000], false, at(0.0));
-        assert_eq!(
-            watch.step([9000, 17_000], false, at(0.143)),
-            Counts::Implausible
-        );
-        assert_eq!(
-            watch.step([9100, 17_100], false, at(0.286)),
-            Counts::Implausible
-        );
-        assert_eq!(
-            watch.step([9200, 17_200], false, at(0.429)),
-            Counts::Elsewhere
-        );
+        assert_eq!(watch.step([9000, 17_000], false, at(0.143)), Counts::Implausible);
+        assert_eq!(watch.step([9100, 17_100], false, at(0.286)), Counts::Implausible);
+        assert_eq!(watch.step([9200, 17_200], false, at(0.429)), Counts::Elsewhere);
         assert_eq!(watch.step([9300, 17_300], false, at(0.571)), Counts::Follow);
         assert_eq!(watch.restarts(), 1, "what lies between is no motion");
     }

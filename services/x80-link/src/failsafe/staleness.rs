@@ -56,11 +56,7 @@ impl Monitor for Staleness {
             return (cause == Cause::CommandStale).into();
         };
         // In lockstep no time passes until the command has come.
-        let now = if self.lockstep {
-            newest.command
-        } else {
-            now.time
-        };
+        let now = if self.lockstep { newest.command } else { now.time };
         let then = match cause {
             Cause::PoseStale => newest.pose,
             Cause::GuidanceStale => newest.guidance,

@@ -100,11 +100,7 @@ impl StopMonitor {
         let within = |speed: f64| speed * self.counts_per_m * gap.as_secs_f64();
         let rests = farthest <= RESTS_COUNTS.max(within(RESTS_M_S));
         let moves = !rests && farthest >= within(MOVES_M_S);
-        self.resting = if rests {
-            self.resting + gap
-        } else {
-            Duration::ZERO
-        };
+        self.resting = if rests { self.resting + gap } else { Duration::ZERO };
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= COMES_TO_REST;
         if !moves {
             self.moving = Duration::ZERO;

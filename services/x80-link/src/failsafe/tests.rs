@@ -21,26 +21,17 @@ fn mission() -> Mission {
 /// So long before the moment that is looked at.
 fn ago(ns: u64) -> Moment {
     let machine_ns = 100_000 * MS - ns;
-    Moment {
-        time: MissionTime(machine_ns),
-        machine_ns,
-    }
+    Moment { time: MissionTime(machine_ns), machine_ns }
 }
 
 const fn now() -> Moment {
-    Moment {
-        time: MissionTime(100_000 * MS),
-        machine_ns: 100_000 * MS,
-    }
+    Moment { time: MissionTime(100_000 * MS), machine_ns: 100_000 * MS }
 }
 
 fn command(tick_ago: u64, pose_ago: u64, guidance_ago: u64) -> CommandSample {
     let stamp_ns = ago(tick_ago).machine_ns;
     CommandSample {
-        stamp: Stamp {
-            stamp_ns,
-            ..Stamp::default()
-        },
+        stamp: Stamp { stamp_ns, ..Stamp::default() },
         pose_ns: ago(pose_ago).machine_ns,
         guidance_ns: ago(guidance_ago).machine_ns,
         ..CommandSample::default()
@@ -66,10 +57,7 @@ fn well() -> Failsafe {
     let frame = ago(SILENT_MS * MS - MOMENT_NS);
     for (what, when) in [
         (Observation::Pace(Pace::Rate(1.0)), now()),
-        (
-            Observation::Directive(Order::Drive, HoldReason::None),
-            supervisor_silent,
-        ),
+        (Observation::Directive(Order::Drive, HoldReason::None), supervisor_silent),
         (Observation::Found { again: false }, frame),
         (Observation::Standard(&standard(255, 7.2)), frame),
         (Observation::Command(&command(limit, limit, limit)), now()),
@@ -108,11 +96,7 @@ fn does_not_stop(failsafe: &mut Failsafe) {
 
 /// What alone leads to each cause, and its action.
 const CASES: &[(Break, Action, Cause)] = &[
-    (
-        |it| directive(it, Order::Stop, HoldReason::Ending),
-        Action::End,
-        Cause::MissionOver,
-    ),
+    (|it| directive(it, Order::Stop, HoldReason::Ending), Action::End, Cause::MissionOver),
     (
         |it| {
             for when in [ago(2000 * MS), now()] {
@@ -122,42 +106,14 @@ const CASES: &[(Break, Action, Cause)] = &[
         Action::End,
         Cause::BatteryEmpty,
     ),
-    (
-        |it| jumps(it, ago(10_000 * MS)),
-        Action::End,
-        Cause::OdometryGivenUp,
-    ),
+    (|it| jumps(it, ago(10_000 * MS)), Action::End, Cause::OdometryGivenUp),
     (does_not_stop, Action::Stop, Cause::RobotDoesNotStop),
-    (
-        |it| directive(it, Order::Hold, HoldReason::Operator),
-        Action::Stop,
-        Cause::OperatorStop,
-    ),
-    (
-        |it| directive(it, Order::Hold, HoldReason::StageHeld),
-        Action::Stop,
-        Cause::StageHeld,
-    ),
-    (
-        |it| it.monitors.orders = Monitor::new(&mission()),
-        Action::Stop,
-        Cause::NotOrdered,
-    ),
-    (
-        |it| directive(it, Order::Hold, HoldReason::Starting),
-        Action::Stop,
-        Cause::NotOrdered,
-    ),
-    (
-        |it| directive(it, Order::Hold, HoldReason::None),
-        Action::Stop,
-        Cause::NotOrdered,
-    ),
-    (
-        |it| directive(it, Order::Hold, HoldReason::Ending),
-        Action::Stop,
-        Cause::NotOrdered,
-    ),
+    (|it| directive(it, Order::Hold, HoldReason::Operator), Action::Stop, Cause::OperatorStop),
+    (|it| directive(it, Order::Hold, HoldReason::StageHeld), Action::Stop, Cause::StageHeld),
+    (|it| it.monitors.orders = Monitor::new(&mission()), Action::Stop, Cause::NotOrdered),
+    (|it| directive(it, Order::Hold, HoldReason::Starting), Action::Stop, Cause::NotOrdered),
+    (|it| directive(it, Order::Hold, HoldReason::None), Action::Stop, Cause::NotOrdered),
+    (|it| directive(it, Order::Hold, HoldReason::Ending), Action::Stop, Cause::NotOrdered),
     (
         |it| {
             let silent = orders::SUPERVISOR_SILENT.as_nanos() as u64 + MOMENT_NS;
@@ -174,11 +130,7 @@ const CASES: &[(Break, Action, Cause)] = &[
         Action::Stop,
         Cause::RobotLost,
     ),
-    (
-        |it| it.observe(&Observation::Found { again: true }, now()),
-        Action::Stop,
-        Cause::RobotLate,
-    ),
+    (|it| it.observe(&Observation::Found { again: true }, now()), Action::Stop, Cause::RobotLate),
     (
         |it| {
             it.observe(&Observation::Found { again: false }, ago(SILENT_MS * MS));
@@ -190,19 +142,13 @@ const CASES: &[(Break, Action, Cause)] = &[
         |it| {
             for frame in 0..10 {
                 let motor = Observation::Motor([0, 0], Counts::Follow);
-                it.monitors
-                    .streams
-                    .observe(&motor, ago(300 * (9 - frame) * MS));
+                it.monitors.streams.observe(&motor, ago(300 * (9 - frame) * MS));
             }
         },
         Action::Stop,
         Cause::FramesSlow,
     ),
-    (
-        |it| jumps(it, now()),
-        Action::Stop,
-        Cause::OdometryImplausible,
-    ),
+    (|it| jumps(it, now()), Action::Stop, Cause::OdometryImplausible),
     (
         |it| {
             let reading = standard(255, 7.2);
@@ -212,11 +158,7 @@ const CASES: &[(Break, Action, Cause)] = &[
         Action::Stop,
         Cause::RangeSilent,
     ),
-    (
-        |it| it.monitors.staleness = fresh(None),
-        Action::Stop,
-        Cause::CommandStale,
-    ),
+    (|it| it.monitors.staleness = fresh(None), Action::Stop, Cause::CommandStale),
     (
         |it| it.monitors.staleness = fresh(Some(command(LIMIT_MS * MS + MOMENT_NS, 0, 0))),
         Action::Stop,
@@ -285,17 +227,12 @@ fn every_cause_has_one_row_and_a_case_that_is_decided_otherwise_without_it() {
 fn whatever_is_wrong_at_once_nothing_milder_is_done_than_the_worst_of_it_asks_for() {
     for applying in 0..1_u32 << TABLE.len() {
         let rules = TABLE.iter().enumerate();
-        let mut rules = rules
-            .filter(|(row, _)| applying >> row & 1 == 1)
-            .map(|(_, rule)| rule);
+        let mut rules = rules.filter(|(row, _)| applying >> row & 1 == 1).map(|(_, rule)| rule);
         let decision = Decision::worst(rules.clone());
         let worst = rules.clone().map(|rule| rule.action).max();
         assert_eq!(decision.action, worst.unwrap_or(Action::Go));
         let reported = rules.find(|rule| Some(rule.action) == worst);
-        assert_eq!(
-            decision.cause,
-            reported.map_or(Cause::None, |rule| rule.cause)
-        );
+        assert_eq!(decision.cause, reported.map_or(Cause::None, |rule| rule.cause));
     }
 }
 

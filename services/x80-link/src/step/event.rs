@@ -24,10 +24,7 @@ pub struct State {
 
 impl Default for State {
     fn default() -> Self {
-        Self {
-            pace: Pace::Max,
-            next_tick: 0,
-        }
+        Self { pace: Pace::Max, next_tick: 0 }
     }
 }
 

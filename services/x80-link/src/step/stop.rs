@@ -59,9 +59,7 @@ impl Link {
             // The last method is given time.
             return;
         } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
-            effects.push(Effect::Send(
-                self.drive.stop_by(self.monitors().stop.method()),
-            ));
+            effects.push(Effect::Send(self.drive.stop_by(self.monitors().stop.method())));
         } else {
             return;
         }

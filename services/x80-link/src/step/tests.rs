@@ -63,11 +63,7 @@ fn datagram(sonar: u8, channel_0: u16, channel_1: u16) -> Vec<u8> {
 
 fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
     CommandSample {
-        stamp: Stamp {
-            tick,
-            stamp_ns: time_ns,
-            ..Stamp::default()
-        },
+        stamp: Stamp { tick, stamp_ns: time_ns, ..Stamp::default() },
         pose_ns: time_ns,
         guidance_ns: time_ns,
         left_rad_s: left,
@@ -116,12 +112,7 @@ fn decided(effects: &[Effect]) -> Vec<(Action, Cause)> {
 
 fn ticks(effects: &[Effect]) -> Vec<(u64, RangeSample, WheelSample)> {
     let tick = |effect: &Effect| match effect {
-        Effect::Tick {
-            tick,
-            range,
-            wheels,
-            ..
-        } => Some((*tick, *range, *wheels)),
+        Effect::Tick { tick, range, wheels, .. } => Some((*tick, *range, *wheels)),
         _ => None,
     };
     effects.iter().filter_map(tick).collect()
@@ -170,11 +161,7 @@ fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
     }
     assert_eq!(pings, [0, 200, 600, 1400, 3000, 5000, 7000]);
     let absence = link.absence(7900 * MS);
-    let expected = Absence {
-        lost_ns: 7900 * MS,
-        pings: 7,
-        next_ping_ns: 1100 * MS,
-    };
+    let expected = Absence { lost_ns: 7900 * MS, pings: 7, next_ping_ns: 1100 * MS };
     assert_eq!(absence, expected);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
@@ -239,10 +226,7 @@ fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_it
     let effects = link.at(Event::Quiet, 90 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(170))]);
     assert_eq!(timed(&link.at(Event::Quiet, 140 * MS)), [], "once");
-    assert_eq!(
-        (link.tally().commands, link.tally().repeated_commands),
-        (1, 1)
-    );
+    assert_eq!((link.tally().commands, link.tally().repeated_commands), (1, 1));
 }
 
 #[test]
@@ -292,15 +276,9 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
 fn a_tick_has_the_infrared_counts_that_came_with_it_and_the_next_without_any_has_none() {
     let mut link = driving(on_the_wall());
     let mut bytes = Vec::new();
-    let custom = CustomSensors {
-        ad: [0, 0, 602, 603, 604, 605, 606, 607],
-        io: 0,
-    };
+    let custom = CustomSensors { ad: [0, 0, 602, 603, 604, 605, 606, 607], io: 0 };
     Report::Custom(custom).encode(Addressing::default(), &mut bytes);
-    let standard = StandardSensors {
-        infrared: 601,
-        ..StandardSensors::default()
-    };
+    let standard = StandardSensors { infrared: 601, ..StandardSensors::default() };
     Report::Standard(standard).encode(Addressing::default(), &mut bytes);
     Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
     let given = ticks(&link.at(Event::Datagram(&bytes), 10 * MS));
@@ -348,10 +326,7 @@ fn a_tick_carries_the_newest_sonar_and_forward_counts() {
     let [(tick, range, wheels)] = ticks(&effects)[..] else {
         panic!("{effects:?}");
     };
-    assert_eq!(
-        (tick, wheels.left_counts, wheels.right_counts),
-        (0, 100, 250)
-    );
+    assert_eq!((tick, wheels.left_counts, wheels.right_counts), (0, 100, 250));
     assert_eq!((range.range_m, range.raw_cm), (0.8, 80));
     assert_eq!(range.status, u8::from(RangeStatus::Measured));
 }
@@ -372,10 +347,7 @@ fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
     link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     // A turn a second is 1200 counts/s, below the top speed of 2247.
     let turn = std::f64::consts::TAU;
-    let effects = link.at(
-        Event::Command(&command(0, 10 * MS, turn, -0.5 * turn)),
-        11 * MS,
-    );
+    let effects = link.at(Event::Command(&command(0, 10 * MS, turn, -0.5 * turn)), 11 * MS);
     assert_eq!(velocities(&effects), [[Some(-1200), Some(-600)]]);
     assert!(effects.contains(&Effect::Answered { began_ns: 10 * MS }));
     let Command::Motion(motion) = sent(&effects)[0] else {
@@ -388,10 +360,7 @@ fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
 fn no_number_moves_no_wheel() {
     let mut link = driving(on_the_wall());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let effects = link.at(
-        Event::Command(&command(0, 10 * MS, f64::NAN, 1e300)),
-        11 * MS,
-    );
+    let effects = link.at(Event::Command(&command(0, 10 * MS, f64::NAN, 1e300)), 11 * MS);
     // NaN stands; the rest is cut to the top speed of 1 m/s.
     assert_eq!(velocities(&effects), [[Some(0), Some(2247)]]);
 }
@@ -403,18 +372,12 @@ fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
     link.at(Event::Command(&command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
     let again = velocities(&link.at(Event::Quiet, 200 * MS));
     assert_eq!(again.len(), 1, "the command once more");
-    assert!(
-        link.at(Event::Quiet, 260 * MS).is_empty(),
-        "not yet over 250 ms"
-    );
+    assert!(link.at(Event::Quiet, 260 * MS).is_empty(), "not yet over 250 ms");
     let effects = link.at(Event::Quiet, 261 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::CommandStale)]);
     assert!(link.at(Event::Quiet, 262 * MS).is_empty(), "said");
-    assert_eq!(
-        velocities(&link.at(Event::Quiet, 462 * MS)),
-        [[Some(0), Some(0)]]
-    );
+    assert_eq!(velocities(&link.at(Event::Quiet, 462 * MS)), [[Some(0), Some(0)]]);
 }
 
 #[test]
@@ -438,11 +401,7 @@ fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
     assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 900 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
-    assert_eq!(
-        ticks(&effects)[0].0,
-        1,
-        "the mission goes on with the next tick"
-    );
+    assert_eq!(ticks(&effects)[0].0, 1, "the mission goes on with the next tick");
 }
 
 #[test]

@@ -32,9 +32,7 @@ pub(super) struct Serial {
 
 impl Serial {
     pub(super) fn on(path: &Path) -> Self {
-        Self {
-            path: path.to_owned(),
-        }
+        Self { path: path.to_owned() }
     }
 }
 

@@ -82,11 +82,7 @@ impl<D: Dial> Stream<D> {
     }
 
     pub(super) const fn tally(&self) -> Tally {
-        Tally {
-            foreign_datagrams: 0,
-            other_port: 0,
-            unsent: self.unsent,
-        }
+        Tally { foreign_datagrams: 0, other_port: 0, unsent: self.unsent }
     }
 
     pub(super) fn attempts(&self, now_ns: u64) -> Option<Attempts> {
@@ -95,10 +91,7 @@ impl<D: Dial> Stream<D> {
             State::Opening { .. } => 0,
             State::Closed => self.backoff.wait_ns(now_ns),
         };
-        Some(Attempts {
-            made: self.backoff.attempts(),
-            next_ns,
-        })
+        Some(Attempts { made: self.backoff.attempts(), next_ns })
     }
 
     /// Start, finish or give up an opening; send the rest of a message.
@@ -112,20 +105,14 @@ impl<D: Dial> Stream<D> {
                 Ok(descriptor) => {
                     let events = EventFlags::IN | EventFlags::OUT;
                     epoll::add(&self.epoll, &descriptor, EventData::new_u64(0), events)?;
-                    self.state = State::Opening {
-                        descriptor,
-                        since_ns: now_ns,
-                    };
+                    self.state = State::Opening { descriptor, since_ns: now_ns };
                 }
                 Err(error) => self.log(&error),
             }
         }
         match &self.state {
             State::Closed => {}
-            State::Opening {
-                descriptor,
-                since_ns,
-            } => {
+            State::Opening { descriptor, since_ns } => {
                 if poll::is_writable(descriptor, Duration::ZERO)? {
                     match self.dial.finish(descriptor) {
                         Ok(()) => self.opened(now_ns)?,
@@ -149,11 +136,7 @@ impl<D: Dial> Stream<D> {
 
     /// Read bytes of the robot into `buffer`. Returns their number; none when there are none.
     pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
-        let State::Open {
-            descriptor,
-            heard_ns,
-        } = &mut self.state
-        else {
+        let State::Open { descriptor, heard_ns } = &mut self.state else {
             return None;
         };
         match read(&*descriptor, buffer) {
@@ -221,10 +204,7 @@ impl<D: Dial> Stream<D> {
     fn opened(&mut self, now_ns: u64) -> io::Result<()> {
         if let State::Opening { descriptor, .. } = std::mem::replace(&mut self.state, State::Closed)
         {
-            self.state = State::Open {
-                descriptor,
-                heard_ns: now_ns,
-            };
+            self.state = State::Open { descriptor, heard_ns: now_ns };
             self.watch(EventFlags::IN)?;
             tracing::info!(robot = %self.dial, "the wire is open");
         }

@@ -38,11 +38,7 @@ impl Dial for Tcp {
     const SILENCE: Option<Duration> = Some(SILENCE);
 
     fn dial(&self) -> io::Result<OwnedFd> {
-        let family = if self.robot.is_ipv4() {
-            AddressFamily::INET
-        } else {
-            AddressFamily::INET6
-        };
+        let family = if self.robot.is_ipv4() { AddressFamily::INET } else { AddressFamily::INET6 };
         let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
         let socket = socket_with(family, SocketType::STREAM, flags, Some(ipproto::TCP))?;
         match connect(&socket, &self.robot) {

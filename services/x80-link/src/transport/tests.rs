@@ -181,9 +181,7 @@ fn a_connection_that_takes_no_more_loses_whole_frames_only() {
     let (listener, address) = listener();
     let mut transport = Transport::open(&Address::Tcp(address)).unwrap();
     let mut robot = connected(&listener, &mut transport, 0);
-    robot
-        .set_read_timeout(Some(Duration::from_millis(200)))
-        .unwrap();
+    robot.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     overfill(&mut transport, |buffer| robot.read(buffer).ok());
 }
 
@@ -208,11 +206,7 @@ fn plug_in(name: &Path) -> OwnedFd {
 fn line() -> Line {
     let directory = tempfile::tempdir().unwrap();
     let name = directory.path().join("ttyUSB0");
-    Line {
-        robot: plug_in(&name),
-        name,
-        _directory: Some(directory),
-    }
+    Line { robot: plug_in(&name), name, _directory: Some(directory) }
 }
 
 fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {

@@ -30,11 +30,7 @@ impl Udp {
         };
         let socket = UdpSocket::bind((any, 0))?;
         socket.set_nonblocking(true)?;
-        Ok(Self {
-            socket,
-            robot,
-            tally: Tally::default(),
-        })
+        Ok(Self { socket, robot, tally: Tally::default() })
     }
 
     /// Read the next datagram of the robot into `buffer`. Returns its length; none when all were taken. Datagrams of others

@@ -7,10 +7,7 @@ use common::mission::Realism;
 const DT: f64 = 0.005;
 
 fn ideal() -> WheelPhysics {
-    WheelPhysics {
-        lag_s: 0.0,
-        ..WheelPhysics::preset(Realism::Laboratory)
-    }
+    WheelPhysics { lag_s: 0.0, ..WheelPhysics::preset(Realism::Laboratory) }
 }
 
 /// Run for `seconds` from mission time `from`; the speed at every step.
@@ -30,15 +27,8 @@ fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
 fn it_boots_suspended_in_pwm_mode_on_one_pot_with_50_5_0() {
     let motor = Motor::new(ideal(), 2000.0);
     assert!(!motor.enabled());
-    assert_eq!(
-        (motor.mode(), motor.feedback()),
-        (Mode::Pwm, Feedback::OnePot)
-    );
-    let boot = PidGains {
-        kp: 50,
-        kd: 5,
-        ki_x100: 0,
-    };
+    assert_eq!((motor.mode(), motor.feedback()), (Mode::Pwm, Feedback::OnePot));
+    let boot = PidGains { kp: 50, kd: 5, ki_x100: 0 };
     assert_eq!(motor.gains(), (boot, boot));
 }
 
@@ -53,10 +43,7 @@ fn a_velocity_command_alone_turns_the_wheel_and_ends_in_time() {
 
 #[test]
 fn the_measured_loop_has_its_gain_and_answers_late() {
-    let physics = WheelPhysics {
-        noise_counts: 0.0,
-        ..WheelPhysics::preset(Realism::Measured)
-    };
+    let physics = WheelPhysics { noise_counts: 0.0, ..WheelPhysics::preset(Realism::Measured) };
     let mut motor = Motor::new(physics, 2000.0);
     motor.order(Quantity::Velocity, 500, None);
     let speeds = run(&mut motor, 0.0, 2.0);
@@ -65,11 +52,7 @@ fn the_measured_loop_has_its_gain_and_answers_late() {
     let late = speeds.iter().position(|s| *s > 0.63 * steady).unwrap() as f64 * DT;
     assert!((0.14..=0.16).contains(&late), "delay and lag are {late} s");
     motor.order(Quantity::Velocity, 25, None);
-    assert_eq!(
-        run(&mut motor, 2.0, 2.0)[399],
-        0.0,
-        "25 * 0.78 lies in the dead band"
-    );
+    assert_eq!(run(&mut motor, 2.0, 2.0)[399], 0.0, "25 * 0.78 lies in the dead band");
 }
 
 #[test]
@@ -107,10 +90,7 @@ fn a_position_is_reached_the_shorter_way_round_and_held() {
 
 #[test]
 fn a_timed_position_is_reached_to_the_last_count_by_a_measured_loop() {
-    let physics = WheelPhysics {
-        noise_counts: 0.0,
-        ..WheelPhysics::preset(Realism::Measured)
-    };
+    let physics = WheelPhysics { noise_counts: 0.0, ..WheelPhysics::preset(Realism::Measured) };
     for way in [-700, 3, 1200] {
         let mut motor = Motor::new(physics, 2000.0);
         motor.order(Quantity::Position, way, Some(1.0));

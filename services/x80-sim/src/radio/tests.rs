@@ -59,22 +59,14 @@ fn delay_and_jitter_keep_the_order() {
     let arrived = arrivals(&mut radio, &times);
     let order: Vec<u8> = arrived.iter().map(|(_, bytes)| bytes[0]).collect();
     assert_eq!(order, (0..100).collect::<Vec<u8>>());
-    assert!(
-        arrived
-            .iter()
-            .zip(&times)
-            .all(|((due, _), sent)| *due >= sent + 0.02)
-    );
+    assert!(arrived.iter().zip(&times).all(|((due, _), sent)| *due >= sent + 0.02));
 }
 
 #[test]
 fn a_reordered_datagram_comes_behind_the_next() {
     let mut radio = radio(|r| r.reorder_share = 0.3);
     let times: Vec<f64> = (0..100).map(|n| f64::from(n) * 0.01).collect();
-    let order: Vec<u8> = arrivals(&mut radio, &times)
-        .iter()
-        .map(|(_, bytes)| bytes[0])
-        .collect();
+    let order: Vec<u8> = arrivals(&mut radio, &times).iter().map(|(_, bytes)| bytes[0]).collect();
     let mut sorted = order.clone();
     sorted.sort_unstable();
     assert_eq!(sorted, (0..100).collect::<Vec<u8>>(), "none is lost");

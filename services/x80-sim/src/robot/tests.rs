@@ -91,22 +91,14 @@ fn everything_but_an_acknowledgement_is_acknowledged() {
     let commands = [
         Command::System(SystemSignal::Ping),
         forward(100, None),
-        Command::Enable {
-            on: false,
-            channel: Some(3),
-        },
+        Command::Enable { on: false, channel: Some(3) },
     ];
     for command in commands {
         assert_eq!(send(&mut robot, command).1, ack, "{command:?}");
     }
     let (heard, replies) = send(&mut robot, Command::System(SystemSignal::Ack));
     assert_eq!((heard, replies.len()), (Heard::Ack, 0));
-    let unknown = Frame {
-        rid: 8,
-        sn: 0,
-        did: 99,
-        data: &[1],
-    };
+    let unknown = Frame { rid: 8, sn: 0, did: 99, data: &[1] };
     let mut replies = Vec::new();
     assert_eq!(robot.on_frame(&unknown, &mut replies), Heard::Other);
     assert_eq!(replies, ack);
@@ -117,12 +109,7 @@ fn the_multimedia_board_acknowledges_and_moves_nothing() {
     let mut robot = robot("");
     let mut velocity = Vec::new();
     Command::velocity([Some(400), Some(400)], None).encode(Addressing::Numbered, &mut velocity);
-    let frame = Frame {
-        rid: 8,
-        sn: 0,
-        did: velocity[4],
-        data: &velocity[6..18],
-    };
+    let frame = Frame { rid: 8, sn: 0, did: velocity[4], data: &velocity[6..18] };
     let mut replies = Vec::new();
     assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Other);
     assert_eq!(replies.len(), 10, "an acknowledgement");
@@ -149,12 +136,7 @@ fn one_is_answered_in_the_form_one_is_addressed_in() {
 fn frames_that_speak_to_a_host_are_none_of_its_business() {
     let mut robot = robot("");
     let mut replies = Vec::new();
-    let reflected = Frame {
-        rid: 0,
-        sn: 0,
-        did: 255,
-        data: &[0],
-    };
+    let reflected = Frame { rid: 0, sn: 0, did: 255, data: &[0] };
     assert_eq!(robot.on_frame(&reflected, &mut replies), Heard::Foreign);
     assert!(replies.is_empty());
 }
@@ -171,15 +153,8 @@ fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
     assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
     assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
     let ground_truth = robot.ground_truth();
-    assert_eq!(
-        (ground_truth.left_counts, ground_truth.right_counts),
-        (1000, 1000)
-    );
-    assert!(
-        (ground_truth.x - 0.445_059).abs() < 1e-6,
-        "{}",
-        ground_truth.x
-    );
+    assert_eq!((ground_truth.left_counts, ground_truth.right_counts), (1000, 1000));
+    assert!((ground_truth.x - 0.445_059).abs() < 1e-6, "{}", ground_truth.x);
     for _ in 0..7 * 32 {
         robot.advance_to_next_tick();
     }
@@ -196,10 +171,7 @@ fn wheels_may_be_wired_the_other_way_round() {
     robot.advance_to_next_tick();
     let ground_truth = robot.ground_truth();
     assert!(ground_truth.heading > 0.0 && ground_truth.omega > 0.0);
-    assert_eq!(
-        (ground_truth.left_counts, ground_truth.right_counts),
-        (0, 71)
-    );
+    assert_eq!((ground_truth.left_counts, ground_truth.right_counts), (0, 71));
 }
 
 #[test]
@@ -212,10 +184,7 @@ fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
         robot.ground_truth().right_counts
     };
     assert_eq!(moved("[simulation.wheels]\nlag_s = 0"), 70);
-    assert_eq!(
-        moved("[simulation]\nignores_time = true\n[simulation.wheels]\nlag_s = 0"),
-        200
-    );
+    assert_eq!(moved("[simulation]\nignores_time = true\n[simulation.wheels]\nlag_s = 0"), 200);
 }
 
 #[test]
@@ -264,28 +233,16 @@ fn parameters_and_enabling_reach_their_channel() {
         &mut robot,
         Command::Parameter {
             channel: 1,
-            parameter: Parameter::VelocityPid(Gains {
-                kp: Some(15),
-                ..Default::default()
-            }),
+            parameter: Parameter::VelocityPid(Gains { kp: Some(15), ..Default::default() }),
         },
     );
     let (position, velocity) = robot.motor(1).unwrap().gains();
     assert_eq!((position.kp, velocity.kp, velocity.kd), (50, 15, 5));
-    send(
-        &mut robot,
-        Command::Enable {
-            on: true,
-            channel: None,
-        },
-    );
+    send(&mut robot, Command::Enable { on: true, channel: None });
     assert!(robot.motor(5).unwrap().enabled());
     let other = Motion {
         quantity: Quantity::Velocity,
-        targets: Targets::One {
-            channel: 4,
-            value: 100,
-        },
+        targets: Targets::One { channel: 4, value: 100 },
         limit_ms: None,
     };
     send(&mut robot, Command::Motion(other));
@@ -306,10 +263,7 @@ fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
     }
     let ground_truth = robot.ground_truth();
     assert_eq!(ground_truth.contacts, 1);
-    assert!(
-        (0.0..1e-6).contains(&ground_truth.clearance_m),
-        "{ground_truth:?}"
-    );
+    assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{ground_truth:?}");
     assert_eq!(ground_truth.v, 0.0, "the wall holds it");
 }
 
@@ -343,9 +297,7 @@ fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
 fn with_crosstalk_a_ranger_hears_its_neighbours_answer() {
     let sonar = "[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\ncrosstalk_share = 1";
     // Only the left one, at 45 degrees, has something before it: a drum 1 m from the centre.
-    let mut robot = robot(&format!(
-        "{sonar}\n[[world.drum]]\nat = [1, 1]\nradius_m = 0.414213562"
-    ));
+    let mut robot = robot(&format!("{sonar}\n[[world.drum]]\nat = [1, 1]\nradius_m = 0.414213562"));
     let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
         panic!("no standard frame");
     };

@@ -206,15 +206,9 @@ impl Session {
     }
 
     fn hear(&mut self, source: Source, bytes: &[u8]) -> Result<(), SimError> {
-        let known = self
-            .decoders
-            .iter()
-            .position(|heard| heard.source == source);
+        let known = self.decoders.iter().position(|heard| heard.source == source);
         let mut heard = known.map_or_else(
-            || SourceDecoder {
-                source,
-                decoder: Decoder::default(),
-            },
+            || SourceDecoder { source, decoder: Decoder::default() },
             |at| self.decoders.swap_remove(at),
         );
         heard.decoder.push(bytes);
@@ -254,8 +248,7 @@ impl Session {
                 if !lost {
                     if let Some(radio) = &mut self.radio {
                         let both_ways = radio.delay() + radio.delay();
-                        self.robot
-                            .advance_to((now + both_ways).min(self.next_tick_s()));
+                        self.robot.advance_to((now + both_ways).min(self.next_tick_s()));
                     }
                     self.robot.on_frame(frame, &mut answer);
                     self.deliver(&answer);

@@ -10,18 +10,9 @@ use crate::noise::Source;
 fn heard_in(text: &str, physics: &SonarPhysics, heading_deg: f64) -> f64 {
     let text = format!("target = [0, -5]\n{text}");
     let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-    let pose = Pose2 {
-        position: DVec2::ZERO,
-        heading: heading_deg.to_radians(),
-    };
+    let pose = Pose2 { position: DVec2::ZERO, heading: heading_deg.to_radians() };
     let mut noise = Noise::new(1, Source::Sonar);
-    listen(
-        &World::new(&mission),
-        pose.position,
-        pose,
-        physics,
-        &mut noise,
-    )
+    listen(&World::new(&mission), pose.position, pose, physics, &mut noise)
 }
 
 fn laboratory(text: &str, heading_deg: f64) -> f64 {
@@ -70,10 +61,7 @@ fn a_drum_half_out_of_the_cone_answers_with_its_flank() {
 #[test]
 fn a_post_before_a_wall_hides_it_and_the_end_of_a_wall_is_heard() {
     close(
-        laboratory(
-            &format!("{WALL}\nworld.drum = [{{ at = [1, 0], radius_m = 0.1 }}]"),
-            0.0,
-        ),
+        laboratory(&format!("{WALL}\nworld.drum = [{{ at = [1, 0], radius_m = 0.1 }}]"), 0.0),
         0.9,
     );
     close(
@@ -93,10 +81,7 @@ fn nothing_beyond_the_reach_is_heard() {
 #[test]
 fn a_smooth_wall_answers_square_on_and_not_when_oblique() {
     close(smooth(WALL, 0.0), 1.5);
-    close(
-        smooth("world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]", 20.0),
-        0.5,
-    );
+    close(smooth("world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]", 20.0), 0.5);
     assert_eq!(smooth(WALL, 24.0), f64::INFINITY);
     assert_eq!(smooth(WALL, 45.0), f64::INFINITY);
 }
@@ -160,9 +145,7 @@ fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
 fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
     let physics = SonarPhysics::preset(Realism::Laboratory);
     let mut noise = Noise::new(4, Source::Sonar);
-    let bytes: Vec<f64> = (0..20_000)
-        .map(|_| f64::from(byte(2.0, &physics, &mut noise)))
-        .collect();
+    let bytes: Vec<f64> = (0..20_000).map(|_| f64::from(byte(2.0, &physics, &mut noise))).collect();
     let mean = bytes.iter().sum::<f64>() / bytes.len() as f64;
     let sd = (bytes.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / bytes.len() as f64).sqrt();
     // 1 cm + 0.5 % of 2 m is 2 cm; rounding adds 1/12 cm^2.
@@ -217,18 +200,12 @@ fn a_sensor_at_or_within_the_bodys_edge_never_looks_through_a_wall_that_the_body
     for realism in [Realism::Laboratory, Realism::Measured] {
         let physics = SonarPhysics::preset(realism);
         for forward_m in [0.19, 0.1915, 0.2] {
-            let pose = Pose2 {
-                position: DVec2::new(1.0 + forward_m, 0.0),
-                heading: 0.0,
-            };
+            let pose = Pose2 { position: DVec2::new(1.0 + forward_m, 0.0), heading: 0.0 };
             let range = listen(&world, DVec2::X, pose, &physics, &mut noise);
             close(range, 0.0);
         }
     }
-    let within = Pose2 {
-        position: DVec2::new(1.1, 0.0),
-        heading: 0.0,
-    };
+    let within = Pose2 { position: DVec2::new(1.1, 0.0), heading: 0.0 };
     let physics = SonarPhysics::preset(Realism::Laboratory);
     let range = listen(&world, DVec2::X, within, &physics, &mut noise);
     close(range, 0.09);

@@ -35,11 +35,7 @@ impl Pty {
         settings.make_raw();
         tcsetattr(&host, OptionalActions::Now, &settings)?;
         fcntl_setfl(&robot, fcntl_getfl(&robot)? | OFlags::NONBLOCK)?;
-        Ok(Self {
-            robot,
-            _host: host,
-            path: path.to_string_lossy().into_owned(),
-        })
+        Ok(Self { robot, _host: host, path: path.to_string_lossy().into_owned() })
     }
 
     pub(super) fn path(&self) -> &str {

@@ -21,12 +21,7 @@ impl Tcp {
     pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
-        Ok(Self {
-            address: listener.local_addr()?,
-            listener,
-            connection: None,
-            accepted: 0,
-        })
+        Ok(Self { address: listener.local_addr()?, listener, connection: None, accepted: 0 })
     }
 
     pub(super) fn address(&self) -> SocketAddr {

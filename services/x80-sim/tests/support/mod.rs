@@ -69,12 +69,7 @@ impl Sim {
         });
         let header: GroundTruthHeader =
             serde_json::from_str(&ground_truth.recv().unwrap()).unwrap();
-        Self {
-            listening: header.listening,
-            ground_truth,
-            stop: Some(stop),
-            thread: Some(thread),
-        }
+        Self { listening: header.listening, ground_truth, stop: Some(stop), thread: Some(thread) }
     }
 
     /// The ground truth of the next tick.

@@ -58,18 +58,12 @@ impl Page {
     }
 
     fn title(&self) -> &'static str {
-        self.text
-            .lines()
-            .next()
-            .unwrap_or_default()
-            .trim_start_matches("# ")
+        self.text.lines().next().unwrap_or_default().trim_start_matches("# ")
     }
 }
 
 fn page(name: &str) -> Option<&'static Page> {
-    GUIDE
-        .iter()
-        .find(|page| page.file.eq_ignore_ascii_case(name))
+    GUIDE.iter().find(|page| page.file.eq_ignore_ascii_case(name))
 }
 
 /// The names of all pages.

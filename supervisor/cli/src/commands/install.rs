@@ -23,12 +23,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     print: bool,
     /// Install below DIR instead of /.
-    #[arg(
-        long,
-        value_name = "DIR",
-        default_value = "/",
-        conflicts_with = "print"
-    )]
+    #[arg(long, value_name = "DIR", default_value = "/", conflicts_with = "print")]
     root: PathBuf,
 }
 
@@ -53,21 +48,9 @@ macro_rules! part {
 }
 
 static PARTS: [Part; 7] = [
-    part!(
-        "etc/systemd/system/firsthand.service",
-        "firsthand.service",
-        false
-    ),
-    part!(
-        "etc/systemd/system/firsthand-watch.service",
-        "firsthand-watch.service",
-        false
-    ),
-    part!(
-        "etc/systemd/system/firsthand-stage@.service",
-        "firsthand-stage@.service",
-        false
-    ),
+    part!("etc/systemd/system/firsthand.service", "firsthand.service", false),
+    part!("etc/systemd/system/firsthand-watch.service", "firsthand-watch.service", false),
+    part!("etc/systemd/system/firsthand-stage@.service", "firsthand-stage@.service", false),
     part!("etc/sysusers.d/firsthand.conf", "firsthand.sysusers", false),
     part!("etc/tmpfiles.d/firsthand.conf", "firsthand.tmpfiles", false),
     part!("etc/default/firsthand", "firsthand.default", true),
@@ -115,21 +98,14 @@ impl Part {
 }
 
 fn put(file: &Path, text: &str) -> Result<(), InstallError> {
-    let written = file
-        .parent()
-        .map_or(Ok(()), fs::create_dir_all)
-        .and_then(|()| fs::write(file, text));
-    written.map_err(|source| InstallError {
-        file: file.to_path_buf(),
-        source,
-    })
+    let written =
+        file.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(file, text));
+    written.map_err(|source| InstallError { file: file.to_path_buf(), source })
 }
 
 /// The commands, and the units they concern.
 fn remaining() -> String {
-    let units = stages::TABLE
-        .iter()
-        .map(|stage| format!("\n    firsthand-stage@{}", stage.name));
+    let units = stages::TABLE.iter().map(|stage| format!("\n    firsthand-stage@{}", stage.name));
     format!("{THEN}{}", units.collect::<String>())
 }
 
@@ -148,10 +124,8 @@ mod tests {
             .lines()
             .filter_map(|line| line.strip_prefix("Wants=firsthand-stage@"))
             .collect();
-        let stages: Vec<_> = stages::TABLE
-            .iter()
-            .map(|stage| format!("{}.service", stage.name))
-            .collect();
+        let stages: Vec<_> =
+            stages::TABLE.iter().map(|stage| format!("{}.service", stage.name)).collect();
         assert_eq!(wanted, stages);
     }
 
@@ -162,9 +136,7 @@ mod tests {
                 let Some(command) = line.strip_prefix("ExecStart=") else {
                     continue;
                 };
-                let command = command
-                    .replace("${FIRSTHAND_ROBOT}", "x80")
-                    .replace("%i", "planner");
+                let command = command.replace("${FIRSTHAND_ROBOT}", "x80").replace("%i", "planner");
                 let words: Vec<_> = command.split_whitespace().skip(1).collect();
                 crate::commands::parse(&words)
                     .unwrap_or_else(|error| panic!("{}: {error}", part.path));
@@ -183,10 +155,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let mission = root.path().join("etc/firsthand/mission.toml");
         put(&mission, "target = [1.0, 0.0]").unwrap();
-        let arguments = Arguments {
-            print: false,
-            root: root.path().to_path_buf(),
-        };
+        let arguments = Arguments { print: false, root: root.path().to_path_buf() };
         main(&arguments).unwrap();
         assert_eq!(fs::read_to_string(&mission).unwrap(), "target = [1.0, 0.0]");
         let service = root.path().join("etc/systemd/system/firsthand.service");

@@ -40,9 +40,7 @@ pub(crate) struct Arguments {
 }
 
 fn topic(name: &str) -> Result<&'static dyn EncodedTopic, String> {
-    let found = topics::ENCODED
-        .iter()
-        .find(|topic| topic.spec().name == name);
+    let found = topics::ENCODED.iter().find(|topic| topic.spec().name == name);
     found.copied().ok_or_else(|| {
         format!("no topic is called {name:?}; `firsthand topic list` prints the table of topics")
     })
@@ -64,15 +62,12 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let mut tell = |happened: Happened<'_>| {
         let printed = match happened {
-            Happened::Attached(file) => print_text(&format!(
-                "recording {} into {}\n",
-                arguments.robot,
-                file.display()
-            )),
-            Happened::Complete(file, lost) => print_text(&format!(
-                "{}: complete, {lost} samples lost\n",
-                file.display()
-            )),
+            Happened::Attached(file) => {
+                print_text(&format!("recording {} into {}\n", arguments.robot, file.display()))
+            }
+            Happened::Complete(file, lost) => {
+                print_text(&format!("{}: complete, {lost} samples lost\n", file.display()))
+            }
         };
         if let Err(error) = printed {
             write_stderr(&format!("firsthand: cannot say so: {error}\n"));

@@ -160,11 +160,7 @@ fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure
 }
 
 fn starter(arguments: &Arguments) -> Starter {
-    if arguments.watch_only {
-        Starter::External
-    } else {
-        Starter::Supervisor
-    }
+    if arguments.watch_only { Starter::External } else { Starter::Supervisor }
 }
 
 /// The mission with all that is set on the command line.
@@ -221,11 +217,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     console.line.end();
     let summary = Summary::new(&options.mission, &finished);
     let json = serde_json::to_string(&summary)?;
-    let text = if arguments.json {
-        format!("{json}\n")
-    } else {
-        summary.to_string()
-    };
+    let text = if arguments.json { format!("{json}\n") } else { summary.to_string() };
     complain(print_text(&text).map_err(|error| format!("cannot print the summary: {error}")));
     if may_be_removed(arguments, &options, &finished) {
         let _ = fs::remove_dir_all(directory);
@@ -236,11 +228,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         for written in run_report::write(&options, &finished, &summary, !arguments.no_record) {
             complain(written.and_then(|(name, file)| {
                 let line = format!("{name}: {}\n", file.display());
-                let printed = if arguments.json {
-                    Ok(())
-                } else {
-                    print_text(&line)
-                };
+                let printed = if arguments.json { Ok(()) } else { print_text(&line) };
                 printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
             }));
         }
@@ -315,11 +303,7 @@ impl Console {
             title: format!(
                 "mission {}{}: {:.1} m to the target, robot {}, pace {}; everything of this run is in {}",
                 mission.name,
-                if options.recovered.is_some() {
-                    " goes on"
-                } else {
-                    ""
-                },
+                if options.recovered.is_some() { " goes on" } else { "" },
                 mission.target.length(),
                 options.robot,
                 options.pace,

@@ -84,11 +84,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn list(arguments: &List) -> Result<ExitCode, Failure> {
     let runs = &arguments.runs;
     if !runs.is_dir() {
-        return Err(format!(
-            "there is no directory {}; say where with --runs",
-            runs.display()
-        )
-        .into());
+        return Err(
+            format!("there is no directory {}; say where with --runs", runs.display()).into()
+        );
     }
     if let Some(keep) = arguments.prune {
         for robot in robots(arguments) {
@@ -98,11 +96,7 @@ fn list(arguments: &List) -> Result<ExitCode, Failure> {
     let mut chosen = chosen(arguments);
     chosen.sort();
     let listed: Vec<_> = chosen.iter().map(listed).collect();
-    let text = if arguments.json {
-        json_lines(&listed)?
-    } else {
-        table(&listed)
-    };
+    let text = if arguments.json { json_lines(&listed)? } else { table(&listed) };
     print_text(&text)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -125,10 +119,7 @@ fn listed(run: &RunDirectory) -> Listed<'_> {
     let (outcome, mission_time_s) = match run.outcome() {
         Outcome::Running => ("running".to_owned(), None),
         Outcome::CutOff => ("cut off".to_owned(), None),
-        Outcome::Ended {
-            outcome,
-            mission_time_s,
-        } => (outcome, mission_time_s),
+        Outcome::Ended { outcome, mission_time_s } => (outcome, mission_time_s),
     };
     let began = run.began.duration_since(UNIX_EPOCH).unwrap_or_default();
     Listed {
@@ -152,15 +143,11 @@ fn table(listed: &[Listed<'_>]) -> String {
         ("time", Right),
         ("size", Right),
     ]);
-    let now = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let mut all = 0;
     for run in listed {
         let began = (now.as_secs_f64() - run.began_s).max(0.0);
-        let time = run
-            .mission_time_s
-            .map_or("-".to_owned(), |time_s| format!("{time_s:.1} s"));
+        let time = run.mission_time_s.map_or("-".to_owned(), |time_s| format!("{time_s:.1} s"));
         let name = run.run.file_name().unwrap_or_default().to_string_lossy();
         table.row([
             name.into_owned(),

@@ -79,9 +79,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         listen: arguments.listen,
         transport: arguments.transport.into(),
         keep: arguments.keep.clone(),
-        ground_truth: arguments
-            .ground_truth
-            .then(|| Box::new(std::io::stdout()) as Box<_>),
+        ground_truth: arguments.ground_truth.then(|| Box::new(std::io::stdout()) as Box<_>),
     };
     x80_sim::run(options, &signals).map_err(|error| match error {
         SimError::Bind { .. } => Failure::from(Refused::new("address-in-use", error.to_string())),

@@ -154,10 +154,7 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let status = Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
-        order: order(
-            Order::from_byte(header.order),
-            HoldReason::from_byte(header.reason),
-        ),
+        order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
         link: link.as_ref().map(link_status),

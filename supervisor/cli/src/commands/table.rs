@@ -65,10 +65,7 @@ pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
 
 /// The topics as a list in Markdown.
 pub(super) fn topics() -> String {
-    topics::TABLE
-        .iter()
-        .map(|topic| topic_row(*topic))
-        .collect()
+    topics::TABLE.iter().map(|topic| topic_row(*topic)).collect()
 }
 
 fn topic_row(topic: &dyn AnyTopic) -> String {
@@ -77,10 +74,7 @@ fn topic_row(topic: &dyn AnyTopic) -> String {
         Rate::EachTick => "each tick".to_owned(),
         Rate::EachFrame => "each frame of the robot".to_owned(),
         Rate::WhenItHappens => "when it happens".to_owned(),
-        Rate::OnChange {
-            at_most_every,
-            again_after,
-        } => {
+        Rate::OnChange { at_most_every, again_after } => {
             let limit = match at_most_every.as_millis() {
                 0 => String::new(),
                 limit => format!(" at most every {limit} ms"),
@@ -106,9 +100,7 @@ fn topic_row(topic: &dyn AnyTopic) -> String {
 pub(super) fn stages() -> String {
     let list = |topics: &[Topics]| {
         let topics = topics.iter().copied().flatten();
-        let names: Vec<_> = topics
-            .map(|topic| format!("`{}`", topic.spec().name))
-            .collect();
+        let names: Vec<_> = topics.map(|topic| format!("`{}`", topic.spec().name)).collect();
         names.join(", ")
     };
     let row = |stage: &stages::Stage| {
@@ -134,9 +126,7 @@ pub(super) fn stages() -> String {
     };
     let rows: String = stages::TABLE.iter().map(row).collect();
     let (reads, writes) = (list(&[EVERY_STAGE_READS]), list(&[EVERY_STAGE_WRITES]));
-    rows + &item(&format!(
-        "every stage also reads {reads} and writes {writes}"
-    ))
+    rows + &item(&format!("every stage also reads {reads} and writes {writes}"))
 }
 
 /// The rules of the link's failsafe as a list in Markdown.
@@ -156,10 +146,7 @@ fn failsafe() -> String {
 fn faults() -> String {
     let row = |fault: &faults::Fault| {
         let stage = fault.stage.unwrap_or("any stage");
-        item(&format!(
-            "`{}` ({stage}): {}; until: {}",
-            fault.name, fault.meaning, fault.ends
-        ))
+        item(&format!("`{}` ({stage}): {}; until: {}", fault.name, fault.meaning, fault.ends))
     };
     faults::TABLE.iter().map(row).collect()
 }

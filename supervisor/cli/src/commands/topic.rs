@@ -49,11 +49,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 impl List {
     fn print(&self) -> Result<(), Failure> {
-        print_text(&if self.python {
-            python::module()
-        } else {
-            table::topics()
-        })?;
+        print_text(&if self.python { python::module() } else { table::topics() })?;
         Ok(())
     }
 }

@@ -130,9 +130,7 @@ pub(crate) fn remark(error: &(dyn Error + 'static)) -> Option<String> {
         return None;
     };
     let user = users(Path::new(SHARED_MEMORY), robot).next()?;
-    Some(format!(
-        "a robot {robot:?} runs here for user {user}: `sudo -u '#{user}' firsthand ...`"
-    ))
+    Some(format!("a robot {robot:?} runs here for user {user}: `sudo -u '#{user}' firsthand ...`"))
 }
 
 /// The users who have files of a robot of that name in `shared` memory: the names of files begin with the number of the user.

@@ -12,13 +12,8 @@ macro_rules! shipped {
 }
 
 /// Name and text of every shipped mission.
-pub(crate) static SHIPPED: [(&str, &str); 5] = shipped!(
-    "open-room",
-    "obstacle-course",
-    "trap",
-    "passage",
-    "one-drum"
-);
+pub(crate) static SHIPPED: [(&str, &str); 5] =
+    shipped!("open-room", "obstacle-course", "trap", "passage", "one-drum");
 
 /// Why a mission cannot be loaded.
 #[derive(Debug, Error)]
@@ -32,11 +27,7 @@ pub(crate) enum LookupError {
     )]
     Assignment { assignment: String, problem: String },
     #[error("{name} with --set {assignments}: {problem}")]
-    Assigned {
-        name: String,
-        assignments: String,
-        problem: String,
-    },
+    Assigned { name: String, assignments: String, problem: String },
     #[error(transparent)]
     Mission(#[from] MissionError),
 }
@@ -59,9 +50,7 @@ pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, Lookup
             (Mission::read(file)?, name.to_owned())
         }
         None => {
-            return Err(LookupError::Neither {
-                name: name.to_owned(),
-            });
+            return Err(LookupError::Neither { name: name.to_owned() });
         }
     };
     let as_written = Mission::parse(&text, Path::new(&origin));
@@ -100,9 +89,7 @@ pub(crate) fn with(
     let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
     let assigned = assign(table, assignments)?;
     let mission = Mission::parse(&assigned, Path::new(&mission.name));
-    mission
-        .map(Some)
-        .map_err(|error| failed(error.without_place()))
+    mission.map(Some).map_err(|error| failed(error.without_place()))
 }
 
 /// The text of `table` with all assignments.
@@ -154,13 +141,7 @@ mod tests {
     #[test]
     fn the_mission_in_the_guide_is_valid_and_shows_the_defaults() {
         let guide = include_str!("../../../guide/mission-file.md");
-        let text = guide
-            .split("```toml\n")
-            .nth(1)
-            .unwrap()
-            .split("```")
-            .next()
-            .unwrap();
+        let text = guide.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
         let mut shown = Mission::parse(text, Path::new("mission-file.md")).unwrap();
         shown.known = common::geometry::Shapes::default();
         shown.world = common::geometry::Shapes::default();
@@ -170,19 +151,10 @@ mod tests {
 
     #[test]
     fn an_assignment_changes_one_key_and_keeps_its_table() {
-        let mission = load(
-            "trap",
-            &["start.heading_deg=90".into(), "perimeter.cells = 60".into()],
-        )
-        .unwrap();
-        assert_eq!(
-            (mission.start.heading_deg, mission.perimeter.cells),
-            (90.0, Some(60))
-        );
-        assert_eq!(
-            mission.perimeter.width_m, 9.0,
-            "the rest of the table stays"
-        );
+        let mission =
+            load("trap", &["start.heading_deg=90".into(), "perimeter.cells = 60".into()]).unwrap();
+        assert_eq!((mission.start.heading_deg, mission.perimeter.cells), (90.0, Some(60)));
+        assert_eq!(mission.perimeter.width_m, 9.0, "the rest of the table stays");
     }
 
     #[test]

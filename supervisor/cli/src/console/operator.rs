@@ -87,16 +87,10 @@ pub(crate) fn ask(robot: &RobotName, kind: RequestKind, stage: &str) -> Result<(
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
     let id = new_id();
-    let request = RequestSample {
-        id,
-        stage: name(stage),
-        kind: kind.into(),
-        ..RequestSample::default()
-    };
+    let request =
+        RequestSample { id, stage: name(stage), kind: kind.into(), ..RequestSample::default() };
     requests.publish(0, MissionTime::default(), request)?;
-    find(&mut roster, robot, |header, _| {
-        (header.last_request == id).then_some(())
-    })
+    find(&mut roster, robot, |header, _| (header.last_request == id).then_some(()))
 }
 
 /// An id for a request, which no other process uses: it mixes time and process id.

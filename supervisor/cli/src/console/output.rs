@@ -10,20 +10,12 @@ use serde::Serialize;
 /// Write `text` to standard output, at once. It is no failure when its reader has read enough (`firsthand help tables | head`).
 pub(crate) fn print_text(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout();
-    unless_closed(
-        stdout
-            .write_all(text.as_bytes())
-            .and_then(|()| stdout.flush()),
-    )
+    unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
 }
 
 /// Print `value` as text, or as one line of JSON.
 pub(crate) fn print(value: &(impl Display + Serialize), json: bool) -> io::Result<()> {
-    print_text(&if json {
-        serde_json::to_string(value)? + "\n"
-    } else {
-        value.to_string()
-    })
+    print_text(&if json { serde_json::to_string(value)? + "\n" } else { value.to_string() })
 }
 
 /// Each of `values` as one line of JSON.
@@ -35,9 +27,7 @@ pub(crate) fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<Strin
 /// Write to standard error; a reader that was closed does not end what is under way.
 pub(crate) fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
-    let _ = stderr
-        .write_all(text.as_bytes())
-        .and_then(|()| stderr.flush());
+    let _ = stderr.write_all(text.as_bytes()).and_then(|()| stderr.flush());
 }
 
 /// `written`, where a pipe whose reader has ended, or a terminal that was closed, is no failure.

@@ -18,17 +18,12 @@ pub(crate) struct ProgressLine {
 impl ProgressLine {
     /// Nothing is shown yet. Lines that cannot be rewritten are shown once in each `every`.
     pub(crate) fn new(every: Duration) -> Self {
-        Self {
-            rewrites: io::stderr().is_terminal(),
-            every,
-            shown: None,
-        }
+        Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
 
     /// Whether it is time for a line.
     pub(crate) fn is_due(&self) -> bool {
-        self.shown
-            .is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
+        self.shown.is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
     }
 
     /// A line is due now. Returns whether it is the first.

@@ -79,13 +79,7 @@ pub(crate) struct Report {
 impl TopicRates {
     /// No sample has come yet on the topic of `spec`.
     pub(crate) fn new(spec: &'static Spec, now: Instant) -> Self {
-        Self {
-            spec,
-            writers: BTreeMap::new(),
-            at: None,
-            since: now,
-            counts: Counts::default(),
-        }
+        Self { spec, writers: BTreeMap::new(), at: None, since: now, counts: Counts::default() }
     }
 
     /// A sample of `author` came at `now`. The first sample of each process may be old, because a topic keeps one for new readers: it
@@ -124,11 +118,7 @@ impl TopicRates {
         let rate = self.spec.rate;
         Report {
             topic: self.spec.name,
-            rate_hz: if over > 0.0 {
-                counts.samples as f64 / over
-            } else {
-                0.0
-            },
+            rate_hz: if over > 0.0 { counts.samples as f64 / over } else { 0.0 },
             longest_gap_s: gap.map(|gap| gap.as_secs_f64()),
             age_s: age.map(|age| age.as_secs_f64()),
             lost: counts.lost,
@@ -200,19 +190,11 @@ mod tests {
     const MS: Duration = Duration::from_millis(1);
 
     fn stamp(number: u32, tick: u64) -> Stamp {
-        Stamp {
-            tick,
-            stamp_ns: u64::from(number) * 100_000_000,
-            generation: 1,
-            sequence: number,
-        }
+        Stamp { tick, stamp_ns: u64::from(number) * 100_000_000, generation: 1, sequence: number }
     }
 
     fn of(process: u32) -> Author {
-        Author {
-            process,
-            generation: 1,
-        }
+        Author { process, generation: 1 }
     }
 
     #[test]
@@ -249,10 +231,7 @@ mod tests {
         }
         health.add(of(2), stamp(60, 0), began + 2000 * MS);
         let report = health.report(began + 2000 * MS);
-        assert_eq!(
-            (report.late, report.longest_gap_s),
-            (Some(true), Some(1.02))
-        );
+        assert_eq!((report.late, report.longest_gap_s), (Some(true), Some(1.02)));
     }
 
     #[test]
@@ -261,10 +240,8 @@ mod tests {
             let began = Instant::now();
             let mut field = TopicRates::new(topics::FIELD.spec(), began);
             for number in 0..3 {
-                let stamp = Stamp {
-                    stamp_ns: u64::from(number) * 1_000_000_000,
-                    ..stamp(number, 0)
-                };
+                let stamp =
+                    Stamp { stamp_ns: u64::from(number) * 1_000_000_000, ..stamp(number, 0) };
                 field.add(of(1), stamp, began + 1000 * number * MS * pace);
             }
             let report = field.report(began + 2000 * MS * pace);

@@ -27,11 +27,7 @@ impl Robot {
     /// The robot `name` as it is now.
     pub(crate) fn find(name: RobotName) -> Self {
         let supervisor = Domain::of(name.clone()).supervisor().ok().flatten();
-        Self {
-            name,
-            supervisor,
-            run: supervisor.and_then(run_directory),
-        }
+        Self { name, supervisor, run: supervisor.and_then(run_directory) }
     }
 }
 
@@ -74,9 +70,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
 /// The directory of the run of the process `supervisor`, which has its log open there.
 fn run_directory(supervisor: u32) -> Option<PathBuf> {
     let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
-    let files = opened
-        .flatten()
-        .filter_map(|entry| fs::read_link(entry.path()).ok());
+    let files = opened.flatten().filter_map(|entry| fs::read_link(entry.path()).ok());
     let mut logs = files.filter(|file| file.ends_with(SUPERVISOR_LOG));
     Some(logs.next()?.parent()?.to_path_buf())
 }

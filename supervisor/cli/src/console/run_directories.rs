@@ -15,10 +15,7 @@ use common::domain::RobotName;
 /// The directory that was asked for. It is refused if it holds an earlier run.
 pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
     fs::create_dir_all(directory).map_err(|error| {
-        format!(
-            "cannot make {}: {error}; give another --out",
-            directory.display()
-        )
+        format!("cannot make {}: {error}; give another --out", directory.display())
     })?;
     if directory.join(common::run::FILE_NAME).exists() {
         let message = format!(
@@ -33,10 +30,7 @@ pub(crate) fn own(directory: &Path) -> Result<PathBuf, Failure> {
 /// `NAME-NNN` below `runs`, with the number after the highest one there.
 pub(crate) fn numbered(runs: &Path, name: &str) -> Result<PathBuf, Failure> {
     fs::create_dir_all(runs).map_err(|error| {
-        format!(
-            "cannot make {}: {error}; say where with --out",
-            runs.display()
-        )
+        format!("cannot make {}: {error}; say where with --out", runs.display())
     })?;
     let mut number = highest_number(runs, name) + 1;
     loop {
@@ -88,9 +82,7 @@ fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
 pub(crate) fn cut_off(runs: &Path, robot: &RobotName) -> io::Result<Option<PathBuf>> {
     let runs = runs_of(robot, runs).into_iter();
     let newest = runs.filter(|run| !run.has_ended()).max();
-    newest
-        .map(|run| fs::canonicalize(run.directory))
-        .transpose()
+    newest.map(|run| fs::canonicalize(run.directory)).transpose()
 }
 
 /// Mark that a run was reported as cut off, so that the next start begins a new one.

@@ -90,14 +90,12 @@ impl RunDirectory {
         let readable = fs::metadata(&file).is_ok_and(|file| file.len() <= LARGEST_SUMMARY);
         let text = readable.then(|| fs::read_to_string(&file).ok()).flatten();
         match text.map(|text| serde_json::from_str::<Summary>(&text)) {
-            Some(Ok(summary)) => Outcome::Ended {
-                outcome: summary.outcome,
-                mission_time_s: summary.mission_time_s,
-            },
-            _ if self.has(SUMMARY) => Outcome::Ended {
-                outcome: "unreadable".to_owned(),
-                mission_time_s: None,
-            },
+            Some(Ok(summary)) => {
+                Outcome::Ended { outcome: summary.outcome, mission_time_s: summary.mission_time_s }
+            }
+            _ if self.has(SUMMARY) => {
+                Outcome::Ended { outcome: "unreadable".to_owned(), mission_time_s: None }
+            }
             _ if self.is_running() => Outcome::Running,
             _ => Outcome::CutOff,
         }
@@ -122,11 +120,7 @@ fn size(directory: &Path, levels: u32) -> u64 {
     let sizes = entries.filter_map(|entry| {
         // A link counts by itself, without the file that it leads to.
         let file = entry.metadata().ok()?;
-        let below = if file.is_dir() && levels > 0 {
-            size(&entry.path(), levels - 1)
-        } else {
-            0
-        };
+        let below = if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
         // The kernel counts blocks of 512 bytes on every file system.
         Some(file.blocks().saturating_mul(512).saturating_add(below))
     });
@@ -159,11 +153,7 @@ mod tests {
             outcome: outcome.to_owned(),
             mission_time_s,
         };
-        let expected = [
-            ended("timeout", Some(2.5)),
-            ended("unreadable", None),
-            Outcome::CutOff,
-        ];
+        let expected = [ended("timeout", Some(2.5)), ended("unreadable", None), Outcome::CutOff];
         assert_eq!(outcomes, expected);
         assert_eq!(listed[0].mission.as_deref(), Some("trap"));
         assert!(listed[0].size() >= 1024, "{}", listed[0].size());

@@ -35,10 +35,7 @@ impl Stream {
     /// From now on a signal lets the command leave the bus before it ends, and stages get the processor first.
     pub(crate) fn open() -> io::Result<Self> {
         let_stages_go_first();
-        Ok(Self {
-            signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?,
-            ended: false,
-        })
+        Ok(Self { signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?, ended: false })
     }
 
     /// Whether the command must end.

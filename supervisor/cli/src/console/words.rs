@@ -60,9 +60,7 @@ mod tests {
     #[test]
     fn ages_and_sizes_have_the_unit_that_fits() {
         let ages = [0.0, 0.25, 59.94, 599.0, 3600.0, 36e3, 5e5].map(|age_s| age(Some(age_s)));
-        let written = [
-            "0 ms", "250 ms", "59.9 s", "599.0 s", "60 min", "10 h", "6 days",
-        ];
+        let written = ["0 ms", "250 ms", "59.9 s", "599.0 s", "60 min", "10 h", "6 days"];
         assert_eq!(ages, written);
         assert_eq!(age(None), "never");
         assert_eq!(seconds(u64::MAX), None);

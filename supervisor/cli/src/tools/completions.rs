@@ -41,9 +41,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 /// If a shell asks, answer and end the process. `whole` is the command line of the executable, `pages` those of the guide.
 pub(crate) fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
-    CompleteEnv::with_factory(|| with_candidates(whole(), pages))
-        .var(VARIABLE)
-        .complete();
+    CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
 }
 
 /// `command` with candidates for what its arguments name.

@@ -158,9 +158,7 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 /// The command that gives these rows.
 fn described(arguments: &Arguments, settings: &[Setting]) -> String {
     let worlds = &arguments.worlds;
-    let count = arguments
-        .count
-        .map_or(String::new(), |count| format!(" --count {count}"));
+    let count = arguments.count.map_or(String::new(), |count| format!(" --count {count}"));
     let ends = match (arguments.start, arguments.target) {
         (Some([x, y, deg]), Some([to_x, to_y])) => {
             format!(" --start {x},{y},{deg} --target {to_x},{to_y}")
@@ -256,10 +254,7 @@ fn body(robot: &str) -> Result<BodySize, Failure> {
     let text = format!("target = [1, 0]\nrobot.model = '{robot}'");
     let mission = Mission::parse(&text, Path::new("--robot"))?;
     let _: Model = mission.robot.model;
-    Ok(BodySize {
-        radius_m: mission.body().radius_m,
-        margin_m: MARGIN_M,
-    })
+    Ok(BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M })
 }
 
 /// The object that `--json` ends with.

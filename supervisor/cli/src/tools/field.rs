@@ -76,11 +76,7 @@ impl FromStr for TargetCell {
 enum FieldError {
     /// The target is blocked or outside.
     #[error("{}: {cause}; the free cell nearest to it is --target-cell {},{}", map.display(), nearest.0, nearest.1)]
-    Target {
-        map: PathBuf,
-        cause: SolveError,
-        nearest: (usize, usize),
-    },
+    Target { map: PathBuf, cause: SolveError, nearest: (usize, usize) },
     /// There is nothing to solve.
     #[error(
         "{}: no cell is free (the rim counts as blocked); check the thresholds, or `negate`, of the map",
@@ -101,10 +97,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         FieldError::Target { .. } => Failure::from(Refused::new("target", error.to_string())),
         error => error.into(),
     })?;
-    let failed = |cause| FieldError::Solve {
-        map: arguments.map.clone(),
-        cause,
-    };
+    let failed = |cause| FieldError::Solve { map: arguments.map.clone(), cause };
     let mut runs = Vec::new();
     let (first, times) = solve(&domain, arguments.threads).map_err(failed)?;
     runs.push(times);
@@ -126,23 +119,15 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// What is to be solved.
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, FieldError> {
     let target = arguments.target_cell.0;
-    let screening = arguments
-        .screening_cells
-        .map_or(Screening::None, Screening::cells);
+    let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
     Domain::new(map.cols, map.rows, map.blocked.clone(), target)
         .and_then(|domain| domain.with_screening(&screening))
         .map_err(|cause| {
             let file = arguments.map.clone();
-            let at_target = matches!(
-                cause,
-                SolveError::TargetBlocked { .. } | SolveError::Outside { .. }
-            );
+            let at_target =
+                matches!(cause, SolveError::TargetBlocked { .. } | SolveError::Outside { .. });
             match map.nearest_free(target.col, target.row) {
-                Some(nearest) if at_target => FieldError::Target {
-                    map: file,
-                    cause,
-                    nearest,
-                },
+                Some(nearest) if at_target => FieldError::Target { map: file, cause, nearest },
                 None if at_target => FieldError::NothingFree { map: file },
                 _ => FieldError::Solve { map: file, cause },
             }
@@ -159,10 +144,7 @@ struct Times {
 
 /// A field from scratch.
 fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), SolveError> {
-    let mut solver = Solver::new(Settings {
-        threads,
-        ..Settings::default()
-    });
+    let mut solver = Solver::new(Settings { threads, ..Settings::default() });
     let mut times = Times::default();
     let mut last = Instant::now();
     let field = solver.solve_observed(domain, &Cancellation::new(), &mut |phase| {
@@ -213,18 +195,11 @@ struct Medians {
 impl Report {
     fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
         let sorted = |phase: fn(&Times) -> Duration| {
-            let mut all: Vec<f64> = runs
-                .iter()
-                .map(|run| phase(run).as_secs_f64() * 1e3)
-                .collect();
+            let mut all: Vec<f64> = runs.iter().map(|run| phase(run).as_secs_f64() * 1e3).collect();
             all.sort_by(f64::total_cmp);
             all
         };
-        let phases = [
-            sorted(|run| run.setup),
-            sorted(|run| run.solve),
-            sorted(|run| run.verify),
-        ];
+        let phases = [sorted(|run| run.setup), sorted(|run| run.solve), sorted(|run| run.verify)];
         let [setup_ms, solve_ms, verify_ms] = [0, 1, 2].map(|nth: usize| phases[nth][0]);
         let median = |nth: usize| {
             let all = &phases[nth];
@@ -306,10 +281,7 @@ fn write(
     File::create(file)
         .map(BufWriter::new)
         .and_then(|mut to| fill(&mut to).and_then(|()| to.flush()))
-        .map_err(|cause| FieldError::Write {
-            file: file.to_owned(),
-            cause,
-        })
+        .map_err(|cause| FieldError::Write { file: file.to_owned(), cause })
 }
 
 /// u and guidance of every cell as arrays of shape (rows, cols).
@@ -359,9 +331,7 @@ fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
         // The field would look for a way out of the wall, which nobody asked for.
         None
     };
-    direction
-        .unwrap_or_default()
-        .map(|component| component as f32)
+    direction.unwrap_or_default().map(|component| component as f32)
 }
 
 /// The picture, as SVG.
@@ -369,11 +339,7 @@ fn draw(map: &Map, field: &Field) -> String {
     let drawn: Vec<FieldCell> = cells(field)
         .map(|cell| {
             let [ex, ey] = guidance(field, cell);
-            FieldCell {
-                ex,
-                ey,
-                log2_u: field.u(cell).log2() as f32,
-            }
+            FieldCell { ex, ey, log2_u: field.u(cell).log2() as f32 }
         })
         .collect();
     picture::map_svg(&FieldOnMap {

@@ -15,10 +15,7 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Missions at once: as many as asked for, or one for each processor.
 pub(super) fn jobs(asked_for: Option<NonZero<usize>>) -> usize {
-    asked_for.map_or_else(
-        || thread::available_parallelism().map_or(1, NonZero::get),
-        NonZero::get,
-    )
+    asked_for.map_or_else(|| thread::available_parallelism().map_or(1, NonZero::get), NonZero::get)
 }
 
 pub(super) struct MissionProgress {
@@ -30,11 +27,7 @@ pub(super) struct MissionProgress {
 impl MissionProgress {
     /// Lines begin with `title`.
     pub(super) fn new(title: &str) -> Self {
-        Self {
-            title: title.to_owned(),
-            began: Instant::now(),
-            line: ProgressLine::new(LINE_EVERY),
-        }
+        Self { title: title.to_owned(), began: Instant::now(), line: ProgressLine::new(LINE_EVERY) }
     }
 
     /// Show the progress after a mission.
@@ -43,11 +36,7 @@ impl MissionProgress {
             return;
         }
         self.line.begin();
-        let Progress {
-            ended,
-            all,
-            ended_now,
-        } = *progress;
+        let Progress { ended, all, ended_now } = *progress;
         let each = self.began.elapsed().as_secs_f64() / ended_now.max(1) as f64;
         let left = each * (all - ended) as f64;
         let title = &self.title;

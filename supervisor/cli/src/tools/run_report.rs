@@ -51,14 +51,8 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
     }
     picture::svg(&Scene {
         mission,
-        grid: record
-            .grid
-            .frame()
-            .map(|frame| (frame, record.grid.cells())),
-        field: record
-            .field
-            .frame()
-            .map(|frame| (frame, record.field.cells())),
+        grid: record.grid.frame().map(|frame| (frame, record.grid.cells())),
+        field: record.field.frame().map(|frame| (frame, record.field.cells())),
         believed: &believed,
         covariance: record.poses.last().map(|pose| {
             let [xx, xy, _, yy, ..] = pose.covariance;
@@ -82,9 +76,6 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
 fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
     truth
         .iter()
-        .map(|tick| Pose2 {
-            position: glam::DVec2::new(tick.x, tick.y),
-            heading: tick.heading,
-        })
+        .map(|tick| Pose2 { position: glam::DVec2::new(tick.x, tick.y), heading: tick.heading })
         .collect()
 }

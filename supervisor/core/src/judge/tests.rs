@@ -3,32 +3,18 @@ use common::samples::Cause;
 
 /// A link that hears the robot.
 fn link(action: Action, cause: Cause) -> LinkSample {
-    LinkSample {
-        connected: 1,
-        action: action.into(),
-        cause: cause.into(),
-        ..LinkSample::default()
-    }
+    LinkSample { connected: 1, action: action.into(), cause: cause.into(), ..LinkSample::default() }
 }
 
 const fn deadline(timeout_s: f64, stopped_s: f64) -> Deadline {
-    Deadline {
-        timeout_s,
-        stopped_s,
-    }
+    Deadline { timeout_s, stopped_s }
 }
 
 #[test]
 fn the_time_of_an_operators_stop_is_counted_from_its_first_sight_to_its_last() {
     let mut clock = StopClock::default();
     let at = MissionTime::from_seconds;
-    let looks = [
-        (3.0, false),
-        (4.0, true),
-        (6.0, true),
-        (9.0, false),
-        (12.0, false),
-    ];
+    let looks = [(3.0, false), (4.0, true), (6.0, true), (9.0, false), (12.0, false)];
     let passed = looks.map(|(seconds, stopped)| clock.passed_s(stopped, at(seconds)));
     assert_eq!(passed, [0.0, 0.0, 2.0, 3.0, 0.0]);
 }
@@ -39,10 +25,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let go = link(Action::Go, Cause::None);
     let stop = link(Action::Stop, Cause::BatteryLow);
     let end = link(Action::End, Cause::BatteryEmpty);
-    let elsewhere = LinkSample {
-        other_port: 4711,
-        ..LinkSample::default()
-    };
+    let elsewhere = LinkSample { other_port: 4711, ..LinkSample::default() };
     let robot = "x80".parse().unwrap();
     let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap();
     let address = address.resolve().unwrap();
@@ -64,16 +47,8 @@ fn every_rule_of_the_judgement_decides_its_row() {
         robot: &robot,
         address: &address,
     };
-    let starting = || Snapshot {
-        was_ready: false,
-        reason: HoldReason::Starting,
-        ..driving()
-    };
-    let held = || Snapshot {
-        reason: HoldReason::StageHeld,
-        held: vec!["mapper"],
-        ..driving()
-    };
+    let starting = || Snapshot { was_ready: false, reason: HoldReason::Starting, ..driving() };
+    let held = || Snapshot { reason: HoldReason::StageHeld, held: vec!["mapper"], ..driving() };
     // How long after the last tick.
     let (early, late) = (NO_PROGRESS - Duration::from_millis(1), NO_PROGRESS);
     #[rustfmt::skip]

@@ -88,14 +88,8 @@ fn a_stage_that_never_becomes_ready_is_held_after_twelve_starts() {
 fn a_released_stage_starts_without_a_history() {
     let mut policy = running();
     let held = crash_until_held(&mut policy, ms(20));
-    assert_eq!(
-        policy.step(Event::Replace, held + ms(1)),
-        Some(Action::Start)
-    );
-    assert_eq!(
-        policy.step(Event::Exited, held + ms(2)),
-        Some(Action::Start)
-    );
+    assert_eq!(policy.step(Event::Replace, held + ms(1)), Some(Action::Start));
+    assert_eq!(policy.step(Event::Exited, held + ms(2)), Some(Action::Start));
 }
 
 #[test]
@@ -112,10 +106,7 @@ fn a_stage_killed_once_a_second_is_never_held() {
 fn a_stage_killed_again_and_again_is_held_though_it_was_stable_in_between() {
     let mut policy = running();
     for death in 1..12 {
-        assert_eq!(
-            policy.step(Event::Exited, ms(death * 600)),
-            Some(Action::Start)
-        );
+        assert_eq!(policy.step(Event::Exited, ms(death * 600)), Some(Action::Start));
         policy.step(Event::BeatReady, ms(death * 600 + 1));
     }
     assert_eq!(policy.step(Event::Exited, ms(12 * 600)), None);
@@ -173,11 +164,7 @@ fn a_bus_that_blocks_starts_is_recreated_once() {
                 now += ms(3000);
                 assert_eq!(policy.step(Event::Time, now), Some(Action::Abort));
             }
-            let event = if refused {
-                Event::Refused
-            } else {
-                Event::Exited
-            };
+            let event = if refused { Event::Refused } else { Event::Exited };
             answers.push(policy.step(event, now));
             // All stages are stopped and started.
             policy.step(Event::Stop, now);
@@ -194,10 +181,7 @@ fn a_generation_that_became_ready_clears_the_bus() {
     for second in 1..5 {
         policy.step(Event::Exited, ms(second * 1000));
         // Two starts lie between two refusals.
-        assert_ne!(
-            policy.step(Event::Refused, ms(second * 1000 + 1)),
-            Some(Action::RecreateBus)
-        );
+        assert_ne!(policy.step(Event::Refused, ms(second * 1000 + 1)), Some(Action::RecreateBus));
         policy.step(Event::Time, ms(second * 1000 + 51));
         policy.step(Event::BeatReady, ms(second * 1000 + 60));
     }

@@ -19,11 +19,7 @@ fn pose(seconds: f64, travelled_m: f64) -> PoseSample {
 }
 
 fn guidance(status: GuidanceStatus, epoch: u64) -> GuidanceSample {
-    GuidanceSample {
-        status: status.into(),
-        epoch,
-        ..GuidanceSample::default()
-    }
+    GuidanceSample { status: status.into(), epoch, ..GuidanceSample::default() }
 }
 
 /// Cause, recovery step and epoch of a stall.
@@ -35,14 +31,8 @@ fn parts(stall: &StallSample) -> (StallCause, RecoveryStep, u64) {
 fn a_robot_that_moves_is_left_alone() {
     let mut watch = watch();
     for tick in (0..100).map(f64::from) {
-        let driving = PoseSample {
-            x_m: tick * 0.05,
-            ..pose(tick, tick * 0.05)
-        };
-        assert_eq!(
-            watch.step(&driving, &guidance(GuidanceStatus::Along, 0), false),
-            None
-        );
+        let driving = PoseSample { x_m: tick * 0.05, ..pose(tick, tick * 0.05) };
+        assert_eq!(watch.step(&driving, &guidance(GuidanceStatus::Along, 0), false), None);
     }
 }
 
@@ -68,10 +58,7 @@ fn a_robot_held_by_something_else_is_not_stalled() {
     let mut watch = watch();
     let along = guidance(GuidanceStatus::Along, 0);
     for second in 0..20 {
-        assert_eq!(
-            watch.step(&pose(f64::from(second), 0.0), &along, true),
-            None
-        );
+        assert_eq!(watch.step(&pose(f64::from(second), 0.0), &along, true), None);
     }
 }
 
@@ -111,11 +98,7 @@ fn a_robot_cut_off_forgets_three_times_and_gives_up() {
     for tick in 0..100 {
         let cut_off = guidance(GuidanceStatus::Unreachable, watch.epoch());
         let pose = pose(f64::from(tick) * 0.5, f64::from(tick));
-        stalls.extend(
-            watch
-                .step(&pose, &cut_off, false)
-                .map(|stall| parts(&stall)),
-        );
+        stalls.extend(watch.step(&pose, &cut_off, false).map(|stall| parts(&stall)));
         if matches!(stalls.last(), Some((_, RecoveryStep::GiveUp, _))) {
             break;
         }
@@ -136,10 +119,7 @@ fn a_robot_cut_off_by_the_evidential_method_looks_around_before_its_belief_is_bl
     let mission = Mission::parse("target = [3, 0]", path).unwrap();
     let mut watch = StallWatch::new(&mission);
     let cut_off = guidance(GuidanceStatus::Unreachable, 0);
-    let turning = |second: f64| PoseSample {
-        heading_rad: second,
-        ..pose(second, 0.0)
-    };
+    let turning = |second: f64| PoseSample { heading_rad: second, ..pose(second, 0.0) };
     let turn = TAU / mission.controller.look_rad_s;
     let first = (0..100)
         .map(f64::from)
@@ -153,10 +133,7 @@ fn a_scan_is_no_stall() {
     let look = guidance(GuidanceStatus::Look, 0);
     for tick in 0..75 {
         let seconds = f64::from(tick) * 0.2;
-        let scanning = PoseSample {
-            heading_rad: seconds.sin(),
-            ..pose(seconds, 0.0)
-        };
+        let scanning = PoseSample { heading_rad: seconds.sin(), ..pose(seconds, 0.0) };
         assert_eq!(watch.step(&scanning, &look, false), None);
     }
 }
@@ -216,14 +193,8 @@ fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to
             heading_rad: heading,
             ..pose(second, speed * second)
         };
-        let crawl = PoseSample {
-            x_m: 0.01 * second,
-            ..pose(second, 0.01 * second)
-        };
-        let near = |distance_m| GuidanceSample {
-            distance_m,
-            ..guidance(GuidanceStatus::Along, 0)
-        };
+        let crawl = PoseSample { x_m: 0.01 * second, ..pose(second, 0.01 * second) };
+        let near = |distance_m| GuidanceSample { distance_m, ..guidance(GuidanceStatus::Along, 0) };
         let stalls = [
             circling.step(&circle, &near(3.0 - circle.x_m), false),
             crawling.step(&crawl, &near(0.5 - crawl.x_m), false),
@@ -239,15 +210,9 @@ fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to
 fn a_place_that_was_left_does_not_count() {
     let mut watch = watch();
     assert_eq!(rock(&mut watch, 0..40).len(), 2);
-    let elsewhere = PoseSample {
-        x_m: 1.0,
-        ..pose(40.0, 3.0)
-    };
+    let elsewhere = PoseSample { x_m: 1.0, ..pose(40.0, 3.0) };
     watch.step(&elsewhere, &guidance(GuidanceStatus::Along, 0), false);
-    let recoveries: Vec<_> = rock(&mut watch, 41..85)
-        .iter()
-        .map(StallSample::recovery)
-        .collect();
+    let recoveries: Vec<_> = rock(&mut watch, 41..85).iter().map(StallSample::recovery).collect();
     assert_eq!(recoveries, [RecoveryStep::Replan, RecoveryStep::Replan]);
     assert_eq!(watch.recoveries(None).0, 4);
 }
@@ -267,10 +232,7 @@ fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
     assert_eq!(drive(&mut watch(), 0..12), Some(want));
     let mut watch = watch();
     assert_eq!(drive(&mut watch, 0..8), None);
-    let out = PoseSample {
-        x_m: 0.8,
-        ..pose(8.0, 0.8)
-    };
+    let out = PoseSample { x_m: 0.8, ..pose(8.0, 0.8) };
     watch.step(&out, &guidance(GuidanceStatus::Along, 0), false);
     assert_eq!(drive(&mut watch, 9..17), None);
 }

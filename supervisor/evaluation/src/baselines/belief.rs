@@ -40,10 +40,7 @@ impl Belief {
 
     /// The map; none before the first keyframe.
     pub fn map(&self) -> Option<Map<'_>> {
-        Some(Map {
-            frame: self.grid.frame()?,
-            cells: self.grid.cells(),
-        })
+        Some(Map { frame: self.grid.frame()?, cells: self.grid.cells() })
     }
 }
 
@@ -52,8 +49,7 @@ impl Map<'_> {
     pub fn is_free(&self, cell: Cell) -> bool {
         let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
         let byte = inside.then(|| self.cells.get(self.frame.index(cell)).copied());
-        byte.flatten()
-            .is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
+        byte.flatten().is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
     }
 
     /// The cell at `point` (metres), if it is free.
@@ -114,10 +110,7 @@ impl Map<'_> {
 
 /// The cells at `reach` columns or rows from the cell at `middle`; those beyond the first column or row left out.
 fn ring(middle: DVec2, reach: u32) -> impl Iterator<Item = Cell> {
-    let middle = Cell {
-        col: middle.x as u32,
-        row: middle.y as u32,
-    };
+    let middle = Cell { col: middle.x as u32, row: middle.y as u32 };
     let reach = reach as i32;
     (-reach..=reach).flat_map(move |rows| {
         let whole = rows.abs() == reach || reach == 0;

@@ -71,11 +71,7 @@ impl Step for Bug {
     type State = State;
 
     fn new(mission: &Mission) -> Self {
-        Self {
-            guide: Guide::new(mission),
-            belief: Belief::default(),
-            state: State::default(),
-        }
+        Self { guide: Guide::new(mission), belief: Belief::default(), state: State::default() }
     }
 
     fn state(&self) -> &State {
@@ -107,20 +103,13 @@ impl Bug {
         };
         let epoch = self.belief.header().epoch;
         if self.state.epoch != epoch {
-            self.state = State {
-                epoch,
-                ..State::default()
-            };
+            self.state = State { epoch, ..State::default() };
         }
         let line_from = *self.state.line_from.get_or_insert(here);
         if map.free_cell_at(here).is_none() {
             return Way::out(&map, here);
         }
-        let way = Straight {
-            map: &map,
-            line_from,
-            target: self.guide.target,
-        };
+        let way = Straight { map: &map, line_from, target: self.guide.target };
         if let Some(following) = &mut self.state.following
             && (!following.is_led_on(&map, here, way.left(here)) || way.is_resumed(here, following))
         {
@@ -166,11 +155,7 @@ impl Straight<'_> {
         let hit = self.blocked(here)?;
         let cell = self.map.free_cell_at(hit)?;
         let place = Place::at(self.map, cell, self.left(here))?;
-        Some(Following {
-            hit,
-            place,
-            was_away: false,
-        })
+        Some(Following { hit, place, was_away: false })
     }
 
     /// Whether the robot leaves the hazard here.

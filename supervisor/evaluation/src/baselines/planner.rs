@@ -66,10 +66,7 @@ pub struct Guide {
 impl Guide {
     /// For the robot of `mission`.
     pub fn new(mission: &Mission) -> Self {
-        Self {
-            target: mission.target,
-            looks_around: mission.method == Method::Evidential,
-        }
+        Self { target: mission.target, looks_around: mission.method == Method::Evidential }
     }
 
     /// The guidance that sends the robot of `sample` along `way` on the map of `belief`.

@@ -68,10 +68,7 @@ where
         let mut asked = false;
         while let Some(grid) = self.grid.take()? {
             let header = grid.header();
-            let input = Input::Grid {
-                header,
-                cells: &grid,
-            };
+            let input = Input::Grid { header, cells: &grid };
             let (tick, time) = (header.stamp.tick, header.stamp.time());
             if self.planner.step(input, time) == Outcome::Missed {
                 tracing::warn!(version = header.part.version, "missed a grid version");

@@ -13,20 +13,13 @@ use glam::DVec2;
 /// The header and the cells of a map drawn row by row, the first one with the greatest y: `#` is hazard. Cells of
 /// 0.1 m, the middle one at (0, 0).
 pub(crate) fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
-    let frame = GridFrame {
-        cells: rows.len() as u32,
-        resolution_m: 0.1,
-        centre: DVec2::ZERO,
-    };
+    let frame = GridFrame { cells: rows.len() as u32, resolution_m: 0.1, centre: DVec2::ZERO };
     let letters = rows.iter().rev().flat_map(|row| row.bytes());
     let state = |letter| match letter {
         b'#' => CellState::Sensed as u8,
         _ => CellState::Free as u8,
     };
-    let header = GridHeader {
-        part: Part::whole(frame, 1),
-        ..GridHeader::default()
-    };
+    let header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
     (header, letters.map(state).collect())
 }
 
@@ -38,9 +31,5 @@ pub(crate) fn mission([x, y]: [f64; 2]) -> Mission {
 
 /// A robot at (x, y) metres that faces along x.
 pub(crate) fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
-    PoseSample {
-        x_m,
-        y_m,
-        ..PoseSample::default()
-    }
+    PoseSample { x_m, y_m, ..PoseSample::default() }
 }

@@ -36,10 +36,7 @@ impl Step for Wavefront {
     type State = ();
 
     fn new(mission: &Mission) -> Self {
-        Self {
-            guide: Guide::new(mission),
-            belief: Belief::default(),
-        }
+        Self { guide: Guide::new(mission), belief: Belief::default() }
     }
 
     fn state(&self) -> &() {

@@ -57,10 +57,7 @@ fn names() -> String {
 
 macro_rules! shipped {
     ($name:literal) => {
-        (
-            $name,
-            include_str!(concat!("../../../missions/", $name, ".toml")),
-        )
+        ($name, include_str!(concat!("../../../missions/", $name, ".toml")))
     };
 }
 
@@ -176,10 +173,7 @@ impl Experiment {
     /// The experiment as a trial of the evaluation.
     pub fn trial(&self) -> Result<Trial, ExperimentError> {
         let mission = self.mission()?;
-        let body = BodySize {
-            radius_m: mission.body().radius_m,
-            margin_m: MARGIN_M,
-        };
+        let body = BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M };
         let trial = Trial::of_mission(self.name.to_owned(), mission, &body);
         trial.ok_or(ExperimentError::Unsolvable { name: self.name })
     }

@@ -37,10 +37,6 @@ impl Method {
             set.push("simulation.realism='measured'".to_owned());
             set.push(format!("simulation.radio.outage_share={OUTAGE_SHARE}"));
         }
-        Setting {
-            name: self.as_str().to_owned(),
-            planner: HARMONIC.to_owned(),
-            set,
-        }
+        Setting { name: self.as_str().to_owned(), planner: HARMONIC.to_owned(), set }
     }
 }

@@ -56,14 +56,10 @@ fn cells(experiment: &Experiment, result: &ExperimentResult) -> Vec<(&'static st
         ("touched", result.touched.to_string()),
         ("wrong place", result.wrong_place.to_string()),
         ("other", result.others.to_string()),
-        (
-            "paper, s",
-            time.map_or("-".to_owned(), |time| format!("{time:.0}")),
-        ),
+        ("paper, s", time.map_or("-".to_owned(), |time| format!("{time:.0}"))),
     ];
-    let measured = COLUMNS
-        .iter()
-        .map(|(title, pick, digits)| (*title, shown(pick(&result.spreads), *digits)));
+    let measured =
+        COLUMNS.iter().map(|(title, pick, digits)| (*title, shown(pick(&result.spreads), *digits)));
     first.into_iter().chain(measured).collect()
 }
 
@@ -73,11 +69,7 @@ impl<'a> Report<'a> {
             let by = |method| ExperimentResult::of(experiment, method, rows);
             (experiment, Method::ALL.into_iter().filter_map(by).collect())
         });
-        Self {
-            rows,
-            results: results.collect(),
-            expectations: expectations(rows),
-        }
+        Self { rows, results: results.collect(), expectations: expectations(rows) }
     }
 
     fn lines(&self) -> impl Iterator<Item = Vec<(&'static str, String)>> {
@@ -94,10 +86,7 @@ impl<'a> Report<'a> {
             object.insert("experiment".to_owned(), json!(experiment.name));
             object.insert("title".to_owned(), json!(experiment.title));
             object.insert("reported".to_owned(), json!(experiment.reported));
-            object.insert(
-                "reported_time_s".to_owned(),
-                json!(experiment.reported_time_s),
-            );
+            object.insert("reported_time_s".to_owned(), json!(experiment.reported_time_s));
             for result in results {
                 let interval = [result.arrival.low, result.arrival.high];
                 let mut found = json!(result.spreads);
@@ -110,9 +99,8 @@ impl<'a> Report<'a> {
                 object.insert(result.method.as_str().to_owned(), found);
             }
             let its = self.expectations.iter();
-            let its: Vec<_> = its
-                .filter(|expectation| expectation.experiment == experiment.name)
-                .collect();
+            let its: Vec<_> =
+                its.filter(|expectation| expectation.experiment == experiment.name).collect();
             object.insert("expectations".to_owned(), json!(its));
             Value::Object(object)
         };
@@ -145,13 +133,7 @@ impl<'a> Report<'a> {
         }
         page.push_str("</table>\n<table><tr><th>experiment</th><th>method</th><th>the paper says</th><th>found</th><th>holds</th></tr>\n");
         for expectation in &self.expectations {
-            let Expectation {
-                experiment,
-                method,
-                claim,
-                found,
-                holds,
-            } = expectation;
+            let Expectation { experiment, method, claim, found, holds } = expectation;
             let holds = if *holds { "yes" } else { "no" };
             let _ = writeln!(
                 page,
@@ -193,29 +175,18 @@ impl fmt::Display for Report<'_> {
             return Ok(());
         };
         let titles: Vec<_> = first.iter().map(|(title, _)| (*title).to_owned()).collect();
-        let rows = lines
-            .iter()
-            .map(|line| line.iter().map(|(_, cell)| cell.clone()).collect());
+        let rows = lines.iter().map(|line| line.iter().map(|(_, cell)| cell.clone()).collect());
         let table: Vec<Vec<String>> = [titles].into_iter().chain(rows).collect();
         let width = |column: usize| table.iter().map(|row| row[column].len()).max();
         let widths: Vec<usize> = (0..first.len()).filter_map(width).collect();
         for row in &table {
             let padded = row.iter().zip(&widths);
-            let padded: Vec<_> = padded
-                .map(|(cell, width)| format!("{cell:<width$}"))
-                .collect();
+            let padded: Vec<_> = padded.map(|(cell, width)| format!("{cell:<width$}")).collect();
             writeln!(f, "{}", padded.join("  ").trim_end())?;
         }
-        writeln!(
-            f,
-            "medians and the middle half of the missions that arrived"
-        )?;
+        writeln!(f, "medians and the middle half of the missions that arrived")?;
         for expectation in &self.expectations {
-            let holds = if expectation.holds {
-                "holds"
-            } else {
-                "does not hold"
-            };
+            let holds = if expectation.holds { "holds" } else { "does not hold" };
             writeln!(
                 f,
                 "{}, {}: {}: {:.2}, {holds}",

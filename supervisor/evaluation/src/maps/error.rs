@@ -24,11 +24,7 @@ pub enum MapError {
     UnknownFormat { file: PathBuf },
     /// The file is longer than any map of its format.
     #[error("{}: {bytes} bytes, a file of this kind has at most {most}; check that it is one", file.display())]
-    TooLong {
-        file: PathBuf,
-        bytes: u64,
-        most: u64,
-    },
+    TooLong { file: PathBuf, bytes: u64, most: u64 },
     /// The map has no cells, or too many.
     #[error("{}: {cols} x {rows} cells; a map has 1 to {MAX_SIDE} on each side, so crop or scale it", file.display())]
     Size { file: PathBuf, cols: u64, rows: u64 },
@@ -43,9 +39,6 @@ pub enum MapError {
 
 impl MapError {
     pub(crate) fn malformed(file: &Path, problem: impl Into<String>) -> Self {
-        Self::Malformed {
-            file: file.to_owned(),
-            problem: problem.into(),
-        }
+        Self::Malformed { file: file.to_owned(), problem: problem.into() }
     }
 }

@@ -12,23 +12,14 @@ use crate::maps::error::MapError;
 
 /// Open a regular file of at most `most` bytes. Other files may never end.
 pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
-    let unreadable = |cause| MapError::Unreadable {
-        file: file.to_owned(),
-        cause,
-    };
+    let unreadable = |cause| MapError::Unreadable { file: file.to_owned(), cause };
     // The check comes before opening, because opening a pipe waits for its other end.
     let metadata = fs::metadata(file).map_err(unreadable)?;
     if !metadata.is_file() {
-        return Err(MapError::NotAFile {
-            file: file.to_owned(),
-        });
+        return Err(MapError::NotAFile { file: file.to_owned() });
     }
     if metadata.len() > most {
-        return Err(MapError::TooLong {
-            file: file.to_owned(),
-            bytes: metadata.len(),
-            most,
-        });
+        return Err(MapError::TooLong { file: file.to_owned(), bytes: metadata.len(), most });
     }
     File::open(file).map_err(unreadable)
 }
@@ -39,10 +30,7 @@ pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     open(file, most)?
         .take(most)
         .read_to_end(&mut bytes)
-        .map_err(|cause| MapError::Unreadable {
-            file: file.to_owned(),
-            cause,
-        })?;
+        .map_err(|cause| MapError::Unreadable { file: file.to_owned(), cause })?;
     Ok(bytes)
 }
 
@@ -52,9 +40,5 @@ pub(crate) fn check_size(file: &Path, cols: u64, rows: u64) -> Result<(), MapErr
     if sides.contains(&cols) && sides.contains(&rows) {
         return Ok(());
     }
-    Err(MapError::Size {
-        file: file.to_owned(),
-        cols,
-        rows,
-    })
+    Err(MapError::Size { file: file.to_owned(), cols, rows })
 }

@@ -31,22 +31,14 @@ pub(super) struct Lightness {
 impl Default for Lightness {
     /// The thresholds the map_server's own map_saver writes.
     fn default() -> Self {
-        Self {
-            negate: false,
-            free_thresh: 0.196,
-            occupied_thresh: 0.65,
-        }
+        Self { negate: false, free_thresh: 0.196, occupied_thresh: 0.65 }
     }
 }
 
 impl Lightness {
     /// Whether a pixel of this brightness, 0 to 1, is free.
     fn is_free(self, brightness: f64) -> bool {
-        let darkness = if self.negate {
-            brightness
-        } else {
-            1.0 - brightness
-        };
+        let darkness = if self.negate { brightness } else { 1.0 - brightness };
         darkness < self.free_thresh && darkness <= self.occupied_thresh
     }
 }
@@ -63,10 +55,8 @@ struct Free {
 /// The map in an image, a cell a pixel.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
-    let start = reader.fill_buf().map_err(|cause| MapError::Unreadable {
-        file: file.to_owned(),
-        cause,
-    })?;
+    let start =
+        reader.fill_buf().map_err(|cause| MapError::Unreadable { file: file.to_owned(), cause })?;
     // By its first bytes: a PNG that is called .pgm is still a PNG.
     let decoded = match start {
         [0x89, b'P', b'N', b'G', ..] => png(reader, lightness, file),
@@ -121,10 +111,7 @@ fn netpbm(
         }
         pixels.push(lightness.is_free(sum / f64::from(most * channels)));
     }
-    Ok(Free {
-        cols: cols as usize,
-        pixels,
-    })
+    Ok(Free { cols: cols as usize, pixels })
 }
 
 fn byte(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u8, Cause> {
@@ -154,9 +141,7 @@ fn number(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u32, Cause
 }
 
 fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result<Free, Cause> {
-    let limits = png::Limits {
-        bytes: LONGEST as usize,
-    };
+    let limits = png::Limits { bytes: LONGEST as usize };
     let mut decoder = png::Decoder::new_with_limits(reader, limits);
     decoder.set_transformations(png::Transformations::EXPAND);
     decoder.set_ignore_text_chunk(true);
@@ -175,30 +160,18 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
     };
     let mut samples = vec![0; reader.output_buffer_size().ok_or("it is too large")?];
     reader.next_frame(&mut samples)?;
-    let bytes = if depth == png::BitDepth::Sixteen {
-        2
-    } else {
-        1
-    };
+    let bytes = if depth == png::BitDepth::Sixteen { 2 } else { 1 };
     let brightness = |sample: &[u8]| match *sample {
         [high, low] => f64::from(u16::from_be_bytes([high, low])) / 65_535.0,
         _ => f64::from(sample[0]) / 255.0,
     };
     let is_free = |pixel: &[u8]| {
         let samples = pixel.chunks_exact(bytes).map(brightness);
-        lightness.is_free(
-            samples
-                .zip(weights)
-                .map(|(sample, weight)| sample * weight)
-                .sum(),
-        )
+        lightness.is_free(samples.zip(weights).map(|(sample, weight)| sample * weight).sum())
     };
     Ok(Free {
         cols: cols as usize,
-        pixels: samples
-            .chunks_exact(bytes * weights.len())
-            .map(is_free)
-            .collect(),
+        pixels: samples.chunks_exact(bytes * weights.len()).map(is_free).collect(),
     })
 }
 
@@ -226,11 +199,7 @@ mod tests {
         let usual = Lightness::default();
         // 1 - 205 / 255 = 0.19607..., which the map_server's 0.196 takes for unknown.
         for (grey, free) in [(0, false), (205, false), (206, true), (255, true)] {
-            assert_eq!(
-                middle_is_free(b"P5 3 3 255\n", &[grey], usual),
-                free,
-                "{grey}"
-            );
+            assert_eq!(middle_is_free(b"P5 3 3 255\n", &[grey], usual), free, "{grey}");
         }
         // A quarter of the range in 16 bits, and in colours.
         assert!(!middle_is_free(b"P5 3 3 65535\n", &[0x40, 0], usual));
@@ -240,10 +209,7 @@ mod tests {
 
     #[test]
     fn a_negated_map_is_free_where_it_is_dark() {
-        let negated = Lightness {
-            negate: true,
-            ..Lightness::default()
-        };
+        let negated = Lightness { negate: true, ..Lightness::default() };
         assert!(middle_is_free(b"P5 3 3 255\n", &[10], negated));
         assert!(!middle_is_free(b"P5 3 3 255\n", &[240], negated));
     }
@@ -263,11 +229,7 @@ mod tests {
             let error = map_of(bytes, usual).unwrap_err();
             assert!(matches!(error, MapError::Malformed { .. }), "{error}");
         }
-        for header in [
-            "P5 99999 3 255\n",
-            "P5 0 3 255\n",
-            "P5 4000000000 4000000000 255\n",
-        ] {
+        for header in ["P5 99999 3 255\n", "P5 0 3 255\n", "P5 4000000000 4000000000 255\n"] {
             let error = map_of(header.as_bytes(), usual).unwrap_err();
             assert!(matches!(error, MapError::Size { .. }), "{header}: {error}");
         }

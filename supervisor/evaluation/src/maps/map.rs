@@ -33,22 +33,17 @@ impl Map {
                 }
             }
         }
-        Self {
-            cols,
-            rows,
-            blocked,
-        }
+        Self { cols, rows, blocked }
     }
 
     /// The free cell nearest to (`col`, `row`), as column and row; none if no cell is free.
     pub fn nearest_free(&self, col: usize, row: usize) -> Option<(usize, usize)> {
         let free = self.blocked.iter().enumerate().filter(|cell| !cell.1);
-        free.map(|(at, _)| (at % self.cols, at / self.cols))
-            .min_by_key(|cell| {
-                let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
-                // Far outside the map a distance may not fit.
-                x.saturating_mul(x).saturating_add(y.saturating_mul(y))
-            })
+        free.map(|(at, _)| (at % self.cols, at / self.cols)).min_by_key(|cell| {
+            let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
+            // Far outside the map a distance may not fit.
+            x.saturating_mul(x).saturating_add(y.saturating_mul(y))
+        })
     }
 }
 

@@ -20,9 +20,8 @@ pub(super) fn load(file: &Path) -> Result<Map, MapError> {
 }
 
 fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
-    let mut lines = bytes
-        .split(|&byte| byte == b'\n')
-        .map(|line| line.strip_suffix(b"\r").unwrap_or(line));
+    let mut lines =
+        bytes.split(|&byte| byte == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line));
     let (cols, rows) = header(file, &mut lines)?;
     check_size(file, cols, rows)?;
     let (cols, rows) = (cols as usize, rows as usize);
@@ -126,16 +125,10 @@ mod tests {
             ("type octile\nheight x\nwidth 3\nmap\n...\n", "begins with"),
             ("type octile\nheight 2\nwidth 3\nmap\n...\n", "row 1 has 0"),
             ("type octile\nheight 1\nwidth 3\nmap\n....\n", "row 0 has 4"),
-            (
-                "type octile\nheight 1\nwidth 3\nmap\n...\n...\n",
-                "more than",
-            ),
+            ("type octile\nheight 1\nwidth 3\nmap\n...\n...\n", "more than"),
             ("type octile\nheight 1\nwidth 3\nmap\n.\u{7}.\n", "column 1"),
             ("type octile\nheight 0\nwidth 3\nmap\n", "0 cells"),
-            (
-                "type octile\nheight 99999999999\nwidth 3\nmap\n",
-                "99999999999",
-            ),
+            ("type octile\nheight 99999999999\nwidth 3\nmap\n", "99999999999"),
         ];
         for (text, said) in cases {
             let error = map_of(text).unwrap_err();

@@ -151,11 +151,7 @@ impl MapFile {
         Ok(Lightness {
             negate,
             free_thresh: share("free_thresh", self.free_thresh, usual.free_thresh)?,
-            occupied_thresh: share(
-                "occupied_thresh",
-                self.occupied_thresh,
-                usual.occupied_thresh,
-            )?,
+            occupied_thresh: share("occupied_thresh", self.occupied_thresh, usual.occupied_thresh)?,
         })
     }
 }
@@ -197,10 +193,7 @@ mod tests {
             let negated = format!("image: ./grey.pgm\nnegate: {negate}");
             assert!(is_free(&negated, 20) && !is_free(&negated, 235));
         }
-        assert!(!is_free(
-            "image: grey.pgm\nfree_thresh: 0.9\noccupied_thresh: 0.2",
-            128
-        ));
+        assert!(!is_free("image: grey.pgm\nfree_thresh: 0.9\noccupied_thresh: 0.2", 128));
     }
 
     #[test]
@@ -219,10 +212,7 @@ mod tests {
         ];
         for (yaml, named) in cases {
             let error = map_of(yaml, 255).unwrap_err().to_string();
-            assert!(
-                error.contains(named) && error.lines().count() == 1,
-                "{yaml:?} gave {error}"
-            );
+            assert!(error.contains(named) && error.lines().count() == 1, "{yaml:?} gave {error}");
         }
     }
 
@@ -236,10 +226,7 @@ mod tests {
         }
         bomb += "image: *a11\n";
         assert!(map_of(&bomb, 255).is_err());
-        assert!(matches!(
-            map_of(&"#".repeat(1 << 17), 255),
-            Err(MapError::TooLong { .. })
-        ));
+        assert!(matches!(map_of(&"#".repeat(1 << 17), 255), Err(MapError::TooLong { .. })));
     }
 
     #[test]

@@ -65,9 +65,7 @@ pub(super) fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
     let index = file.with_file_name("index.csv");
     let times: BTreeMap<u32, f64> = if index.exists() {
         let rows = rows::<IndexRow>(&index)?;
-        rows.into_iter()
-            .map(|row| (row.world, row.optimal_time_s))
-            .collect()
+        rows.into_iter().map(|row| (row.world, row.optimal_time_s)).collect()
     } else {
         BTreeMap::new()
     };
@@ -80,15 +78,9 @@ pub(super) fn table(file: &Path) -> Result<Vec<Found>, WorldError> {
 
 pub(super) fn gazebo(file: &Path) -> Result<Found, WorldError> {
     let mut text = String::new();
-    open(file)?
-        .take(LONGEST)
-        .read_to_string(&mut text)
-        .map_err(WorldError::unreadable(file))?;
+    open(file)?.take(LONGEST).read_to_string(&mut text).map_err(WorldError::unreadable(file))?;
     let drums = cylinders(&text).ok_or_else(|| {
-        WorldError::malformed(
-            file,
-            "no <model> with a <pose> and a <cylinder>; give a BARN world",
-        )
+        WorldError::malformed(file, "no <model> with a <pose> and a <cylinder>; give a BARN world")
     })?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     Ok((format!("barn-{name}"), scene(drums), rules(None)))
@@ -110,11 +102,7 @@ fn cylinders(text: &str) -> Option<Vec<Drum>> {
         if let (Ok(radius_m), Some(Ok(x)), Some(Ok(y))) =
             (radius.trim().parse(), pose.next(), pose.next())
         {
-            drums.push(Drum {
-                at: DVec2::new(x, y),
-                radius_m,
-                ..Drum::default()
-            });
+            drums.push(Drum { at: DVec2::new(x, y), radius_m, ..Drum::default() });
         }
     }
     // The world's state at the end of the file repeats the poses.
@@ -139,10 +127,7 @@ fn scene(drums: Vec<Drum>) -> Scene {
     Scene {
         shapes: Shapes {
             drums,
-            walls: vec![Wall {
-                points: corners.to_vec(),
-                ..Wall::default()
-            }],
+            walls: vec![Wall { points: corners.to_vec(), ..Wall::default() }],
             ..Shapes::default()
         },
         start: START,
@@ -152,35 +137,22 @@ fn scene(drums: Vec<Drum>) -> Scene {
 }
 
 fn rules(optimal_time_s: Option<f64>) -> Rules {
-    Rules {
-        success_within_m: SUCCESS_WITHIN_M,
-        clock_after_departure: true,
-        optimal_time_s,
-    }
+    Rules { success_within_m: SUCCESS_WITHIN_M, clock_after_departure: true, optimal_time_s }
 }
 
 fn open(file: &Path) -> Result<Box<dyn Read>, WorldError> {
     let opened = File::open(file).map_err(WorldError::unreadable(file))?;
     let zipped = file.extension().is_some_and(|extension| extension == "gz");
-    Ok(if zipped {
-        Box::new(flate2::read::GzDecoder::new(opened))
-    } else {
-        Box::new(opened)
-    })
+    Ok(if zipped { Box::new(flate2::read::GzDecoder::new(opened)) } else { Box::new(opened) })
 }
 
 /// The rows of a CSV file.
 fn rows<T: for<'row> Deserialize<'row>>(file: &Path) -> Result<Vec<T>, WorldError> {
     let mut reader = csv::Reader::from_reader(open(file)?.take(LONGEST));
-    reader
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(|error: csv::Error| match error.kind() {
-            csv::ErrorKind::Io(_) => {
-                WorldError::unreadable(file)(io::Error::other(error.to_string()))
-            }
-            _ => WorldError::malformed(file, error.to_string()),
-        })
+    reader.deserialize().collect::<Result<_, _>>().map_err(|error: csv::Error| match error.kind() {
+        csv::ErrorKind::Io(_) => WorldError::unreadable(file)(io::Error::other(error.to_string())),
+        _ => WorldError::malformed(file, error.to_string()),
+    })
 }
 
 #[cfg(test)]
@@ -192,11 +164,7 @@ mod tests {
         let text = "<world><model name='unit_cylinder_1'><pose frame=''>-1.5 2.25 0.5 0 0 0</pose>\
             <link><collision><geometry><cylinder><radius>0.075</radius><length>1</length></cylinder>\
             </geometry></collision></link></model><model name='ground'><pose>0 0 0</pose></model></world>";
-        let want = Drum {
-            at: DVec2::new(-1.5, 2.25),
-            radius_m: 0.075,
-            ..Drum::default()
-        };
+        let want = Drum { at: DVec2::new(-1.5, 2.25), radius_m: 0.075, ..Drum::default() };
         assert_eq!(cylinders(text), Some(vec![want]));
         assert_eq!(cylinders("<world></world>"), None);
     }
@@ -205,11 +173,8 @@ mod tests {
     fn a_table_of_cylinders_gives_each_world_with_its_time() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("cylinders.csv");
-        std::fs::write(
-            &file,
-            "world,x_m,y_m,radius_m\n7,0,5,0.075\n7,1,5,0.075\n9,0,6,0.1\n",
-        )
-        .unwrap();
+        std::fs::write(&file, "world,x_m,y_m,radius_m\n7,0,5,0.075\n7,1,5,0.075\n9,0,6,0.1\n")
+            .unwrap();
         std::fs::write(
             folder.path().join("index.csv"),
             "world,path_length_m,optimal_time_s\n7,12,6.2\n",
@@ -219,11 +184,7 @@ mod tests {
         let found: Vec<_> = worlds
             .iter()
             .map(|(name, scene, rules)| {
-                (
-                    name.as_str(),
-                    scene.shapes.drums.len(),
-                    rules.optimal_time_s,
-                )
+                (name.as_str(), scene.shapes.drums.len(), rules.optimal_time_s)
             })
             .collect();
         assert_eq!(found, [("barn-007", 2, Some(6.2)), ("barn-009", 1, None)]);

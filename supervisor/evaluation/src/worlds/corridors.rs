@@ -39,13 +39,7 @@ pub(super) fn draw(random: &mut Random, bends: Bends) -> Scene {
         _ => ahead.to_angle(),
     };
     Scene {
-        shapes: Shapes {
-            walls: vec![Wall {
-                points,
-                ..Wall::default()
-            }],
-            ..Shapes::default()
-        },
+        shapes: Shapes { walls: vec![Wall { points, ..Wall::default() }], ..Shapes::default() },
         start: axis[0] + ahead * 0.6,
         heading,
         target: axis[last] + back * 0.7,
@@ -86,13 +80,9 @@ mod tests {
         let axis = [DVec2::ZERO, DVec2::X, DVec2::new(1.0, 1.0)];
         assert_eq!(
             beside(&axis, 0.5),
-            [
-                DVec2::new(0.0, 0.5),
-                DVec2::new(0.5, 0.5),
-                DVec2::new(0.5, 1.0)
-            ]
-            .map(|point: DVec2| point)
-            .to_vec()
+            [DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5), DVec2::new(0.5, 1.0)]
+                .map(|point: DVec2| point)
+                .to_vec()
         );
     }
 }

@@ -15,13 +15,8 @@ use super::error::WorldError;
 /// Most bytes of such a file, which has some twenty short lines.
 const LONGEST: u64 = 64 << 10;
 /// The keys of a test.
-const KEYS: [&str; 5] = [
-    "initial_pose_x",
-    "initial_pose_y",
-    "initial_pose_a",
-    "goal_pose_x",
-    "goal_pose_y",
-];
+const KEYS: [&str; 5] =
+    ["initial_pose_x", "initial_pose_y", "initial_pose_a", "goal_pose_x", "goal_pose_y"];
 
 /// Start and target of a mission, in the frame of its map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +31,7 @@ pub struct Ends {
 pub(super) fn read(file: &Path) -> Result<Vec<Ends>, WorldError> {
     // The check comes before opening, because opening a pipe waits for its other end.
     if !file.is_file() {
-        return Err(WorldError::malformed(
-            file,
-            "not a regular file; give MRPB's tests",
-        ));
+        return Err(WorldError::malformed(file, "not a regular file; give MRPB's tests"));
     }
     let mut text = String::new();
     File::open(file)
@@ -75,11 +67,9 @@ fn parse(text: &str) -> Result<Vec<Ends>, String> {
     let complete = |(number, test): (usize, [Option<f64>; KEYS.len()])| {
         let missing = KEYS.iter().zip(test).find(|(_, value)| value.is_none());
         match (test, missing) {
-            ([Some(x), Some(y), Some(heading), Some(to_x), Some(to_y)], _) => Ok(Ends {
-                start: DVec2::new(x, y),
-                heading,
-                target: DVec2::new(to_x, to_y),
-            }),
+            ([Some(x), Some(y), Some(heading), Some(to_x), Some(to_y)], _) => {
+                Ok(Ends { start: DVec2::new(x, y), heading, target: DVec2::new(to_x, to_y) })
+            }
             (_, missing) => {
                 let key = missing.map_or("a key", |(key, _)| key);
                 Err(format!("test {number} has no {key}; add it"))
@@ -112,11 +102,8 @@ mod tests {
     #[test]
     fn each_test_of_a_file_gives_its_start_and_target() {
         let ends = parse(&[TEST, TEST].concat()).unwrap();
-        let want = Ends {
-            start: DVec2::new(-1.5, 2.0),
-            heading: 1.571,
-            target: DVec2::new(3.0, 4.25),
-        };
+        let want =
+            Ends { start: DVec2::new(-1.5, 2.0), heading: 1.571, target: DVec2::new(3.0, 4.25) };
         assert_eq!(ends, [want, want]);
     }
 

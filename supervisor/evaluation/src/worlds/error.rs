@@ -49,16 +49,10 @@ pub enum WorldError {
 impl WorldError {
     pub(super) fn unreadable(file: &Path) -> impl Fn(io::Error) -> Self {
         let file = file.to_path_buf();
-        move |source| Self::Unreadable {
-            file: file.clone(),
-            source,
-        }
+        move |source| Self::Unreadable { file: file.clone(), source }
     }
 
     pub(super) fn malformed(file: &Path, problem: impl Into<String>) -> Self {
-        Self::Malformed {
-            file: file.to_path_buf(),
-            problem: problem.into(),
-        }
+        Self::Malformed { file: file.to_path_buf(), problem: problem.into() }
     }
 }

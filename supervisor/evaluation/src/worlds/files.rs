@@ -98,9 +98,7 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    fs::read_dir(folder)?
-        .map(|entry| Ok(entry?.path()))
-        .collect()
+    fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
 }
 
 fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
@@ -201,15 +199,8 @@ mod tests {
 
     use super::*;
 
-    const BODY: BodySize = BodySize {
-        radius_m: 0.19,
-        margin_m: 0.05,
-    };
-    const ALL: Asked = Asked {
-        count: None,
-        seed: 1,
-        ends: None,
-    };
+    const BODY: BodySize = BodySize { radius_m: 0.19, margin_m: 0.05 };
+    const ALL: Asked = Asked { count: None, seed: 1, ends: None };
 
     fn names(found: &Found) -> Vec<&str> {
         found.trials.iter().map(|trial| &*trial.world).collect()
@@ -250,23 +241,14 @@ mod tests {
         let drawn = read(folder.path(), ALL, &BODY).unwrap();
         assert_eq!(drawn.trials.len(), DRAWN);
 
-        let ends = Ends {
-            start: DVec2::new(11.0, 21.0),
-            heading: 0.0,
-            target: DVec2::new(15.0, 22.0),
-        };
-        let asked = Asked {
-            ends: Some(ends),
-            ..ALL
-        };
+        let ends =
+            Ends { start: DVec2::new(11.0, 21.0), heading: 0.0, target: DVec2::new(15.0, 22.0) };
+        let asked = Asked { ends: Some(ends), ..ALL };
         let given = read(folder.path(), asked, &BODY).unwrap();
         let mission = &given.trials[0].mission;
         assert_eq!(mission.target, DVec2::new(4.0, 1.0));
         let left_m = mission.world.clearance(DVec2::ZERO);
-        assert!(
-            (left_m - 0.9).abs() < 1e-9,
-            "the wall at the left: {left_m}"
-        );
+        assert!((left_m - 0.9).abs() < 1e-9, "the wall at the left: {left_m}");
         assert!((given.trials[0].shortest_m - 17_f64.sqrt()).abs() < 1e-9);
 
         let value = |key: &str, value: f64| format!("<arg name=\"{key}\" default=\"{value}\"/>\n");
@@ -288,18 +270,11 @@ mod tests {
         let folder = hall();
         let refused = |path: &Path, asked| read(path, asked, &BODY).unwrap_err().to_string();
         let image = refused(&folder.path().join("hall.pgm"), ALL);
-        assert!(
-            image.contains("hall.pgm") && image.contains(".yaml"),
-            "{image}"
-        );
+        assert!(image.contains("hall.pgm") && image.contains(".yaml"), "{image}");
 
         let mission = folder.path().join("mission.toml");
         fs::write(&mission, "target = [2, 0]").unwrap();
-        let ends = Some(Ends {
-            start: DVec2::ZERO,
-            heading: 0.0,
-            target: DVec2::ONE,
-        });
+        let ends = Some(Ends { start: DVec2::ZERO, heading: 0.0, target: DVec2::ONE });
         let no_map = refused(&mission, Asked { ends, ..ALL });
         assert!(no_map.contains("--start"), "{no_map}");
 

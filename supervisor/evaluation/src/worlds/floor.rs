@@ -49,16 +49,9 @@ impl Floor {
             let problem = format!(
                 "its walls are more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
             );
-            return Err(MapError::Malformed {
-                file: file.to_path_buf(),
-                problem,
-            }
-            .into());
+            return Err(MapError::Malformed { file: file.to_path_buf(), problem }.into());
         }
-        Ok(Shapes {
-            boxes,
-            ..Shapes::default()
-        })
+        Ok(Shapes { boxes, ..Shapes::default() })
     }
 
     /// For each stream of random numbers a start, and a target 3 to 15 m away that a body is connected to which needs
@@ -67,9 +60,7 @@ impl Floor {
         let roomy = self.roomy(swept_m);
         let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();
         // If one draw finds nothing, the next hardly would.
-        streams
-            .map_while(|mut random| self.draw_one(&mut random, &roomy, &places))
-            .collect()
+        streams.map_while(|mut random| self.draw_one(&mut random, &roomy, &places)).collect()
     }
 
     /// One start and target on the cells `roomy`, which are those of `places`.
@@ -182,10 +173,7 @@ impl Floor {
             let (col, row) = (first % cols, first / cols);
             // The box grows to the right as far as cells are solid, and down while that covers more.
             let run = (first..(row + 1) * cols).take_while(|&cell| blocked[cell]);
-            let width = run
-                .filter(|&cell| wanted[cell])
-                .last()
-                .map_or(1, |last| last - first + 1);
+            let width = run.filter(|&cell| wanted[cell]).last().map_or(1, |last| last - first + 1);
             let line = |row: usize| row * cols + col..row * cols + col + width;
             let height = (row..rows)
                 .take_while(|&row| {
@@ -197,11 +185,7 @@ impl Floor {
             }
             let least = self.place(col as f64, (row + height) as f64);
             let size_m = DVec2::new(width as f64, height as f64) * self.map.cell_m;
-            boxes.push(Box2 {
-                at: least + size_m / 2.0,
-                size_m,
-                ..Box2::default()
-            });
+            boxes.push(Box2 { at: least + size_m / 2.0, size_m, ..Box2::default() });
         }
         boxes
     }
@@ -223,11 +207,7 @@ mod tests {
         }));
         std::fs::write(folder.path().join("a.pgm"), image).unwrap();
         let file = folder.path().join("a.yaml");
-        std::fs::write(
-            &file,
-            "image: a.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]",
-        )
-        .unwrap();
+        std::fs::write(&file, "image: a.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]").unwrap();
         Floor::load(&file).unwrap()
     }
 
@@ -256,25 +236,16 @@ mod tests {
     fn what_no_robot_can_come_near_is_left_out() {
         let floor = floor(&["#######", "#.###.#", "#######"]);
         let shapes = floor.shapes(Path::new("a.yaml"), floor.centre(8)).unwrap();
-        let greatest = shapes
-            .pieces()
-            .map(|piece| piece.bounds().1.x)
-            .fold(f64::MIN, f64::max);
+        let greatest = shapes.pieces().map(|piece| piece.bounds().1.x).fold(f64::MIN, f64::max);
         assert_eq!(greatest, 0.5);
-        assert!(
-            floor
-                .shapes(Path::new("a.yaml"), DVec2::ZERO)
-                .unwrap()
-                .is_empty()
-        );
+        assert!(floor.shapes(Path::new("a.yaml"), DVec2::ZERO).unwrap().is_empty());
     }
 
     #[test]
     fn drawn_ends_are_connected_for_the_body_and_follow_from_the_seed() {
         let long = [".".repeat(16), "#".repeat(16)];
-        let rows: Vec<String> = [1, 0, 0, 0, 1, 0, 1]
-            .map(|solid: usize| format!("#{}#", long[solid]))
-            .to_vec();
+        let rows: Vec<String> =
+            [1, 0, 0, 0, 1, 0, 1].map(|solid: usize| format!("#{}#", long[solid])).to_vec();
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let floor = floor(&rows);
         let draw = |seed| floor.draw([Random::new(seed, 7, 0)].into_iter(), 0.24)[0];
@@ -285,11 +256,7 @@ mod tests {
             assert!((3.0..=15.0).contains(&start.distance(target)));
             // The row in the middle of the upper corridor has this y.
             let middle = 4.25;
-            assert_eq!(
-                (start.y, target.y),
-                (middle, middle),
-                "the lower one is too narrow"
-            );
+            assert_eq!((start.y, target.y), (middle, middle), "the lower one is too narrow");
         }
     }
 

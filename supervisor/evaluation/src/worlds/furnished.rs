@@ -25,10 +25,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
     let least = DVec2::new(-1.2, -half_width);
     let greatest = DVec2::new(distance + 1.2, half_width);
-    let mut shapes = Shapes {
-        walls: vec![closed(least, greatest)],
-        ..Shapes::default()
-    };
+    let mut shapes = Shapes { walls: vec![closed(least, greatest)], ..Shapes::default() };
     if random.share() < 0.5 {
         shapes.walls.push(curtain(random, least, greatest));
     }
@@ -92,12 +89,7 @@ fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
         7..=8 => DVec2::new(random.within(0.3, 0.9), random.within(0.3, 0.7)),
         _ => DVec2::new(random.within(1.3, 1.8), random.within(0.7, 0.9)),
     };
-    let block = Box2 {
-        at,
-        size_m,
-        angle_deg: angle.to_degrees(),
-        ..Box2::default()
-    };
+    let block = Box2 { at, size_m, angle_deg: angle.to_degrees(), ..Box2::default() };
     let shapes = match kind {
         // The seat of a chair and the top of a table, above the robot.
         0..=3 => on_legs(random, &block, 0.42, 0.47),
@@ -108,24 +100,14 @@ fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
             on_legs(random, &block, bottom, bottom + 0.02)
         }
         // A step, the foot of a lamp: lower than the sonar.
-        7..=8 => one(Box2 {
-            top_m: Some(random.within(0.05, 0.10)),
-            ..block
-        }),
-        _ => one(Box2 {
-            top_m: Some(0.8),
-            echo: Some(SOFT),
-            ..block
-        }),
+        7..=8 => one(Box2 { top_m: Some(random.within(0.05, 0.10)), ..block }),
+        _ => one(Box2 { top_m: Some(0.8), echo: Some(SOFT), ..block }),
     };
     (shapes, size_m.length() / 2.0)
 }
 
 fn one(block: Box2) -> Shapes {
-    Shapes {
-        boxes: vec![block],
-        ..Shapes::default()
-    }
+    Shapes { boxes: vec![block], ..Shapes::default() }
 }
 
 /// `top` between two heights, metres, on four legs 2 to 3 cm thick at its corners.
@@ -141,11 +123,7 @@ fn on_legs(random: &mut Random, top: &Box2, bottom_m: f64, top_m: f64) -> Shapes
     });
     Shapes {
         drums: legs.to_vec(),
-        boxes: vec![Box2 {
-            bottom_m: Some(bottom_m),
-            top_m: Some(top_m),
-            ..top.clone()
-        }],
+        boxes: vec![Box2 { bottom_m: Some(bottom_m), top_m: Some(top_m), ..top.clone() }],
         ..Shapes::default()
     }
 }
@@ -171,9 +149,8 @@ mod tests {
 
     #[test]
     fn rooms_have_legs_tops_over_and_in_the_body_low_things_and_soft_ones() {
-        let scenes: Vec<Scene> = (0..30)
-            .map(|number| draw(&mut Random::new(1, 6, number), number as usize))
-            .collect();
+        let scenes: Vec<Scene> =
+            (0..30).map(|number| draw(&mut Random::new(1, 6, number), number as usize)).collect();
         let boxes: Vec<&Box2> = scenes.iter().flat_map(|it| &it.shapes.boxes).collect();
         let count = |is: &dyn Fn(&Box2) -> bool| boxes.iter().filter(|it| is(it)).count();
         let (sonar_m, body_top_m) = (0.18, 0.255);
@@ -181,20 +158,14 @@ mod tests {
         let overhanging = count(&|it| (sonar_m..body_top_m).contains(&it.profile().bottom_m));
         let low = count(&|it| it.profile().top_m < sonar_m);
         let soft = count(&|it| it.profile().echo == SOFT);
-        for (what, number) in [
-            ("over", over),
-            ("overhanging", overhanging),
-            ("low", low),
-            ("soft", soft),
-        ] {
+        for (what, number) in
+            [("over", over), ("overhanging", overhanging), ("low", low), ("soft", soft)]
+        {
             assert!(number >= 5, "{what}: {number}");
         }
         let legs: Vec<&Drum> = scenes.iter().flat_map(|it| &it.shapes.drums).collect();
         assert_eq!(legs.len(), 4 * (over + overhanging));
-        assert!(
-            legs.iter()
-                .all(|leg| (0.010..=0.015).contains(&leg.radius_m))
-        );
+        assert!(legs.iter().all(|leg| (0.010..=0.015).contains(&leg.radius_m)));
         let curtains = scenes.iter().flat_map(|it| &it.shapes.walls);
         assert!(curtains.filter(|wall| wall.echo == Some(SOFT)).count() >= 5);
     }

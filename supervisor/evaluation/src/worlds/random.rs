@@ -9,10 +9,7 @@ pub(super) struct Random(Pcg64);
 impl Random {
     /// The stream of world `number` of the kind `kind` under `seed`.
     pub(super) fn new(seed: u64, kind: u64, number: u64) -> Self {
-        Self(Pcg64::new(
-            u128::from(seed),
-            u128::from(kind) << 64 | u128::from(number),
-        ))
+        Self(Pcg64::new(u128::from(seed), u128::from(kind) << 64 | u128::from(number)))
     }
 
     /// Uniform in [0, 1).

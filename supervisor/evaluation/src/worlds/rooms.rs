@@ -30,25 +30,13 @@ pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
     let distance = random.within(4.0, 8.0);
     let half_width = random.within(1.6, 3.0);
     let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
-    let (least, greatest) = (
-        DVec2::new(-1.2, -half_width),
-        DVec2::new(distance + 1.2, half_width),
-    );
-    let mut shapes = Shapes {
-        walls: vec![closed(least, greatest)],
-        ..Shapes::default()
-    };
+    let (least, greatest) = (DVec2::new(-1.2, -half_width), DVec2::new(distance + 1.2, half_width));
+    let mut shapes = Shapes { walls: vec![closed(least, greatest)], ..Shapes::default() };
     if doors == Doors::All || random.share() < DOOR_SHARE {
         let at = random.within(1.2, distance - 1.2);
         let gap = random.within(0.8, 1.2);
         let reach = half_width - gap / 2.0 - 0.1;
-        partition(
-            &mut shapes,
-            at,
-            random.within(-reach, reach),
-            gap,
-            half_width,
-        );
+        partition(&mut shapes, at, random.within(-reach, reach), gap, half_width);
     }
     let extent = greatest - least;
     let things = (extent.x * extent.y * DENSITIES[number % DENSITIES.len()]).round() as usize;
@@ -62,35 +50,19 @@ pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
         2 => PI,
         _ => random.within(-PI, PI),
     };
-    Scene {
-        shapes,
-        start: DVec2::ZERO,
-        heading,
-        target,
-    }
+    Scene { shapes, start: DVec2::ZERO, heading, target }
 }
 
 /// A closed rectangle of walls.
 pub(super) fn closed(least: DVec2, greatest: DVec2) -> Wall {
-    let corners = [
-        least,
-        DVec2::new(greatest.x, least.y),
-        greatest,
-        DVec2::new(least.x, greatest.y),
-        least,
-    ];
-    Wall {
-        points: corners.to_vec(),
-        ..Wall::default()
-    }
+    let corners =
+        [least, DVec2::new(greatest.x, least.y), greatest, DVec2::new(least.x, greatest.y), least];
+    Wall { points: corners.to_vec(), ..Wall::default() }
 }
 
 /// A wall across the room at x = `at` with a door of `gap` metres around y = `middle`.
 fn partition(shapes: &mut Shapes, at: f64, middle: f64, gap: f64, half_width: f64) {
-    for (from, to) in [
-        (-half_width, middle - gap / 2.0),
-        (middle + gap / 2.0, half_width),
-    ] {
+    for (from, to) in [(-half_width, middle - gap / 2.0), (middle + gap / 2.0, half_width)] {
         shapes.walls.push(Wall {
             points: vec![DVec2::new(at, from), DVec2::new(at, to)],
             ..Wall::default()
@@ -106,33 +78,21 @@ fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2)
         0..=4 => {
             let radius_m = random.within(0.12, 0.35);
             if is_free(radius_m) {
-                shapes.drums.push(Drum {
-                    at,
-                    radius_m,
-                    ..Drum::default()
-                });
+                shapes.drums.push(Drum { at, radius_m, ..Drum::default() });
             }
         }
         5..=7 => {
             let size_m = DVec2::new(random.within(0.24, 0.8), random.within(0.24, 0.8));
             let angle_deg = random.within(0.0, 180.0);
             if is_free(size_m.length() / 2.0) {
-                shapes.boxes.push(Box2 {
-                    at,
-                    size_m,
-                    angle_deg,
-                    ..Box2::default()
-                });
+                shapes.boxes.push(Box2 { at, size_m, angle_deg, ..Box2::default() });
             }
         }
         _ => {
             let half = random.within(0.4, 1.1);
             let along = DVec2::from_angle(random.within(0.0, TAU)) * half;
             if is_free(half) {
-                shapes.walls.push(Wall {
-                    points: vec![at - along, at + along],
-                    ..Wall::default()
-                });
+                shapes.walls.push(Wall { points: vec![at - along, at + along], ..Wall::default() });
             }
         }
     }

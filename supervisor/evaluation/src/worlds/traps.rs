@@ -36,10 +36,7 @@ pub(super) fn draw(random: &mut Random, number: usize) -> Scene {
     ];
     let mut shapes = Shapes::default();
     match sides {
-        Sides::Walls => shapes.walls.push(Wall {
-            points: corners.to_vec(),
-            ..Wall::default()
-        }),
+        Sides::Walls => shapes.walls.push(Wall { points: corners.to_vec(), ..Wall::default() }),
         Sides::Drums => {
             for pair in corners.windows(2) {
                 let steps = (pair[0].distance(pair[1]) / DRUM_SPACING_M).ceil();

@@ -48,18 +48,10 @@ impl Step for Odometer {
             let way_m = (here[0] - there[0]).hypot(here[1] - there[1]);
             let elapsed_s = now.since(time).as_secs_f64();
             *driven_m += way_m;
-            *moving_s += if way_m > STANDS_M_S * elapsed_s {
-                elapsed_s
-            } else {
-                0.0
-            };
+            *moving_s += if way_m > STANDS_M_S * elapsed_s { elapsed_s } else { 0.0 };
         }
         *last = Some((pose.stamp.tick, now, here));
-        DistanceSample {
-            driven_m: *driven_m,
-            moving_s: *moving_s,
-            ..Default::default()
-        }
+        DistanceSample { driven_m: *driven_m, moving_s: *moving_s, ..Default::default() }
     }
 }
 
@@ -83,16 +75,8 @@ mod tests {
 
     /// The sums after the robot is at x metres, two ticks a second.
     fn step(odometer: &mut Odometer, tick: u64, x_m: f64) -> (f64, f64) {
-        let stamp = Stamp {
-            tick,
-            stamp_ns: tick * 500_000_000,
-            ..Stamp::default()
-        };
-        let pose = PoseSample {
-            stamp,
-            x_m,
-            ..PoseSample::default()
-        };
+        let stamp = Stamp { tick, stamp_ns: tick * 500_000_000, ..Stamp::default() };
+        let pose = PoseSample { stamp, x_m, ..PoseSample::default() };
         let sums = odometer.step(&pose, stamp.time());
         (sums.driven_m, sums.moving_s)
     }
@@ -102,10 +86,7 @@ mod tests {
         let mut odometer = Odometer::default();
         let steps = [(0, 1.0), (1, 1.5), (2, 1.5), (3, 1.25), (3, 1.25)];
         let sums = steps.map(|(tick, x_m)| step(&mut odometer, tick, x_m));
-        assert_eq!(
-            sums,
-            [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (0.75, 1.0), (0.75, 1.0)]
-        );
+        assert_eq!(sums, [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (0.75, 1.0), (0.75, 1.0)]);
     }
 
     #[test]

@@ -12,10 +12,7 @@ fn block(caption: &str) -> &'static str {
 fn the_page_shows_the_stage_as_it_is() {
     // The payload and the topic are in `common` there, and here beside the stage.
     let stage = include_str!("odometer.rs")
-        .replace(
-            "    samples::PoseSample,",
-            "    samples::{DistanceSample, PoseSample},",
-        )
+        .replace("    samples::PoseSample,", "    samples::{DistanceSample, PoseSample},")
         .replace("    topics::POSE,", "    topics::{DISTANCE, POSE},")
         .replace("\nuse crate::rows::{DISTANCE, DistanceSample};\n", "");
     assert_eq!(block("New file `services/odometer/src/lib.rs`:"), stage);

@@ -24,10 +24,8 @@ pub struct Parting {
 
 /// Find where `first` and `second` part.
 pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingError> {
-    let mut parting = Parting {
-        run: run_differences(first.run_text(), second.run_text()),
-        ..Parting::default()
-    };
+    let mut parting =
+        Parting { run: run_differences(first.run_text(), second.run_text()), ..Parting::default() };
     if first.build() != second.build() {
         parting.builds = Some([first, second].map(|recording| recording.build().to_owned()));
     }
@@ -35,10 +33,7 @@ pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingE
         let (found, ticks) = first_in(topic, first, second)?;
         parting.ticks = parting.ticks.max(ticks);
         if let Some(found) = found
-            && parting
-                .first
-                .as_ref()
-                .is_none_or(|held| found.tick < held.tick)
+            && parting.first.as_ref().is_none_or(|held| found.tick < held.tick)
         {
             parting.first = Some(found);
         }
@@ -48,14 +43,10 @@ pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingE
 
 fn run_differences(first: &str, second: &str) -> Vec<String> {
     let own = |line: &&str| {
-        !["robot =", "address =", "epoch_ns ="]
-            .iter()
-            .any(|key| line.starts_with(key))
+        !["robot =", "address =", "epoch_ns ="].iter().any(|key| line.starts_with(key))
     };
-    let (first, second): (Vec<_>, Vec<_>) = (
-        first.lines().filter(own).collect(),
-        second.lines().filter(own).collect(),
-    );
+    let (first, second): (Vec<_>, Vec<_>) =
+        (first.lines().filter(own).collect(), second.lines().filter(own).collect());
     let only = |mark: &'static str, lines: &[&str], others: &[&str]| -> Vec<String> {
         let lines = lines.iter().filter(|line| !others.contains(line));
         lines.map(|line| format!("{mark} {line}")).collect()

@@ -37,12 +37,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            stages: Vec::new(),
-            from: MissionTime::default(),
-            pace: Pace::Max,
-            run: None,
-        }
+        Self { stages: Vec::new(), from: MissionTime::default(), pace: Pace::Max, run: None }
     }
 }
 
@@ -69,38 +64,27 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
             options.stages.is_empty() || options.stages.iter().any(|name| name == stage.name)
         })
         .collect();
-    let mut wanted = vec![
-        topics::INPUTS.spec().name,
-        topics::HEALTH.spec().name,
-        topics::DEATHS.spec().name,
-    ];
+    let mut wanted =
+        vec![topics::INPUTS.spec().name, topics::HEALTH.spec().name, topics::DEATHS.spec().name];
     for stage in &chosen {
         let outputs = stage.wiring.outputs.iter().map(|topic| topic.spec().name);
         wanted.extend(outputs.filter(|topic| !NOT_COMPUTED.contains(topic)));
     }
-    let mut report = Report {
-        cut_after_s: cut,
-        ..Report::default()
-    };
+    let mut report = Report { cut_after_s: cut, ..Report::default() };
     for stage in &chosen {
         report.stages.entry(stage.name).or_default();
     }
-    let mut generations = Generations {
-        chosen,
-        all: BTreeMap::new(),
-    };
+    let mut generations = Generations { chosen, all: BTreeMap::new() };
     let began = Instant::now();
     for message in recording.messages(&wanted)? {
         let message = message?;
         if let Pace::Rate(rate) = options.pace {
             wait_for(&message, rate, began);
         }
-        generations
-            .take(&setting, message)
-            .map_err(|topic| RecordingError::Message {
-                file: recording.path().to_path_buf(),
-                topic: topic.to_owned(),
-            })?;
+        generations.take(&setting, message).map_err(|topic| RecordingError::Message {
+            file: recording.path().to_path_buf(),
+            topic: topic.to_owned(),
+        })?;
     }
     for ((_, stage, _), generation) in generations.all {
         let found = report.stages.entry(stage).or_default();
@@ -126,17 +110,10 @@ struct Generations {
 
 impl Generations {
     fn of(&mut self, stage: &str, number: u32) -> Option<&mut Generation> {
-        let (place, stage) = self
-            .chosen
-            .iter()
-            .enumerate()
-            .find(|(_, chosen)| chosen.name == stage)?;
+        let (place, stage) =
+            self.chosen.iter().enumerate().find(|(_, chosen)| chosen.name == stage)?;
         let key = (place, stage.name, number);
-        Some(
-            self.all
-                .entry(key)
-                .or_insert_with(|| Generation::new(stage, number)),
-        )
+        Some(self.all.entry(key).or_insert_with(|| Generation::new(stage, number)))
     }
 
     /// Take a message. The error names the topic that it does not match.
@@ -162,19 +139,12 @@ impl Generations {
             let death: DeathSample = common::bus::decode_sample(&message.data).ok_or("deaths")?;
             self.of(name_str(&death.stage), death.generation);
         } else {
-            let writer = topics::TABLE
-                .iter()
-                .find(|known| known.spec().name == topic);
+            let writer = topics::TABLE.iter().find(|known| known.spec().name == topic);
             let writer = writer.map_or("", |topic| topic.spec().writer);
             let number = message.data.get(20..).and_then(|rest| rest.first_chunk());
             let number = number.map_or(0, |bytes| u32::from_le_bytes(*bytes));
             if let Some(generation) = self.of(writer, number) {
-                let Message {
-                    topic,
-                    sequence,
-                    data,
-                    ..
-                } = message;
+                let Message { topic, sequence, data, .. } = message;
                 generation.output(setting, &topic, sequence, data);
             }
         }

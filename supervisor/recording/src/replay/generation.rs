@@ -126,11 +126,7 @@ impl Generation {
     fn entry(&mut self, setting: &Setting<'_>, body: Vec<u8>) {
         let Some(replay) = &mut self.replay else {
             let fields = (setting.recorded)(topics::FIELD.spec().name);
-            let beginning = Beginning {
-                run: setting.run,
-                start: &body,
-                fields,
-            };
+            let beginning = Beginning { run: setting.run, start: &body, fields };
             match (self.stage.replay)(beginning) {
                 Ok(replay) => self.replay = Some(replay),
                 Err(error) => self.give_up(error.to_string()),
@@ -218,9 +214,7 @@ impl Generation {
 
     fn differs(&mut self, topic: &str, recorded: &[u8], computed: &Computed) {
         let tick = tick_of(recorded);
-        let known = topics::TABLE
-            .iter()
-            .find(|known| known.spec().name == topic);
+        let known = topics::TABLE.iter().find(|known| known.spec().name == topic);
         let (field, was, is) = known.map_or_else(Default::default, |topic| {
             values::first_difference(*topic, recorded, &computed.message)
         });
@@ -267,10 +261,7 @@ impl Generation {
         if !self.is_over() && !setting.cut {
             self.find_what_was_not_computed(setting);
         }
-        let waiting = self
-            .channels
-            .values()
-            .map(|channel| channel.computed.len() as u64);
+        let waiting = self.channels.values().map(|channel| channel.computed.len() as u64);
         self.unrecorded += waiting.sum::<u64>();
         report.inputs += self.inputs;
         report.compared += self.compared;
@@ -312,20 +303,15 @@ impl Generation {
             return Verdict::NotReplayed(why.clone());
         }
         if self.pieces_came {
-            return if self.inputs == 0 {
-                Verdict::WithoutStep
-            } else {
-                Verdict::Equal
-            };
+            return if self.inputs == 0 { Verdict::WithoutStep } else { Verdict::Equal };
         }
         if !self.worked {
             return Verdict::WithoutStep;
         }
         Verdict::NotReplayed(match self.stage.executable(&setting.run.mission) {
-            Some(executable) => format!(
-                "it was {}, which publishes no `inputs`",
-                executable.display()
-            ),
+            Some(executable) => {
+                format!("it was {}, which publishes no `inputs`", executable.display())
+            }
             None => "none of its `inputs` is recorded".to_owned(),
         })
     }

@@ -48,13 +48,8 @@ pub use self::{
 };
 
 /// Topics that are not played: processes and requests. The process ids belong to other processes now.
-static NOT_PLAYED: [&dyn AnyTopic; 5] = [
-    &topics::ROSTER,
-    &topics::HEALTH,
-    &topics::INPUTS,
-    &topics::REQUESTS,
-    &topics::FAULTS,
-];
+static NOT_PLAYED: [&dyn AnyTopic; 5] =
+    [&topics::ROSTER, &topics::HEALTH, &topics::INPUTS, &topics::REQUESTS, &topics::FAULTS];
 /// Most elements of a slice of a topic that is no map.
 const LONGEST_PIECE: usize = 1 << 16;
 /// Longest wait until a stop request is seen.
@@ -91,11 +86,7 @@ pub fn play(
     stop: &mut dyn FnMut() -> bool,
     tell: &mut dyn FnMut(Happened),
 ) -> Result<LiveReport, LiveError> {
-    if options
-        .stages
-        .iter()
-        .any(|stage| stage.name == error::NEVER_LIVE)
-    {
+    if options.stages.iter().any(|stage| stage.name == error::NEVER_LIVE) {
         return Err(LiveError::Link);
     }
     let mut player = Player::open(recording, options)?;
@@ -161,9 +152,7 @@ impl Player {
         let run = Run {
             robot: options.robot.clone(),
             // A live stage's behaviour follows from the played samples, not from the wall clock.
-            clock: MissionClock::Ticks {
-                period_ns: (1e9 / mission.robot.rate_hz) as u64,
-            },
+            clock: MissionClock::Ticks { period_ns: (1e9 / mission.robot.rate_hz) as u64 },
             mission: mission.clone(),
             ..recorded.clone()
         };
@@ -171,9 +160,7 @@ impl Player {
         let domain = Domain::of(options.robot.clone());
         let link = domain.run_directory();
         let lock = DomainLock::acquire(domain, cells)?;
-        let directory = tempfile::Builder::new()
-            .prefix("firsthand-replay-")
-            .tempdir();
+        let directory = tempfile::Builder::new().prefix("firsthand-replay-").tempdir();
         let directory = directory.map_err(LiveError::Directory)?;
         run.save(directory.path())?;
         symlink(directory.path(), link).map_err(LiveError::Directory)?;
@@ -241,12 +228,7 @@ impl Player {
             let ended = live.ended();
             let ended = ended.map_err(|source| LiveError::Start { stage, source })?;
             if let Some((cause, log_tail)) = ended {
-                return Err(LiveError::Ended {
-                    stage,
-                    tick: self.tick,
-                    cause,
-                    log_tail,
-                });
+                return Err(LiveError::Ended { stage, tick: self.tick, cause, log_tail });
             }
         }
         Ok(())
@@ -347,10 +329,7 @@ impl Player {
     }
 
     fn report(&self) -> LiveReport {
-        let mut report = LiveReport {
-            played: self.played,
-            ..LiveReport::default()
-        };
+        let mut report = LiveReport { played: self.played, ..LiveReport::default() };
         for live in &self.stages {
             let (found, first) = live.report();
             report.stages.insert(live.stage.name, found);
@@ -368,7 +347,5 @@ impl Player {
 
 /// The stages that can be live: all but the link.
 pub fn live_stages() -> impl Iterator<Item = &'static Stage> {
-    stages::TABLE
-        .iter()
-        .filter(|stage| stage.name != error::NEVER_LIVE)
+    stages::TABLE.iter().filter(|stage| stage.name != error::NEVER_LIVE)
 }

@@ -109,10 +109,7 @@ impl fmt::Display for Report {
         }
         for (stage, found) in &self.stages {
             for (generation, why) in &found.not_replayed {
-                writeln!(
-                    to,
-                    "{stage} generation {generation} was not replayed: {why}"
-                )?;
+                writeln!(to, "{stage} generation {generation} was not replayed: {why}")?;
             }
         }
         if let Some(after) = self.cut_after_s {

@@ -18,12 +18,7 @@ pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::COMMAND,
 ];
 /// Fields that a process measures of itself, or that count its restarts. No two runs have the same.
-const OWN: [&str; 4] = [
-    "stamp.generation",
-    "stamp.sequence",
-    "full_solve_ns",
-    "full_solves",
-];
+const OWN: [&str; 4] = ["stamp.generation", "stamp.sequence", "full_solve_ns", "full_solves"];
 
 /// The first difference of two recordings.
 #[derive(Clone, Debug, PartialEq, Serialize)]

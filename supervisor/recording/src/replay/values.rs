@@ -10,19 +10,13 @@ pub fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
     let Some(bytes) = message.strip_prefix(&cdr::HEADER) else {
         return Vec::new();
     };
-    let mut walk = Walk {
-        bytes,
-        at: 0,
-        values: Vec::new(),
-    };
+    let mut walk = Walk { bytes, at: 0, values: Vec::new() };
     let (sample, element) = topic.layout();
     if walk.kind("", &sample).is_some()
         && let Some(element) = element
         && let Some(length) = walk.number(4)
     {
-        let length = length
-            .first_chunk()
-            .map_or(0, |bytes| u32::from_le_bytes(*bytes));
+        let length = length.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         for index in 0..length {
             if walk.kind(&format!("elements[{index}]"), &element).is_none() {
                 break;
@@ -42,11 +36,9 @@ pub fn first_difference(
     let differs = first.iter().zip(&second).find(|(one, other)| one != other);
     match differs {
         Some(((field, one), (_, other))) => (field.clone(), one.clone(), other.clone()),
-        None => (
-            "number of elements".to_owned(),
-            first.len().to_string(),
-            second.len().to_string(),
-        ),
+        None => {
+            ("number of elements".to_owned(), first.len().to_string(), second.len().to_string())
+        }
     }
 }
 
@@ -117,13 +109,7 @@ mod tests {
     fn the_field_that_differs_is_named_with_both_values() {
         let mut messages = [Vec::new(), Vec::new()];
         for (message, x_m) in messages.iter_mut().zip([1.5, 1.25]) {
-            encode_sample(
-                &PoseSample {
-                    x_m,
-                    ..PoseSample::default()
-                },
-                message,
-            );
+            encode_sample(&PoseSample { x_m, ..PoseSample::default() }, message);
         }
         let difference = first_difference(&topics::POSE, &messages[0], &messages[1]);
         assert_eq!(difference, ("x_m".into(), "1.5".into(), "1.25".into()));

@@ -65,11 +65,7 @@ pub(crate) struct Attack {
 
 impl Attack {
     pub(crate) fn new(seed: u64, consumers: Consumers) -> Self {
-        Self {
-            seed,
-            consumers,
-            ..Self::default()
-        }
+        Self { seed, consumers, ..Self::default() }
     }
 
     /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
@@ -164,9 +160,7 @@ impl Attack {
 
     /// Whether the supervisor was hit and has no working successor yet.
     pub(crate) fn supervisor_is_down(&self) -> bool {
-        self.pending
-            .iter()
-            .any(|recovery| recovery.stage == SUPERVISOR)
+        self.pending.iter().any(|recovery| recovery.stage == SUPERVISOR)
     }
 
     /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
@@ -222,12 +216,7 @@ impl Attack {
         }
         while let Some(health) = subscriptions.health.take()? {
             if HealthState::from_byte(health.state) == HealthState::Ready {
-                self.on_sign(
-                    name_str(&health.stage),
-                    health.stamp.generation,
-                    true,
-                    report,
-                );
+                self.on_sign(name_str(&health.stage), health.stamp.generation, true, report);
             }
         }
         while let Some(sample) = subscriptions.wheels.take()? {
@@ -284,8 +273,7 @@ impl Attack {
     fn freeze_all(&mut self, pause: Duration, report: &mut Report) {
         // A stage that is frozen alone stays frozen.
         let hangs = |entry: &&RosterEntry| {
-            self.frozen
-                .contains(&(name_str(&entry.stage), entry.generation))
+            self.frozen.contains(&(name_str(&entry.stage), entry.generation))
         };
         let stages = self.entries.iter().filter(|entry| !hangs(entry));
         let stages = stages.map(|entry| entry.pid);
@@ -315,19 +303,13 @@ impl Attack {
 
     /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
     fn hit(&mut self, series: &mut Series<'_>) -> Result<(), ChaosError> {
-        let Series {
-            options,
-            schedule,
-            report,
-            ..
-        } = series;
+        let Series { options, schedule, report, .. } = series;
         if let Some((index, kind, pause)) =
             schedule.consumer(self.consumers.len(), options.only_consumers)
         {
             let supervisor = self.supervisor;
             let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
-            self.measured
-                .extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
+            self.measured.extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
             return Ok(());
         }
         if options.supervisor && schedule.supervisor() {
@@ -335,8 +317,7 @@ impl Attack {
             if !self.supervisor_is_down() && send(self.supervisor, kind) {
                 report.hit(SUPERVISOR, kind);
                 let row = self.row(SUPERVISOR, kind, None);
-                self.pending
-                    .push(PendingRecovery::new(SUPERVISOR, 0, StartupHit::None, row));
+                self.pending.push(PendingRecovery::new(SUPERVISOR, 0, StartupHit::None, row));
                 self.supervisor_hit = true;
                 self.driving = false;
             }
@@ -376,8 +357,7 @@ impl Attack {
         };
         let generation = entry.generation;
         let row = self.row(stage, kind, Some(generation));
-        self.pending
-            .push(PendingRecovery::new(stage, generation, startup_hit, row));
+        self.pending.push(PendingRecovery::new(stage, generation, startup_hit, row));
         Ok(())
     }
 
@@ -400,13 +380,7 @@ impl Attack {
                 report.hit(stage, Kind::KillAtStart);
                 self.hits.push((stage, Instant::now()));
                 let time_s = self.time.map(MissionTime::seconds);
-                let row = Row::new(
-                    self.seed,
-                    time_s,
-                    stage,
-                    Kind::KillAtStart,
-                    Some(generation),
-                );
+                let row = Row::new(self.seed, time_s, stage, Kind::KillAtStart, Some(generation));
                 let next = PendingRecovery::new(stage, generation, StartupHit::None, row);
                 self.measured.push(std::mem::replace(recovery, next).row);
             }

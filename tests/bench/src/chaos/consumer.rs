@@ -62,10 +62,7 @@ enum ConsumerProblem {
     #[error(transparent)]
     Words(#[from] WordsError),
     #[error("{program}: {problem}")]
-    Program {
-        program: String,
-        problem: ExecutableError,
-    },
+    Program { program: String, problem: ExecutableError },
 }
 
 impl FromStr for GivenConsumer {
@@ -80,15 +77,9 @@ impl FromStr for GivenConsumer {
                 Err(problem) => Err(ConsumerProblem::Program { program, problem }),
             }
         };
-        let (program, arguments) = found().map_err(|problem| ConsumerError {
-            command: command.to_owned(),
-            problem,
-        })?;
-        Ok(Self {
-            command: command.to_owned(),
-            program,
-            arguments,
-        })
+        let (program, arguments) =
+            found().map_err(|problem| ConsumerError { command: command.to_owned(), problem })?;
+        Ok(Self { command: command.to_owned(), program, arguments })
     }
 }
 
@@ -161,10 +152,7 @@ mod tests {
         for command in ["sh 'x", ""] {
             let error = command.parse::<GivenConsumer>().unwrap_err();
             assert_eq!(error.command, command);
-            assert!(
-                matches!(error.problem, ConsumerProblem::Words(_)),
-                "{error}"
-            );
+            assert!(matches!(error.problem, ConsumerProblem::Words(_)), "{error}");
         }
     }
 

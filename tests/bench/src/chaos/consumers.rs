@@ -70,10 +70,7 @@ impl Consumers {
             return Ok(Self::default());
         }
         fs::create_dir(&directory).map_err(system("make a directory"))?;
-        let setting = Setting {
-            robot: options.robot.clone(),
-            directory,
-        };
+        let setting = Setting { robot: options.robot.clone(), directory };
         let mut all = Vec::new();
         for (place, consumer) in options.consumers.iter().enumerate() {
             let mut running = Running {
@@ -86,11 +83,7 @@ impl Consumers {
             running.start(&setting, report)?;
             all.push(running);
         }
-        Ok(Self {
-            all,
-            setting: Some(setting),
-            hit_recordings: Vec::new(),
-        })
+        Ok(Self { all, setting: Some(setting), hit_recordings: Vec::new() })
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -107,9 +100,8 @@ impl Consumers {
         let entries = directory.and_then(|directory| fs::read_dir(directory).ok());
         let files = entries.into_iter().flatten().flatten();
         let files = files.map(|entry| entry.path());
-        let mut recordings: Vec<_> = files
-            .filter(|file| file.extension() == Some(OsStr::new("mcap")))
-            .collect();
+        let mut recordings: Vec<_> =
+            files.filter(|file| file.extension() == Some(OsStr::new("mcap"))).collect();
         recordings.sort();
         recordings
     }
@@ -117,10 +109,7 @@ impl Consumers {
     /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
     pub(crate) fn maintain(&mut self, report: &mut Report) -> Result<(), ChaosError> {
         for running in &mut self.all {
-            if running
-                .frozen_until
-                .is_some_and(|until| Instant::now() >= until)
-            {
+            if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
             }
             if running.consumer != Consumer::RunRecorder
@@ -249,8 +238,7 @@ impl Running {
 fn last_line(said: &Path) -> Option<String> {
     let mut file = File::open(said).ok()?;
     let length = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_LINE)))
-        .ok()?;
+    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_LINE))).ok()?;
     let mut end = Vec::new();
     file.take(LONGEST_LINE).read_to_end(&mut end).ok()?;
     let end = String::from_utf8_lossy(&end);
@@ -282,10 +270,7 @@ fn run_recorder(supervisor: u32) -> Option<(Process, PathBuf)> {
             && let Some(recording) = after("--out")
             && let Ok(process) = Process::adopt(pid, "recorder")
         {
-            return Some((
-                process,
-                Path::new(OsStr::from_bytes(recording)).to_path_buf(),
-            ));
+            return Some((process, Path::new(OsStr::from_bytes(recording)).to_path_buf()));
         }
     }
     None

@@ -16,10 +16,7 @@ pub enum ChaosError {
     #[error(transparent)]
     Signals(#[from] SignalsError),
     #[error("cannot {action}: {source}")]
-    System {
-        action: &'static str,
-        source: std::io::Error,
-    },
+    System { action: &'static str, source: std::io::Error },
     /// A mission ended without a summary.
     #[error("a mission gave no summary: {0}")]
     NoSummary(String),

@@ -109,16 +109,9 @@ impl FaultInjector {
         if self.faulty && self.fault == RobotFault::OldFrames && now >= self.next_again {
             self.next_again = now + AGAIN_EVERY;
             let old = self.kept.iter().rfind(|kept| kept.at + OLD <= now);
-            more.extend(old.map(|old| Late {
-                at: now,
-                bytes: old.bytes.clone(),
-            }));
+            more.extend(old.map(|old| Late { at: now, bytes: old.bytes.clone() }));
         }
-        let at = if self.faulty && self.fault == RobotFault::FramesLate {
-            now + LATE
-        } else {
-            now
-        };
+        let at = if self.faulty && self.fault == RobotFault::FramesLate { now + LATE } else { now };
         let first = (!out.is_empty()).then_some(Late { at, bytes: out });
         first.into_iter().chain(more).collect()
     }

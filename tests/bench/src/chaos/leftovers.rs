@@ -13,9 +13,7 @@ pub(crate) fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let entries = fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let shared = names.filter(|name| name.starts_with(&prefix));
-    let mut found: Vec<String> = shared
-        .map(|name| format!("{SHARED_MEMORY}/{name}"))
-        .collect();
+    let mut found: Vec<String> = shared.map(|name| format!("{SHARED_MEMORY}/{name}")).collect();
     let directory = directory.to_string_lossy();
     let others = processes().filter(|pid| *pid != std::process::id());
     found.extend(others.filter_map(|pid| {

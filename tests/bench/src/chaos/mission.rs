@@ -77,11 +77,7 @@ fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
 /// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
 pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
     let directory = options.directory.join("undisturbed");
-    let pace = if options.only_consumers {
-        options.pace
-    } else {
-        Pace::Max
-    };
+    let pace = if options.only_consumers { options.pace } else { Pace::Max };
     let output = command(options, seed, &pace.to_string(), &directory, false)?
         .output()
         .map_err(system("start a mission"))?;
@@ -100,17 +96,10 @@ pub(crate) fn attack(
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).map_err(system("make a directory"))?;
     let directory = files.join("run");
-    let mut robot = options
-        .supervisor
-        .then(|| robot(options, seed, &files.join("robot")))
-        .transpose()?;
-    let mut start = command(
-        options,
-        seed,
-        &options.pace.to_string(),
-        &directory,
-        options.records(),
-    )?;
+    let mut robot =
+        options.supervisor.then(|| robot(options, seed, &files.join("robot"))).transpose()?;
+    let mut start =
+        command(options, seed, &options.pace.to_string(), &directory, options.records())?;
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
@@ -189,10 +178,7 @@ pub(crate) fn robot(
     directory: &Path,
 ) -> Result<Simulator, ChaosError> {
     fs::create_dir(directory).map_err(system("make a directory"))?;
-    let mission = Mission {
-        seed,
-        ..options.loaded.clone()
-    };
+    let mission = Mission { seed, ..options.loaded.clone() };
     Ok(Simulator::start(directory, &mission, options.pace)?)
 }
 

@@ -66,11 +66,7 @@ impl Proxy {
                 let _ = wire.turn();
             }
         });
-        Ok(Self {
-            address,
-            shared,
-            thread: Some(thread),
-        })
+        Ok(Self { address, shared, thread: Some(thread) })
     }
 
     pub(crate) const fn address(&self) -> SocketAddr {

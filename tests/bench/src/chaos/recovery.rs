@@ -41,13 +41,7 @@ impl PendingRecovery {
         startup_hit: StartupHit,
         row: Row,
     ) -> Self {
-        Self {
-            stage,
-            generation,
-            at: Instant::now(),
-            startup_hit,
-            row,
-        }
+        Self { stage, generation, at: Instant::now(), startup_hit, row }
     }
 
     pub(crate) fn noticed(&mut self) {
@@ -108,11 +102,7 @@ impl PendingRecovery {
     /// Process and generation of the successor, once, when its hit is due.
     pub(crate) fn take_due_startup_hit(&mut self) -> Option<(u32, u32)> {
         match self.startup_hit {
-            StartupHit::At {
-                when,
-                process,
-                generation,
-            } if Instant::now() >= when => {
+            StartupHit::At { when, process, generation } if Instant::now() >= when => {
                 self.startup_hit = StartupHit::None;
                 Some((process, generation))
             }

@@ -62,14 +62,10 @@ impl Replays {
         let files: Vec<_> = entries.map(|entry| entry.path()).collect();
         let (hit, whole): (Vec<_>, Vec<_>) = files
             .iter()
-            .filter(|file| {
-                file.extension()
-                    .is_some_and(|extension| extension == "mcap")
-            })
+            .filter(|file| file.extension().is_some_and(|extension| extension == "mcap"))
             .partition(|file| hit.contains(file));
         if hit.is_empty() && whole.is_empty() {
-            self.wrong
-                .push(format!("seed {seed}: nothing was recorded"));
+            self.wrong.push(format!("seed {seed}: nothing was recorded"));
         }
         for file in whole {
             self.recordings += 1;
@@ -115,9 +111,7 @@ impl Replays {
             self.without_step += found.without_step;
             self.compared += found.compared;
             for (generation, why) in &found.not_replayed {
-                self.wrong.push(format!(
-                    "seed {seed}: {stage} generation {generation}: {why}"
-                ));
+                self.wrong.push(format!("seed {seed}: {stage} generation {generation}: {why}"));
             }
         }
         if let Some(difference) = &report.difference {

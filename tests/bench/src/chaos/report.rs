@@ -78,13 +78,7 @@ pub(crate) struct ConsumerCounts {
 
 impl fmt::Display for ConsumerCounts {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            killed,
-            frozen,
-            started,
-            ended_by_itself,
-            last_end,
-        } = self;
+        let Self { killed, frozen, started, ended_by_itself, last_end } = self;
         write!(
             to,
             "{killed} killed, {frozen} frozen, {started} started, {ended_by_itself} ended by themselves"
@@ -166,12 +160,7 @@ impl Report {
     }
 
     pub(crate) fn hit(&mut self, stage: &'static str, kind: Kind) {
-        *self
-            .kills
-            .entry(stage)
-            .or_default()
-            .entry(kind)
-            .or_default() += 1;
+        *self.kills.entry(stage).or_default().entry(kind).or_default() += 1;
     }
 
     pub(crate) fn recovery(&mut self, stage: &'static str) -> &mut Recovery {
@@ -196,15 +185,11 @@ impl Report {
             self.wrong.push(format!("seed {seed}: {outcome}: {reason}"));
         }
         if end.collisions > 0 {
-            self.wrong.push(format!(
-                "seed {seed}: touched something {} times",
-                end.collisions
-            ));
+            self.wrong.push(format!("seed {seed}: touched something {} times", end.collisions));
         }
         self.healthy_aborted += end.healthy_aborted.len() as u64;
         for stage in &end.healthy_aborted {
-            self.wrong
-                .push(format!("seed {seed}: aborted although healthy: {stage}"));
+            self.wrong.push(format!("seed {seed}: aborted although healthy: {stage}"));
         }
         if excess > allowance {
             self.wrong.push(format!(
@@ -337,10 +322,8 @@ impl fmt::Display for Report {
         for (&kind, &count) in self.kills.values().flatten() {
             *kinds.entry(kind).or_default() += count;
         }
-        let kinds: Vec<_> = kinds
-            .iter()
-            .map(|(kind, count)| format!("{count} {}", kind.as_str()))
-            .collect();
+        let kinds: Vec<_> =
+            kinds.iter().map(|(kind, count)| format!("{count} {}", kind.as_str())).collect();
         writeln!(to, "(p50, p99, max) {}", kinds.join(", "))?;
         for (name, counts) in &self.consumers {
             writeln!(to, "consumer {name}: {counts}")?;
@@ -355,10 +338,7 @@ impl fmt::Display for Report {
             "a wheel turned at most {:.2} s of mission time after the last command",
             self.longest_stopping_time_s
         )?;
-        let Resources {
-            descriptors,
-            memory_kib,
-        } = self.supervisor_growth;
+        let Resources { descriptors, memory_kib } = self.supervisor_growth;
         writeln!(
             to,
             "a supervisor grew by at most {descriptors} descriptors and {memory_kib} KiB"

@@ -20,9 +20,6 @@ impl Resources {
         // Pages of shared memory belong to the bus and do not count.
         let memory = process_status::field(&pid.to_string(), "RssAnon")?;
         let memory_kib = memory.trim_end_matches(" kB").parse().ok()?;
-        Some(Self {
-            descriptors,
-            memory_kib,
-        })
+        Some(Self { descriptors, memory_kib })
     }
 }

@@ -51,12 +51,7 @@ pub struct Row {
 }
 
 const fn row(fault: RobotFault, name: &'static str, promise: Promise, what: &'static str) -> Row {
-    Row {
-        fault,
-        name,
-        what,
-        promise,
-    }
+    Row { fault, name, what, promise }
 }
 
 #[rustfmt::skip]
@@ -94,10 +89,7 @@ impl Promise {
 impl RobotFault {
     pub fn row(self) -> &'static Row {
         // A test ensures that every fault has a row.
-        TABLE
-            .iter()
-            .find(|row| row.fault == self)
-            .unwrap_or(&TABLE[0])
+        TABLE.iter().find(|row| row.fault == self).unwrap_or(&TABLE[0])
     }
 
     pub fn named(name: &str) -> Option<Self> {

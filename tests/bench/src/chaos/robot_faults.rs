@@ -62,10 +62,7 @@ pub fn run_robot_faults(
     for &fault in &options.faults {
         for number in 0..u64::from(options.missions) {
             let seed = options.base.seed + number;
-            let files = options
-                .base
-                .directory
-                .join(format!("{}-{seed}", fault.row().name));
+            let files = options.base.directory.join(format!("{}-{seed}", fault.row().name));
             fs::create_dir(&files).map_err(system("make a directory"))?;
             let entry = one(&options.base, fault, seed, &files)?;
             if entry.is_kept() {
@@ -152,9 +149,7 @@ impl Observed {
                 Some(_) => WATCHED,
                 None => WATCHED_ON_ITS_WAY,
             };
-            let patience = self
-                .fault_began
-                .map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
+            let patience = self.fault_began.map_or(began + DEPARTS_WITHIN, |(at, _)| at + watched);
             if self.ended_by_itself || Instant::now() >= patience {
                 break;
             }

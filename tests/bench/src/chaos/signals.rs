@@ -114,12 +114,8 @@ impl SignalsFile {
             };
             failed("make", &path)(format!("{error}{remedy}"))
         })?;
-        let mut writer = csv::WriterBuilder::new()
-            .has_headers(false)
-            .from_writer(file);
-        writer
-            .write_record(HEADER)
-            .map_err(failed("write", &path))?;
+        let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(file);
+        writer.write_record(HEADER).map_err(failed("write", &path))?;
         writer.flush().map_err(failed("write", &path))?;
         Ok(Self { path, writer })
     }
@@ -133,11 +129,7 @@ impl SignalsFile {
 
 fn failed<E: ToString>(action: &'static str, file: &Path) -> impl FnOnce(E) -> SignalsError {
     let file = file.to_path_buf();
-    move |problem| SignalsError {
-        action,
-        file,
-        problem: problem.to_string(),
-    }
+    move |problem| SignalsError { action, file, problem: problem.to_string() }
 }
 
 #[cfg(test)]
@@ -166,10 +158,7 @@ mod tests {
         // Another process reads it like this while it is written.
         assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
         let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
-        assert!(
-            text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,,,\n"),
-            "{text}"
-        );
+        assert!(text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,,,\n"), "{text}");
     }
 
     #[test]
@@ -183,9 +172,7 @@ mod tests {
     #[test]
     fn the_columns_are_the_fields_of_a_row_in_order() {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer
-            .serialize(Row::new(1, None, "a", Kind::Kill, None))
-            .unwrap();
+        writer.serialize(Row::new(1, None, "a", Kind::Kill, None)).unwrap();
         let text = String::from_utf8(writer.into_inner().unwrap()).unwrap();
         assert_eq!(text.lines().next(), Some(&*HEADER.join(",")));
     }

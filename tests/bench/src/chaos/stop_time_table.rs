@@ -79,10 +79,7 @@ impl fmt::Display for StopTimeTable {
                 format!("{}: {reason}", entry.outcome)
             });
             let name = fault.row().name;
-            writeln!(
-                to,
-                "{name:<17} {last:>14} {rest:>11} {touches:>8} {kept:>9}  {told}"
-            )?;
+            writeln!(to, "{name:<17} {last:>14} {rest:>11} {touches:>8} {kept:>9}  {told}")?;
         }
         writeln!(
             to,
@@ -97,10 +94,7 @@ impl fmt::Display for StopTimeTable {
 /// Names of the faults with this promise.
 fn names(promise: Promise) -> String {
     let table = crate::chaos::robot_fault::TABLE.iter();
-    let names: Vec<_> = table
-        .filter(|row| row.promise == promise)
-        .map(|row| row.name)
-        .collect();
+    let names: Vec<_> = table.filter(|row| row.promise == promise).map(|row| row.name).collect();
     names.join(", ")
 }
 
@@ -156,25 +150,14 @@ mod tests {
         ];
         for (entry, kept) in rows {
             assert_eq!(entry.is_kept(), kept, "{entry:?}");
-            assert_eq!(
-                StopTimeTable {
-                    entries: vec![entry]
-                }
-                .is_kept(),
-                kept
-            );
+            assert_eq!(StopTimeTable { entries: vec![entry] }.is_kept(), kept);
         }
     }
 
     #[test]
     fn the_table_shows_the_longest_time_of_each_kind_and_who_still_moved() {
-        let moved = Entry {
-            last_moving_s: Some(9.9),
-            ..entry(RobotFault::Silence)
-        };
-        let table = StopTimeTable {
-            entries: vec![entry(RobotFault::Silence), moved],
-        };
+        let moved = Entry { last_moving_s: Some(9.9), ..entry(RobotFault::Silence) };
+        let table = StopTimeTable { entries: vec![entry(RobotFault::Silence), moved] };
         let text = table.to_string();
         let row = text.lines().nth(1).unwrap_or_default();
         let words: Vec<_> = row.split_whitespace().collect();

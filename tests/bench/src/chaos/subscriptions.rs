@@ -51,9 +51,7 @@ impl Subscriptions {
         let of_supervisor = |header: &RosterHeader, _: &[RosterEntry]| {
             (header.supervisor_pid == supervisor).then_some(())
         };
-        let found = subscriptions
-            .roster
-            .find(2 * topics::RESTATE, of_supervisor)?;
+        let found = subscriptions.roster.find(2 * topics::RESTATE, of_supervisor)?;
         Ok(found.map(|()| subscriptions))
     }
 }

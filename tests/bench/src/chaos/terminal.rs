@@ -12,12 +12,7 @@ use rustix::{
     termios::{Winsize, tcsetwinsize},
 };
 
-const SIZE: Winsize = Winsize {
-    ws_row: 24,
-    ws_col: 80,
-    ws_xpixel: 0,
-    ws_ypixel: 0,
-};
+const SIZE: Winsize = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
 
 /// Both ends of a terminal: the first reads the text that a program writes to the second.
 pub(crate) fn open() -> io::Result<(File, File)> {

@@ -62,10 +62,7 @@ mod tests {
             ("a 'b  c' \"d 'e\"", &["a", "b  c", "d 'e"]),
             ("a\\ b '\\' \"\\\"\" ''", &["a b", "\\", "\"", ""]),
             ("x=\"y z\"w", &["x=y zw"]),
-            (
-                "echo $HOME *.rs | sh; `id`",
-                &["echo", "$HOME", "*.rs", "|", "sh;", "`id`"],
-            ),
+            ("echo $HOME *.rs | sh; `id`", &["echo", "$HOME", "*.rs", "|", "sh;", "`id`"]),
         ] {
             assert_eq!(split(command).unwrap(), words, "{command}");
         }

@@ -16,9 +16,7 @@ use super::error::TickError;
 /// The path of a tick: every stage of the table, then again those with feedback.
 fn way() -> impl Iterator<Item = (&'static str, Answers)> {
     let stages = stages::TABLE.iter();
-    let again = stages
-        .clone()
-        .filter(|stage| !stage.wiring.feedback.is_empty());
+    let again = stages.clone().filter(|stage| !stage.wiring.feedback.is_empty());
     let first = stages.map(|stage| (stage.name, Answers::Inputs));
     first.chain(again.map(|stage| (stage.name, Answers::Feedback)))
 }
@@ -50,10 +48,7 @@ impl Budget {
                     self.column(row, item.name()).push(ns);
                 }
             }
-            published = times
-                .iter()
-                .map(|times| (times.tick, times.published_ns))
-                .collect();
+            published = times.iter().map(|times| (times.tick, times.published_ns)).collect();
         }
         Ok(())
     }
@@ -73,17 +68,9 @@ impl Budget {
                     let us = times.iter().map(|&ns| ns as f64 / 1e3);
                     crate::quantile(us, share)
                 };
-                cells.push(Cell {
-                    item: name,
-                    p50_us: quantile(0.5),
-                    p99_us: quantile(0.99),
-                });
+                cells.push(Cell { item: name, p50_us: quantile(0.5), p99_us: quantile(0.99) });
             }
-            rows.push(Row {
-                stage,
-                on_feedback: answers == Answers::Feedback,
-                cells,
-            });
+            rows.push(Row { stage, on_feedback: answers == Answers::Feedback, cells });
         }
         rows
     }
@@ -175,11 +162,7 @@ mod tests {
         let rows = Budget::default().rows();
         for stage in stages::TABLE {
             let ways = rows.iter().filter(|row| row.stage == stage.name).count();
-            let expected = if stage.wiring.feedback.is_empty() {
-                1
-            } else {
-                2
-            };
+            let expected = if stage.wiring.feedback.is_empty() { 1 } else { 2 };
             assert_eq!(ways, expected, "{}", stage.name);
         }
         for row in &rows {
@@ -195,11 +178,7 @@ mod tests {
             let file = latency_budget::file(directory.path(), stage, number);
             fs::write(file, lines).unwrap();
         };
-        save(
-            "x80-link",
-            1,
-            "5 inputs 1000 9000 1 2 3 4 5\n5 feedback 90000 95000 1 2 3 4 5\n",
-        );
+        save("x80-link", 1, "5 inputs 1000 9000 1 2 3 4 5\n5 feedback 90000 95000 1 2 3 4 5\n");
         save("dead-reckoning", 1, "4 inputs 1 2 3 4 5 6 7\n");
         save("dead-reckoning", 2, "5 inputs 19000 29000 1 2 3 4 5\n");
         let mut budget = Budget::default();

@@ -33,10 +33,7 @@ pub fn run(robot: &RobotName, supervisor: u32) -> Result<(), TickError> {
     become_child("consumer", supervisor)?;
     let domain = Domain::of(robot.clone());
     let mut follower = Follower::new(domain, "consumer", &topics::GRID, |bus| {
-        Ok((
-            bus.slice_reader(&topics::GRID)?,
-            bus.slice_reader(&topics::FIELD)?,
-        ))
+        Ok((bus.slice_reader(&topics::GRID)?, bus.slice_reader(&topics::FIELD)?))
     });
     while !terminated.came() {
         if let Event::Samples((grids, fields)) = follower.wait(LOOK_EVERY)? {

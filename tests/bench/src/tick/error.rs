@@ -20,10 +20,7 @@ pub enum TickError {
     #[error(transparent)]
     Stage(#[from] StageError),
     #[error("cannot {action}: {source}")]
-    System {
-        action: &'static str,
-        source: io::Error,
-    },
+    System { action: &'static str, source: io::Error },
     /// A sample went out and none came back.
     #[error("no sample came back within {LOST:?}; is the machine overloaded?")]
     Lost,

@@ -118,11 +118,5 @@ fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, TickError> {
     else {
         return Err(TickError::Nothing);
     };
-    Ok(Ticks {
-        count: summary["ticks"].as_u64().unwrap_or_default(),
-        p50_us,
-        p99_us,
-        max_us,
-        used,
-    })
+    Ok(Ticks { count: summary["ticks"].as_u64().unwrap_or_default(), p50_us, p99_us, max_us, used })
 }

@@ -44,25 +44,15 @@ struct Count {
 
 impl ProcessSet {
     pub(super) const fn of(root: u32) -> Self {
-        Self {
-            root,
-            first: None,
-            last: None,
-            pss_kib: 0,
-        }
+        Self { root, first: None, last: None, pss_kib: 0 }
     }
 
     /// Count now. Counting begins anew whenever a process has started, and stops when the first has ended.
     pub(super) fn look(&mut self) {
         let all = descendants(self.root);
-        let processes: BTreeMap<_, _> = all
-            .iter()
-            .filter_map(|&process| Some((process, Count::of(process)?)))
-            .collect();
-        let counts = Counts {
-            at: Instant::now(),
-            processes,
-        };
+        let processes: BTreeMap<_, _> =
+            all.iter().filter_map(|&process| Some((process, Count::of(process)?))).collect();
+        let counts = Counts { at: Instant::now(), processes };
         let known = self.first.as_ref().map(|first| &first.processes);
         let started = known.is_none_or(|known| all.iter().any(|one| !known.contains_key(one)));
         let ended = known.is_some_and(|known| known.keys().any(|one| !all.contains(one)));
@@ -97,10 +87,7 @@ impl ProcessSet {
 impl Count {
     fn of(process: u32) -> Option<Self> {
         let mut waits = 0;
-        for thread in fs::read_dir(format!("/proc/{process}/task"))
-            .ok()?
-            .flatten()
-        {
+        for thread in fs::read_dir(format!("/proc/{process}/task")).ok()?.flatten() {
             let thread = format!("{process}/task/{}", thread.file_name().display());
             let switches = process_status::field(&thread, "voluntary_ctxt_switches")?;
             waits += switches.parse::<u64>().ok()?;
@@ -130,11 +117,8 @@ fn descendants(root: u32) -> BTreeSet<u32> {
     let parents: Vec<(u32, u64)> = crate::processes()
         .filter_map(|process| Some((process, *stat(process)?.get(PARENT)?)))
         .collect();
-    let mut found: BTreeSet<u32> = parents
-        .iter()
-        .map(|(process, _)| *process)
-        .filter(|process| *process == root)
-        .collect();
+    let mut found: BTreeSet<u32> =
+        parents.iter().map(|(process, _)| *process).filter(|process| *process == root).collect();
     loop {
         let more: Vec<u32> = parents
             .iter()

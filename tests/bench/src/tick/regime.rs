@@ -54,9 +54,7 @@ impl fmt::Display for Regime {
 pub fn parse_hz(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(hz),
-        _ => Err(format!(
-            "{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}"
-        )),
+        _ => Err(format!("{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}")),
     }
 }
 

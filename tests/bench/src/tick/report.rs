@@ -52,13 +52,7 @@ impl Report {
         let (tick_p50_us, tick_p99_us) = (middle(|tick| tick.p50_us)?, middle(|tick| tick.p99_us)?);
         let (hops_p50_us, hops_p99_us) = (hops.quantile_us(0.5)?, hops.quantile_us(0.99)?);
         let used = |of: fn(&Used) -> f64| {
-            quantile(
-                rounds
-                    .iter()
-                    .filter_map(|ticks| ticks.used.as_ref())
-                    .map(of),
-                0.5,
-            )
+            quantile(rounds.iter().filter_map(|ticks| ticks.used.as_ref()).map(of), 0.5)
         };
         Some(Self {
             regime: regime.to_string(),
@@ -84,10 +78,7 @@ impl fmt::Display for Report {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         let row = |to: &mut fmt::Formatter<'_>, what, count, figures: [f64; 3]| {
             let [p50, p99, max] = figures;
-            writeln!(
-                to,
-                "{what:<36} {count:>8} {p50:>7.0} us {p99:>7.0} us {max:>7.0} us"
-            )
+            writeln!(to, "{what:<36} {count:>8} {p50:>7.0} us {p99:>7.0} us {max:>7.0} us")
         };
         writeln!(
             to,
@@ -98,11 +89,7 @@ impl fmt::Display for Report {
         row(to, "five bare hops between processes", self.trips, hops)?;
         let tick = [self.tick_p50_us, self.tick_p99_us, self.tick_max_us];
         row(to, "a tick, datagram in to datagram out", self.ticks, tick)?;
-        writeln!(
-            to,
-            "ratio of the medians {:.2}, at 99 % {:.2}",
-            self.ratio, self.ratio_p99
-        )?;
+        writeln!(to, "ratio of the medians {:.2}, at 99 % {:.2}", self.ratio, self.ratio_p99)?;
         if let (Some(wakeups), Some(cpu), Some(pss)) =
             (self.wakeups_per_s, self.cpu_share, self.pss_mib)
         {

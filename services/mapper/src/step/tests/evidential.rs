@@ -13,16 +13,8 @@ fn mapper(extra: &str) -> Mapper {
 
 /// A robot at (x, 0) facing `heading` hears an echo, or nothing.
 fn hear(mapper: &mut Mapper, tick: u64, x: f64, heading: f64, echo: Option<f64>) -> Window {
-    let stamp = Stamp {
-        tick,
-        ..Stamp::default()
-    };
-    let pose = PoseSample {
-        stamp,
-        x_m: x,
-        heading_rad: heading,
-        ..PoseSample::default()
-    };
+    let stamp = Stamp { tick, ..Stamp::default() };
+    let pose = PoseSample { stamp, x_m: x, heading_rad: heading, ..PoseSample::default() };
     let status = echo.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
     let range = RangeSample {
         stamp,
@@ -63,19 +55,9 @@ fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
 
 /// A robot at the origin facing along x whose infrared rangers give these counts, and whose sonar gives nothing.
 fn see(mapper: &mut Mapper, tick: u64, infrared_ad: [u16; 7]) {
-    let stamp = Stamp {
-        tick,
-        ..Stamp::default()
-    };
-    let pose = PoseSample {
-        stamp,
-        ..PoseSample::default()
-    };
-    let range = RangeSample {
-        stamp,
-        infrared_ad,
-        ..RangeSample::default()
-    };
+    let stamp = Stamp { tick, ..Stamp::default() };
+    let pose = PoseSample { stamp, ..PoseSample::default() };
+    let range = RangeSample { stamp, infrared_ad, ..RangeSample::default() };
     mapper.hear(&pose, Some(&range));
 }
 
@@ -182,9 +164,7 @@ fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
     }
     let hazards = |mapper: &Mapper| {
         let cells = mapper.state().cells().iter();
-        cells
-            .filter(|&&cell| CellState::from_byte(cell).is_hazard())
-            .count()
+        cells.filter(|&&cell| CellState::from_byte(cell).is_hazard()).count()
     };
     let before = hazards(&mapper);
     // Turned by the arc's half: its edge meets the thing, its middle meets nothing new.
@@ -270,10 +250,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     };
     assert!((f64::from(echo.x_m) - 0.2).abs() < 1e-6 && echo.bearing_rad == 0.0);
     assert!((0.6..0.7).contains(&echo.clear_m), "{echo:?}");
-    assert!(
-        silence.bearing_rad == 0.5 && silence.clear_m >= 1.5,
-        "{silence:?}"
-    );
+    assert!(silence.bearing_rad == 0.5 && silence.clear_m >= 1.5, "{silence:?}");
     // On the spot, till the wheels have rolled more than a reading is good for.
     for tick in 2..200 {
         hear(&mut mapper, tick, 0.0, 0.5 + tick as f64, None);

@@ -10,18 +10,8 @@ fn mapper(method: &str) -> Mapper {
 }
 
 fn stand(mapper: &mut Mapper, tick: u64, x_m: f64) {
-    let stamp = Stamp {
-        tick,
-        ..Stamp::default()
-    };
-    mapper.hear(
-        &PoseSample {
-            stamp,
-            x_m,
-            ..PoseSample::default()
-        },
-        None,
-    );
+    let stamp = Stamp { tick, ..Stamp::default() };
+    mapper.hear(&PoseSample { stamp, x_m, ..PoseSample::default() }, None);
 }
 
 fn is_hazard(mapper: &Mapper, x: f64, y: f64) -> bool {
@@ -37,12 +27,7 @@ fn is_connected(mapper: &Mapper) -> bool {
     let mut seen = vec![false; frame.area()];
     let mut next = vec![frame.cell_at(DVec2::ZERO).unwrap()];
     while let Some(Cell { col, row }) = next.pop() {
-        let beside = [
-            (col - 1, row),
-            (col + 1, row),
-            (col, row - 1),
-            (col, row + 1),
-        ];
+        let beside = [(col - 1, row), (col + 1, row), (col, row - 1), (col, row + 1)];
         for (col, row) in beside {
             let cell = Cell { col, row };
             if free(cell) && !std::mem::replace(&mut seen[frame.index(cell)], true) {

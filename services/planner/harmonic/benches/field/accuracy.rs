@@ -41,9 +41,8 @@ pub(crate) fn angle_table() {
                     .domain()
                     .and_then(|it| it.with_screening(&Screening::cells(length)))
                     .expect("a valid map");
-                let field = Solver::default()
-                    .solve(&domain, &Cancellation::new())
-                    .expect("a field");
+                let field =
+                    Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
                 let exact = exact(&domain).expect("a field");
                 let angles = Angles::between(&field, &exact, |_| true);
                 worst.p50 = worst.p50.max(angles.p50);
@@ -103,9 +102,7 @@ pub(crate) fn sequence_table(maps: Vec<(String, Domain)>) {
                 block
             };
             domain.apply(&changes).expect("valid changes");
-            field = solver
-                .solve_near(&domain, &field, &cancellation)
-                .expect("a field");
+            field = solver.solve_near(&domain, &field, &cancellation).expect("a field");
             broken += usize::from(follow(&field) < 1.0);
             if COMPARED_AFTER.contains(&update) {
                 let exact = exact(&domain).expect("a field");

@@ -22,12 +22,7 @@ pub(crate) fn sweep(n: usize) -> f64 {
     let masks: [Vec<u8>; 4] = std::array::from_fn(|_| vec![1; len]);
     let arch = pulp::Arch::new();
     fastest(4 * runs(n * n), || {
-        arch.dispatch(Sweep {
-            planes: &mut planes,
-            masks: &masks,
-            half,
-            stride,
-        });
+        arch.dispatch(Sweep { planes: &mut planes, masks: &masks, half, stride });
     })
 }
 
@@ -43,12 +38,7 @@ impl pulp::WithSimd for Sweep<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self {
-            planes,
-            masks,
-            half,
-            stride,
-        } = self;
+        let Self { planes, masks, half, stride } = self;
         let [ee, oe, eo, oo] = planes;
         for y in 0..=half {
             if y < half {

@@ -47,10 +47,7 @@ fn main() {
         return updates::table(quick);
     }
     if asked("split") {
-        return split::table(
-            quick,
-            maps_directory().map(|it| real::load_all(Path::new(&it))),
-        );
+        return split::table(quick, maps_directory().map(|it| real::load_all(Path::new(&it))));
     }
     if asked(split::BYTES) {
         return split::print_bytes();
@@ -80,10 +77,7 @@ fn sequence_maps() -> Vec<(String, Domain)> {
         (format!("{kind:?} 512"), domain.expect("a valid map"))
     });
     let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
-    let largest = real
-        .into_iter()
-        .flatten()
-        .max_by_key(|(_, domain)| domain.blocked().len());
+    let largest = real.into_iter().flatten().max_by_key(|(_, domain)| domain.blocked().len());
     generated.into_iter().chain(largest).collect()
 }
 
@@ -94,20 +88,9 @@ fn maps_directory() -> Option<String> {
 
 fn machine_table(quick: bool) {
     println!("\nThe machine: one pass over the grid, ms");
-    println!(
-        "{:>6} {:>14} {:>24}",
-        "N", "stream f32", "red-black sweep f32"
-    );
-    for n in if quick {
-        vec![50, 256, 512]
-    } else {
-        vec![50, 256, 512, 1024, 2048, 4096]
-    } {
-        println!(
-            "{n:>6} {:>14.4} {:>24.4}",
-            machine::stream(n),
-            machine::sweep(n)
-        );
+    println!("{:>6} {:>14} {:>24}", "N", "stream f32", "red-black sweep f32");
+    for n in if quick { vec![50, 256, 512] } else { vec![50, 256, 512, 1024, 2048, 4096] } {
+        println!("{n:>6} {:>14.4} {:>24.4}", machine::stream(n), machine::sweep(n));
     }
 }
 
@@ -145,11 +128,7 @@ fn full_table(quick: bool) {
         Kind::Serpentine { corridor: 8 },
         Kind::Serpentine { corridor: 24 },
     ];
-    for n in if quick {
-        vec![50, 512]
-    } else {
-        vec![50, 256, 512, 1024, 2048, 4096]
-    } {
+    for n in if quick { vec![50, 512] } else { vec![50, 256, 512, 1024, 2048, 4096] } {
         for kind in kinds {
             let narrow = matches!(kind, Kind::Maze { .. } | Kind::Serpentine { .. });
             // Seconds and gigabytes each, for nothing new.
@@ -219,12 +198,9 @@ fn screening_table() {
     );
     for length in [f64::INFINITY, 11.18, 3.54] {
         for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
-            let domain = Map::generate(kind, 512, 512, 1)
-                .domain()
-                .expect("a valid map");
-            let domain = domain
-                .with_screening(&Screening::cells(length))
-                .expect("a valid screening");
+            let domain = Map::generate(kind, 512, 512, 1).domain().expect("a valid map");
+            let domain =
+                domain.with_screening(&Screening::cells(length)).expect("a valid screening");
             let mut phases = [f64::INFINITY; 3];
             let mut method = "";
             let mut least = 0.0;
@@ -263,9 +239,6 @@ pub(crate) fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
     (row..row + 3)
         .flat_map(|row| (col..col + 3).map(move |col| Cell::new(col, row)))
         .filter(|&cell| cell != domain.target() && !domain.is_blocked(cell))
-        .map(|cell| Change {
-            cell,
-            blocked: true,
-        })
+        .map(|cell| Change { cell, blocked: true })
         .collect()
 }

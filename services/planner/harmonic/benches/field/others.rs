@@ -66,9 +66,7 @@ pub(crate) fn sparse_cholesky(domain: &Domain) -> f64 {
         let matrix =
             SparseColMat::<usize, f64>::try_new_from_triplets(unknowns, unknowns, &entries)
                 .expect("a matrix");
-        let factor = matrix
-            .sp_cholesky(faer::Side::Lower)
-            .expect("a positive definite matrix");
+        let factor = matrix.sp_cholesky(faer::Side::Lower).expect("a positive definite matrix");
         std::hint::black_box(factor.solve(&right));
     })
 }

@@ -32,10 +32,8 @@ fn load(file: &Path) -> Domain {
         let (col, row) = (at % width, at / width);
         col.abs_diff(width / 2).pow(2) + row.abs_diff(height / 2).pow(2)
     };
-    let target = (0..blocked.len())
-        .filter(|&at| !blocked[at])
-        .min_by_key(from_middle)
-        .expect("a free cell");
+    let target =
+        (0..blocked.len()).filter(|&at| !blocked[at]).min_by_key(from_middle).expect("a free cell");
     let target = Cell::new(target % width, target / width);
     Domain::new(width, height, blocked, target).expect("a valid map")
 }

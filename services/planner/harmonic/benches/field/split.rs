@@ -147,10 +147,7 @@ pub(crate) const BYTES: &str = "bytes";
 /// [`most_bytes`] in a process of its own, in which no memory was used and freed before.
 fn bytes_of_a_process(kind: Kind, n: usize) -> Option<f64> {
     let map = format!("{kind:?}:{n}");
-    let output = Command::new(std::env::current_exe().ok()?)
-        .args([BYTES, &map])
-        .output()
-        .ok()?;
+    let output = Command::new(std::env::current_exe().ok()?).args([BYTES, &map]).output().ok()?;
     String::from_utf8(output.stdout).ok()?.trim().parse().ok()
 }
 

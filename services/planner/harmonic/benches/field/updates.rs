@@ -13,15 +13,9 @@ const UPDATES: usize = 100;
 /// 3 x 3 blocks that appear one by one and vanish again.
 pub(crate) fn table(quick: bool) {
     println!("\nUpdates: 3 x 3 blocks that appear and vanish at random, us");
-    println!(
-        "{:<10} {:>5} {:>7} {:>8} {:>8} {:>8}",
-        "map", "N", "length", "p50", "p90", "p99"
-    );
-    let sides: &[usize] = if quick {
-        &[50, 120, 280, 512]
-    } else {
-        &[50, 120, 280, 512, 1024, 2048]
-    };
+    println!("{:<10} {:>5} {:>7} {:>8} {:>8} {:>8}", "map", "N", "length", "p50", "p90", "p99");
+    let sides: &[usize] =
+        if quick { &[50, 120, 280, 512] } else { &[50, 120, 280, 512, 1024, 2048] };
     for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
         for &n in sides {
             for length in [f64::INFINITY, 7.0] {
@@ -48,14 +42,10 @@ fn row(kind: Kind, n: usize, length: f64) {
             continue;
         }
         for blocked in [true, false] {
-            changes
-                .iter_mut()
-                .for_each(|change| change.blocked = blocked);
+            changes.iter_mut().for_each(|change| change.blocked = blocked);
             let start = Instant::now();
             domain.apply(&changes).expect("valid changes");
-            field = solver
-                .solve_near(&domain, &field, &cancellation)
-                .expect("a field");
+            field = solver.solve_near(&domain, &field, &cancellation).expect("a field");
             times.push(start.elapsed().as_secs_f64() * 1e6);
         }
     }

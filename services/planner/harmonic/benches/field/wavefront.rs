@@ -46,14 +46,7 @@ impl Wavefront {
 
     /// Distances of all cells from the target of `domain`.
     pub(crate) fn run(&mut self, domain: &Domain) {
-        let Self {
-            stride,
-            distance,
-            open,
-            now,
-            soon,
-            later,
-        } = self;
+        let Self { stride, distance, open, now, soon, later } = self;
         let stride = *stride;
         let (distance, open) = (distance.as_mut_slice(), open.as_mut_slice());
         let target = domain.target();
@@ -84,11 +77,7 @@ impl Wavefront {
                     let found = near + step;
                     if found + LEAST_GAIN < own {
                         distance[at] = found;
-                        let next = if found < front {
-                            &mut *soon
-                        } else {
-                            &mut *later
-                        };
+                        let next = if found < front { &mut *soon } else { &mut *later };
                         push_around(at, found, stride, distance, open, next);
                     }
                 }

@@ -48,10 +48,7 @@ pub(super) fn substitute(
         let taken: u32 = lengths_here.iter().sum();
         let (before, rows_here) = rows.split_at(rows.len() - taken as usize);
         rows = before;
-        let here = Rows {
-            rows: rows_here,
-            lengths: lengths_here,
-        };
+        let here = Rows { rows: rows_here, lengths: lengths_here };
         if !in_plain_range(u, cells, here, &mut plain) {
             in_extended_range(u, cells, here);
         }
@@ -73,20 +70,12 @@ fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled]) -> Store {
     if least.is_some_and(|least| least >= BOTTOM - TOP) {
         let mut values = Vec::with_capacity(width * height);
         for row in 0..height {
-            values.extend(
-                pass.row(row)
-                    .iter()
-                    .zip(blocked(row))
-                    .map(|(&place, &blocked)| {
-                        let u = at(place);
-                        raw(u, blocked, u.relative_to(-TOP))
-                    }),
-            );
+            values.extend(pass.row(row).iter().zip(blocked(row)).map(|(&place, &blocked)| {
+                let u = at(place);
+                raw(u, blocked, u.relative_to(-TOP))
+            }));
         }
-        return Store::Double {
-            values,
-            exponent: -TOP,
-        };
+        return Store::Double { values, exponent: -TOP };
     }
     let mut mantissas = Vec::with_capacity(width * height);
     let mut exponents = Vec::with_capacity(width * height);
@@ -97,10 +86,7 @@ fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled]) -> Store {
             exponents.push(u.exponent);
         }
     }
-    Store::Extended {
-        mantissas,
-        exponents,
-    }
+    Store::Extended { mantissas, exponents }
 }
 
 /// The weights of a front.
@@ -114,38 +100,26 @@ impl<'a> Rows<'a> {
     /// Last eliminated first, each with its position.
     fn backwards(self) -> impl Iterator<Item = (usize, &'a [f64])> {
         let mut rest = self.rows;
-        self.lengths
-            .iter()
-            .enumerate()
-            .rev()
-            .map(move |(row, &length)| {
-                let (before, weights) = rest.split_at(rest.len() - length as usize);
-                rest = before;
-                (row, weights)
-            })
+        self.lengths.iter().enumerate().rev().map(move |(row, &length)| {
+            let (before, weights) = rest.split_at(rest.len() - length as usize);
+            rest = before;
+            (row, weights)
+        })
     }
 }
 
 /// Computes a front with one common exponent; false, with nothing written, if its range is too wide for that.
 fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut Vec<f64>) -> bool {
     let own = rows.lengths.len();
-    let boundary = cells[own..]
-        .iter()
-        .map(|&place| u[place as usize])
-        .filter(|u| !u.is_zero());
-    let (least, largest) = boundary.fold((i32::MAX, i32::MIN), |(low, high), u| {
-        (low.min(u.exponent), high.max(u.exponent))
-    });
+    let boundary = cells[own..].iter().map(|&place| u[place as usize]).filter(|u| !u.is_zero());
+    let (least, largest) = boundary
+        .fold((i32::MAX, i32::MIN), |(low, high), u| (low.min(u.exponent), high.max(u.exponent)));
     if largest == i32::MIN || largest - least > PLAIN_SPAN {
         return false;
     }
     plain.clear();
     plain.resize(own, 0.0);
-    plain.extend(
-        cells[own..]
-            .iter()
-            .map(|&place| u[place as usize].relative_to(largest)),
-    );
+    plain.extend(cells[own..].iter().map(|&place| u[place as usize].relative_to(largest)));
     for (row, weights) in rows.backwards() {
         let sum = dot(weights, &plain[row + 1..][..weights.len()]);
         if sum < PLAIN_LEAST {
@@ -163,24 +137,15 @@ fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut V
 fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     for (row, weights) in rows.backwards() {
         let terms = || {
-            weights
-                .iter()
-                .zip(&cells[row + 1..])
-                .map(|(&weight, &place)| {
-                    let u = u[place as usize];
-                    Scaled::new(weight * u.mantissa, u.exponent)
-                })
+            weights.iter().zip(&cells[row + 1..]).map(|(&weight, &place)| {
+                let u = u[place as usize];
+                Scaled::new(weight * u.mantissa, u.exponent)
+            })
         };
-        let largest = terms()
-            .filter(|term| !term.is_zero())
-            .map(|term| term.exponent)
-            .max();
+        let largest = terms().filter(|term| !term.is_zero()).map(|term| term.exponent).max();
         let sum = largest.map_or(Scaled::ZERO, |largest| {
             Scaled::new(
-                terms()
-                    .filter(|term| !term.is_zero())
-                    .map(|term| term.relative_to(largest))
-                    .sum(),
+                terms().filter(|term| !term.is_zero()).map(|term| term.relative_to(largest)).sum(),
                 largest,
             )
         });

@@ -81,12 +81,7 @@ impl BreadthFirst {
                 }
             }
         }
-        Ok(Self {
-            order,
-            place,
-            levels,
-            width,
-        })
+        Ok(Self { order, place, levels, width })
     }
 
     /// Cells with a place.
@@ -122,11 +117,8 @@ impl BreadthFirst {
         let (mut cells, mut walls) = (0_usize, 0_usize);
         for place in (0..self.len() as u32).step_by(EVERY) {
             cells += 1;
-            walls += self
-                .neighbours(place)
-                .into_iter()
-                .filter(|&neighbour| neighbour == ABSENT)
-                .count();
+            walls +=
+                self.neighbours(place).into_iter().filter(|&neighbour| neighbour == ABSENT).count();
         }
         2.0 * cells as f64 / walls.max(1) as f64
     }

@@ -14,29 +14,16 @@ pub(crate) struct Budget {
 impl Budget {
     /// `allowed` bytes for the factorisation of `domain`.
     pub(crate) fn of(domain: &Domain, allowed: u64) -> Self {
-        Self {
-            allowed,
-            width: domain.width(),
-            height: domain.height(),
-        }
+        Self { allowed, width: domain.width(), height: domain.height() }
     }
 
     /// # Errors
     /// [`SolveError::TooCostly`] if `needed` bytes are more than are allowed.
     pub(super) fn ask(&self, needed: u64) -> Result<(), SolveError> {
-        let Self {
-            allowed,
-            width,
-            height,
-        } = *self;
+        let Self { allowed, width, height } = *self;
         if needed <= allowed {
             return Ok(());
         }
-        Err(SolveError::TooCostly {
-            needed,
-            allowed,
-            width,
-            height,
-        })
+        Err(SolveError::TooCostly { needed, allowed, width, height })
     }
 }

@@ -24,11 +24,7 @@ pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &mut Store) {
         for place in places.clone().rev().chain(places) {
             let mut largest = i32::MIN;
             let around = pass.neighbours(place).map(|place| {
-                let u = if place == ABSENT {
-                    Scaled::ZERO
-                } else {
-                    store.u(pass.cell(place))
-                };
+                let u = if place == ABSENT { Scaled::ZERO } else { store.u(pass.cell(place)) };
                 if !u.is_zero() {
                     largest = largest.max(u.exponent);
                 }
@@ -36,10 +32,7 @@ pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &mut Store) {
             });
             let sum: f64 = around.iter().map(|u| u.relative_to(largest)).sum();
             let index = pass.cell(place);
-            let u = Scaled::new(
-                0.25 * sum / (1.0 + domain.screening_coefficient(index)),
-                largest,
-            );
+            let u = Scaled::new(0.25 * sum / (1.0 + domain.screening_coefficient(index)), largest);
             let before = store.u(index);
             change = change.max((before.relative_to(u.exponent) / u.mantissa - 1.0).abs());
             store.set(index, u.mantissa, u.exponent);

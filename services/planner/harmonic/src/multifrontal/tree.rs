@@ -68,10 +68,7 @@ impl Shape {
             ..MIDDLING if !many => (2, 0),
             _ => (1, 24),
         };
-        Self {
-            thickness,
-            slab: many.then_some(slab),
-        }
+        Self { thickness, slab: many.then_some(slab) }
     }
 }
 
@@ -122,11 +119,7 @@ impl Tree {
                 }
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
-                let next = if start > inner + 1 {
-                    Next::Stage
-                } else {
-                    Next::Separator
-                };
+                let next = if start > inner + 1 { Next::Stage } else { Next::Separator };
                 builder.add_stage(&(at(start)..at(end)), &outer, end - start > 1, next);
                 end = start;
             }
@@ -251,8 +244,7 @@ impl<'a> Builder<'a> {
             for place in stage.clone() {
                 for neighbour in self.pass.neighbours(place) {
                     if neighbour > place && neighbour < stage.end {
-                        self.pieces
-                            .join(place - stage.start, neighbour - stage.start);
+                        self.pieces.join(place - stage.start, neighbour - stage.start);
                     }
                 }
             }
@@ -322,8 +314,7 @@ impl<'a> Builder<'a> {
         let index = tree.fronts.len() as u32;
         let first = tree.places.len();
         let members = self.pieces.members(piece);
-        tree.places
-            .extend(members.iter().map(|local| local + stage.start));
+        tree.places.extend(members.iter().map(|local| local + stage.start));
         let own = members.len();
         for at in first..first + own {
             for neighbour in self.pass.neighbours(tree.places[at]) {

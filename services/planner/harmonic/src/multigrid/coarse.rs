@@ -75,18 +75,10 @@ impl<R: Real> Coarse<R> {
         if let Some(span) = self.grid.span() {
             return self.descend_whole(next, span);
         }
-        let Grid {
-            columns: n, rows, ..
-        } = self.grid;
+        let Grid { columns: n, rows, .. } = self.grid;
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.reset(&self.grid, &next.grid);
-        let Scratch {
-            residual_eo,
-            residual_oe,
-            residual_ee,
-            restricted,
-            ..
-        } = &mut scratch;
+        let Scratch { residual_eo, residual_oe, residual_ee, restricted, .. } = &mut scratch;
         for y in 0..=rows {
             if y < rows {
                 let o = self.grid.start(y);
@@ -103,17 +95,9 @@ impl<R: Real> Coarse<R> {
 
             residual_eo.swap(0, 1);
             self.gather(EE, o, ALL, &mut residual_ee[MARGIN..][..n]);
-            self.gather(
-                OE,
-                o,
-                [N, S, NW, NE, SW, SE],
-                &mut residual_oe[MARGIN..][..n],
-            );
+            self.gather(OE, o, [N, S, NW, NE, SW, SE], &mut residual_oe[MARGIN..][..n]);
             self.gather(EO, o, [W, E], &mut residual_eo[1][MARGIN..][..n]);
-            let residual_eo = (
-                &residual_eo[0][MARGIN..][..n],
-                &residual_eo[1][MARGIN..][..n],
-            );
+            let residual_eo = (&residual_eo[0][MARGIN..][..n], &residual_eo[1][MARGIN..][..n]);
             let m = MARGIN;
             self.restrict(
                 o,
@@ -132,13 +116,7 @@ impl<R: Real> Coarse<R> {
     fn descend_whole(&mut self, next: &mut Self, span: usize) {
         let (o, stride) = (self.grid.start(0), self.grid.stride);
         let mut whole = std::mem::take(&mut self.whole);
-        let Whole {
-            transfer,
-            residual_ee,
-            residual_oe,
-            residual_eo,
-            ..
-        } = &mut whole;
+        let Whole { transfer, residual_ee, residual_oe, residual_eo, .. } = &mut whole;
         self.relax(EE, o, span, []);
         self.relax(OE, o, span, [W, E]);
         self.relax(EO, o, span, [N, S, NW, NE, SW, SE]);
@@ -184,9 +162,7 @@ impl<R: Real> Coarse<R> {
         if let Some(span) = self.grid.span() {
             return self.ascend_whole(next, share, span);
         }
-        let Grid {
-            columns: n, rows, ..
-        } = self.grid;
+        let Grid { columns: n, rows, .. } = self.grid;
         let mut scratch = std::mem::take(&mut self.scratch);
         let Scratch { upper, lower, .. } = &mut scratch;
         for row in [&mut *upper, &mut *lower] {
@@ -366,34 +342,20 @@ impl<R: Real> Coarse<R> {
     /// all convergence far from the target.
     #[inline(always)]
     pub(super) fn interpolate(&mut self, rows: std::ops::Range<usize>) {
-        let Grid {
-            columns: n,
-            stride: s,
-            ..
-        } = self.grid;
+        let Grid { columns: n, stride: s, .. } = self.grid;
         let [right, down, down_right, down_left] = &self.coupling;
         let least = R::of(1e-4);
         let share = |d: R, a: R, b: R| {
             let rest = d - a - b;
-            if rest > least * d {
-                R::ONE / rest
-            } else {
-                R::default()
-            }
+            if rest > least * d { R::ONE / rest } else { R::default() }
         };
         for y in rows {
             let o = self.grid.start(y);
             let own = &self.inverse[OE][o..][..n];
-            let (w, nw, sw) = (
-                &right[EE][o..][..n],
-                &down_right[EO][o - s..][..n],
-                &down_left[OE][o..][..n],
-            );
-            let (e, ne, se) = (
-                &right[OE][o..][..n],
-                &down_left[EO][o + 1 - s..][..n],
-                &down_right[OE][o..][..n],
-            );
+            let (w, nw, sw) =
+                (&right[EE][o..][..n], &down_right[EO][o - s..][..n], &down_left[OE][o..][..n]);
+            let (e, ne, se) =
+                (&right[OE][o..][..n], &down_left[EO][o + 1 - s..][..n], &down_right[OE][o..][..n]);
             let (no, so) = (&down[OO][o - s..][..n], &down[OE][o..][..n]);
             let (to_west, to_east) = (&mut self.west[o..][..n], &mut self.east[o..][..n]);
             for x in 0..n {
@@ -402,16 +364,10 @@ impl<R: Real> Coarse<R> {
                 to_east[x] = e[x].is_active() * (e[x] + ne[x] + se[x]) * share;
             }
             let own = &self.inverse[EO][o..][..n];
-            let (no, nw, ne) = (
-                &down[EE][o..][..n],
-                &down_right[OE][o - 1..][..n],
-                &down_left[OE][o..][..n],
-            );
-            let (so, sw, se) = (
-                &down[EO][o..][..n],
-                &down_left[EO][o..][..n],
-                &down_right[EO][o..][..n],
-            );
+            let (no, nw, ne) =
+                (&down[EE][o..][..n], &down_right[OE][o - 1..][..n], &down_left[OE][o..][..n]);
+            let (so, sw, se) =
+                (&down[EO][o..][..n], &down_left[EO][o..][..n], &down_right[EO][o..][..n]);
             let (w, e) = (&right[OO][o - 1..][..n], &right[EO][o..][..n]);
             let (to_north, to_south) = (&mut self.north[o..][..n], &mut self.south[o..][..n]);
             for x in 0..n {

@@ -19,8 +19,7 @@ impl Coarsest {
         let grid = &level.grid;
         self.cells.clear();
         let positions = (0..grid.height).flat_map(|row| (0..grid.width).map(move |col| (col, row)));
-        self.cells
-            .extend(positions.map(|(col, row)| grid.locate(col, row)));
+        self.cells.extend(positions.map(|(col, row)| grid.locate(col, row)));
         let n = self.cells.len();
         let mut matrix = vec![0.0; n * n];
         for (i, &(plane, at)) in self.cells.iter().enumerate() {
@@ -28,12 +27,7 @@ impl Coarsest {
             // Inactive cells keep the identity, and a right-hand side of zero.
             matrix[i * n + i] = if inverse > 0.0 { 1.0 / inverse } else { 1.0 };
             let (col, row) = (i % grid.width, i / grid.width);
-            let steps = [
-                (EAST, 1, 0),
-                (SOUTH, 0, 1),
-                (SOUTH_EAST, 1, 1),
-                (SOUTH_WEST, -1, 1),
-            ];
+            let steps = [(EAST, 1, 0), (SOUTH, 0, 1), (SOUTH_EAST, 1, 1), (SOUTH_WEST, -1, 1)];
             for (direction, dx, dy) in steps {
                 let (c, r) = (col as isize + dx, row + dy);
                 if c >= 0 && (c as usize) < grid.width && r < grid.height {
@@ -53,17 +47,12 @@ impl Coarsest {
         for (value, &(plane, at)) in self.right.iter_mut().zip(&self.cells) {
             *value = level.f[plane][at].wide();
         }
-        for (row, &(plane, at)) in self
-            .inverse
-            .chunks_exact(self.cells.len().max(1))
-            .zip(&self.cells)
+        for (row, &(plane, at)) in
+            self.inverse.chunks_exact(self.cells.len().max(1)).zip(&self.cells)
         {
             let sum: f64 = row.iter().zip(&self.right).map(|(a, b)| a * b).sum();
-            level.u[plane][at] = if level.inverse[plane][at] > R::default() {
-                R::of(sum)
-            } else {
-                R::default()
-            };
+            level.u[plane][at] =
+                if level.inverse[plane][at] > R::default() { R::of(sum) } else { R::default() };
         }
     }
 }

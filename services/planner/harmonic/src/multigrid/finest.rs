@@ -95,11 +95,7 @@ impl<R: Real> Finest<R> {
         let even = &mut first[plane][start..][..columns];
         let odd = &mut second[0][start..][..columns];
         let value = |col: usize| {
-            if blocked[col] {
-                R::default()
-            } else {
-                inverse(col)
-            }
+            if blocked[col] { R::default() } else { inverse(col) }
         };
         for x in 0..width / 2 {
             even[x] = value(2 * x);
@@ -114,41 +110,25 @@ impl<R: Real> Finest<R> {
     /// equals, which leaves those to the west and east. Blocked cells give and take nothing.
     #[inline(always)]
     pub(super) fn interpolate_rows(&mut self, rows: std::ops::Range<usize>) {
-        let Grid {
-            columns: n, stride, ..
-        } = self.grid;
+        let Grid { columns: n, stride, .. } = self.grid;
         let least = R::of(1e-4);
         for row in rows {
             let o = self.grid.start(row);
             let of = |plane: usize, start: usize| &self.inverse[plane][start..start + n];
             let weights = |d: R, a: R, b: R| {
                 let rest = d - a.is_active() - b.is_active();
-                if rest > least * d {
-                    R::ONE / rest
-                } else {
-                    R::default()
-                }
+                if rest > least * d { R::ONE / rest } else { R::default() }
             };
-            let (own, west, east, north, south) = (
-                of(OE, o),
-                of(EE, o),
-                of(EE, o + 1),
-                of(OO, o - stride),
-                of(OO, o),
-            );
+            let (own, west, east, north, south) =
+                (of(OE, o), of(EE, o), of(EE, o + 1), of(OO, o - stride), of(OO, o));
             let (to_west, to_east) = (&mut self.west[o..o + n], &mut self.east[o..o + n]);
             for x in 0..n {
                 let weight = weights(own[x].inverse(), north[x], south[x]);
                 to_west[x] = west[x].is_active() * weight;
                 to_east[x] = east[x].is_active() * weight;
             }
-            let (own, north, south, west, east) = (
-                of(EO, o),
-                of(EE, o),
-                of(EE, o + stride),
-                of(OO, o - 1),
-                of(OO, o),
-            );
+            let (own, north, south, west, east) =
+                (of(EO, o), of(EE, o), of(EE, o + stride), of(OO, o - 1), of(OO, o));
             let (to_north, to_south) = (&mut self.north[o..o + n], &mut self.south[o..o + n]);
             for x in 0..n {
                 let weight = weights(own[x].inverse(), west[x], east[x]);
@@ -177,15 +157,8 @@ impl<R: Real> Finest<R> {
         if let Some(span) = self.grid.span() {
             return self.pass_whole(next, work, span);
         }
-        let Work {
-            share,
-            sweeps,
-            descend,
-            tolerance,
-        } = work;
-        let Grid {
-            columns: n, rows, ..
-        } = self.grid;
+        let Work { share, sweeps, descend, tolerance } = work;
+        let Grid { columns: n, rows, .. } = self.grid;
         let grid = self.grid;
         let mut progress = Progress::default();
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -266,14 +239,7 @@ impl<R: Real> Finest<R> {
         let grid = self.grid;
         let (o, stride) = (grid.start(0), grid.stride);
         let mut whole = std::mem::take(&mut self.whole);
-        let Whole {
-            transfer,
-            change_ee,
-            change_oo,
-            residual_oe,
-            residual_eo,
-            ..
-        } = &mut whole;
+        let Whole { transfer, change_ee, change_oo, residual_oe, residual_eo, .. } = &mut whole;
         let mut progress = Progress::default();
         join(&grid, &next.grid, &next.u, work.share, transfer);
         let (upper, lower) = (&transfer[o..], &transfer[o + stride..]);
@@ -408,9 +374,8 @@ impl<R: Real> Finest<R> {
     /// Adds what flows into the cells of one row, to u and to its noted change.
     #[inline(always)]
     fn add_sources(&mut self, plane: usize, row: usize, mut change: Option<&mut [R]>) {
-        let first = self
-            .sources
-            .partition_point(|source| (source.plane, source.row) < (plane, row));
+        let first =
+            self.sources.partition_point(|source| (source.plane, source.row) < (plane, row));
         for source in &self.sources[first..] {
             if (source.plane, source.row) != (plane, row) {
                 break;

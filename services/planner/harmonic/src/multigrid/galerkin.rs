@@ -73,12 +73,7 @@ impl<R: Real> Products<R> {
     #[inline(always)]
     fn finish_row(&mut self, weights: &Weights<'_, R>, next: &mut Coarse<R>, y: usize) {
         let n = self.n;
-        let Weights {
-            west,
-            east,
-            north,
-            south,
-        } = weights;
+        let Weights { west, east, north, south } = weights;
         let q = |column: usize| &self.odd_even[column][MARGIN..][..n];
         let q_west = |column: usize| &self.odd_even[column][MARGIN - 1..][..n];
         let v = |column: usize| &self.even_odd[1][column][MARGIN..][..n];
@@ -89,11 +84,7 @@ impl<R: Real> Products<R> {
         let (e0, a, b, c, d) = (own(0), q(FIRST), q_west(SECOND), v(FIRST), v_above(SECOND));
         for (x, out) in diagonal[..n].iter_mut().enumerate() {
             let sum = e0[x] + west[x] * a[x] + east[x] * b[x] + north[x] * c[x] + south[x] * d[x];
-            *out = if e0[x] > R::default() {
-                sum
-            } else {
-                R::default()
-            };
+            *out = if e0[x] > R::default() { sum } else { R::default() };
         }
         let (e1, a, c, d) = (own(1), q(SECOND), v(NORTH_EAST), v_above(BELOW_EAST));
         for (x, out) in right[..n].iter_mut().enumerate() {
@@ -139,11 +130,7 @@ impl<R: Real> Finest<R> {
         rows: Range<usize>,
         products: &mut Products<R>,
     ) {
-        let Grid {
-            columns: n,
-            stride: s,
-            ..
-        } = self.grid;
+        let Grid { columns: n, stride: s, .. } = self.grid;
         products.start();
         let zero = R::default();
         // One row more before the first: what it leaves behind is added to that one.
@@ -157,12 +144,8 @@ impl<R: Real> Finest<R> {
             let (no_east, so_east) = (&self.north[o + 1..][..n], &self.south[o + 1..][..n]);
 
             let [nw, ne, sw, se] = &mut products.corner[1];
-            let (nw, ne, sw, se) = (
-                &mut nw[m..][..n],
-                &mut ne[m..][..n],
-                &mut sw[m..][..n],
-                &mut se[m..][..n],
-            );
+            let (nw, ne, sw, se) =
+                (&mut nw[m..][..n], &mut ne[m..][..n], &mut sw[m..][..n], &mut se[m..][..n]);
             let inverse = &self.inverse[OO][o..][..n];
             for x in 0..n {
                 nw[x] = inverse[x] * (w[x] + no[x]);
@@ -188,12 +171,8 @@ impl<R: Real> Finest<R> {
                     q0[x] = d * w[x] - active[x].is_active() - a_sw[x] - h_nw[x];
                     q1[x] = d * e[x] - active_east[x].is_active() - a_se[x] - h_ne[x];
                 }
-                let (q2, q3, q4, q5) = (
-                    &mut q2[m..][..n],
-                    &mut q3[m..][..n],
-                    &mut q4[m..][..n],
-                    &mut q5[m..][..n],
-                );
+                let (q2, q3, q4, q5) =
+                    (&mut q2[m..][..n], &mut q3[m..][..n], &mut q4[m..][..n], &mut q5[m..][..n]);
                 for x in 0..n {
                     q2[x] = zero - a_nw[x];
                     q3[x] = zero - a_ne[x];
@@ -214,12 +193,8 @@ impl<R: Real> Finest<R> {
                     v0[x] = d * no[x] - active[x].is_active() - l_ne[x] - h_nw[x];
                     v1[x] = d * so[x] - active_south[x].is_active() - l_se[x] - h_sw[x];
                 }
-                let (v2, v3, v4, v5) = (
-                    &mut v2[m..][..n],
-                    &mut v3[m..][..n],
-                    &mut v4[m..][..n],
-                    &mut v5[m..][..n],
-                );
+                let (v2, v3, v4, v5) =
+                    (&mut v2[m..][..n], &mut v3[m..][..n], &mut v4[m..][..n], &mut v5[m..][..n]);
                 for x in 0..n {
                     v2[x] = zero - l_nw[x];
                     v3[x] = zero - h_ne[x];
@@ -257,11 +232,7 @@ impl<R: Real> Coarse<R> {
     /// Sets `rows` of the equations of `next`.
     #[inline(always)]
     pub(super) fn coarsen(&self, next: &mut Self, rows: Range<usize>, products: &mut Products<R>) {
-        let Grid {
-            columns: n,
-            stride: s,
-            ..
-        } = self.grid;
+        let Grid { columns: n, stride: s, .. } = self.grid;
         products.start();
         let zero = R::default();
         let m = MARGIN;
@@ -285,12 +256,8 @@ impl<R: Real> Coarse<R> {
 
             {
                 let [nw, ne, sw, se] = &mut products.corner[1];
-                let (nw, ne, sw, se) = (
-                    &mut nw[m..][..n],
-                    &mut ne[m..][..n],
-                    &mut sw[m..][..n],
-                    &mut se[m..][..n],
-                );
+                let (nw, ne, sw, se) =
+                    (&mut nw[m..][..n], &mut ne[m..][..n], &mut sw[m..][..n], &mut se[m..][..n]);
                 let inverse = &self.inverse[OO][o..][..n];
                 let (up, down) = (a(SOUTH, OE, o), a(SOUTH, OO, o));
                 let (left, right) = (a(EAST, EO, o), a(EAST, OO, o));
@@ -333,12 +300,8 @@ impl<R: Real> Coarse<R> {
                         - c_ne[x] * so_above_east[x]
                         - c_se[x] * no_east[x];
                 }
-                let (q2, q3, q4, q5) = (
-                    &mut q2[m..][..n],
-                    &mut q3[m..][..n],
-                    &mut q4[m..][..n],
-                    &mut q5[m..][..n],
-                );
+                let (q2, q3, q4, q5) =
+                    (&mut q2[m..][..n], &mut q3[m..][..n], &mut q4[m..][..n], &mut q5[m..][..n]);
                 for x in 0..n {
                     q2[x] = zero - up[x] * a_nw[x] - c_nw[x] * no_above[x];
                     q3[x] = zero - up[x] * a_ne[x] - c_ne[x] * no_above_east[x];
@@ -352,12 +315,8 @@ impl<R: Real> Coarse<R> {
                 let (left, right) = (a(EAST, OO, o - 1), a(EAST, EO, o));
                 let (c_nw, c_ne) = (a(SOUTH_EAST, OE, o - 1), a(SOUTH_WEST, OE, o));
                 let (c_sw, c_se) = (a(SOUTH_WEST, EO, o), a(SOUTH_EAST, EO, o));
-                let (l_nw, l_ne, l_sw, l_se) = (
-                    here(0, m - 1),
-                    here(1, m - 1),
-                    here(2, m - 1),
-                    here(3, m - 1),
-                );
+                let (l_nw, l_ne, l_sw, l_se) =
+                    (here(0, m - 1), here(1, m - 1), here(2, m - 1), here(3, m - 1));
                 let (h_nw, h_ne, h_sw, h_se) = (here(0, m), here(1, m), here(2, m), here(3, m));
                 let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
                 let (v0, v1) = (&mut v0[m..][..n], &mut v1[m..][..n]);
@@ -376,12 +335,8 @@ impl<R: Real> Coarse<R> {
                         - c_sw[x] * e_below_west[x]
                         - c_se[x] * w_below[x];
                 }
-                let (v2, v3, v4, v5) = (
-                    &mut v2[m..][..n],
-                    &mut v3[m..][..n],
-                    &mut v4[m..][..n],
-                    &mut v5[m..][..n],
-                );
+                let (v2, v3, v4, v5) =
+                    (&mut v2[m..][..n], &mut v3[m..][..n], &mut v4[m..][..n], &mut v5[m..][..n]);
                 for x in 0..n {
                     v2[x] = zero - left[x] * l_nw[x] - c_nw[x] * w_west[x];
                     v3[x] = zero - right[x] * h_ne[x] - c_ne[x] * e[x];
@@ -411,12 +366,8 @@ impl<R: Real> Coarse<R> {
                             + c_ne[x] * a_sw[x]
                             + c_nw[x] * al_se[x]);
                 }
-                let (p1, p2, p3, p4) = (
-                    &mut p1[m..][..n],
-                    &mut p2[m..][..n],
-                    &mut p3[m..][..n],
-                    &mut p4[m..][..n],
-                );
+                let (p1, p2, p3, p4) =
+                    (&mut p1[m..][..n], &mut p2[m..][..n], &mut p3[m..][..n], &mut p4[m..][..n]);
                 for x in 0..n {
                     p1[x] = zero - right[x] * e[x] - c_se[x] * h_ne[x] - c_ne[x] * a_se[x];
                     p2[x] = zero - down[x] * so[x] - c_se[x] * h_sw[x] - c_sw[x] * l_se[x];
@@ -424,12 +375,7 @@ impl<R: Real> Coarse<R> {
                     p4[x] = zero - c_sw[x] * l_sw[x];
                 }
             }
-            let weights = Weights {
-                west: w,
-                east: e_west,
-                north: no,
-                south: so_above,
-            };
+            let weights = Weights { west: w, east: e_west, north: no, south: so_above };
             if y >= rows.start {
                 products.finish_row(&weights, next, y);
             }

@@ -127,11 +127,7 @@ impl<R: Real> Whole<R> {
     /// Planes of zeros.
     pub(super) fn new(grid: &Grid) -> Self {
         let plane = || {
-            if grid.span().is_some() {
-                grid.plane()
-            } else {
-                Vec::new()
-            }
+            if grid.span().is_some() { grid.plane() } else { Vec::new() }
         };
         Self {
             transfer: plane(),
@@ -186,11 +182,8 @@ impl<R: Real> Scratch<R> {
         for row in [&mut self.upper, &mut self.lower, &mut self.restricted] {
             reset(row, 2 * next.columns + 2);
         }
-        let pairs = self
-            .change_ee
-            .iter_mut()
-            .chain(&mut self.change_oo)
-            .chain(&mut self.residual_eo);
+        let pairs =
+            self.change_ee.iter_mut().chain(&mut self.change_oo).chain(&mut self.residual_eo);
         for row in pairs.chain([&mut self.residual_oe, &mut self.residual_ee]) {
             reset(row, grid.stride + MARGIN);
         }

@@ -19,15 +19,10 @@ fn domain() -> Domain {
         ".##.#.####.",
         "....#......",
     ];
-    let blocked = rows
-        .iter()
-        .flat_map(|row| row.bytes().map(|cell| cell == b'#'))
-        .collect();
+    let blocked = rows.iter().flat_map(|row| row.bytes().map(|cell| cell == b'#')).collect();
     let domain = Domain::new(11, 9, blocked, Cell::new(0, 0)).unwrap();
     // k = 0.1.
-    domain
-        .with_screening(&Screening::cells(0.5 / 0.1_f64.sqrt()))
-        .unwrap()
+    domain.with_screening(&Screening::cells(0.5 / 0.1_f64.sqrt())).unwrap()
 }
 
 fn levels() -> Multigrid<f64> {
@@ -74,11 +69,7 @@ fn galerkin(equations: &Dense, interpolation: &Dense) -> Dense {
     let mut product = vec![vec![0.0; coarse]; coarse];
     for (i, row) in equations.iter().enumerate() {
         for (j, &a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-            for (c, &p) in interpolation[i]
-                .iter()
-                .enumerate()
-                .filter(|(_, p)| **p != 0.0)
-            {
+            for (c, &p) in interpolation[i].iter().enumerate().filter(|(_, p)| **p != 0.0) {
                 for (d, &q) in interpolation[j].iter().enumerate() {
                     product[c][d] += p * a * q;
                 }
@@ -128,10 +119,7 @@ fn the_first_coarse_equations_are_the_galerkin_product() {
     for i in (0..99).filter(|&i| !domain.blocked()[i]) {
         equations[i][i] = 4.4;
         let (col, row) = (i % 11, i / 11);
-        for j in [(col < 10).then_some(i + 1), (row < 8).then_some(i + 11)]
-            .into_iter()
-            .flatten()
-        {
+        for j in [(col < 10).then_some(i + 1), (row < 8).then_some(i + 11)].into_iter().flatten() {
             if !domain.blocked()[j] {
                 equations[i][j] = -1.0;
                 equations[j][i] = -1.0;
@@ -145,10 +133,7 @@ fn the_first_coarse_equations_are_the_galerkin_product() {
         |at| [fine.west[at], fine.east[at], fine.north[at], fine.south[at]],
         |at| fine.corner_weights(at),
     );
-    assert_equal(
-        &stored(&levels.coarse[0]),
-        &galerkin(&equations, &interpolation),
-    );
+    assert_equal(&stored(&levels.coarse[0]), &galerkin(&equations, &interpolation));
 }
 
 #[test]
@@ -161,10 +146,7 @@ fn the_coarser_equations_are_the_galerkin_product() {
         |at| [fine.west[at], fine.east[at], fine.north[at], fine.south[at]],
         |at| fine.corner_weights(at),
     );
-    assert_equal(
-        &stored(&levels.coarse[1]),
-        &galerkin(&stored(fine), &interpolation),
-    );
+    assert_equal(&stored(&levels.coarse[1]), &galerkin(&stored(fine), &interpolation));
 }
 
 #[test]
@@ -179,11 +161,7 @@ fn a_converged_solution_satisfies_every_equation() {
     levels.read(domain.target(), -1.0, &mut u);
     let at = |col: isize, row: isize| {
         let inside = (0..11).contains(&col) && (0..9).contains(&row);
-        if inside {
-            u[(row * 11 + col) as usize].max(0.0)
-        } else {
-            0.0
-        }
+        if inside { u[(row * 11 + col) as usize].max(0.0) } else { 0.0 }
     };
     for row in 0..9 {
         for col in 0..11 {

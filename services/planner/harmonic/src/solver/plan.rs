@@ -53,10 +53,7 @@ impl Plan {
     /// Try the multigrid method `first`, then those after it.
     fn multigrid(first: Method) -> Self {
         let methods = METHODS.into_iter().skip_while(|&method| method != first);
-        Self {
-            methods: methods.collect(),
-            multifrontal: None,
-        }
+        Self { methods: methods.collect(), multifrontal: None }
     }
 }
 
@@ -110,15 +107,8 @@ pub(super) fn plan(
         tree => tree?,
     };
     let exact = MULTIFRONTAL_PER_CELL * cells + MULTIFRONTAL_PER_OPERATION * tree.cost.operations;
-    let methods = if exact <= cost {
-        vec![Method::Multifrontal]
-    } else {
-        multigrid.methods
-    };
-    Ok(Plan {
-        methods,
-        multifrontal: Some((pass, tree)),
-    })
+    let methods = if exact <= cost { vec![Method::Multifrontal] } else { multigrid.methods };
+    Ok(Plan { methods, multifrontal: Some((pass, tree)) })
 }
 
 /// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.

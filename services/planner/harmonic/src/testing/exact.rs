@@ -69,12 +69,7 @@ impl Angles {
             return Self::default();
         };
         let at = |share: f64| angles[((angles.len() - 1) as f64 * share) as usize];
-        Self {
-            p50: at(0.5),
-            p99: at(0.99),
-            max,
-            clear_max,
-        }
+        Self { p50: at(0.5), p99: at(0.99), max, clear_max }
     }
 }
 

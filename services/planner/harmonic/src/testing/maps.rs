@@ -38,12 +38,8 @@ impl Map {
     /// A map of `kind`, its rim blocked, its target free.
     pub fn generate(kind: Kind, width: usize, height: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let mut map = Self {
-            width,
-            height,
-            blocked: vec![false; width * height],
-            target: Cell::new(0, 0),
-        };
+        let mut map =
+            Self { width, height, blocked: vec![false; width * height], target: Cell::new(0, 0) };
         let wanted = match kind {
             Kind::Empty | Kind::Noise { .. } => (width / 3, height / 4),
             Kind::Drums | Kind::Office => (width / 6, height / 5),
@@ -98,15 +94,11 @@ impl Map {
     /// Puts the target on the free cell nearest to `wanted`, freeing that one if there is none.
     pub fn aim(&mut self, wanted: (usize, usize)) {
         let wanted = (wanted.0.min(self.width - 1), wanted.1.min(self.height - 1));
-        let nearest = (0..self.blocked.len())
-            .filter(|&i| !self.blocked[i])
-            .min_by_key(|&i| {
-                let (dc, dr) = (
-                    (i % self.width).abs_diff(wanted.0),
-                    (i / self.width).abs_diff(wanted.1),
-                );
-                dc * dc + dr * dr
-            });
+        let nearest = (0..self.blocked.len()).filter(|&i| !self.blocked[i]).min_by_key(|&i| {
+            let (dc, dr) =
+                ((i % self.width).abs_diff(wanted.0), (i / self.width).abs_diff(wanted.1));
+            dc * dc + dr * dr
+        });
         let index = nearest.unwrap_or(wanted.1 * self.width + wanted.0);
         self.blocked[index] = false;
         self.target = Cell::new(index % self.width, index / self.width);
@@ -117,10 +109,8 @@ impl Map {
         let mut covered = 0;
         while covered * 5 < self.blocked.len() {
             let radius = random.between(0.3, 1.0) * largest;
-            let centre = (
-                random.between(0.0, self.width as f64),
-                random.between(0.0, self.height as f64),
-            );
+            let centre =
+                (random.between(0.0, self.width as f64), random.between(0.0, self.height as f64));
             let range = |c: f64, end: usize| {
                 (c - radius).max(0.0) as usize..((c + radius) as usize + 2).min(end)
             };
@@ -164,10 +154,8 @@ impl Map {
 
     fn maze(&mut self, corridor: usize, random: &mut Random) {
         let pitch = corridor + 1;
-        let (wide, high) = (
-            self.width.saturating_sub(1) / pitch,
-            self.height.saturating_sub(1) / pitch,
-        );
+        let (wide, high) =
+            (self.width.saturating_sub(1) / pitch, self.height.saturating_sub(1) / pitch);
         self.fill(0..self.width, 0..self.height, true);
         for (a, b) in spanning_tree(wide, high, 0.05, random) {
             let (left, right) = (a.0.min(b.0) * pitch + 1, a.0.max(b.0) * pitch + 1);
@@ -177,9 +165,8 @@ impl Map {
     }
 
     fn serpentine(&mut self, corridor: usize) {
-        for (turn, row) in (corridor + 1..self.height.saturating_sub(1))
-            .step_by(corridor + 1)
-            .enumerate()
+        for (turn, row) in
+            (corridor + 1..self.height.saturating_sub(1)).step_by(corridor + 1).enumerate()
         {
             self.fill(0..self.width, row..row + 1, true);
             if turn % 2 == 0 {
@@ -219,9 +206,8 @@ fn spanning_tree(
         path.push((0, 0));
     }
     while let Some(&room) = path.last() {
-        let open: Vec<_> = neighbours(room, wide, high)
-            .filter(|n| !seen[n.1 * wide + n.0])
-            .collect();
+        let open: Vec<_> =
+            neighbours(room, wide, high).filter(|n| !seen[n.1 * wide + n.0]).collect();
         if open.is_empty() {
             path.pop();
         } else {
@@ -249,12 +235,7 @@ fn neighbours(
     high: usize,
 ) -> impl Iterator<Item = (usize, usize)> {
     let (col, row) = room;
-    [
-        (col.wrapping_sub(1), row),
-        (col + 1, row),
-        (col, row.wrapping_sub(1)),
-        (col, row + 1),
-    ]
-    .into_iter()
-    .filter(move |n| n.0 < wide && n.1 < high)
+    [(col.wrapping_sub(1), row), (col + 1, row), (col, row.wrapping_sub(1)), (col, row + 1)]
+        .into_iter()
+        .filter(move |n| n.0 < wide && n.1 < high)
 }

@@ -19,11 +19,7 @@ impl Random {
 
     /// A number in 0 .. `below`; 0 if `below` is 0.
     pub fn below(&mut self, below: usize) -> usize {
-        if below == 0 {
-            0
-        } else {
-            (self.bits() % below as u64) as usize
-        }
+        if below == 0 { 0 } else { (self.bits() % below as u64) as usize }
     }
 
     /// A number in 0.0 .. 1.0.

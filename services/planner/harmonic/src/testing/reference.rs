@@ -28,11 +28,7 @@ impl Reference {
         for i in (0..cells).filter(|&i| free(i) && i != target) {
             diagonal[i] = 4.0 * (1.0 + domain.screening_coefficient(i));
             let [_, east, _, south] = domain.neighbours(i);
-            for next in [east, south]
-                .into_iter()
-                .flatten()
-                .filter(|&n| free(n) && n != target)
-            {
+            for next in [east, south].into_iter().flatten().filter(|&n| free(n) && n != target) {
                 coupling[i * width + (next - i - 1)] += 1.0;
             }
             if domain.neighbours(i).contains(&Some(target)) {
@@ -46,12 +42,7 @@ impl Reference {
                 let share = weight / diagonal[i];
                 right[j] = sum([right[j], scale(right[i], share)]);
                 diagonal[j] -= share * weight;
-                for (b, &other) in row
-                    .iter()
-                    .enumerate()
-                    .skip(a + 1)
-                    .filter(|(_, w)| **w > 0.0)
-                {
+                for (b, &other) in row.iter().enumerate().skip(a + 1).filter(|(_, w)| **w > 0.0) {
                     coupling[j * width + (b - a - 1)] += share * other;
                 }
             }
@@ -65,17 +56,9 @@ impl Reference {
                 .filter(|(_, w)| **w > 0.0)
                 .map(|(a, &w)| scale(u[i + 1 + a], w));
             let total = terms.fold(right[i], |total, term| sum([total, term]));
-            u[i] = if i == target {
-                Scaled::ONE
-            } else {
-                scale(total, 1.0 / diagonal[i])
-            };
+            u[i] = if i == target { Scaled::ONE } else { scale(total, 1.0 / diagonal[i]) };
         }
-        let mut reference = Self {
-            domain: domain.clone(),
-            u,
-            worst_residual: f64::INFINITY,
-        };
+        let mut reference = Self { domain: domain.clone(), u, worst_residual: f64::INFINITY };
         for _ in 0..4 {
             reference.worst_residual = reference.polish();
         }
@@ -98,10 +81,7 @@ impl Reference {
             return None;
         }
         let relative = |u: Scaled| u.relative_to(largest.exponent) / largest.mantissa;
-        Some([
-            relative(east) - relative(west),
-            relative(south) - relative(north),
-        ])
+        Some([relative(east) - relative(west), relative(south) - relative(north)])
     }
 
     /// Share of directions of `field` more than one degree off, and the worst angle in degrees among the cells whose
@@ -139,9 +119,8 @@ impl Reference {
         let target = self.domain.index(self.domain.target());
         let mut worst = 0.0_f64;
         let order: Vec<usize> = (0..self.u.len()).collect();
-        for (pass, order) in [order.clone(), order.into_iter().rev().collect()]
-            .into_iter()
-            .enumerate()
+        for (pass, order) in
+            [order.clone(), order.into_iter().rev().collect()].into_iter().enumerate()
         {
             for i in order {
                 if self.u[i].is_zero() || i == target {
@@ -162,10 +141,7 @@ impl Reference {
 
 /// The angle between two vectors, degrees.
 pub fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] * b[1] - a[1] * b[0])
-        .atan2(a[0] * b[0] + a[1] * b[1])
-        .abs()
-        .to_degrees()
+    (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]).abs().to_degrees()
 }
 
 /// Share of the reachable cells from which steepest ascent ends at the target.
@@ -205,18 +181,10 @@ fn scale(a: Scaled, factor: f64) -> Scaled {
 }
 
 fn sum<const N: usize>(terms: [Scaled; N]) -> Scaled {
-    let largest = terms
-        .into_iter()
-        .filter(|t| !t.is_zero())
-        .map(|t| t.exponent)
-        .max();
+    let largest = terms.into_iter().filter(|t| !t.is_zero()).map(|t| t.exponent).max();
     largest.map_or(Scaled::ZERO, |largest| {
         Scaled::new(
-            terms
-                .into_iter()
-                .filter(|t| !t.is_zero())
-                .map(|t| t.relative_to(largest))
-                .sum(),
+            terms.into_iter().filter(|t| !t.is_zero()).map(|t| t.relative_to(largest)).sum(),
             largest,
         )
     })

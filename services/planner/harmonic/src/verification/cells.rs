@@ -77,12 +77,7 @@ pub(super) struct Cells<R> {
 impl<R: Real> Cells<R> {
     pub(super) fn new(width: usize) -> Self {
         let row = vec![R::default(); width];
-        Self {
-            weights: row.clone(),
-            weights_set: false,
-            residuals: row.clone(),
-            slopes: row,
-        }
+        Self { weights: row.clone(), weights_set: false, residuals: row.clone(), slopes: row }
     }
 
     /// Checks row `row` of the map but the target.
@@ -117,10 +112,8 @@ impl<R: Real> Cells<R> {
             }
             Coefficients::Uniform(_) => {}
             Coefficients::PerCell(cells) => {
-                for (weight, &k) in self
-                    .weights
-                    .iter_mut()
-                    .zip(&cells[row * width..(row + 1) * width])
+                for (weight, &k) in
+                    self.weights.iter_mut().zip(&cells[row * width..(row + 1) * width])
                 {
                     *weight = R::of(0.25 / (1.0 + f64::from(k)));
                 }
@@ -140,11 +133,8 @@ impl<R: Real> Cells<R> {
         let (start, n) = (columns.start, columns.len());
         let zero = R::default();
         let raw = &raw[start..][..n];
-        let (here, west, east) = (
-            &u.here[start..][..n],
-            &u.west[start..][..n],
-            &u.east[start..][..n],
-        );
+        let (here, west, east) =
+            (&u.here[start..][..n], &u.west[start..][..n], &u.east[start..][..n]);
         let (north, south) = (&u.north[start..][..n], &u.south[start..][..n]);
         let weights = &self.weights[start..][..n];
         let residuals = &mut self.residuals[start..][..n];

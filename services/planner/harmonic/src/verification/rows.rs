@@ -27,11 +27,7 @@ pub(super) struct Rows<R> {
 impl<R: Real> Rows<R> {
     pub(super) fn new(width: usize) -> Self {
         let row = vec![R::default(); width + 2];
-        Self {
-            above: row.clone(),
-            here: row.clone(),
-            below: row,
-        }
+        Self { above: row.clone(), here: row.clone(), below: row }
     }
 }
 
@@ -128,12 +124,6 @@ impl Window<f64> for ScaledRows {
             }
         }
         let [west, east, north, south] = &self.relative;
-        Around {
-            here: u.here,
-            west,
-            east,
-            north,
-            south,
-        }
+        Around { here: u.here, west, east, north, south }
     }
 }

@@ -14,10 +14,7 @@ pub(super) struct Tiles {
 
 impl Tiles {
     pub(super) fn new(width: usize) -> Self {
-        Self {
-            sums: vec![[0.0; 2]; width.div_ceil(TILE)],
-            worst: 0.0,
-        }
+        Self { sums: vec![[0.0; 2]; width.div_ceil(TILE)], worst: 0.0 }
     }
 
     /// Adds row `row` of the map; the first of a tile ends the tiles above.
@@ -40,11 +37,7 @@ impl Tiles {
             if residual != 0.0 {
                 // A share that is no number counts as large.
                 let share = 4.0 * residual.abs() / slope;
-                self.worst = if share <= self.worst {
-                    self.worst
-                } else {
-                    share
-                };
+                self.worst = if share <= self.worst { self.worst } else { share };
             }
         }
     }

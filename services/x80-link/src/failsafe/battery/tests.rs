@@ -1,11 +1,7 @@
 use super::*;
 use std::path::Path;
 
-const LIMITS: BatteryLimits = BatteryLimits {
-    board: 6.6,
-    motor: 11.0,
-    servo: 0.0,
-};
+const LIMITS: BatteryLimits = BatteryLimits { board: 6.6, motor: 11.0, servo: 0.0 };
 
 fn batteries(limits: BatteryLimits) -> Batteries {
     let mut mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
@@ -76,9 +72,6 @@ fn a_robot_drives_on_without_its_servos() {
     let mut batteries = batteries(BatteryLimits::default());
     for seconds in [0.0, 5.0] {
         let (low, _) = batteries.at(seconds, [7.2, 7.2, 5.0]);
-        assert_eq!(
-            (low, batteries.charge()),
-            ([false, false, true], Charge::Enough)
-        );
+        assert_eq!((low, batteries.charge()), ([false, false, true], Charge::Enough));
     }
 }

@@ -49,8 +49,7 @@ impl Wheels {
     }
 
     fn counts(&self) -> [u16; 2] {
-        self.rolled
-            .map(|rolled| rolled.rem_euclid(f64::from(COUNTS)) as u16)
+        self.rolled.map(|rolled| rolled.rem_euclid(f64::from(COUNTS)) as u16)
     }
 }
 
@@ -94,10 +93,7 @@ fn honest(_: u32, counts: [u16; 2]) -> [u16; 2] {
 /// At rest within 1.5 s of the first motion: 0.2 s are left for the wheels to come to rest, and a frame's jitter.
 fn in_time(suspected: Option<(f64, Suspicion)>, why: Suspicion) {
     let (after, suspicion) = suspected.unwrap();
-    assert!(
-        after <= 1.15 && suspicion == why,
-        "{suspicion:?} after {after} s"
-    );
+    assert!(after <= 1.15 && suspicion == why, "{suspicion:?} after {after} s");
 }
 
 #[test]
@@ -106,27 +102,13 @@ fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
     let turning = |_| [-TURN / 2, TURN / 2];
     let slow = |_| [70, 70];
     let reversing = |tick: u32| {
-        if (tick / 2).is_multiple_of(2) {
-            [TURN, -TURN]
-        } else {
-            [-TURN, TURN]
-        }
+        if (tick / 2).is_multiple_of(2) { [TURN, -TURN] } else { [-TURN, TURN] }
     };
-    let curves = |tick: u32| {
-        [
-            900 + 300 * (tick % 3) as i16,
-            1200 - 300 * (tick % 4) as i16,
-        ]
-    };
+    let curves = |tick: u32| [900 + 300 * (tick % 3) as i16, 1200 - 300 * (tick % 4) as i16];
     let stop_and_go = |tick: u32| if tick % 7 < 3 { [0, 0] } else { [TURN, 80] };
-    for tells in [
-        &straight as &dyn Fn(u32) -> [i16; 2],
-        &turning,
-        &slow,
-        &reversing,
-        &curves,
-        &stop_and_go,
-    ] {
+    for tells in
+        [&straight as &dyn Fn(u32) -> [i16; 2], &turning, &slow, &reversing, &curves, &stop_and_go]
+    {
         assert_eq!(drive(400, tells, never, honest), None);
     }
 }
@@ -150,11 +132,7 @@ fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_ti
                 left -= left.signum();
                 is_out
             };
-            assert_eq!(
-                drive(200, |_| [TURN, TURN / 2], out, honest),
-                None,
-                "{seed}"
-            );
+            assert_eq!(drive(200, |_| [TURN, TURN / 2], out, honest), None, "{seed}");
         }
     }
 }
@@ -192,41 +170,22 @@ fn one_dead_encoder_is_suspected_in_time_and_named() {
 fn a_dead_encoder_is_suspected_though_the_direction_changes_with_every_tick_and_a_live_one_is_not()
 {
     let to_and_fro = |tick: u32| {
-        if tick.is_multiple_of(2) {
-            [400, -400]
-        } else {
-            [-400, 400]
-        }
+        if tick.is_multiple_of(2) { [400, -400] } else { [-400, 400] }
     };
     let dead = drive(40, to_and_fro, never, |_, [left, _]| [left, 0]);
-    assert!(
-        matches!(dead, Some((after_s, Suspicion::Right)) if after_s < 1.5),
-        "{dead:?}"
-    );
+    assert!(matches!(dead, Some((after_s, Suspicion::Right)) if after_s < 1.5), "{dead:?}");
     assert_eq!(drive(200, to_and_fro, never, honest), None);
 }
 
 #[test]
 fn wheels_that_are_reversed_or_swapped_are_suspected_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
-    in_time(
-        drive(40, |_| [TURN, TURN], never, reversed),
-        Suspicion::Left,
-    );
+    in_time(drive(40, |_| [TURN, TURN], never, reversed), Suspicion::Left);
     // As a controller does whose robot turns away from the target.
-    let chatter = |tick: u32| {
-        [if (tick / 2).is_multiple_of(2) {
-            584
-        } else {
-            -584
-        }; 2]
-    };
+    let chatter = |tick: u32| [if (tick / 2).is_multiple_of(2) { 584 } else { -584 }; 2];
     in_time(drive(40, chatter, never, reversed), Suspicion::Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
-    in_time(
-        drive(40, |_| [-TURN, TURN], never, swapped),
-        Suspicion::Left,
-    );
+    in_time(drive(40, |_| [-TURN, TURN], never, swapped), Suspicion::Left);
     // In a curve both roll forward as told, but the robot turns the other way.
     let curve = drive(40, |_| [TURN / 2, TURN], never, swapped);
     in_time(curve, Suspicion::Turn);
@@ -253,10 +212,7 @@ fn a_robot_that_is_suspected_is_given_up_after_10_s_or_plausible_again_when_an_o
         odometry.commanded([TURN, TURN], now);
     }
     let given_up = |odometry: &Odometry, seconds| {
-        let now = Moment {
-            time: at(seconds),
-            machine_ns: 0,
-        };
+        let now = Moment { time: at(seconds), machine_ns: 0 };
         odometry.condition(Cause::OdometryGivenUp, now) == Condition::Holds
     };
     assert!(suspicion(&odometry).is_some());
@@ -288,11 +244,7 @@ fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_
         assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps));
         odometry.plausible([5, 5], at(start + 2.3));
     }
-    assert_eq!(
-        suspicion(&odometry),
-        Some(Suspicion::Jumps),
-        "the third time"
-    );
+    assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps), "the third time");
 }
 
 #[test]

@@ -28,20 +28,13 @@ fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
     watch.monitor.commanded([900, 900], MissionTime::default());
     for tick in 0..42 {
         let time = f64::from(tick) * PERIOD;
-        rolled += PERIOD
-            * if time <= 1.0 {
-                700.0
-            } else {
-                speed(time - 1.0)
-            };
+        rolled += PERIOD * if time <= 1.0 { 700.0 } else { speed(time - 1.0) };
         let now = MissionTime::from_seconds(time);
         watch.monitor.heard([rolled as u16; 2], now);
         if time >= 1.0 {
             watch.monitor.commanded([0, 0], now);
         }
-        let condition = watch
-            .monitor
-            .condition(Cause::RobotDoesNotStop, Moment::default());
+        let condition = watch.monitor.condition(Cause::RobotDoesNotStop, Moment::default());
         watch.does_not_stop = watch.clears.applies(watch.does_not_stop, condition);
         if watch.does_not_stop {
             first.get_or_insert(time - 1.0);

@@ -15,10 +15,7 @@ fn streams(text: &str) -> Streams {
 fn range(streams: &mut Streams, machine_ns: u64) {
     let mut standard = StandardSensors::default();
     standard.ultrasonic[1] = 255;
-    let now = Moment {
-        time: MissionTime(machine_ns),
-        machine_ns,
-    };
+    let now = Moment { time: MissionTime(machine_ns), machine_ns };
     streams.observe(&Observation::Standard(&standard), now);
 }
 

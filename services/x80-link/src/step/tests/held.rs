@@ -83,20 +83,10 @@ fn in_lockstep_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
 #[test]
 fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
     let fresh = command(2, 300 * MS, TURN, TURN);
-    let old_pose = CommandSample {
-        pose_ns: 49 * MS,
-        ..fresh
-    };
-    let old_guidance = CommandSample {
-        guidance_ns: 49 * MS,
-        ..fresh
-    };
+    let old_pose = CommandSample { pose_ns: 49 * MS, ..fresh };
+    let old_guidance = CommandSample { guidance_ns: 49 * MS, ..fresh };
     // One that does not say how old they are says 0.
-    let silent = CommandSample {
-        pose_ns: 0,
-        guidance_ns: 0,
-        ..fresh
-    };
+    let silent = CommandSample { pose_ns: 0, guidance_ns: 0, ..fresh };
     for (command, cause) in [
         (old_pose, Cause::PoseStale),
         (old_guidance, Cause::GuidanceStale),
@@ -117,10 +107,7 @@ fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
 fn a_pose_that_grows_old_stops_the_robot_before_the_command_does() {
     let mut link = driving(on_the_wall());
     tick(&mut link, 0, 0);
-    let older = CommandSample {
-        pose_ns: 0,
-        ..command(1, 150 * MS, TURN, TURN)
-    };
+    let older = CommandSample { pose_ns: 0, ..command(1, 150 * MS, TURN, TURN) };
     let effects = tick_by(&mut link, 150 * MS, &datagram(255, 0, 0), &older);
     assert_eq!(velocities(&effects).len(), 1);
     let effects = link.at(Event::Quiet, 251 * MS);
@@ -202,8 +189,6 @@ fn in_lockstep_none_begins_beyond_the_supervisors_limit_until_it_was_waited_for_
     on_the_wall.at(Event::TickLimit(0), 0);
     let mut on_the_wall = driving(on_the_wall);
     for tick in 1..3 {
-        assert!(given(
-            &on_the_wall.at(Event::Datagram(&frames), tick * PERIOD_NS)
-        ));
+        assert!(given(&on_the_wall.at(Event::Datagram(&frames), tick * PERIOD_NS)));
     }
 }

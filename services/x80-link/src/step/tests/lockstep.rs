@@ -30,14 +30,8 @@ fn in_lockstep_a_second_answer_to_a_ping_is_no_tick() {
 fn in_lockstep_nothing_follows_the_arrival() {
     let mut link = driving(in_ticks());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    let arrived = CommandSample {
-        state: CommandState::Arrived.into(),
-        ..command(0, 0, 0.0, 0.0)
-    };
-    assert_eq!(
-        velocities(&link.at(Event::Command(&arrived), 2)),
-        [[Some(0), Some(0)]]
-    );
+    let arrived = CommandSample { state: CommandState::Arrived.into(), ..command(0, 0, 0.0, 0.0) };
+    assert_eq!(velocities(&link.at(Event::Command(&arrived), 2)), [[Some(0), Some(0)]]);
     assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3)).is_empty());
 }
 
@@ -51,10 +45,7 @@ fn in_lockstep_the_order_asks_for_tick_0_and_each_command_for_the_next() {
     for tick in 0..3 {
         let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
         assert_eq!(ticks(&effects)[0].0, tick);
-        let effects = link.at(
-            Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)),
-            3,
-        );
+        let effects = link.at(Event::Command(&command(tick, tick * PERIOD_NS, 1.0, 1.0)), 3);
         assert_eq!(velocities(&effects).len(), 1);
     }
 }

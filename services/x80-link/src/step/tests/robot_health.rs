@@ -38,23 +38,13 @@ fn a_robot_whose_counts_stay_while_it_is_told_to_drive_stands_in_time_and_its_mi
     let decisions = drive(&mut link, 0..90, |_| datagram(255, 0, 0));
     let suspected = (Action::Stop, Cause::OdometryImplausible);
     let given_up = (Action::End, Cause::OdometryGivenUp);
-    let what: Vec<_> = decisions
-        .iter()
-        .map(|&(_, action, cause)| (action, cause))
-        .collect();
+    let what: Vec<_> = decisions.iter().map(|&(_, action, cause)| (action, cause)).collect();
     assert_eq!(what[what.len() - 2..], [suspected, given_up]);
     let [(stood, ..), (ended, ..)] = decisions[what.len() - 2..] else {
         panic!();
     };
-    assert!(
-        stood < 1200 && (10_000..10_200).contains(&(ended - stood)),
-        "{decisions:?}"
-    );
-    assert!(
-        link.explain(Cause::OdometryGivenUp, 0)
-            .unwrap()
-            .contains("left wheel")
-    );
+    assert!(stood < 1200 && (10_000..10_200).contains(&(ended - stood)), "{decisions:?}");
+    assert!(link.explain(Cause::OdometryGivenUp, 0).unwrap().contains("left wheel"));
 }
 
 #[test]
@@ -76,10 +66,7 @@ fn an_operators_stop_and_resume_let_a_suspected_robot_go_on_and_its_wait_is_no_e
 #[test]
 fn counts_that_cannot_be_true_give_no_tick() {
     let mut link = driving(on_the_wall());
-    assert_eq!(
-        ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS)).len(),
-        1
-    );
+    assert_eq!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS)).len(), 1);
     let old = link.at(Event::Datagram(&datagram(255, 9000, 9000)), 150 * MS);
     assert_eq!(ticks(&old), []);
     let good = ticks(&link.at(Event::Datagram(&datagram(255, 0, 10)), 290 * MS));
@@ -104,10 +91,7 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
             match command {
                 Command::Enable { on: false, channel } => tried.push(channel),
                 Command::Motion(motion) if motion.quantity == Quantity::Pwm => {
-                    assert_eq!(
-                        [motion.targets.of(0), motion.targets.of(1)],
-                        [Some(16_384); 2]
-                    );
+                    assert_eq!([motion.targets.of(0), motion.targets.of(1)], [Some(16_384); 2]);
                     tried.push(Some(99));
                 }
                 Command::Motion(motion) => assert_eq!(motion.targets.of(1), Some(0)),
@@ -129,11 +113,7 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     link.at(Event::Order(Order::Drive, HoldReason::None), now);
     link.at(Event::Datagram(&datagram(255, 2320, 29_680)), now);
     let go = sent(&link.at(Event::Command(&command(0, now, TURN, TURN)), now));
-    assert!(
-        go.iter()
-            .any(|it| matches!(it, Command::Enable { on: true, .. })),
-        "{go:?}"
-    );
+    assert!(go.iter().any(|it| matches!(it, Command::Enable { on: true, .. })), "{go:?}");
     assert!(matches!(go.last(), Some(Command::Motion(_))), "{go:?}");
 }
 
@@ -144,9 +124,7 @@ fn a_sonar_that_says_0_holds_the_robot_until_its_next_reading_and_255_is_one() {
         let rolled = 171 * number.min(10) as u16;
         datagram(sonar, 32_768 - rolled, rolled)
     };
-    let decisions = drive(&mut link, 1..20, |number| {
-        obeying(u8::from(number < 5) * 255, number)
-    });
+    let decisions = drive(&mut link, 1..20, |number| obeying(u8::from(number < 5) * 255, number));
     let [.., (when, Action::Stop, Cause::RangeSilent)] = decisions[..] else {
         panic!("{decisions:?}");
     };
@@ -218,18 +196,12 @@ fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven()
         effects.extend(link.at(Event::Datagram(&datagram), now));
         effects.extend(link.at(Event::Command(&command(number, now, TURN, TURN)), now + MS));
         causes.extend(decided(&effects).into_iter().map(|(_, cause)| cause));
-        if velocities(&effects)
-            .iter()
-            .any(|velocity| *velocity != STAND)
-        {
+        if velocities(&effects).iter().any(|velocity| *velocity != STAND) {
             moving.push(number);
         }
     }
     assert_eq!(causes.first(), Some(&Cause::RobotLate), "{causes:?}");
     // It is asked again every 2 s.
-    assert!(
-        moving.first().is_some_and(|first| *first > 28),
-        "{moving:?}"
-    );
+    assert!(moving.first().is_some_and(|first| *first > 28), "{moving:?}");
     assert_eq!(causes.last(), Some(&Cause::None), "{causes:?}");
 }

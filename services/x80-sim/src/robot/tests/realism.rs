@@ -71,10 +71,7 @@ fn wheels_count_on_at_a_contact_where_they_slip_and_not_where_they_stall() {
             "simulation.wheels.contact_slip = {slip}\nworld.wall = [{{ points = [[0.5, -1], [0.5, 1]] }}]"
         );
         let truth = driven(&text, forward(562, None), 28).ground_truth();
-        assert!(
-            (truth.x - 0.31).abs() < 1e-3,
-            "the wall holds it: {truth:?}"
-        );
+        assert!((truth.x - 0.31).abs() < 1e-3, "the wall holds it: {truth:?}");
         let way = f64::from(truth.right_counts) * mission("").body().metres_per_count();
         (way, truth.v)
     };
@@ -82,10 +79,7 @@ fn wheels_count_on_at_a_contact_where_they_slip_and_not_where_they_stall() {
     assert!((stalled.0 - 0.31).abs() < 0.005, "{stalled:?}");
     // Four seconds at 0.25 m/s, less what the speed loop lags.
     assert!((slipping.0 - 0.985).abs() < 0.02, "{slipping:?}");
-    assert!(
-        stalled.1 < 0.01 && slipping.1 > 0.24,
-        "{stalled:?} {slipping:?}"
-    );
+    assert!(stalled.1 < 0.01 && slipping.1 > 0.24, "{stalled:?} {slipping:?}");
 }
 
 #[test]
@@ -144,9 +138,7 @@ fn what_is_low_is_heard_at_middle_ranges_only_and_touched_and_a_sill_is_passed_o
 fn infrared_rangers_look_over_what_is_low() {
     use crate::sensors::Ranging;
     let infrared = |top: &str| {
-        let mission = mission(&format!(
-            "[[world.wall]]\npoints = [[-1, 0.4], [1, 0.4]]\n{top}"
-        ));
+        let mission = mission(&format!("[[world.wall]]\npoints = [[-1, 0.4], [1, 0.4]]\n{top}"));
         let world = super::World::new(&mission);
         let body = super::Body::new(&mission, &world, 1.0);
         let physics = mission.simulation.physics();
@@ -177,9 +169,6 @@ fn a_resumed_robot_has_the_wheels_and_the_silences_it_had() {
     assert!((curvature(&mut resumed) - had).abs() < 1e-3);
     // A run of a minute does not end within a few readings; drawn anew, half of the six would differ.
     let silent = resumed.saved_state().silent;
-    let kept = silent
-        .iter()
-        .zip(saved.silent)
-        .filter(|(now, then)| **now == *then);
+    let kept = silent.iter().zip(saved.silent).filter(|(now, then)| **now == *then);
     assert!(kept.count() >= 5, "{silent:?} {:?}", saved.silent);
 }

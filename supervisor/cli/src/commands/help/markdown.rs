@@ -63,9 +63,7 @@ fn item(line: &str) -> (String, String, usize) {
 
 /// Whether `line` belongs to the paragraph before it.
 fn continues(line: &str) -> bool {
-    let starts_block = ["```", "#", "|"]
-        .iter()
-        .any(|start| line.starts_with(start));
+    let starts_block = ["```", "#", "|"].iter().any(|start| line.starts_with(start));
     !line.trim().is_empty() && !starts_block && item(line).0.is_empty()
 }
 
@@ -117,9 +115,7 @@ fn link(text: &str) -> Option<(&str, &str, &str)> {
 
 /// Characters that are seen.
 fn width_of(text: &str) -> usize {
-    text.chars()
-        .filter(|&letter| letter != BOLD && letter != CODE)
-        .count()
+    text.chars().filter(|&letter| letter != BOLD && letter != CODE).count()
 }
 
 fn longest_word(text: &str) -> usize {
@@ -193,9 +189,7 @@ fn styled(lines: &[String]) -> Vec<String> {
 /// The styled `lines`, of which the first begins with `first` and the others with `rest`.
 fn painted(lines: &[String], first: &str, rest: &str) -> String {
     let lines = styled(lines).into_iter().enumerate();
-    lines
-        .map(|(at, line)| format!("{}{line}\n", if at == 0 { first } else { rest }))
-        .collect()
+    lines.map(|(at, line)| format!("{}{line}\n", if at == 0 { first } else { rest })).collect()
 }
 
 /// The cells of a row, which are parted by bars outside of code.
@@ -223,21 +217,14 @@ fn table(mut rows: Vec<Vec<String>>, width: usize) -> String {
         let cells = cells.filter(|cell| !is_rule(cell));
         cells.map(|cell| width(cell)).max().unwrap_or(1)
     };
-    let mut widths: Vec<usize> = (0..columns)
-        .map(|column| widest(column, width_of))
-        .collect();
-    let words: Vec<usize> = (0..columns)
-        .map(|column| widest(column, longest_word))
-        .collect();
+    let mut widths: Vec<usize> = (0..columns).map(|column| widest(column, width_of)).collect();
+    let words: Vec<usize> = (0..columns).map(|column| widest(column, longest_word)).collect();
     let room = width.saturating_sub(GAP * columns.saturating_sub(1));
     // Words are cut only if the table does not fit otherwise.
     for least in [words, vec![NARROWEST; columns]] {
         while widths.iter().sum::<usize>() > room
-            && let Some((widest, _)) = widths
-                .iter_mut()
-                .zip(&least)
-                .filter(|(width, least)| **width > **least)
-                .max()
+            && let Some((widest, _)) =
+                widths.iter_mut().zip(&least).filter(|(width, least)| **width > **least).max()
         {
             *widest -= 1;
         }
@@ -246,10 +233,7 @@ fn table(mut rows: Vec<Vec<String>>, width: usize) -> String {
         *cell = format!("{BOLD}{cell}{BOLD}");
     }
     let mut text = String::new();
-    for row in rows
-        .iter()
-        .filter(|row| !row.iter().all(|cell| is_rule(cell)))
-    {
+    for row in rows.iter().filter(|row| !row.iter().all(|cell| is_rule(cell))) {
         let cells = row.iter().zip(&widths);
         let cells: Vec<_> = cells.map(|(cell, &width)| wrapped(cell, width)).collect();
         let height = cells.iter().map(Vec::len).max().unwrap_or_default();
@@ -286,9 +270,7 @@ mod tests {
     fn plain(text: &str) -> String {
         let mut parts = text.split('\x1b');
         let first = parts.next().unwrap_or_default().to_owned();
-        parts.fold(first, |plain, part| {
-            plain + part.split_once('m').map_or("", |(_, rest)| rest)
-        })
+        parts.fold(first, |plain, part| plain + part.split_once('m').map_or("", |(_, rest)| rest))
     }
 
     #[test]
@@ -300,30 +282,19 @@ mod tests {
 
     #[test]
     fn a_link_to_a_page_names_its_command_and_one_elsewhere_its_address() {
-        let shown = plain(&render(
-            "[Add one](sub/A-stage.md#x), [site](http://a.b), [code](../x.rs)",
-            100,
-        ));
-        assert_eq!(
-            shown,
-            "Add one (firsthand help a-stage), site (http://a.b), code\n"
-        );
+        let shown =
+            plain(&render("[Add one](sub/A-stage.md#x), [site](http://a.b), [code](../x.rs)", 100));
+        assert_eq!(shown, "Add one (firsthand help a-stage), site (http://a.b), code\n");
     }
 
     #[test]
     fn a_table_fits_the_width_and_no_style_leaves_its_cell() {
         let page = "| key | meaning |\n|---|---|\n| `a` | **many words that take two lines** |\n";
         let shown = render(page, 24);
-        assert_eq!(
-            plain(&shown),
-            "key  meaning\na    many words that\n     take two lines\n"
-        );
+        assert_eq!(plain(&shown), "key  meaning\na    many words that\n     take two lines\n");
         for line in shown.lines() {
             assert!(width_of(&plain(line)) <= 24, "{line}");
-            assert!(
-                !line.contains("\x1b[1m") || line.ends_with("\x1b[0m"),
-                "{line:?}"
-            );
+            assert!(!line.contains("\x1b[1m") || line.ends_with("\x1b[0m"), "{line:?}");
         }
     }
 

@@ -25,15 +25,11 @@ struct Document {
 }
 
 fn documents() -> Vec<Document> {
-    let pages = GUIDE
-        .iter()
-        .map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
+    let pages =
+        GUIDE.iter().map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
     std::iter::once(PathBuf::from("README.md"))
         .chain(pages)
-        .map(|path| Document {
-            text: fs::read_to_string(root().join(&path)).unwrap(),
-            path,
-        })
+        .map(|path| Document { text: fs::read_to_string(root().join(&path)).unwrap(), path })
         .collect()
 }
 
@@ -94,10 +90,7 @@ fn commands(line: &str) -> Vec<Vec<String>> {
             }
             '#' if word.is_none() => break,
             ' ' | ';' | '|' | '&' | '>' => {
-                commands
-                    .last_mut()
-                    .unwrap()
-                    .extend(word.take().map(|word| filled_in(&word)));
+                commands.last_mut().unwrap().extend(word.take().map(|word| filled_in(&word)));
                 if letter != ' ' {
                     commands.push(Vec::new());
                 }
@@ -203,9 +196,7 @@ fn every_old_name_leads_to_a_subcommand_that_exists() {
     for (old, new) in renamed::RENAMED {
         let mut words = new.iter().filter(|word| !word.starts_with('-'));
         let mut whole = commands::command_line();
-        let found = words.try_fold(&mut whole, |command, word| {
-            command.find_subcommand_mut(word)
-        });
+        let found = words.try_fold(&mut whole, |command, word| command.find_subcommand_mut(word));
         assert!(found.is_some(), "{old}");
     }
 }
@@ -233,20 +224,14 @@ fn every_link_and_path_in_readme_and_guide_exists() {
 #[test]
 fn no_line_of_a_document_is_longer_than_160_letters() {
     for document in documents() {
-        let long = document
-            .text
-            .lines()
-            .find(|line| line.chars().count() > 160);
+        let long = document.text.lines().find(|line| line.chars().count() > 160);
         assert_eq!(long, None, "{}", document.path.display());
     }
 }
 
 #[test]
 fn the_guide_has_at_most_14000_words() {
-    let words: usize = GUIDE
-        .iter()
-        .map(|page| page.text.split_whitespace().count())
-        .sum();
+    let words: usize = GUIDE.iter().map(|page| page.text.split_whitespace().count()).sum();
     assert!(words <= 14_000, "{words} words");
 }
 
@@ -287,11 +272,7 @@ fn every_page_is_listed_in_the_help_the_readme_and_the_package() {
         path.extension().is_some_and(|extension| extension == "md")
             && !path.ends_with("CHANGELOG.md")
     });
-    assert_eq!(
-        written.count(),
-        GUIDE.len(),
-        "a page that is not in the list"
-    );
+    assert_eq!(written.count(), GUIDE.len(), "a page that is not in the list");
 }
 
 #[test]
@@ -303,15 +284,9 @@ fn the_readme_is_shorter_than_200_lines() {
 #[test]
 fn the_guides_values_of_the_simulation_are_the_presets() {
     let physics = |realism: &str, setting: &str| {
-        let set = [
-            format!("simulation.realism='{realism}'"),
-            setting.to_owned(),
-        ];
+        let set = [format!("simulation.realism='{realism}'"), setting.to_owned()];
         let mission = missions::load("obstacle-course", &set);
-        mission
-            .unwrap_or_else(|error| panic!("{setting}: {error}"))
-            .simulation
-            .physics()
+        mission.unwrap_or_else(|error| panic!("{setting}: {error}")).simulation.physics()
     };
     let mut values = 0;
     for line in page("mission-file").unwrap().text.lines() {

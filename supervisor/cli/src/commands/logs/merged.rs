@@ -51,11 +51,7 @@ pub(crate) struct Line {
 
 impl std::fmt::Display for Line {
     fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            time,
-            process,
-            text,
-        } = self;
+        let Self { time, process, text } = self;
         write!(to, "{time:TIME$} {process:<14} {text}")
     }
 }
@@ -135,9 +131,7 @@ impl Log {
         }
         let room = LONGEST_LINE.saturating_sub(self.unfinished.len() as u64);
         let most = room.min(self.end.saturating_sub(self.position));
-        let read = (&mut self.file)
-            .take(most)
-            .read_until(b'\n', &mut self.unfinished)?;
+        let read = (&mut self.file).take(most).read_until(b'\n', &mut self.unfinished)?;
         self.position += read as u64;
         let finished = self.unfinished.ends_with(b"\n");
         if !finished && (self.unfinished.len() as u64) < LONGEST_LINE {
@@ -176,19 +170,14 @@ mod tests {
     use super::*;
 
     fn append(directory: &Path, file: &str, text: &str) {
-        let file = File::options()
-            .create(true)
-            .append(true)
-            .open(directory.join(file));
+        let file = File::options().create(true).append(true).open(directory.join(file));
         file.unwrap().write_all(text.as_bytes()).unwrap();
     }
 
     fn round(logs: &mut Logs) -> Vec<String> {
         logs.look().unwrap();
         let lines = std::iter::from_fn(|| logs.next_line().unwrap());
-        lines
-            .map(|line| format!("{} {}", line.process, line.text))
-            .collect()
+        lines.map(|line| format!("{} {}", line.process, line.text)).collect()
     }
 
     const AT: &str = "2026-11-21T06:04:22.72915";
@@ -197,11 +186,7 @@ mod tests {
     fn lines_of_all_processes_come_in_the_order_of_their_times() {
         let directory = tempfile::tempdir().unwrap();
         let directory = directory.path();
-        append(
-            directory,
-            "b.log",
-            &format!("{AT}1Z  INFO one\n{AT}4Z  WARN four\nand more\n"),
-        );
+        append(directory, "b.log", &format!("{AT}1Z  INFO one\n{AT}4Z  WARN four\nand more\n"));
         append(
             directory,
             "a.log",
@@ -209,13 +194,7 @@ mod tests {
         );
         append(directory, "c.checkpoint", "no log");
         let mut logs = Logs::of(directory, None);
-        let lines = [
-            "b INFO one",
-            "a INFO two",
-            "a INFO three",
-            "b WARN four",
-            "b and more",
-        ];
+        let lines = ["b INFO one", "a INFO two", "a INFO three", "b WARN four", "b and more"];
         assert_eq!(round(&mut logs), lines);
         append(directory, "a.log", "FO five\n");
         append(directory, "new.log", &format!("{AT}6Z  INFO six\n"));
@@ -229,11 +208,7 @@ mod tests {
     #[test]
     fn a_line_without_end_is_cut() {
         let directory = tempfile::tempdir().unwrap();
-        append(
-            directory.path(),
-            "a.log",
-            &"x".repeat(3 * LONGEST_LINE as usize / 2),
-        );
+        append(directory.path(), "a.log", &"x".repeat(3 * LONGEST_LINE as usize / 2));
         let mut logs = Logs::of(directory.path(), None);
         let lines = round(&mut logs);
         assert_eq!(lines.len(), 1);

@@ -32,10 +32,7 @@ impl RunRecorder {
 
     fn spawn(options: &Options) -> std::io::Result<Self> {
         let directory = &options.directory;
-        let log = File::options()
-            .create(true)
-            .append(true)
-            .open(directory.join("recorder.log"))?;
+        let log = File::options().create(true).append(true).open(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &options.robot.to_string()]);
         // A run that is resumed may have a recording already.
         let free = recording::places(directory).find(|file| !file.exists());

@@ -82,12 +82,7 @@ const DEPARTED_M: f64 = 0.1;
 impl Summary {
     /// The summary of a finished run. Samples after the end was decided do not count.
     pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
-        let Finished {
-            ending,
-            record,
-            resumes,
-            ..
-        } = finished;
+        let Finished { ending, record, resumes, .. } = finished;
         let last_tick = finished.last_tick.or(record.newest_tick());
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
@@ -147,10 +142,7 @@ impl Summary {
             value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))
         };
         let stalls = (self.replans > 0 || self.resets > 0).then(|| {
-            format!(
-                "The robot stalled: replans {}, map resets {}",
-                self.replans, self.resets
-            )
+            format!("The robot stalled: replans {}, map resets {}", self.replans, self.resets)
         });
         let numbers = [
             format!(
@@ -165,10 +157,9 @@ impl Summary {
                 self.tick_latency_us,
                 self.ticks,
                 self.restarted(),
-                self.stopping_time_s
-                    .map_or(String::new(), |seconds| format!(
-                        " · at rest at most {seconds:.2} s after a last command"
-                    )),
+                self.stopping_time_s.map_or(String::new(), |seconds| format!(
+                    " · at rest at most {seconds:.2} s after a last command"
+                )),
             ),
         ];
         stalls.into_iter().chain(numbers).collect()
@@ -183,11 +174,7 @@ impl Summary {
             .collect();
         let resumed = (self.resumes > 0).then(|| format!("resumed {}×", self.resumes));
         let all: Vec<_> = resumed.into_iter().chain(some).collect();
-        if all.is_empty() {
-            "no restarts".to_owned()
-        } else {
-            all.join(", ")
-        }
+        if all.is_empty() { "no restarts".to_owned() } else { all.join(", ") }
     }
 }
 
@@ -195,10 +182,7 @@ impl fmt::Display for Quantiles {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.p50, self.p99, self.max) {
             (Some(p50), Some(p99), Some(max)) => {
-                write!(
-                    f,
-                    "{p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)"
-                )
+                write!(f, "{p50:.0} µs (median), {p99:.0} µs (99 %), {max:.0} µs (longest)")
             }
             _ => f.write_str("unknown"),
         }
@@ -208,11 +192,7 @@ impl fmt::Display for Quantiles {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {}", self.outcome.as_str(), self.reason)?;
-        write!(
-            f,
-            "{:.1} s, {:.2} m driven, ",
-            self.mission_time_s, self.path_length_m
-        )?;
+        write!(f, "{:.1} s, {:.2} m driven, ", self.mission_time_s, self.path_length_m)?;
         // The straight distance to a target at the start is 0.
         if self.straight_m > 0.0 {
             let ratio = self.path_length_m / self.straight_m;
@@ -227,10 +207,7 @@ impl fmt::Display for Summary {
 }
 
 fn path_length(truth: &[GroundTruthTick]) -> f64 {
-    truth
-        .windows(2)
-        .map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y))
-        .sum()
+    truth.windows(2).map(|pair| (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y)).sum()
 }
 
 /// Share of the ticks whose front sonar byte is no distance: 255, nothing in range, or 0, not valid.

@@ -41,18 +41,12 @@ impl SummaryFile {
             let code = if full { "disk-full" } else { "not-writable" };
             Refused::new(code, failed("reserve room for", &path)(error))
         })?;
-        Ok(Self {
-            file,
-            directory: directory.to_path_buf(),
-        })
+        Ok(Self { file, directory: directory.to_path_buf() })
     }
 
     /// Write the summary.
     pub(crate) fn write(mut self, text: &str) -> Result<(), String> {
-        let (from, to) = (
-            self.directory.join(UNFINISHED),
-            self.directory.join(SUMMARY),
-        );
+        let (from, to) = (self.directory.join(UNFINISHED), self.directory.join(SUMMARY));
         let written = self.file.write_all(text.as_bytes());
         // The reserved room that is not needed is released.
         let written = written.and_then(|()| self.file.set_len(text.len() as u64));

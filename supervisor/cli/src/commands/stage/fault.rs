@@ -54,9 +54,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     };
     let robot = &arguments.robot;
     let bus = Bus::join(&Domain::of(robot.clone()), "operator")?;
-    let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| {
-        Some(header.simulated == 1)
-    })?;
+    let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| Some(header.simulated == 1))?;
     if !simulated && !arguments.break_a_real_robot {
         return Err(real_robot(robot).into());
     }

@@ -83,10 +83,8 @@ type RosterFacts = (&'static str, Option<f64>, Option<bool>);
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
     let bus = Bus::join(&Domain::of(robot.name.clone()), "list")?;
     Roster::open(&bus)?.find(PATIENCE, |header, _| {
-        let order = words::order(
-            Order::from_byte(header.order),
-            HoldReason::from_byte(header.reason),
-        );
+        let order =
+            words::order(Order::from_byte(header.order), HoldReason::from_byte(header.reason));
         let time_s = header.stamp.time().seconds();
         Some((order, Some(time_s), Some(header.simulated == 1)))
     })
@@ -112,9 +110,7 @@ fn table(listed: &[Listed]) -> String {
         let run = robot.run.as_ref();
         table.row([
             robot.robot.clone(),
-            robot
-                .supervisor_pid
-                .map_or_else(unknown, |pid| pid.to_string()),
+            robot.supervisor_pid.map_or_else(unknown, |pid| pid.to_string()),
             robot.state.to_owned(),
             time.map_or_else(unknown, |time_s| format!("{time_s:.1} s")),
             kind.to_owned(),

@@ -62,11 +62,7 @@ fn capability(row: &[String]) -> String {
         return String::new();
     };
     let named = |tests: &str| {
-        tests
-            .split(' ')
-            .map(|test| format!("`{test}`"))
-            .collect::<Vec<_>>()
-            .join(" ")
+        tests.split(' ').map(|test| format!("`{test}`")).collect::<Vec<_>>().join(" ")
     };
     let said = match (text.as_str(), tests.as_str()) {
         ("", test) => test.replace('_', " "),
@@ -85,19 +81,12 @@ fn figure(row: &[String]) -> String {
         "" => String::new(),
         realism => format!("{realism}, "),
     };
-    format!(
-        "{}  `{command}`\n",
-        item(&format!("{what} ({realism}n = {n}): {figure}"))
-    )
+    format!("{}  `{command}`\n", item(&format!("{what} ({realism}n = {n}): {figure}")))
 }
 
 fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> String {
     let header: Vec<&str> = header.collect();
-    let mut table = format!(
-        "| {} |\n|{}\n",
-        header.join(" | "),
-        "---|".repeat(header.len())
-    );
+    let mut table = format!("| {} |\n|{}\n", header.join(" | "), "---|".repeat(header.len()));
     for row in rows {
         // Writing to a String cannot fail.
         let _ = writeln!(table, "| {} |", row.join(" | "));

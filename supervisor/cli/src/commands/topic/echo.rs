@@ -72,14 +72,9 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
 /// The topic of that name.
 pub(super) fn readable(name: &str) -> Result<&'static dyn ReadableTopic, Failure> {
     let mut all = topics::READABLE.iter();
-    all.find(|topic| topic.spec().name == name)
-        .copied()
-        .ok_or_else(|| {
-            let names: Vec<_> = topics::TABLE
-                .iter()
-                .map(|topic| topic.spec().name)
-                .collect();
-            let message = format!("there is no topic {name:?}; there are {}", names.join(", "));
-            Refused::new("unknown-topic", message).into()
-        })
+    all.find(|topic| topic.spec().name == name).copied().ok_or_else(|| {
+        let names: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();
+        let message = format!("there is no topic {name:?}; there are {}", names.join(", "));
+        Refused::new("unknown-topic", message).into()
+    })
 }

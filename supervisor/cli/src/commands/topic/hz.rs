@@ -64,11 +64,7 @@ impl Readers {
         let now = Instant::now();
         let reports = self.0.iter_mut().map(|(_, rates)| rates.report(now));
         let reports: Vec<_> = reports.collect();
-        if json {
-            json_lines(&reports)
-        } else {
-            Ok(rates::table(&reports) + "\n")
-        }
+        if json { json_lines(&reports) } else { Ok(rates::table(&reports) + "\n") }
     }
 }
 
@@ -80,10 +76,7 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mut stream = Stream::open()?;
     let domain = Domain::of(arguments.robot.clone());
     let open = |bus: &Bus| Readers::open(bus, &topics);
-    let others = topics
-        .iter()
-        .skip(1)
-        .map(|&topic| topic as &'static dyn AnyTopic);
+    let others = topics.iter().skip(1).map(|&topic| topic as &'static dyn AnyTopic);
     // Some topics wake no reader. Their samples are read when the link ends the tick.
     let others = others.chain([&topics::LINK as &'static dyn AnyTopic]);
     let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);

@@ -18,12 +18,8 @@ pub(super) fn module() -> String {
         }
         let element = element.map_or("None".to_owned(), |element| python(&element));
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            table,
-            "    \"{}\": ({}, {element}),",
-            topic.spec().name,
-            python(&payload)
-        );
+        let _ =
+            writeln!(table, "    \"{}\": ({}, {element}),", topic.spec().name, python(&payload));
     }
     let _ = write!(
         module,
@@ -48,23 +44,14 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
     let class = class(structure);
     let _ = writeln!(module, "class {class}(ctypes.Structure):\n    _fields_ = [");
     for field in &structure.fields {
-        let _ = writeln!(
-            module,
-            "        (\"{}\", {}),",
-            field.name,
-            python(&field.kind)
-        );
+        let _ = writeln!(module, "        (\"{}\", {}),", field.name, python(&field.kind));
     }
     let _ = writeln!(
         module,
         "    ]\n\n    @staticmethod\n    def type_name():\n        return \"{}\"\n\n",
         structure.name
     );
-    let _ = writeln!(
-        module,
-        "assert ctypes.sizeof({class}) == {}",
-        structure.size
-    );
+    let _ = writeln!(module, "assert ctypes.sizeof({class}) == {}", structure.size);
     for field in &structure.fields {
         let (name, offset) = (field.name, field.offset);
         let _ = writeln!(module, "assert {class}.{name}.offset == {offset}");
@@ -138,9 +125,7 @@ mod tests {
             let row = format!("\"{}\": (", topic.spec().name);
             assert!(module.contains(&row), "{row}");
         }
-        let ran = std::process::Command::new("python3")
-            .args(["-c", &module])
-            .output();
+        let ran = std::process::Command::new("python3").args(["-c", &module]).output();
         // Without Python here, the layouts are checked only when a consumer loads the module.
         if let Ok(output) = ran {
             let error = String::from_utf8_lossy(&output.stderr);

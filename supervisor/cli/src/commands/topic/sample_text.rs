@@ -128,17 +128,11 @@ mod tests {
 
     use super::*;
 
-    const AUTHOR: Author = Author {
-        process: 7,
-        generation: 1,
-    };
+    const AUTHOR: Author = Author { process: 7, generation: 1 };
 
     #[test]
     fn text_has_one_field_a_line_in_the_order_of_the_layout() {
-        let infrared = InfraredSample {
-            range_m: [0.5; 7],
-            ..InfraredSample::default()
-        };
+        let infrared = InfraredSample { range_m: [0.5; 7], ..InfraredSample::default() };
         let shown = text(&(AUTHOR, infrared), false);
         let lines: Vec<_> = shown.lines().collect();
         assert_eq!(lines[0], "stamp:");
@@ -149,21 +143,13 @@ mod tests {
 
     #[test]
     fn names_are_text_and_numbers_that_are_not_finite_are_null() {
-        let health = HealthSample {
-            stage: name("mapper"),
-            ..HealthSample::default()
-        };
+        let health = HealthSample { stage: name("mapper"), ..HealthSample::default() };
         assert!(text(&(AUTHOR, health), false).contains("\nstage: \"mapper\"\n"));
-        let guidance = GuidanceSample {
-            speed_limit_m_s: f64::INFINITY,
-            ..GuidanceSample::default()
-        };
+        let guidance =
+            GuidanceSample { speed_limit_m_s: f64::INFINITY, ..GuidanceSample::default() };
         let line = json(&(AUTHOR, guidance)).unwrap();
         let read: serde_json::Value = serde_json::from_str(&line).unwrap();
-        assert!(
-            read["speed_limit_m_s"].is_null() && read["stamp"]["tick"] == 0,
-            "{line}"
-        );
+        assert!(read["speed_limit_m_s"].is_null() && read["stamp"]["tick"] == 0, "{line}");
     }
 
     #[test]
@@ -175,9 +161,6 @@ mod tests {
         let structs = Value::Array(vec![Value::Struct(vec![("x", Value::Signed(-2))]); 18]);
         let mut text = String::new();
         write_field(&mut text, 0, "beams", &structs, SHOWN);
-        assert!(
-            text.starts_with("beams:\n- {x: -2}\n") && text.ends_with("# 2 more\n"),
-            "{text}"
-        );
+        assert!(text.starts_with("beams:\n- {x: -2}\n") && text.ends_with("# 2 more\n"), "{text}");
     }
 }

@@ -92,11 +92,7 @@ fn parse_faults(names: &str) -> Result<Faults, String> {
             format!("no robot fault {name:?}; give some of {}", all.join(", "))
         })
     };
-    names
-        .split(',')
-        .map(named)
-        .collect::<Result<_, _>>()
-        .map(Faults)
+    names.split(',').map(named).collect::<Result<_, _>>().map(Faults)
 }
 
 /// The exit code if a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something
@@ -126,19 +122,12 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if arguments.pace == Pace::Max {
         return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
     }
-    let pace = if arguments.include_supervisor {
-        Pace::Rate(1.0)
-    } else {
-        arguments.pace
-    };
+    let pace = if arguments.include_supervisor { Pace::Rate(1.0) } else { arguments.pace };
     let options = options(arguments, loaded, set, pace)?;
     let directory = options.directory.clone();
     let ended = chaos::run(&options, &mut |report| {
         let (kills, missions) = (report.signals(), report.missions());
-        write_stderr(&format!(
-            "{kills} of {} signals, {missions} missions\n",
-            options.kills
-        ));
+        write_stderr(&format!("{kills} of {} signals, {missions} missions\n", options.kills));
     });
     let report = match ended {
         Ok(report) => report,
@@ -163,11 +152,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ));
     }
     print(&report, arguments.json)?;
-    Ok(ExitCode::from(if report.is_clean() {
-        0
-    } else {
-        NOT_CLEAN
-    }))
+    Ok(ExitCode::from(if report.is_clean() { 0 } else { NOT_CLEAN }))
 }
 
 /// The options of the missions, which run in a new directory.

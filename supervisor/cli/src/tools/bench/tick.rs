@@ -65,9 +65,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         hops::run_forwarder(&robot, place, supervisor)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let rate_hz = missions::load(&arguments.mission, &arguments.set)?
-        .robot
-        .rate_hz;
+    let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
     let report = tick::measure(&Options {
         mission: &arguments.mission,
         set: &arguments.set,

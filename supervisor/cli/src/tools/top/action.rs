@@ -86,9 +86,7 @@ pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
         rest = match rest {
             // A sequence of bytes for one key ends with a letter or `~`.
             [ESCAPE, b'[' | b'O', sequence @ ..] => {
-                let Some(last) = sequence
-                    .iter()
-                    .position(|byte| (b'@'..=b'~').contains(byte))
+                let Some(last) = sequence.iter().position(|byte| (b'@'..=b'~').contains(byte))
                 else {
                     break;
                 };
@@ -142,10 +140,7 @@ pub(super) struct Operator {
 
 impl Operator {
     pub(super) fn new(robot: &RobotName) -> Self {
-        Self {
-            robot: robot.clone(),
-            under_way: None,
-        }
+        Self { robot: robot.clone(), under_way: None }
     }
 
     /// Begin `action`. Returns what to show meanwhile.

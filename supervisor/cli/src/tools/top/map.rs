@@ -108,17 +108,9 @@ pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'st
     if side == 0 {
         return None;
     }
-    let scale = Scale {
-        frame,
-        side,
-        step: f64::from(frame.cells) / side as f64,
-    };
+    let scale = Scale { frame, side, step: f64::from(frame.cells) / side as f64 };
     let mut letters: Vec<Vec<(char, Style)>> = (0..side / 2)
-        .map(|line| {
-            (0..side)
-                .map(|col| letter(view, &scale, col, line))
-                .collect()
-        })
+        .map(|line| (0..side).map(|col| letter(view, &scale, col, line)).collect())
         .collect();
     let mut put = |point: DVec2, letter: char, style: Style| {
         if let Some((col, row)) = scale.square(point) {
@@ -135,9 +127,8 @@ pub(super) fn lines(view: &View, width: u16, height: u16) -> Option<Vec<Line<'st
         put(pose.pose().position, robot(pose.heading_rad), ROBOT_STYLE);
     }
     let line = |letters: Vec<(char, Style)>| {
-        let spans = letters
-            .into_iter()
-            .map(|(letter, style)| Span::styled(letter.to_string(), style));
+        let spans =
+            letters.into_iter().map(|(letter, style)| Span::styled(letter.to_string(), style));
         Line::from(spans.collect::<Vec<_>>())
     };
     Some(letters.into_iter().map(line).collect())
@@ -160,10 +151,7 @@ fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) 
         let rows = scale.cells(scale.side - 1 - row);
         let cols = scale.cells(col);
         let of_rows = rows.flat_map(|row| &cells[row * side + cols.start..row * side + cols.end]);
-        of_rows
-            .map(|&cell| Square::of(cell))
-            .max()
-            .unwrap_or(Square::Free)
+        of_rows.map(|&cell| Square::of(cell)).max().unwrap_or(Square::Free)
     };
     let (above, below) = (square(2 * line), square(2 * line + 1));
     let ground = |square| match square {
@@ -177,10 +165,7 @@ fn letter(view: &View, scale: &Scale, col: usize, line: usize) -> (char, Style) 
         (None, Some(other)) => ('▄', Style::new().fg(other).bg(ground(above))),
         (None, None) => {
             let arrow = field(view, scale, col, line);
-            (
-                arrow.unwrap_or(' '),
-                FIELD_STYLE.bg(ground(above.max(below))),
-            )
+            (arrow.unwrap_or(' '), FIELD_STYLE.bg(ground(above.max(below))))
         }
     }
 }

@@ -84,21 +84,10 @@ fn message_height(message: &str, width: u16) -> u16 {
 fn heading(view: &View) -> Line<'static> {
     let robot = format!("robot {}", view.robot);
     let Some(supervisor) = view.supervisor else {
-        let state = if view.connected {
-            "is here"
-        } else {
-            waiting::NOT_RUNNING
-        };
-        return Line::from(vec![
-            Span::styled(robot, TITLE),
-            Span::raw(format!(" {state}")),
-        ]);
+        let state = if view.connected { "is here" } else { waiting::NOT_RUNNING };
+        return Line::from(vec![Span::styled(robot, TITLE), Span::raw(format!(" {state}"))]);
     };
-    let kind = if supervisor.simulated == 1 {
-        " (simulated): "
-    } else {
-        ": "
-    };
+    let kind = if supervisor.simulated == 1 { " (simulated): " } else { ": " };
     let state = if view.connected {
         let order = words::order(
             Order::from_byte(supervisor.order),
@@ -108,30 +97,19 @@ fn heading(view: &View) -> Line<'static> {
     } else {
         waiting::ENDED.to_owned()
     };
-    Line::from(vec![
-        Span::styled(robot, TITLE),
-        Span::raw(kind),
-        Span::raw(state),
-    ])
+    Line::from(vec![Span::styled(robot, TITLE), Span::raw(kind), Span::raw(state)])
 }
 
 fn keys_line() -> Line<'static> {
     let spans = KEYS.iter().flat_map(|(key, what)| {
-        [
-            Span::styled(*key, TITLE),
-            Span::styled(format!(" {what}  "), DIM),
-        ]
+        [Span::styled(*key, TITLE), Span::styled(format!(" {what}  "), DIM)]
     });
     Line::from(spans.collect::<Vec<_>>())
 }
 
 fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let right = |text: String, width: usize| format!("{text:>width$}");
-    let mut rows: Vec<_> = view
-        .stages
-        .iter()
-        .map(|stage| stage_row(view, stage))
-        .collect();
+    let mut rows: Vec<_> = view.stages.iter().map(|stage| stage_row(view, stage)).collect();
     if let Some(supervisor) = view.supervisor {
         let pid = supervisor.supervisor_pid.to_string();
         let state = if view.connected { "running" } else { "ended" };
@@ -153,9 +131,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         });
     }
     let widths: [u16; 9] = [14, 11, 7, 3, 8, 7, 7, 5, 8];
-    let heads = [
-        "stage", "state", "pid", "gen", "restarts", "rate", "beat", "CPU", "memory",
-    ];
+    let heads = ["stage", "state", "pid", "gen", "restarts", "rate", "beat", "CPU", "memory"];
     let cells = |texts: [String; 9]| {
         let mut at = 0;
         texts.map(|text| {
@@ -167,9 +143,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         })
     };
     let heads = Row::new(cells(heads.map(str::to_owned))).style(DIM);
-    let rows = rows
-        .into_iter()
-        .map(|row| Row::new(cells(row.texts)).style(row.style));
+    let rows = rows.into_iter().map(|row| Row::new(cells(row.texts)).style(row.style));
     let table = Table::new(rows, widths)
         .header(heads)
         .column_spacing(1)
@@ -194,11 +168,7 @@ fn stage_row(view: &View, stage: &Stage) -> Cells {
         texts: [
             name_str(&entry.stage).to_owned(),
             words::state(state).to_owned(),
-            if runs {
-                entry.pid.to_string()
-            } else {
-                "-".to_owned()
-            },
+            if runs { entry.pid.to_string() } else { "-".to_owned() },
             entry.generation.to_string(),
             entry.restarts.to_string(),
             stage.rate_hz.map_or("-".to_owned(), rate),
@@ -215,17 +185,11 @@ fn stage_row(view: &View, stage: &Stage) -> Cells {
 }
 
 fn rate(hz: f64) -> String {
-    if hz < 100.0 {
-        format!("{hz:.1} Hz")
-    } else {
-        format!("{hz:.0} Hz")
-    }
+    if hz < 100.0 { format!("{hz:.1} Hz") } else { format!("{hz:.0} Hz") }
 }
 
 fn cpu(usage: Usage) -> String {
-    usage
-        .cpu
-        .map_or("-".to_owned(), |share| format!("{:.0} %", share * 100.0))
+    usage.cpu.map_or("-".to_owned(), |share| format!("{:.0} %", share * 100.0))
 }
 
 fn memory(usage: Usage) -> String {
@@ -244,12 +208,7 @@ fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     // The events get the room between the numbers and the legend at the foot.
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
-    lines.extend(
-        view.events
-            .iter()
-            .take(room)
-            .map(|event| Line::raw(event.clone())),
-    );
+    lines.extend(view.events.iter().take(room).map(|event| Line::raw(event.clone())));
     let [above, foot] =
         Layout::vertical([Constraint::Min(0), Constraint::Length(legend.len() as u16)]).areas(area);
     frame.render_widget(Paragraph::new(lines), above);
@@ -266,16 +225,8 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
     let plain = Style::new();
     if let Some(pose) = view.pose {
         let heading = pose.heading_rad.to_degrees().rem_euclid(360.0);
-        line(
-            "pose",
-            format!("{:.2}, {:.2} m, {heading:.0}°", pose.x_m, pose.y_m),
-            plain,
-        );
-        line(
-            "speed",
-            format!("{:.2} m/s, {:.2} rad/s", pose.v_m_s, pose.omega_rad_s),
-            plain,
-        );
+        line("pose", format!("{:.2}, {:.2} m, {heading:.0}°", pose.x_m, pose.y_m), plain);
+        line("speed", format!("{:.2} m/s, {:.2} rad/s", pose.v_m_s, pose.omega_rad_s), plain);
         if let Some(command) = view.command {
             let (left, driven) = (command.distance_m, pose.travelled_m);
             line("to go", format!("{left:.2} m; driven {driven:.2} m"), plain);
@@ -283,16 +234,9 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
     }
     if let Some(guidance) = view.guidance {
         let limit = guidance.speed_limit_m_s;
-        let limit = if limit.is_finite() {
-            format!(", at most {limit:.2} m/s")
-        } else {
-            String::new()
-        };
-        line(
-            "guidance",
-            format!("{}{limit}", top_words::guidance(guidance.status)),
-            plain,
-        );
+        let limit =
+            if limit.is_finite() { format!(", at most {limit:.2} m/s") } else { String::new() };
+        line("guidance", format!("{}{limit}", top_words::guidance(guidance.status)), plain);
         let (events, full) = (guidance.safety_events, guidance.full_solves);
         line("map", format!("{events} safety events"), plain);
         line("solves", format!("{full} full"), plain);
@@ -305,11 +249,7 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
     if let Some(power) = view.power {
         let (board, motor, servo) = (power.board_v, power.motor_v, power.servo_v);
         let style = if power.is_low() { BAD } else { plain };
-        line(
-            "battery",
-            format!("board {board:.1}, motors {motor:.1}, servos {servo:.1} V"),
-            style,
-        );
+        line("battery", format!("board {board:.1}, motors {motor:.1}, servos {servo:.1} V"), style);
     }
     lines
 }
@@ -334,12 +274,7 @@ fn latency(link: &LinkSample) -> String {
     let mut histogram = Histogram::default();
     histogram.add(&link.latency_histogram, link.latency_max_ns);
     let quantile = |share| histogram.quantile_us(share).map_or("-".to_owned(), time);
-    format!(
-        "{}, 99 % {}, longest {}",
-        quantile(0.5),
-        quantile(0.99),
-        quantile(1.0)
-    )
+    format!("{}, 99 % {}, longest {}", quantile(0.5), quantile(0.99), quantile(1.0))
 }
 
 fn time(microseconds: f64) -> String {

@@ -15,24 +15,13 @@ use ratatui::{Terminal, backend::TestBackend};
 
 use super::{action::KEYS, screen, usage::Usage, view::View, words};
 
-const STAGES: [&str; 5] = [
-    "x80-link",
-    "dead-reckoning",
-    "mapper",
-    "planner",
-    "controller",
-];
+const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
 
 /// A robot in the middle of a mission: a wall to the east of it, the field to the north, where the target is.
 fn view() -> View {
     let mut view = View::of("robot-of-16-char".parse().unwrap());
     view.on_connected();
-    let stamp = Stamp {
-        tick: 8641,
-        stamp_ns: 1_234_500_000_000,
-        generation: 1,
-        sequence: 9,
-    };
+    let stamp = Stamp { tick: 8641, stamp_ns: 1_234_500_000_000, generation: 1, sequence: 9 };
     let header = RosterHeader {
         stamp,
         supervisor_pid: 4_194_303,
@@ -52,29 +41,15 @@ fn view() -> View {
         output_age_ns: 0,
     });
     view.on_roster(header, &entries);
-    let usage = Usage {
-        cpu: Some(1.99),
-        memory_bytes: Some(999_900_000),
-    };
+    let usage = Usage { cpu: Some(1.99), memory_bytes: Some(999_900_000) };
     view.supervisor_usage = usage;
     for stage in &mut view.stages {
         (stage.rate_hz, stage.usage) = (Some(1234.4), usage);
     }
     view.stages[3].entry.state = StageState::BackingOff.into();
-    let frame = GridFrame {
-        cells: 100,
-        resolution_m: 0.1,
-        centre: DVec2::ZERO,
-    };
+    let frame = GridFrame { cells: 100, resolution_m: 0.1, centre: DVec2::ZERO };
     let mut grid = vec![CellState::Free as u8; frame.area()];
-    let mut field = vec![
-        FieldCell {
-            ex: 0.0,
-            ey: 1.0,
-            log2_u: -1.0
-        };
-        frame.area()
-    ];
+    let mut field = vec![FieldCell { ex: 0.0, ey: 1.0, log2_u: -1.0 }; frame.area()];
     for row in 0..100 {
         for col in 0..100 {
             let rim = [row, col].iter().any(|&at| at == 0 || at == 99);
@@ -100,22 +75,14 @@ fn view() -> View {
             ..PoseSample::default()
         });
     }
-    view.command = Some(CommandSample {
-        distance_m: 4.1,
-        ..CommandSample::default()
-    });
+    view.command = Some(CommandSample { distance_m: 4.1, ..CommandSample::default() });
     view.guidance = Some(GuidanceSample {
         status: GuidanceStatus::Unreachable.into(),
         speed_limit_m_s: 0.5,
         full_solves: 1000,
         ..GuidanceSample::default()
     });
-    view.link = Some(LinkSample {
-        connected: 1,
-        action: 2,
-        cause: 12,
-        ..LinkSample::default()
-    });
+    view.link = Some(LinkSample { connected: 1, action: 2, cause: 12, ..LinkSample::default() });
     view.power = Some(PowerSample::default());
     for generation in 0..60 {
         view.on_event(words::death(&DeathSample {
@@ -150,10 +117,7 @@ fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
 /// The columns in `line` that have one of `letters`.
 fn columns(line: &str, letters: &str) -> Vec<usize> {
     let columns = line.chars().enumerate();
-    columns
-        .filter(|(_, letter)| letters.contains(*letter))
-        .map(|(at, _)| at)
-        .collect()
+    columns.filter(|(_, letter)| letters.contains(*letter)).map(|(at, _)| at).collect()
 }
 
 #[test]
@@ -166,23 +130,14 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
             lines[0]
         );
         for (line, stage) in lines[2..].iter().zip(STAGES) {
-            let state = if stage == "planner" {
-                "backing off"
-            } else {
-                "running"
-            };
-            let cells = [
-                stage, state, "4194000", "100", "99", "1234 Hz", "599.9 s", "199 %", "999.9 MB",
-            ];
+            let state = if stage == "planner" { "backing off" } else { "running" };
+            let cells =
+                [stage, state, "4194000", "100", "99", "1234 Hz", "599.9 s", "199 %", "999.9 MB"];
             let line: String = line.chars().take(80).collect();
             let words: Vec<_> = line.trim_start_matches('>').split_whitespace().collect();
             assert_eq!(words.join(" "), cells.join(" "), "{width} columns");
         }
-        assert!(
-            lines[7].contains("supervisor") && lines[7].contains("4194303"),
-            "{}",
-            lines[7]
-        );
+        assert!(lines[7].contains("supervisor") && lines[7].contains("4194303"), "{}", lines[7]);
         let foot = &lines[usize::from(height) - 2..];
         assert_eq!(foot[0], "kill planner: done");
         for (key, what) in KEYS {
@@ -198,10 +153,7 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
             "dead-reckoning 59: hung, signal 9",
             "█ perimeter",
         ] {
-            assert!(
-                whole.contains(text),
-                "{width} columns: {text:?} in\n{whole}"
-            );
+            assert!(whole.contains(text), "{width} columns: {text:?} in\n{whole}");
         }
     }
 }
@@ -212,10 +164,7 @@ fn robot_way_target_hazard_and_field_are_where_they_are_on_the_map() {
         let lines = screen(&view(), width, height);
         let below = if left == 0 { 9 } else { 1 };
         let map = lines[below..usize::from(height) - 2].iter().map(|line| {
-            line.chars()
-                .skip(left)
-                .take(if left == 0 { 26 } else { 118 })
-                .collect::<String>()
+            line.chars().skip(left).take(if left == 0 { 26 } else { 118 }).collect::<String>()
         });
         let map: Vec<_> = map.collect();
         let find = |letter: &str| {
@@ -227,29 +176,15 @@ fn robot_way_target_hazard_and_field_are_where_they_are_on_the_map() {
         let (robot, target) = (find("▲"), find("X"));
         let ((robot_row, robot_col), (target_row, target_col)) = (robot[0], target[0]);
         assert_eq!((robot.len(), target.len()), (1, 1));
-        assert!(
-            target_row < robot_row && target_col == robot_col,
-            "the target is north of it"
-        );
+        assert!(target_row < robot_row && target_col == robot_col, "the target is north of it");
         let way: Vec<_> = find("·");
-        assert!(
-            way.iter()
-                .all(|&(row, col)| row >= robot_row && col == robot_col),
-            "{way:?}"
-        );
+        assert!(way.iter().all(|&(row, col)| row >= robot_row && col == robot_col), "{way:?}");
         assert!(!way.is_empty());
         assert!(find("↑").len() > 2, "the field leads north");
         let wall = |line: &str| columns(line, "█").len();
         let (north, south) = (wall(&map[2]), wall(&map[map.len() - 3]));
-        assert!(
-            south >= north + 3,
-            "{south} letters of wall below, {north} above"
-        );
-        assert!(
-            columns(&map[map.len() - 3], "█")
-                .iter()
-                .any(|&at| at > robot_col)
-        );
+        assert!(south >= north + 3, "{south} letters of wall below, {north} above");
+        assert!(columns(&map[map.len() - 3], "█").iter().any(|&at| at > robot_col));
     }
 }
 
@@ -260,10 +195,7 @@ fn a_long_message_is_shown_whole() {
     let whole = screen(&view, 80, 24).join(" ");
     let words = whole.matches("seen at").count();
     assert_eq!(words, 8, "{whole}");
-    assert!(
-        whole.contains("q quit") && whole.contains("supervisor"),
-        "{whole}"
-    );
+    assert!(whole.contains("q quit") && whole.contains("supervisor"), "{whole}");
 }
 
 #[test]

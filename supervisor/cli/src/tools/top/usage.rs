@@ -31,10 +31,7 @@ impl Processes {
     /// The usage of each of `processes` at `now`, in their order. Shares are over a second at least.
     pub(super) fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
         self.seen.retain(|process, _| processes.contains(process));
-        processes
-            .iter()
-            .map(|&process| self.one(process, now))
-            .collect()
+        processes.iter().map(|&process| self.one(process, now)).collect()
     }
 
     fn one(&mut self, process: u32, now: Instant) -> Usage {
@@ -51,10 +48,7 @@ impl Processes {
             let over = now.saturating_duration_since(at).as_secs_f64();
             used.saturating_sub(then).as_secs_f64() / over
         });
-        let usage = Usage {
-            cpu,
-            memory_bytes: memory_bytes(&process.to_string(), "VmRSS"),
-        };
+        let usage = Usage { cpu, memory_bytes: memory_bytes(&process.to_string(), "VmRSS") };
         self.seen.insert(process, (now, used, usage));
         usage
     }
@@ -68,9 +62,7 @@ fn cpu_time(process: u32) -> Option<Duration> {
     let mut times = numbers.split_ascii_whitespace().skip(11);
     let mut time = || times.next()?.parse::<u64>().ok();
     let ticks = time()?.saturating_add(time()?);
-    Some(Duration::from_secs_f64(
-        ticks as f64 / clock_ticks_per_second() as f64,
-    ))
+    Some(Duration::from_secs_f64(ticks as f64 / clock_ticks_per_second() as f64))
 }
 
 /// The bytes that `field` of the status of `process`, a number or `self`, gives in kB.

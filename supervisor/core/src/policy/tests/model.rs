@@ -179,15 +179,8 @@ impl Model {
         if generation.stopping {
             return self.wanted.then(|| self.begin());
         }
-        let until = if generation.aborted {
-            generation.sign
-        } else {
-            now
-        };
-        if generation
-            .ready
-            .is_some_and(|since| until - since >= ms(500))
-        {
+        let until = if generation.aborted { generation.sign } else { now };
+        if generation.ready.is_some_and(|since| until - since >= ms(500)) {
             self.row = 0;
         }
         self.row += 1;
@@ -217,16 +210,9 @@ impl Model {
         assert_eq!(action, expected, "{event:?} at {now:?}, now {phase:?}");
         assert_eq!(self.policy.deadline(), self.due(), "{event:?}: {phase:?}");
         assert_eq!(phase == Phase::Held, self.held, "{event:?}: {phase:?}");
-        assert_eq!(
-            phase == Phase::Down,
-            self.generation.is_none() && !self.wanted
-        );
+        assert_eq!(phase == Phase::Down, self.generation.is_none() && !self.wanted);
         let no_process = matches!(phase, Phase::Down | Phase::Held | Phase::BackingOff { .. });
-        assert_eq!(
-            no_process,
-            self.generation.is_none(),
-            "{event:?}: {phase:?}"
-        );
+        assert_eq!(no_process, self.generation.is_none(), "{event:?}: {phase:?}");
     }
 
     /// The moments at and around what is due, and one long after anything.
@@ -245,8 +231,7 @@ impl Model {
         const ORIGIN: Duration = Duration::from_secs(100);
         let back = |then: &mut Now| *then = (*then + ORIGIN).saturating_sub(self.now);
         let mut same = self.clone();
-        same.deaths
-            .retain(|then| self.now - *then < ms(10_000) || self.wanted);
+        same.deaths.retain(|then| self.now - *then < ms(10_000) || self.wanted);
         same.deaths.iter_mut().for_each(back);
         same.policy.recent.iter_mut().for_each(back);
         match &mut same.policy.phase {

@@ -51,10 +51,7 @@ impl Place {
         [RIGHT, 0, LEFT, BACK].into_iter().find_map(|turn| {
             let cell = map.neighbour(self.cell, self.turned(turn))?;
             let heading = (usize::from(self.heading) + turn) % DIRECTIONS.len();
-            Some(Self {
-                cell,
-                heading: heading as u8,
-            })
+            Some(Self { cell, heading: heading as u8 })
         })
     }
 

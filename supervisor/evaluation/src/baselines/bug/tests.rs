@@ -6,11 +6,7 @@ use common::samples::{GridHeader, GuidanceSample, GuidanceStatus};
 fn wall() -> Vec<String> {
     let row = |row: i32| {
         let column = |col: i32| {
-            if col == 12 && (7..=17).contains(&row) {
-                '#'
-            } else {
-                '.'
-            }
+            if col == 12 && (7..=17).contains(&row) { '#' } else { '.' }
         };
         (0..25).map(column).collect()
     };
@@ -43,22 +39,14 @@ impl Drive {
     fn on(rows: &[String]) -> Self {
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let (header, cells) = drawn(&rows);
-        let mut drive = Self {
-            bug: Bug::new(&mission(TARGET)),
-            header,
-            cells,
-            at: START.into(),
-        };
+        let mut drive = Self { bug: Bug::new(&mission(TARGET)), header, cells, at: START.into() };
         drive.see();
         drive
     }
 
     /// Give the planner the map.
     fn see(&mut self) {
-        let input = Input::Grid {
-            header: &self.header,
-            cells: &self.cells,
-        };
+        let input = Input::Grid { header: &self.header, cells: &self.cells };
         let outcome = self.bug.step(input, MissionTime::default());
         assert_eq!(outcome, Outcome::Followed);
     }
@@ -101,11 +89,7 @@ fn a_hazard_is_gone_around_to_the_left_and_left_on_the_line_nearer_to_the_target
     drive.until(|drive| drive.at.y.abs() > 0.3);
     assert!(drive.at.y > 0.0, "to the left, {}", drive.at);
     drive.until(|drive| !drive.follows());
-    assert!(
-        drive.at.x > 0.05 && drive.at.y.abs() < 0.08,
-        "left at {}",
-        drive.at
-    );
+    assert!(drive.at.x > 0.05 && drive.at.y.abs() < 0.08, "left at {}", drive.at);
     drive.until(Drive::is_there);
     assert!(drive.is_there(), "{:?} at {}", drive.bug.state(), drive.at);
 }

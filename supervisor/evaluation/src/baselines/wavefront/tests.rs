@@ -18,14 +18,8 @@ const WALL: [&str; 9] = [
 fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
     let mut planner = Wavefront::new(&mission([0.3, 0.0]));
     let (header, cells) = drawn(rows);
-    let input = Input::Grid {
-        header: &header,
-        cells: &cells,
-    };
-    assert_eq!(
-        planner.step(input, MissionTime::default()),
-        Outcome::Followed
-    );
+    let input = Input::Grid { header: &header, cells: &cells };
+    assert_eq!(planner.step(input, MissionTime::default()), Outcome::Followed);
     match planner.step(Input::Pose(&pose(at)), MissionTime::default()) {
         Outcome::Guidance(guidance) => guidance,
         outcome => panic!("{outcome:?}"),
@@ -41,17 +35,10 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
     let mut driven = 0.0;
     while at.distance(DVec2::new(0.3, 0.0)) > 0.03 {
         let guidance = guidance(&WALL, at.into());
-        assert_eq!(
-            guidance.status,
-            u8::from(GuidanceStatus::Along),
-            "at {at}, after {driven} m"
-        );
+        assert_eq!(guidance.status, u8::from(GuidanceStatus::Along), "at {at}, after {driven} m");
         at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         driven += 0.02;
-        assert!(
-            belief.map().unwrap().free_cell_at(at).is_some(),
-            "in the wall at {at}"
-        );
+        assert!(belief.map().unwrap().free_cell_at(at).is_some(), "in the wall at {at}");
         assert!(driven < 2.0, "no end of it, at {at}");
     }
     // The path leads around the end of the wall: two legs of 0.3 by 0.3 m, 0.85 m in all; cells round it up.

@@ -23,10 +23,7 @@ pub enum LiveError {
     #[error("cannot make the directory of the live stages: {0}; is $TMPDIR writable?")]
     Directory(io::Error),
     #[error("cannot start {stage}: {source}")]
-    Start {
-        stage: &'static str,
-        source: io::Error,
-    },
+    Start { stage: &'static str, source: io::Error },
     #[error("{stage} ended in tick {tick}: {cause}; its log ends: {log_tail:?}")]
     Ended {
         stage: &'static str,

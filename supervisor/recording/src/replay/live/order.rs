@@ -18,11 +18,7 @@ pub(super) struct ByTick<I> {
 
 impl<I: Iterator<Item = Result<Message, RecordingError>>> ByTick<I> {
     pub(super) const fn new(messages: I) -> Self {
-        Self {
-            messages,
-            held: BTreeMap::new(),
-            came: 0,
-        }
+        Self { messages, held: BTreeMap::new(), came: 0 }
     }
 }
 
@@ -36,14 +32,8 @@ impl<I: Iterator<Item = Result<Message, RecordingError>>> Iterator for ByTick<I>
                 Some(Err(error)) => return Some(Err(error)),
                 None => break,
             };
-            let place = topics::TABLE
-                .iter()
-                .position(|topic| topic.spec().name == &*message.topic);
-            let key = (
-                tick_of(&message.data),
-                place.unwrap_or(topics::TABLE.len()),
-                self.came,
-            );
+            let place = topics::TABLE.iter().position(|topic| topic.spec().name == &*message.topic);
+            let key = (tick_of(&message.data), place.unwrap_or(topics::TABLE.len()), self.came);
             self.came += 1;
             self.held.insert(key, message);
         }
@@ -58,12 +48,7 @@ mod tests {
     fn message(topic: &str, tick: u64) -> Message {
         let mut data = vec![0; 4];
         data.extend_from_slice(&tick.to_le_bytes());
-        Message {
-            topic: topic.into(),
-            log_ns: 0,
-            sequence: 0,
-            data,
-        }
+        Message { topic: topic.into(), log_ns: 0, sequence: 0, data }
     }
 
     #[test]
@@ -75,9 +60,6 @@ mod tests {
             .map(|message| (message.topic.to_string(), tick_of(&message.data)))
             .collect();
         let expected = [("range", 1), ("pose", 1), ("range", 2), ("pose", 2)];
-        assert_eq!(
-            ordered,
-            expected.map(|(topic, tick)| (topic.to_owned(), tick))
-        );
+        assert_eq!(ordered, expected.map(|(topic, tick)| (topic.to_owned(), tick)));
     }
 }

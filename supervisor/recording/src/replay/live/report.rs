@@ -39,11 +39,7 @@ impl fmt::Display for LiveReport {
             "live stage", "answered", "as recorded", "unanswered"
         )?;
         for (stage, found) in &self.stages {
-            let LiveStageReport {
-                answered,
-                equal,
-                unanswered,
-            } = found;
+            let LiveStageReport { answered, equal, unanswered } = found;
             writeln!(to, "{stage:<16} {answered:>9} {equal:>12} {unanswered:>11}")?;
         }
         let Some(first) = &self.first else {

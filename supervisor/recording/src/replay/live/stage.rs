@@ -58,9 +58,8 @@ impl LiveStage {
     ) -> Result<Self, LiveError> {
         let mut answers = Vec::new();
         for topic in topics::ENCODED {
-            let is_compared = COMPARED
-                .iter()
-                .any(|compared| compared.spec().name == topic.spec().name);
+            let is_compared =
+                COMPARED.iter().any(|compared| compared.spec().name == topic.spec().name);
             if is_compared && topic.spec().writer == stage.name {
                 waiter.on(bus.wakeup(*topic)?);
                 answers.push(Answers {
@@ -80,22 +79,12 @@ impl LiveStage {
             first_tick: 0,
         };
         let log = directory.join(format!("{}.log", stage.name));
-        let failed = |source: io::Error| LiveError::Start {
-            stage: stage.name,
-            source,
-        };
+        let failed = |source: io::Error| LiveError::Start { stage: stage.name, source };
         let mut command = process::stage(stage.executable(&run.mission), &generation);
-        command
-            .stdout(Stdio::null())
-            .stderr(File::create(&log).map_err(failed)?);
+        command.stdout(Stdio::null()).stderr(File::create(&log).map_err(failed)?);
         let process = Process::spawn(command).map_err(failed)?;
         waiter.on_readable(&process)?;
-        Ok(Self {
-            stage,
-            process,
-            log,
-            answers,
-        })
+        Ok(Self { stage, process, log, answers })
     }
 
     /// How it ended, and the end of its log; none while it runs.
@@ -119,9 +108,7 @@ impl LiveStage {
             return true;
         }
         let outputs = self.stage.wiring.outputs.iter();
-        outputs
-            .map(|output| output.spec().name)
-            .any(|name| name == topic)
+        outputs.map(|output| output.spec().name).any(|name| name == topic)
     }
 
     /// Read its samples. Returns whether it has answered `tick` on every topic on which the recorded stage did.

@@ -4,30 +4,18 @@ use super::*;
 use crate::chaos::robot_fault::TABLE;
 
 const fn encoder(position: u16) -> Encoder {
-    Encoder {
-        position,
-        speed: 300,
-        positive: true,
-    }
+    Encoder { position, speed: 300, positive: true }
 }
 
 /// The bytes that a robot with these counts sends in a tick.
 fn tick(counts: [u16; 2]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let motor = MotorSensors {
-        encoders: counts.map(encoder),
-        ..MotorSensors::default()
-    };
-    let standard = StandardSensors {
-        ultrasonic: [90; 6],
-        human: [2048; 4],
-        ..StandardSensors::default()
-    };
-    for report in [
-        Report::Motor(motor),
-        Report::Standard(standard),
-        Report::System(SystemSignal::Ack),
-    ] {
+    let motor = MotorSensors { encoders: counts.map(encoder), ..MotorSensors::default() };
+    let standard =
+        StandardSensors { ultrasonic: [90; 6], human: [2048; 4], ..StandardSensors::default() };
+    for report in
+        [Report::Motor(motor), Report::Standard(standard), Report::System(SystemSignal::Ack)]
+    {
         report.encode(Addressing::Numbered, &mut bytes);
     }
     bytes
@@ -48,10 +36,7 @@ fn reports(passed: &[Late]) -> Vec<Report> {
         }
     }
     let frames = reports.len() as u64;
-    let sound = DecoderTally {
-        frames,
-        ..DecoderTally::default()
-    };
+    let sound = DecoderTally { frames, ..DecoderTally::default() };
     assert_eq!(decoder.tally(), sound);
     reports
 }
@@ -86,10 +71,7 @@ fn bytes_pass_unchanged_until_the_fault_begins_and_every_frame_of_a_fault_is_val
         let mut injector = FaultInjector::new(row.fault, 1);
         let passed = injector.report(&tick([100, 200]), at(1.0));
         assert_eq!(passed.len(), 1, "{}", row.name);
-        assert_eq!(
-            (passed[0].at, &passed[0].bytes),
-            (at(1.0), &tick([100, 200]))
-        );
+        assert_eq!((passed[0].at, &passed[0].bytes), (at(1.0), &tick([100, 200])));
         injector.begin();
         for number in 0..50 {
             let now = at(1.1 + 0.1 * f64::from(number));
@@ -97,12 +79,7 @@ fn bytes_pass_unchanged_until_the_fault_begins_and_every_frame_of_a_fault_is_val
             // It panics if a frame is invalid.
             let reports = reports(&passed);
             let acknowledged = reports.contains(&Report::System(SystemSignal::Ack));
-            assert_eq!(
-                acknowledged,
-                row.fault != RobotFault::Silence,
-                "{}",
-                row.name
-            );
+            assert_eq!(acknowledged, row.fault != RobotFault::Silence, "{}", row.name);
         }
     }
 }
@@ -119,15 +96,9 @@ fn the_encoders_lie_as_the_table_says() {
     assert_eq!(told(F::SonarStuck), Some([150, 190]));
     assert_eq!([told(F::StreamsStop), told(F::Silence)], [None, None]);
     let dead = told(F::EncoderDead);
-    assert!(
-        dead == Some([100, 190]) || dead == Some([150, 200]),
-        "{dead:?}"
-    );
+    assert!(dead == Some([100, 190]) || dead == Some([150, 200]), "{dead:?}");
     let reversed = told(F::EncoderReversed);
-    assert!(
-        reversed == Some([50, 190]) || reversed == Some([150, 210]),
-        "{reversed:?}"
-    );
+    assert!(reversed == Some([50, 190]) || reversed == Some([150, 210]), "{reversed:?}");
     let (mut injector, first) = faulted(F::CountsRandom, [150, 190]);
     let second = injector.report(&tick([150, 190]), at(1.2));
     assert_ne!(counts(&first), counts(&second));
@@ -177,26 +148,16 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
     };
     let go = bytes(Command::velocity([Some(-400), Some(400)], 250));
     let stop = bytes(Command::velocity([Some(0), Some(0)], 250));
-    let suspend = bytes(Command::Enable {
-        on: false,
-        channel: None,
-    });
+    let suspend = bytes(Command::Enable { on: false, channel: None });
     let mut moved = 0;
     let mut injector = FaultInjector::new(RobotFault::DoesNotStop, 1);
     let mut heard =
         |injector: &mut FaultInjector, bytes: &[u8]| injector.order(bytes, &mut || moved += 1);
     assert_eq!(heard(&mut injector, &go), go);
-    assert_eq!(
-        heard(&mut injector, &stop),
-        stop,
-        "the robot stops before its fault"
-    );
+    assert_eq!(heard(&mut injector, &stop), stop, "the robot stops before its fault");
     injector.begin();
     assert_eq!(heard(&mut injector, &stop), go);
     assert_eq!(heard(&mut injector, &suspend), suspend);
     assert_eq!(heard(&mut injector, &stop), stop);
-    assert_eq!(
-        moved, 1,
-        "what the host ordered, not what the robot was told"
-    );
+    assert_eq!(moved, 1, "what the host ordered, not what the robot was told");
 }

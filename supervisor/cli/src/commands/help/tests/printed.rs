@@ -23,9 +23,7 @@ fn test_functions() -> BTreeSet<String> {
                 let text = fs::read_to_string(&path).unwrap();
                 // A macro of tests is called with their names, each before its row.
                 if text.contains("fn $promise()") {
-                    let promises = text
-                        .lines()
-                        .filter_map(|line| line.trim().strip_suffix(':'));
+                    let promises = text.lines().filter_map(|line| line.trim().strip_suffix(':'));
                     functions.extend(promises.map(str::to_owned));
                 }
                 functions.extend(text.split("#[test]").skip(1).filter_map(|after| {
@@ -62,10 +60,7 @@ fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
 fn every_capability_has_a_verdict_and_every_contract_tests_that_exist() {
     let functions = test_functions();
     let rows = stored::capabilities();
-    let flaws: Vec<_> = rows
-        .iter()
-        .filter_map(|row| flaw(row, &functions))
-        .collect();
+    let flaws: Vec<_> = rows.iter().filter_map(|row| flaw(row, &functions)).collect();
     assert!(flaws.is_empty(), "{flaws:#?}");
     assert!(rows.len() > 90, "only {} rows were found", rows.len());
 }
@@ -99,9 +94,7 @@ fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
     while let Some(line) = lines.next() {
         renewed.push_str(line);
         renewed.push('\n');
-        let marker = line
-            .strip_prefix("<!-- table ")
-            .and_then(|line| line.strip_suffix(" -->"));
+        let marker = line.strip_prefix("<!-- table ").and_then(|line| line.strip_suffix(" -->"));
         let Some(marker) = marker else { continue };
         let (name, section) = match marker.split_once(' ') {
             Some((name, section)) => (name, Some(section)),
@@ -109,10 +102,7 @@ fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
         };
         renewed.push('\n');
         renewed.push_str(&print(name, section));
-        while lines
-            .next_if(|line| line.is_empty() || is_of_a_table(line))
-            .is_some()
-        {}
+        while lines.next_if(|line| line.is_empty() || is_of_a_table(line)).is_some() {}
         if lines.peek().is_some() {
             renewed.push('\n');
         }
@@ -122,9 +112,7 @@ fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
 
 /// Whether a line can stand in a printed table or list.
 fn is_of_a_table(line: &str) -> bool {
-    ["- ", "  ", "|"]
-        .iter()
-        .any(|start| line.starts_with(start))
+    ["- ", "  ", "|"].iter().any(|start| line.starts_with(start))
 }
 
 #[test]
