@@ -122,8 +122,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     assert_nothing_left("rec-shot");
 }
 
-/// After a change that is meant, record it again, from the top of the tree:
-/// `firsthand run open-room --timeout 8 --robot x80 --out /tmp/golden`, then copy `recording.mcap` from there.
+/// After a change that is meant, `.ci/renew` records it again.
 #[test]
 fn the_golden_recording_replays_to_the_bit() {
     let report = replayed(&golden());
