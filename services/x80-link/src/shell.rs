@@ -164,10 +164,10 @@ fn log_battery(change: &BatteryChange) {
     let pack = pack.as_str();
     match charge {
         Charge::Empty => {
-            tracing::error!(pack, volts, "battery empty: charge it, or set robot.low_battery_v")
+            tracing::error!(pack, volts, "battery empty: charge it, or set robot.low_battery_v");
         }
         Charge::Low => {
-            tracing::warn!(pack, volts, "battery low: charge it, or set robot.low_battery_v")
+            tracing::warn!(pack, volts, "battery low: charge it, or set robot.low_battery_v");
         }
         Charge::Enough => tracing::info!(pack, volts, "the battery gives enough again"),
     }
