@@ -231,7 +231,8 @@ fn no_line_of_a_document_is_longer_than_160_letters() {
 
 #[test]
 fn the_guide_has_at_most_11000_words_beside_its_tables() {
-    let lines = GUIDE.iter().flat_map(|page| page.text.lines()).filter(|line| !line.starts_with('|'));
+    let lines =
+        GUIDE.iter().flat_map(|page| page.text.lines()).filter(|line| !line.starts_with('|'));
     let words: usize = lines.map(|line| line.split_whitespace().count()).sum();
     assert!(words <= 11_000, "{words} words");
 }
