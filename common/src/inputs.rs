@@ -95,16 +95,11 @@ impl InputLog {
 
 /// Samples as fields of an input: `#[serde(with = "inputs::sample")]`.
 pub mod sample {
-    use std::{fmt, marker::PhantomData};
-
-    use serde::{Deserializer, Serializer, de};
+    use serde::{Deserializer, Serializer, de::Error as _};
 
     use crate::bus::{Layout, decode_sample, encode_sample};
 
     /// Write it.
-    ///
-    /// # Errors
-    /// Those of `to`.
     pub fn serialize<P: Layout, S: Serializer>(sample: &P, to: S) -> Result<S::Ok, S::Error> {
         let mut bytes = Vec::with_capacity(size_of::<P>() + 8);
         encode_sample(sample, &mut bytes);
@@ -112,22 +107,40 @@ pub mod sample {
     }
 
     /// Read it.
-    ///
-    /// # Errors
-    /// When it is no such sample.
     pub fn deserialize<'de, P: Layout, D: Deserializer<'de>>(from: D) -> Result<P, D::Error> {
-        struct Bytes<P>(PhantomData<P>);
-        impl<P: Layout> de::Visitor<'_> for Bytes<P> {
-            type Value = P;
+        let bytes: &[u8] = serde_bytes::deserialize(from)?;
+        decode_sample(bytes).ok_or_else(|| D::Error::custom("not a sample of this topic"))
+    }
+}
 
-            fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-                to.write_str("the bytes of a sample")
-            }
+/// A header with a slice as a field of an input: `#[serde(with = "inputs::slice")]`.
+pub mod slice {
+    use std::borrow::Cow;
 
-            fn visit_bytes<E: de::Error>(self, bytes: &[u8]) -> Result<P, E> {
-                decode_sample(bytes).ok_or_else(|| E::custom("not a sample of this topic"))
-            }
-        }
-        from.deserialize_bytes(Bytes(PhantomData))
+    use serde::{Deserializer, Serializer, de::Error as _};
+
+    use crate::bus::{Layout, decode_slice, encode_slice};
+
+    /// Write it.
+    pub fn serialize<H: Layout, T: Layout + Clone, S: Serializer>(
+        (header, slice): &(H, Cow<'_, [T]>),
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        let mut bytes = Vec::with_capacity(size_of::<H>() + size_of_val(&**slice) + 16);
+        encode_slice(header, slice, &mut bytes);
+        to.serialize_bytes(&bytes)
+    }
+
+    /// Read it.
+    pub fn deserialize<'de, H, T, D>(from: D) -> Result<(H, Cow<'static, [T]>), D::Error>
+    where
+        H: Layout,
+        T: Layout + Clone + Default,
+        D: Deserializer<'de>,
+    {
+        let bytes: &[u8] = serde_bytes::deserialize(from)?;
+        let (header, slice) =
+            decode_slice(bytes).ok_or_else(|| D::Error::custom("not a sample of this topic"))?;
+        Ok((header, Cow::Owned(slice)))
     }
 }

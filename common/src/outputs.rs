@@ -26,7 +26,7 @@ pub struct Outputs {
 
 enum Destination {
     Process(Box<Process>),
-    Replay(Vec<Output>),
+    Replay { published: Vec<Output>, has_field: bool },
 }
 
 struct Process {
@@ -34,22 +34,14 @@ struct Process {
     inputs: InputLog,
     saved: Saved,
     budget: LatencyBudget,
+    /// The topic that answers a tick: the last of the outputs that are published each tick.
+    answer: Option<&'static str>,
     /// An input was noted, and nothing published since.
     noted: bool,
 }
 
-/// How readers come to know of a sample.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Wake {
-    /// They are woken, and the tick is answered.
-    Answer,
-    Yes,
-    /// Something else wakes them.
-    No,
-}
-
 impl Outputs {
-    /// Of the process of `context`, which starts from `start`; a slice has at most `longest` elements.
+    /// The outputs of the process of `context`, which starts from `start`. A slice has at most `longest` elements.
     pub(crate) fn of_process(
         context: &mut Context,
         start: &impl Serialize,
@@ -61,29 +53,37 @@ impl Outputs {
             inputs,
             saved: context.take_saved(),
             budget: context.budget.clone(),
+            answer: context.opened.wiring.answer(),
             noted: false,
         };
         process.open(context, longest, false)?;
         Ok(Self { at: Progress::default(), to: Destination::Process(Box::new(process)) })
     }
 
-    pub(crate) fn of_replay() -> Self {
-        Self { at: Progress::default(), to: Destination::Replay(Vec::new()) }
+    /// The outputs of a replay. `has_field` says whether samples of `field` are compared.
+    pub(crate) fn of_replay(has_field: bool) -> Self {
+        let to = Destination::Replay { published: Vec::new(), has_field };
+        Self { at: Progress::default(), to }
+    }
+
+    /// Whether samples of `field` are published: a replay saves the time where there are none to compare with.
+    pub const fn has_field(&self) -> bool {
+        matches!(self.to, Destination::Process(_) | Destination::Replay { has_field: true, .. })
     }
 
     /// Open the topics that follow each frame of the robot.
     pub(crate) fn open_late(&mut self, context: &mut Context) -> Result<(), StageError> {
         match &mut self.to {
             Destination::Process(process) => process.open(context, 0, true),
-            Destination::Replay(_) => Ok(()),
+            Destination::Replay { .. } => Ok(()),
         }
     }
 
-    /// What was published since this was last asked, in a replay.
+    /// The samples that a replay published since the last call.
     pub(crate) fn drain(&mut self) -> Vec<Output> {
         match &mut self.to {
             Destination::Process(_) => Vec::new(),
-            Destination::Replay(published) => std::mem::take(published),
+            Destination::Replay { published, .. } => std::mem::take(published),
         }
     }
 
@@ -107,94 +107,75 @@ impl Outputs {
         }
     }
 
-    /// Publish the inputs that were noted: what follows from them is not a sample.
+    /// Publish the inputs that were noted, before anything follows from them that is not a sample.
     pub fn publish_inputs(&mut self) -> Result<(), StageError> {
         match &mut self.to {
             Destination::Process(process) => process.publish_inputs(self.at),
-            Destination::Replay(_) => Ok(()),
+            Destination::Replay { .. } => Ok(()),
         }
-    }
-
-    /// Publish the sample that answers the tick.
-    pub fn answer<P>(&mut self, topic: &'static Topic<P>, sample: P) -> Result<(), StageError>
-    where
-        P: Payload + Stamped + Layout,
-    {
-        self.put(topic, sample, Wake::Answer)
     }
 
     /// Publish a sample, and wake its readers.
-    pub fn give<P>(&mut self, topic: &'static Topic<P>, sample: P) -> Result<(), StageError>
+    pub fn publish<P>(&mut self, topic: &'static Topic<P>, sample: P) -> Result<(), StageError>
     where
         P: Payload + Stamped + Layout,
     {
-        self.put(topic, sample, Wake::Yes)
-    }
-
-    /// As [`Outputs::answer`], of a header with a slice.
-    pub fn answer_slice<H, T>(
-        &mut self,
-        topic: &'static SliceTopic<H, T>,
-        header: H,
-        slice: &[T],
-    ) -> Result<(), StageError>
-    where
-        H: Payload + Stamped + Layout,
-        T: Payload + Layout,
-    {
-        self.put_slice(topic, header, slice, Wake::Answer)
-    }
-
-    /// Publish a header with a slice, and wake nobody.
-    pub fn give_slice_quietly<H, T>(
-        &mut self,
-        topic: &'static SliceTopic<H, T>,
-        header: H,
-        slice: &[T],
-    ) -> Result<(), StageError>
-    where
-        H: Payload + Stamped + Layout,
-        T: Payload + Layout,
-    {
-        self.put_slice(topic, header, slice, Wake::No)
-    }
-
-    fn put<P: Payload + Stamped + Layout>(
-        &mut self,
-        topic: &'static Topic<P>,
-        sample: P,
-        wake: Wake,
-    ) -> Result<(), StageError> {
         let Progress { tick, time } = self.at;
         match &mut self.to {
-            Destination::Replay(published) => {
+            Destination::Replay { published, .. } => {
                 published.push(Output::of(topic, tick, time, sample));
+                Ok(())
             }
             Destination::Process(process) => {
                 let publish = |writer: &mut Writer<P>| writer.publish_quietly(tick, time, sample);
-                process.publish(topic.spec().name, self.at, wake, publish, Writer::wake)?;
+                let writer: &Writer<P> = process.publish(topic.spec().name, self.at, publish)?;
+                Ok(writer.wake()?)
             }
         }
-        Ok(())
     }
 
-    fn put_slice<H: Payload + Stamped + Layout, T: Payload + Layout>(
+    /// Publish a header with a slice, and wake its readers.
+    pub fn publish_slice<H, T>(
         &mut self,
         topic: &'static SliceTopic<H, T>,
         header: H,
         slice: &[T],
-        wake: Wake,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), StageError>
+    where
+        H: Payload + Stamped + Layout,
+        T: Payload + Layout,
+    {
+        self.publish_slice_quietly(topic, header, slice)?;
+        match &mut self.to {
+            Destination::Replay { .. } => Ok(()),
+            Destination::Process(process) => {
+                let writer: &mut SliceWriter<H, T> = process.writer(topic.spec().name)?;
+                Ok(writer.wake()?)
+            }
+        }
+    }
+
+    /// Publish a header with a slice on a topic that wakes nobody.
+    pub fn publish_slice_quietly<H, T>(
+        &mut self,
+        topic: &'static SliceTopic<H, T>,
+        header: H,
+        slice: &[T],
+    ) -> Result<(), StageError>
+    where
+        H: Payload + Stamped + Layout,
+        T: Payload + Layout,
+    {
         let Progress { tick, time } = self.at;
         match &mut self.to {
-            Destination::Replay(published) => {
+            Destination::Replay { published, .. } => {
                 published.push(Output::of_slice(topic, tick, time, header, slice));
             }
             Destination::Process(process) => {
                 let publish = |writer: &mut SliceWriter<H, T>| {
                     writer.publish_slice_quietly(tick, time, header, slice)
                 };
-                process.publish(topic.spec().name, self.at, wake, publish, SliceWriter::wake)?;
+                process.publish(topic.spec().name, self.at, publish)?;
             }
         }
         Ok(())
@@ -213,7 +194,7 @@ impl Outputs {
                 let writer: &mut SliceWriter<H, T> = process.writer(topic.spec().name)?;
                 Ok(writer.has_new_reader())
             }
-            Destination::Replay(_) => Ok(false),
+            Destination::Replay { .. } => Ok(false),
         }
     }
 
@@ -249,7 +230,7 @@ impl Outputs {
     pub fn is_journal_long(&self) -> bool {
         match &self.to {
             Destination::Process(process) => process.saved.is_journal_long(),
-            Destination::Replay(_) => false,
+            Destination::Replay { .. } => false,
         }
     }
 
@@ -257,7 +238,7 @@ impl Outputs {
     pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result<(), StageError> {
         match &mut self.to {
             Destination::Process(process) => Ok(process.saved.shorten_journal(state)?),
-            Destination::Replay(_) => Ok(()),
+            Destination::Replay { .. } => Ok(()),
         }
     }
 }
@@ -287,26 +268,19 @@ impl Process {
         writer.ok_or(WiringError::NotListed(Access::Write, topic).into())
     }
 
-    /// Publish a sample on `topic`, and the inputs that it follows from before.
+    /// Publish the inputs that were noted, then a sample on `topic`. The caller wakes the readers.
     fn publish<W: 'static>(
         &mut self,
         topic: &'static str,
         at: Progress,
-        wake: Wake,
         publish: impl FnOnce(&mut W) -> Result<(), BusError>,
-        wake_readers: impl FnOnce(&W) -> Result<(), BusError>,
-    ) -> Result<(), StageError> {
+    ) -> Result<&mut W, StageError> {
         self.publish_inputs(at)?;
-        let budget = self.budget.clone();
-        let writer = self.writer(topic)?;
-        publish(writer)?;
-        if wake == Wake::Answer {
-            budget.published(at.tick, Answers::Inputs);
+        publish(self.writer(topic)?)?;
+        if self.answer == Some(topic) {
+            self.budget.published(at.tick, Answers::Inputs);
         }
-        if wake != Wake::No {
-            wake_readers(writer)?;
-        }
-        Ok(())
+        self.writer(topic)
     }
 
     fn publish_inputs(&mut self, at: Progress) -> Result<(), StageError> {

@@ -69,9 +69,6 @@ pub enum ReplayError {
     /// It is not of this program.
     #[error("not an entry of this version of the stage ({0}); replay with the version that ran")]
     Foreign(#[from] postcard::Error),
-    /// It holds another sample than it should.
-    #[error("an entry holds no sample of topic {0:?}; replay with the version that ran")]
-    Sample(&'static str),
     /// The stage could not take it.
     #[error("the stage cannot take an entry: {0}")]
     Stage(String),

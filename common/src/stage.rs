@@ -116,7 +116,7 @@ pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, Rep
         // The process went on without a foreign state, too.
         let _ = stage.begin(entry(beginning.start)?);
     }
-    let out = Outputs::of_replay();
+    let out = Outputs::of_replay(beginning.fields);
     Ok(Box::new(Generation { stage, out }))
 }
 
@@ -209,7 +209,7 @@ impl<A: Answering> Stage for A {
         if answer.saves_first {
             out.save(self.state())?;
         }
-        out.answer(A::OUTPUT, answer.sample)?;
+        out.publish(A::OUTPUT, answer.sample)?;
         if !answer.saves_first {
             out.save(self.state())?;
         }

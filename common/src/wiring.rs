@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::{
     bus::OpenTopic,
-    topics::{FAULTS, HEALTH, INPUTS},
+    topics::{FAULTS, HEALTH, INPUTS, Rate},
 };
 
 /// Rows of the table of topics.
@@ -28,7 +28,8 @@ pub struct Wiring {
     pub feedback: Topics,
     /// Topics that start a turn of its work loop.
     pub wakes: Topics,
-    /// Topics it alone writes. Those that follow each frame of the robot are opened after the first heartbeat that says ready.
+    /// Topics that it alone writes. The last one that is published each tick answers the tick. Topics that follow each frame
+    /// of the robot are opened after the first heartbeat that says ready.
     pub outputs: Topics,
     /// What its next process goes on from.
     pub persists: Persists,
@@ -74,6 +75,12 @@ impl Wiring {
             outputs: &[],
             persists: Persists::Nothing,
         }
+    }
+
+    /// The topic that answers a tick.
+    pub(crate) fn answer(&self) -> Option<&'static str> {
+        let mut specs = self.outputs.iter().rev().map(|topic| topic.spec());
+        specs.find(|spec| spec.rate == Rate::EachTick).map(|spec| spec.name)
     }
 
     /// The names of the topics that it opens for `access`.

@@ -1,5 +1,7 @@
 //! Cells and metres: what is believed of a cell, windows of cells, and how the cells lie in the mission frame.
 
+use std::borrow::Cow;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -179,16 +181,16 @@ impl GridFrame {
     }
 
     /// The cells of `window` out of a row-major slice of the whole map, in order.
-    pub fn cells_of<'map, T: Copy>(
-        &self,
-        window: Window,
-        map: &'map [T],
-    ) -> impl ExactSizeIterator<Item = T> + use<'map, T> {
-        let (frame, width) = (*self, window.width.max(1));
-        (0..window.area() as u32).map(move |offset| {
-            map[frame
-                .index(Cell { col: window.col + offset % width, row: window.row + offset / width })]
-        })
+    pub fn cells_of<'map, T: Copy>(&self, window: Window, map: &'map [T]) -> Cow<'map, [T]> {
+        if window == self.whole() {
+            return Cow::Borrowed(map);
+        }
+        let mut cells = Vec::with_capacity(window.area());
+        for row in window.row..window.row + window.height {
+            let start = self.index(Cell { col: window.col, row });
+            cells.extend_from_slice(&map[start..start + window.width as usize]);
+        }
+        Cow::Owned(cells)
     }
 
     /// The smallest window outside of which two whole maps are the same; empty if they are.

@@ -78,12 +78,7 @@ impl Stage for Mapper {
             Change::Whole => Part::whole(frame, version),
         };
         let (header, cells) = (self.header(part), self.state().cells());
-        if part.is_keyframe() {
-            out.answer_slice(&GRID, header, cells)?;
-        } else {
-            let window: Vec<u8> = frame.cells_of(part.window(), cells).collect();
-            out.answer_slice(&GRID, header, &window)?;
-        }
+        out.publish_slice(&GRID, header, &frame.cells_of(part.window(), cells))?;
         Ok(Some(part))
     }
 }

@@ -8,7 +8,6 @@ use std::{
 };
 
 use common::{
-    bus::{BusError, SliceWriter},
     clock::MissionTime,
     grid::{GridFrame, Part, Window},
     samples::{FieldCell, FieldHeader},
@@ -20,12 +19,25 @@ use crate::{background::Background, step::Snapshot};
 
 /// The policy of every cell.
 #[derive(Debug)]
-struct Policy {
-    header: FieldHeader,
-    frame: GridFrame,
+pub(crate) struct Policy {
+    pub(crate) header: FieldHeader,
+    pub(crate) frame: GridFrame,
+    pub(crate) cells: Arc<Vec<FieldCell>>,
+}
+
+impl Policy {
+    pub(crate) fn of(snapshot: &Snapshot) -> Self {
+        let Snapshot { header, frame, .. } = *snapshot;
+        Self { header, frame, cells: Arc::new(snapshot.cells()) }
+    }
+}
+
+/// A result of the thread.
+#[derive(Debug)]
+struct Computed {
+    policy: Policy,
     /// The tick whose field it is computed from.
     at: Progress,
-    cells: Arc<Vec<FieldCell>>,
     /// The window in which it differs from the policy before.
     changed: Window,
 }
@@ -40,7 +52,7 @@ struct Worker {
 }
 
 impl Worker {
-    fn policy(&mut self, (snapshot, at): (Snapshot, Progress)) -> Policy {
+    fn compute(&mut self, (snapshot, at): (Snapshot, Progress)) -> Computed {
         let frame = snapshot.frame;
         let rows = frame.cells as usize;
         let mut cells = Vec::with_capacity(frame.area());
@@ -58,19 +70,17 @@ impl Worker {
             frame.whole()
         };
         self.before = Arc::clone(&cells);
-        Policy { header: snapshot.header, frame, at, cells, changed }
+        Computed { policy: Policy { header: snapshot.header, frame, cells }, at, changed }
     }
 }
 
-/// Publishes the window that changed, or the whole policy when that is due again or there is a new reader.
+/// Says which part of which policy is to be published: the window that changed, or the whole policy when that is due again
+/// or there is a new reader.
 #[derive(Debug)]
 pub(crate) struct FieldPublisher {
-    writer: SliceWriter<FieldHeader, FieldCell>,
-    thread: Background<(Snapshot, Progress), Policy>,
+    thread: Background<(Snapshot, Progress), Computed>,
     /// The thread computes a policy.
     busy: bool,
-    /// The policy that was published last.
-    published: Option<Policy>,
     version: u64,
     change_published: Option<MissionTime>,
     keyframe_published: Option<MissionTime>,
@@ -79,18 +89,12 @@ pub(crate) struct FieldPublisher {
 }
 
 impl FieldPublisher {
-    /// Publishes through `writer`.
-    ///
-    /// # Errors
-    /// When the system has no thread or descriptor left.
-    pub(crate) fn start(writer: SliceWriter<FieldHeader, FieldCell>) -> io::Result<Self> {
+    /// Start the thread.
+    pub(crate) fn start() -> io::Result<Self> {
         let mut worker = Worker::default();
-        let policy = move |job| worker.policy(job);
         Ok(Self {
-            writer,
-            thread: Background::start("policy", policy)?,
+            thread: Background::start("policy", move |job| worker.compute(job))?,
             busy: false,
-            published: None,
             version: 0,
             change_published: None,
             keyframe_published: None,
@@ -116,26 +120,31 @@ impl FieldPublisher {
         self.busy
     }
 
-    /// The part to publish `now`, if any, and its tick: a policy that is ready has its own tick, one that is published again
-    /// has that of `now`.
-    pub(crate) fn next(&mut self, now: Progress) -> Option<(Part, Progress)> {
+    /// The part of `policy` to publish `now`, if any, and its tick: a policy that is ready takes the place of `policy` and has
+    /// its own tick, one that is published again has that of `now`.
+    pub(crate) fn next(
+        &mut self,
+        now: Progress,
+        has_new_reader: bool,
+        policy: &mut Option<Policy>,
+    ) -> Option<(Part, Progress)> {
+        self.keyframe |= has_new_reader;
         let (mut changed, mut at) = (Window::default(), now);
         if self.busy {
-            let policy = self.thread.take()?;
+            let computed = self.thread.take()?;
             self.busy = false;
-            (changed, at) = (policy.changed, policy.at);
-            self.published = Some(policy);
+            (changed, at) = (computed.changed, computed.at);
+            *policy = Some(computed.policy);
         }
         let age = self.keyframe_published.map(|then| now.time.since(then));
-        self.keyframe |= self.writer.has_new_reader()
-            || age.is_none_or(|age| age >= topics::FIELD.restated_every());
-        let policy = self.published.as_ref()?;
+        self.keyframe |= age.is_none_or(|age| age >= topics::FIELD.restated_every());
+        let frame = policy.as_ref()?.frame;
         if changed.area() > 0 {
             self.version += 1;
         } else if !self.keyframe {
             return None;
         }
-        let (frame, version) = (policy.frame, self.version);
+        let version = self.version;
         let part = if self.keyframe || changed == frame.whole() {
             (self.keyframe, self.keyframe_published) = (false, Some(now.time));
             Part::whole(frame, version)
@@ -143,26 +152,6 @@ impl FieldPublisher {
             Part::of(frame, changed, version)
         };
         Some((part, at))
-    }
-
-    /// Publish `part`, as of `at`.
-    ///
-    /// # Errors
-    /// When the middleware refuses.
-    pub(crate) fn publish(&mut self, part: Part, at: Progress) -> Result<(), BusError> {
-        let Some(policy) = &self.published else {
-            return Ok(());
-        };
-        let Progress { tick, time } = at;
-        let header = FieldHeader { part, ..policy.header };
-        let (frame, cells) = (policy.frame, &policy.cells);
-        if part.window() == frame.whole() {
-            self.writer.publish_slice_quietly(tick, time, header, cells)?;
-        } else {
-            let window = frame.cells_of(part.window(), cells);
-            self.writer.publish_quietly(tick, time, header, window)?;
-        }
-        self.writer.wake()
     }
 }
 

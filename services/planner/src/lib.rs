@@ -3,7 +3,8 @@
 //! The library `harmonic` solves the field; this crate is the stage around it.
 //!
 //! - [`step`]: follows the `grid`, has a field of it solved, answers a pose; pure.
-//! - [`shell`]: wires it to the topics.
+//! - [`stage`]: what a recording holds of it, and what it publishes.
+//! - [`shell`]: its process.
 //! - [`background_solver`]: the thread that solves large maps.
 
 mod active_sensing;
@@ -14,8 +15,8 @@ pub mod background_solver;
 mod fault;
 mod field_publisher;
 mod near_echoes;
-pub mod replay;
 pub mod shell;
+pub mod stage;
 pub mod step;
 mod undetected_surfaces;
 mod view;

@@ -1,88 +1,67 @@
 //! The planner's process: reads `grid` and `pose`, publishes `guidance` each tick and `field` when it changes.
 
-use std::time::Instant;
+use std::borrow::Cow;
 
 use common::{
-    bus::{Reader, SliceReader, Writer, encode_slice},
+    bus::{Reader, SliceReader},
     clock::MissionClock,
-    inputs::InputLog,
-    latency_budget::{Answers, Item, LatencyBudget},
-    samples::{FaultKind, GridHeader, GuidanceSample, PoseSample},
-    shell::{Context, Process, Progress, StageError},
-    step::Step as _,
-    topics,
+    samples::{FaultKind, GridHeader, PoseSample},
+    shell::{Context, Process, Progress},
+    stage::Runner,
+    start::StageError,
+    topics::{FIELD, GRID, GUIDANCE, POSE},
     wiring::Wiring,
 };
-
-use harmonic::SolveError;
 
 use crate::{
     background_solver::BackgroundSolver,
     field_publisher::FieldPublisher,
-    replay::{Entry, Taken},
-    step::{Input, Planner, Solved, Work},
+    stage::{Entry, PlannerStage, Taken},
+    step::{Solved, Work},
 };
 
 /// The planner process.
-#[derive(Debug)]
 pub struct Shell {
     grid: SliceReader<GridHeader, u8>,
     pose: Reader<PoseSample>,
-    guidance: Writer<GuidanceSample>,
-    field: FieldPublisher,
-    planner: Planner,
+    runner: Runner<PlannerStage>,
     background: BackgroundSolver,
-    inputs: InputLog,
-    /// A grid sample, encoded.
-    encoded: Vec<u8>,
+    field: FieldPublisher,
     lockstep: bool,
     /// In lockstep: the job begun last and the tick at which it began, until its result is taken.
     job: Option<(u64, u64)>,
     latest_pose: Option<PoseSample>,
     /// The last tick that was answered.
     answered: Option<u64>,
-    full_solve_ns: u64,
     field_changed: bool,
-    progress: Progress,
-    budget: LatencyBudget,
 }
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&topics::POSE, &topics::GRID],
-        wakes: &[&topics::GRID],
-        outputs: &[&topics::GUIDANCE, &topics::FIELD],
+        inputs: &[&POSE, &GRID],
+        wakes: &[&GRID],
+        outputs: &[&GUIDANCE, &FIELD],
         ..Wiring::of("planner")
     };
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        let longest = context.run.mission.grid_frame().area();
-        let background = BackgroundSolver::start().map_err(|error| {
-            StageError::Other(format!("cannot start the thread of full solves: {error}"))
-        })?;
+        let no_thread = |error| StageError::Other(format!("cannot start a thread: {error}"));
+        let background = BackgroundSolver::start().map_err(no_thread)?;
         context.waiter.on_readable(&background)?;
-        let field = context.slice_writer(&topics::FIELD, longest)?;
-        let field = FieldPublisher::start(field).map_err(|error| {
-            StageError::Other(format!("cannot start the thread of policies: {error}"))
-        })?;
+        let field = FieldPublisher::start().map_err(no_thread)?;
         context.waiter.on_readable(&field)?;
+        let cells = context.run.mission.grid_frame().area();
         Ok(Self {
-            grid: context.slice_reader(&topics::GRID)?,
-            pose: context.reader(&topics::POSE)?,
-            guidance: context.writer(&topics::GUIDANCE)?,
-            field,
-            planner: Planner::new(&context.run.mission),
+            runner: Runner::open(context, |_| cells)?,
+            grid: context.slice_reader(&GRID)?,
+            pose: context.reader(&POSE)?,
             background,
-            inputs: InputLog::begin(context, &())?,
-            encoded: Vec::new(),
+            field,
             lockstep: matches!(context.run.clock, MissionClock::Ticks { .. }),
             job: None,
             latest_pose: None,
             answered: None,
-            full_solve_ns: 0,
             field_changed: false,
-            progress: Progress::default(),
-            budget: context.budget.clone(),
         })
     }
 
@@ -95,13 +74,12 @@ impl Process for Shell {
         if self.field.is_busy() {
             self.publish_field()?;
         }
-        Ok(self.progress)
+        Ok(self.runner.out.at)
     }
 
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
         let robot = self.latest_pose.unwrap_or_default().pose().position;
-        self.note(Taken::Fault(fault, robot))?;
-        Ok(self.work(Input::Fault { fault, robot })?.changed())
+        Ok(self.take(Taken::Fault(fault, robot))?.changed())
     }
 
     /// A new reader of the field may be waiting for it; that is not known before.
@@ -110,17 +88,33 @@ impl Process for Shell {
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
-        self.begin_background_solve()?;
+        self.take(Taken::Idle)?;
+        while let Some(job) = self.runner.stage.jobs.pop_front() {
+            tracing::debug!(number = job.number, "background solve begins");
+            self.job = Some((job.number, self.runner.out.at.tick));
+            self.background.begin(job);
+        }
         self.publish_field()
     }
 }
 
-#[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
-fn no_field(error: SolveError) -> StageError {
-    StageError::Other(format!("no field: {error}"))
-}
-
 impl Shell {
+    /// Let the stage take this. Says what it did to the field.
+    fn take(&mut self, taken: Taken<'_>) -> Result<Work, StageError> {
+        self.take_at(taken, self.runner.out.at)
+    }
+
+    fn take_at(&mut self, taken: Taken<'_>, at: Progress) -> Result<Work, StageError> {
+        let work = self.runner.take(Entry { taken, at })?;
+        let work = work.map_err(|error| StageError::Other(format!("no field: {error}")))?;
+        self.field_changed |= work.changed();
+        if matches!(work, Work::Solved | Work::SwappedIn) {
+            let took_us = self.runner.stage.full_solve_ns / 1000;
+            tracing::debug!(took_us, ?work, "full solve");
+        }
+        Ok(work)
+    }
+
     /// Take the results of the background solver. Says whether the field is another now.
     ///
     /// In lockstep the result of a job is taken one tick after the job began, no sooner and no later, so that a run can be
@@ -133,8 +127,8 @@ impl Shell {
             }
             return Ok(swapped);
         }
-        let due = self.job.take_if(|(_, began)| self.progress.tick > *began);
-        let Some((number, _)) = due else {
+        let tick = self.runner.out.at.tick;
+        let Some((number, _)) = self.job.take_if(|(_, began)| tick > *began) else {
             return Ok(false);
         };
         while let Some(solved) = self.background.wait() {
@@ -147,40 +141,10 @@ impl Shell {
         Ok(swapped)
     }
 
-    fn note(&mut self, taken: Taken<'_>) -> Result<(), StageError> {
-        let at = self.progress;
-        self.inputs.note(&Entry { taken, at }, at)
-    }
-
-    /// An input that may change the field.
-    fn work(&mut self, input: Input<'_>) -> Result<Work, StageError> {
-        let outcome = self.planner.step(input, self.progress.time);
-        let work = outcome.map_err(no_field)?.work;
-        self.field_changed |= work.changed();
-        Ok(work)
-    }
-
-    /// Begin the background solve that is due, if any.
-    fn begin_background_solve(&mut self) -> Result<(), StageError> {
-        self.note(Taken::Idle)?;
-        let outcome = self.planner.step(Input::Idle, self.progress.time);
-        if let Some(job) = outcome.map_err(no_field)?.job {
-            tracing::debug!(number = job.number, "background solve begins");
-            self.job = Some((job.number, self.progress.tick));
-            self.background.begin(job);
-        }
-        Ok(())
-    }
-
     fn swap_in(&mut self, solved: Solved) -> Result<bool, StageError> {
-        let took_ns = solved.took_ns;
-        self.note(Taken::Solved(solved.number))?;
-        let swapped = self.work(Input::Solved(solved))? == Work::SwappedIn;
-        if swapped {
-            self.full_solve_ns = took_ns;
-            tracing::debug!(took_us = took_ns / 1000, "background solve swapped in");
-        }
-        Ok(swapped)
+        let number = solved.number;
+        self.runner.stage.solved = Some(solved);
+        Ok(self.take(Taken::Solved(number))? == Work::SwappedIn)
     }
 
     /// Follow every grid sample that came. Says whether an answer is due.
@@ -188,78 +152,44 @@ impl Shell {
         let mut asked = false;
         while let Some(grid) = self.grid.take()? {
             let GridHeader { stamp, part, .. } = *grid.header();
-            self.budget.end(Item::Read);
-            self.encoded.clear();
-            encode_slice(grid.header(), &grid, &mut self.encoded);
-            let at = self.progress;
-            let taken = Taken::Grid(&self.encoded);
-            self.inputs.note(&Entry { taken, at }, at)?;
-            self.budget.end(Item::Persist);
-            let began = Instant::now();
-            let work = self.work(Input::Grid { header: grid.header(), cells: &grid })?;
-            let took_ns = began.elapsed().as_nanos() as u64;
-            self.budget.end(Item::Step);
-            match work {
-                Work::Missed => {
-                    tracing::warn!(version = part.version, "missed a grid version");
-                    continue;
-                }
-                Work::Solved => {
-                    self.full_solve_ns = took_ns;
-                    tracing::debug!(took_us = took_ns / 1000, "full solve");
-                }
-                Work::None | Work::Stale | Work::SwappedIn | Work::Broken => {}
+            let work = self.take(Taken::Grid((*grid.header(), Cow::Borrowed(&grid))))?;
+            if work == Work::Missed {
+                tracing::warn!(version = part.version, "missed a grid version");
+                continue;
             }
             // A keyframe published again after its tick was answered needs no answer, unless it changes the field.
             asked |= part.keyframe == 0 || self.answered != Some(stamp.tick) || work != Work::None;
-            self.progress = Progress { tick: stamp.tick, time: stamp.time() };
+            self.runner.out.at = Progress::of(&stamp);
         }
         Ok(asked)
     }
 
     /// Guidance for the pose of the tick, which was published before the grid was.
     fn answer(&mut self) -> Result<(), StageError> {
-        if let Some(pose) = self.pose.newest()? {
-            self.latest_pose = Some(pose);
-        }
+        self.latest_pose = self.pose.newest()?.or(self.latest_pose);
         // A keyframe for new readers may belong to a tick that is over.
-        let tick = self.progress.tick;
-        let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) else {
-            return Ok(());
-        };
-        let Progress { tick, time } = self.progress;
-        let full_solve_ns = self.full_solve_ns;
-        self.budget.end(Item::Read);
-        self.note(Taken::Pose { pose, full_solve_ns })?;
-        self.budget.end(Item::Persist);
-        let outcome = self.planner.step(Input::Pose(&pose), time);
-        self.budget.end(Item::Step);
-        if let Some(guidance) = outcome.map_err(no_field)?.guidance {
-            let guidance = GuidanceSample { full_solve_ns, ..guidance };
-            self.inputs.publish(self.progress)?;
-            self.budget.end(Item::Persist);
-            self.guidance.publish_quietly(tick, time, guidance)?;
-            self.budget.published(tick, Answers::Inputs);
-            self.guidance.wake()?;
+        let tick = self.runner.out.at.tick;
+        if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {
+            let full_solve_ns = self.runner.stage.full_solve_ns;
+            self.take(Taken::Pose { pose, full_solve_ns })?;
+            self.answered = Some(tick);
         }
-        self.answered = Some(tick);
         Ok(())
     }
 
     /// Publish the field for consumers, after the robot has its guidance.
     fn publish_field(&mut self) -> Result<(), StageError> {
-        if let Some((part, at)) = self.field.next(self.progress) {
-            let taken = Taken::Field(part);
-            self.inputs.note(&Entry { taken, at }, self.progress)?;
-            self.inputs.publish(self.progress)?;
-            self.field.publish(part, at)?;
+        let Runner { stage, out } = &mut self.runner;
+        let (now, has_new_reader) = (out.at, out.has_new_reader(&FIELD)?);
+        if let Some((part, at)) = self.field.next(now, has_new_reader, &mut stage.policy) {
+            self.take_at(Taken::Field(part), at)?;
         }
-        if self.field.is_due(self.field_changed, self.progress.time)
-            && let Some(snapshot) = self.planner.snapshot()
-        {
-            self.field_changed = false;
-            self.note(Taken::Policy)?;
-            self.field.begin(snapshot, self.progress);
+        if self.field.is_due(self.field_changed, now.time) {
+            self.take(Taken::Policy)?;
+            if let Some(snapshot) = self.runner.stage.snapshot.take() {
+                self.field_changed = false;
+                self.field.begin(snapshot, now);
+            }
         }
         Ok(())
     }

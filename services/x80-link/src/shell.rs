@@ -306,6 +306,6 @@ impl Shell {
             latency_histogram: *self.latency.counts(),
             ..LinkSample::default()
         };
-        self.runner.out.give(&topics::LINK, sample)
+        self.runner.out.publish(&topics::LINK, sample)
     }
 }

@@ -110,8 +110,8 @@ impl LinkStage {
         match effect {
             Effect::Tick { tick, time, range, wheels } => {
                 out.at = Progress { tick, time };
-                out.give(&RANGE, range)?;
-                out.answer(&WHEELS, wheels)?;
+                out.publish(&RANGE, range)?;
+                out.publish(&WHEELS, wheels)?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),
             Effect::Power(sample) => self.power = Some(sample),
@@ -127,13 +127,13 @@ impl LinkStage {
 
     fn publish_telemetry(&mut self, out: &mut Outputs) -> Result<(), StageError> {
         if let Some(infrared) = self.infrared.take() {
-            out.give(&INFRARED, infrared)?;
+            out.publish(&INFRARED, infrared)?;
         }
         if let Some(power) = self.power.take() {
-            out.give(&POWER, power)?;
+            out.publish(&POWER, power)?;
         }
         if let Some(surroundings) = self.surroundings.take() {
-            out.give(&SURROUNDINGS, surroundings)?;
+            out.publish(&SURROUNDINGS, surroundings)?;
         }
         Ok(())
     }
@@ -203,7 +203,7 @@ impl Stage for LinkStage {
         for (at, header, bytes) in self.wire.drain(..) {
             out.at = at;
             for piece in bytes.chunks(WIRE_PIECE) {
-                out.give_slice_quietly(&WIRE, header, piece)?;
+                out.publish_slice_quietly(&WIRE, header, piece)?;
             }
         }
         out.at = now;

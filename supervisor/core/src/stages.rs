@@ -120,7 +120,7 @@ pub static TABLE: &[Stage] = &[
     Stage {
         deadlines: PLANNER_DEADLINES,
         per_million_cells: PLANNER_MILLION_CELLS,
-        ..Stage::new::<planner::shell::Shell>(planner::replay::begin, STOPPED)
+        ..Stage::new::<planner::shell::Shell>(replay::<planner::stage::PlannerStage>, STOPPED)
     },
     Stage::answering::<controller::Controller>(STOPPED),
 ];
