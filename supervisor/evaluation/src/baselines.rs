@@ -3,10 +3,10 @@
 //! | module | holds |
 //! |---|---|
 //! | [`belief`] | a planner's copy of the map: free cells, lines of sight |
-//! | [`planner`] | input and output of a planner's step |
+//! | [`planner`] | a planner to compare with, and the guidance along its way |
 //! | [`wavefront`] | the shortest path over the map, planned anew in every tick; pure |
 //! | [`bug`] | Bug2: straight to the target, and around hazards; pure |
-//! | [`shell`] | wires either of them to the topics |
+//! | [`shell`] | the process of either of them |
 //!
 //! Both take unknown cells for free, like the harmonic planner. Neither looks around before it drives: that is the harmonic
 //! planner's active sensing, with the evidential method.

@@ -20,6 +20,8 @@ pub struct Belief {
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     pub frame: GridFrame,
+    /// Increases when the map is reset.
+    pub epoch: u64,
     cells: &'a [u8],
 }
 
@@ -40,7 +42,8 @@ impl Belief {
 
     /// The map; none before the first keyframe.
     pub fn map(&self) -> Option<Map<'_>> {
-        Some(Map { frame: self.grid.frame()?, cells: self.grid.cells() })
+        let frame = self.grid.frame()?;
+        Some(Map { frame, epoch: self.header.epoch, cells: self.grid.cells() })
     }
 }
 

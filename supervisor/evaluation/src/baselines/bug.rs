@@ -7,19 +7,13 @@
 
 mod boundary;
 
-use common::{
-    clock::MissionTime,
-    grid::Cell,
-    mission::Mission,
-    samples::PoseSample,
-    step::{ForeignState, Step},
-};
+use common::grid::Cell;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::baselines::{
-    belief::{Belief, Map},
-    planner::{Guide, Input, Outcome, Way},
+    belief::Map,
+    planner::{Planner, Way},
 };
 use boundary::Place;
 
@@ -33,9 +27,9 @@ const ON_LINE_M: f64 = 0.05;
 /// The most cells of a boundary that are looked at ahead.
 const MOST_CELLS: usize = 256;
 
-/// The state that must survive the process.
+/// The planner of Bug2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct State {
+pub struct Bug {
     /// The epoch of the map. With a new epoch all state is reset.
     epoch: u64,
     /// Start of the line to the target, metres; none before the first pose.
@@ -57,74 +51,31 @@ struct Following {
     was_away: bool,
 }
 
-/// The planner of Bug2.
-#[derive(Clone, Debug)]
-pub struct Bug {
-    guide: Guide,
-    belief: Belief,
-    state: State,
-}
-
-impl Step for Bug {
-    type Input<'a> = Input<'a>;
-    type Output = Outcome;
-    type State = State;
-
-    fn new(mission: &Mission) -> Self {
-        Self { guide: Guide::new(mission), belief: Belief::default(), state: State::default() }
-    }
-
-    fn state(&self) -> &State {
-        &self.state
-    }
-
-    fn restore(&mut self, state: State) -> Result<(), ForeignState> {
-        self.state = state;
-        Ok(())
-    }
-
-    fn step(&mut self, input: Input<'_>, _: MissionTime) -> Outcome {
-        match input {
-            Input::Grid { header, cells } if self.belief.follow(header, cells) => Outcome::Followed,
-            Input::Grid { .. } => Outcome::Missed,
-            Input::Pose(pose) => {
-                let way = self.way(pose);
-                Outcome::Guidance(self.guide.sample(pose, way, self.belief.header()))
-            }
+impl Planner for Bug {
+    fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way {
+        if self.epoch != map.epoch {
+            *self = Self { epoch: map.epoch, ..Self::default() };
         }
-    }
-}
-
-impl Bug {
-    fn way(&mut self, pose: &PoseSample) -> Way {
-        let here = pose.pose().position;
-        let Some(map) = self.belief.map() else {
-            return Way::Unknown;
-        };
-        let epoch = self.belief.header().epoch;
-        if self.state.epoch != epoch {
-            self.state = State { epoch, ..State::default() };
-        }
-        let line_from = *self.state.line_from.get_or_insert(here);
+        let line_from = *self.line_from.get_or_insert(here);
         if map.free_cell_at(here).is_none() {
-            return Way::out(&map, here);
+            return Way::out(map, here);
         }
-        let way = Straight { map: &map, line_from, target: self.guide.target };
-        if let Some(following) = &mut self.state.following
-            && (!following.is_led_on(&map, here, way.left(here)) || way.is_resumed(here, following))
+        let way = Straight { map, line_from, target };
+        if let Some(following) = &mut self.following
+            && (!following.is_led_on(map, here, way.left(here)) || way.is_resumed(here, following))
         {
-            self.state.following = None;
+            self.following = None;
         }
-        if self.state.following.is_none() {
+        if self.following.is_none() {
             let Some(following) = way.hit(here) else {
-                return Way::To(self.guide.target);
+                return Way::To(target);
             };
-            self.state.following = Some(following);
+            self.following = Some(following);
         }
-        let following = self.state.following.as_ref();
-        self.state.enclosed |= following.is_some_and(|it| it.is_back(&map));
+        let following = self.following.as_ref();
+        self.enclosed |= following.is_some_and(|it| it.is_back(map));
         match following {
-            Some(following) if !self.state.enclosed => Way::To(following.aim(&map, here)),
+            Some(following) if !self.enclosed => Way::To(following.aim(map, here)),
             _ => Way::None,
         }
     }

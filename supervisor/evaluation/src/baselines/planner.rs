@@ -1,38 +1,23 @@
-//! Input and output of a planner's step, and the guidance that all planners share.
+//! A planner to compare with, and what all of them share: the map, and the guidance along a way.
+
+use std::fmt::Debug;
 
 use common::{
     mission::{Method, Mission},
     samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample},
 };
 use glam::DVec2;
+use serde::{Serialize, de::DeserializeOwned};
 
-use crate::baselines::belief::Map;
+use crate::baselines::belief::{Belief, Map};
 
 /// Speed of a robot that leaves a hazard, m/s: that of the harmonic planner with the evidential method.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// An input of a planner.
-#[derive(Clone, Copy, Debug)]
-pub enum Input<'a> {
-    /// A sample of `grid`.
-    Grid {
-        header: &'a GridHeader,
-        /// The cells of its window.
-        cells: &'a [u8],
-    },
-    /// The pose of the tick, which is answered with guidance.
-    Pose(&'a PoseSample),
-}
-
-/// The result of an input.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Outcome {
-    /// The map is up to date.
-    Followed,
-    /// A version of the map is missing.
-    Missed,
-    /// The guidance for a pose.
-    Guidance(GuidanceSample),
+/// A planner to compare with. It saves itself whenever it has answered.
+pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
+    /// The way from `here` to `target` (metres) on `map`.
+    fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
 }
 
 /// The direction at a pose.
@@ -55,22 +40,45 @@ impl Way {
     }
 }
 
-/// Makes guidance from a [`Way`].
-#[derive(Clone, Copy, Debug)]
-pub struct Guide {
+/// A planner on a copy of the map.
+#[derive(Debug)]
+pub struct Baseline<P> {
     /// X_T, metres.
-    pub target: DVec2,
+    target: DVec2,
     looks_around: bool,
+    belief: Belief,
+    pub planner: P,
 }
 
-impl Guide {
-    /// For the robot of `mission`.
+impl<P: Planner> Baseline<P> {
+    /// For the robot of `mission`, without a map.
     pub fn new(mission: &Mission) -> Self {
-        Self { target: mission.target, looks_around: mission.method == Method::Evidential }
+        Self {
+            target: mission.target,
+            looks_around: mission.method == Method::Evidential,
+            belief: Belief::default(),
+            planner: P::default(),
+        }
     }
 
-    /// The guidance that sends the robot of `sample` along `way` on the map of `belief`.
-    pub fn sample(&self, sample: &PoseSample, way: Way, belief: &GridHeader) -> GuidanceSample {
+    /// Apply one sample of `grid`. Returns false if a version is missing; then there is no map until a keyframe comes.
+    pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
+        self.belief.follow(header, cells)
+    }
+
+    /// The guidance for the pose of `sample`.
+    pub fn guidance(&mut self, sample: &PoseSample) -> GuidanceSample {
+        let here = sample.pose().position;
+        let way = match self.belief.map() {
+            Some(map) => self.planner.way(&map, here, self.target),
+            None => Way::Unknown,
+        };
+        self.along(way, sample)
+    }
+
+    /// The guidance that sends the robot of `sample` along `way`.
+    fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
+        let belief = self.belief.header();
         let pose = sample.pose();
         let to_target = self.target - pose.position;
         // A robot that stands on the point keeps its heading.
@@ -100,13 +108,22 @@ impl Guide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::baselines::testing::{mission, pose};
+    use crate::baselines::{
+        testing::{mission, pose},
+        wavefront::Wavefront,
+    };
 
     #[test]
     fn a_robot_without_a_way_is_told_so_and_looks_around() {
-        let guide = Guide::new(&mission([1.0, 0.0]));
-        let guidance = guide.sample(&pose([0.0, 0.0]), Way::None, &GridHeader::default());
+        let baseline = Baseline::<Wavefront>::new(&mission([1.0, 0.0]));
+        let guidance = baseline.along(Way::None, &pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Unreachable));
         assert_eq!((guidance.ex, guidance.ey), (0.0, 1.0));
+    }
+
+    #[test]
+    fn without_a_map_the_robot_waits() {
+        let guidance = Baseline::<Wavefront>::new(&mission([0.3, 0.0])).guidance(&pose([0.0, 0.0]));
+        assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
     }
 }

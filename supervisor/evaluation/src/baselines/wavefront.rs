@@ -1,19 +1,14 @@
 //! The shortest path over the map, planned anew in every tick, like the global planners NavFn or A*: A* over eight neighbours
 //! that cuts no corner, and guidance to the farthest point of the path that is near and in sight.
 
-use common::{
-    clock::MissionTime,
-    grid::Cell,
-    mission::Mission,
-    samples::PoseSample,
-    step::{ForeignState, Step},
-};
+use common::grid::Cell;
 use glam::DVec2;
 use pathfinding::prelude::astar;
+use serde::{Deserialize, Serialize};
 
 use crate::baselines::{
-    belief::{Belief, Map},
-    planner::{Guide, Input, Outcome, Way},
+    belief::Map,
+    planner::{Planner, Way},
 };
 
 /// The robot heads for a point of its path that is no farther than this, metres.
@@ -22,70 +17,33 @@ const AIM_M: f64 = 0.6;
 const STRAIGHT: u64 = 1000;
 const DIAGONAL: u64 = 1414;
 
-/// The planner of shortest paths.
-#[derive(Clone, Debug)]
-pub struct Wavefront {
-    guide: Guide,
-    belief: Belief,
-}
+/// The planner of shortest paths. It plans from the map alone.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Wavefront;
 
-impl Step for Wavefront {
-    type Input<'a> = Input<'a>;
-    type Output = Outcome;
-    /// It has no state: it plans from the map alone.
-    type State = ();
-
-    fn new(mission: &Mission) -> Self {
-        Self { guide: Guide::new(mission), belief: Belief::default() }
-    }
-
-    fn state(&self) -> &() {
-        &()
-    }
-
-    fn restore(&mut self, (): ()) -> Result<(), ForeignState> {
-        Ok(())
-    }
-
-    fn step(&mut self, input: Input<'_>, _: MissionTime) -> Outcome {
-        match input {
-            Input::Grid { header, cells } if self.belief.follow(header, cells) => Outcome::Followed,
-            Input::Grid { .. } => Outcome::Missed,
-            Input::Pose(pose) => {
-                let way = self.way(pose);
-                Outcome::Guidance(self.guide.sample(pose, way, self.belief.header()))
-            }
-        }
-    }
-}
-
-impl Wavefront {
-    fn way(&self, pose: &PoseSample) -> Way {
-        let here = pose.pose().position;
-        let Some(map) = self.belief.map() else {
-            return Way::Unknown;
-        };
+impl Planner for Wavefront {
+    fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way {
         let Some(start) = map.free_cell_at(here) else {
-            return Way::out(&map, here);
+            return Way::out(map, here);
         };
-        let goal = map.free_cell_at(self.guide.target);
-        let path = goal.and_then(|goal| shortest_path(&map, start, goal));
-        path.map_or(Way::None, |path| Way::To(self.aim(&map, here, &path)))
+        let goal = map.free_cell_at(target);
+        let path = goal.and_then(|goal| shortest_path(map, start, goal));
+        path.map_or(Way::None, |path| Way::To(aim(map, here, target, &path)))
     }
+}
 
-    /// The farthest point of `path` within [`AIM_M`] that a robot at `here` (metres) sees; the next one if it sees none.
-    fn aim(&self, map: &Map<'_>, here: DVec2, path: &[Cell]) -> DVec2 {
-        let last = path.len() - 1;
-        let point = |index: usize| match path.get(index) {
-            Some(&cell) if index < last => map.frame.centre_of(cell),
-            _ => self.guide.target,
-        };
-        let near = (1..=last)
-            .rev()
-            .map(point)
-            .find(|&point| here.distance(point) <= AIM_M && map.sees(here, point));
-        near.unwrap_or_else(|| point(1))
-    }
+/// The farthest point of `path` within [`AIM_M`] that a robot at `here` (metres) sees; the next one if it sees none.
+fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
+    let last = path.len() - 1;
+    let point = |index: usize| match path.get(index) {
+        Some(&cell) if index < last => map.frame.centre_of(cell),
+        _ => target,
+    };
+    let near = (1..=last)
+        .rev()
+        .map(point)
+        .find(|&point| here.distance(point) <= AIM_M && map.sees(here, point));
+    near.unwrap_or_else(|| point(1))
 }
 
 /// The cells of the shortest path between two free cells, both of them included.

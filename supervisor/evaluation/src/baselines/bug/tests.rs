@@ -1,5 +1,8 @@
 use super::*;
-use crate::baselines::testing::{drawn, mission, pose};
+use crate::baselines::{
+    planner::Baseline,
+    testing::{drawn, mission, pose},
+};
 use common::samples::{GridHeader, GuidanceSample, GuidanceStatus};
 
 /// Cells of 0.1 m with (0, 0) in the middle: a wall across the line, its ends 0.5 m off.
@@ -29,7 +32,7 @@ const START: [f64; 2] = [-0.6, 0.0];
 const TARGET: [f64; 2] = [0.8, 0.0];
 
 struct Drive {
-    bug: Bug,
+    bug: Baseline<Bug>,
     header: GridHeader,
     cells: Vec<u8>,
     at: DVec2,
@@ -39,25 +42,20 @@ impl Drive {
     fn on(rows: &[String]) -> Self {
         let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
         let (header, cells) = drawn(&rows);
-        let mut drive = Self { bug: Bug::new(&mission(TARGET)), header, cells, at: START.into() };
+        let mut drive =
+            Self { bug: Baseline::new(&mission(TARGET)), header, cells, at: START.into() };
         drive.see();
         drive
     }
 
     /// Give the planner the map.
     fn see(&mut self) {
-        let input = Input::Grid { header: &self.header, cells: &self.cells };
-        let outcome = self.bug.step(input, MissionTime::default());
-        assert_eq!(outcome, Outcome::Followed);
+        assert!(self.bug.follow(&self.header, &self.cells));
     }
 
     /// The planner's answer for the robot's place.
     fn guidance(&mut self) -> GuidanceSample {
-        let pose = pose(self.at.into());
-        match self.bug.step(Input::Pose(&pose), MissionTime::default()) {
-            Outcome::Guidance(guidance) => guidance,
-            outcome => panic!("{outcome:?}"),
-        }
+        self.bug.guidance(&pose(self.at.into()))
     }
 
     /// Drive along the guidance until it is of another status or `is_over`; the guidance then.
@@ -69,11 +67,11 @@ impl Drive {
             }
             self.at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         }
-        panic!("no end of it: {:?} at {}", self.bug.state(), self.at);
+        panic!("no end of it: {:?} at {}", self.bug.planner, self.at);
     }
 
     fn follows(&self) -> bool {
-        self.bug.state().following.is_some()
+        self.bug.planner.following.is_some()
     }
 
     fn is_there(&self) -> bool {
@@ -91,7 +89,7 @@ fn a_hazard_is_gone_around_to_the_left_and_left_on_the_line_nearer_to_the_target
     drive.until(|drive| !drive.follows());
     assert!(drive.at.x > 0.05 && drive.at.y.abs() < 0.08, "left at {}", drive.at);
     drive.until(Drive::is_there);
-    assert!(drive.is_there(), "{:?} at {}", drive.bug.state(), drive.at);
+    assert!(drive.is_there(), "{:?} at {}", drive.bug.planner, drive.at);
 }
 
 #[test]
@@ -112,14 +110,14 @@ fn the_next_process_goes_on_around_the_hazard_where_the_last_one_was_killed() {
     first.until(|drive| drive.at.y > 0.4);
     let mut second = Drive::on(&wall());
     second.at = first.at;
-    second.bug.restore(first.bug.state().clone()).unwrap();
+    second.bug.planner = first.bug.planner.clone();
     for _ in 0..40 {
         let guidance = first.guidance();
         assert_eq!(guidance, second.guidance());
         first.at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         second.at = first.at;
     }
-    assert_eq!(first.bug.state(), second.bug.state());
+    assert_eq!(first.bug.planner, second.bug.planner);
 }
 
 #[test]

@@ -1,5 +1,9 @@
 use super::*;
-use crate::baselines::testing::{drawn, mission, pose};
+use crate::baselines::{
+    belief::Belief,
+    planner::Baseline,
+    testing::{drawn, mission, pose},
+};
 use common::samples::{GuidanceSample, GuidanceStatus};
 
 const WALL: [&str; 9] = [
@@ -16,14 +20,10 @@ const WALL: [&str; 9] = [
 
 /// The answer of a planner with target (0.3, 0) on the map `rows` to a robot at (x, y).
 fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
-    let mut planner = Wavefront::new(&mission([0.3, 0.0]));
+    let mut planner = Baseline::<Wavefront>::new(&mission([0.3, 0.0]));
     let (header, cells) = drawn(rows);
-    let input = Input::Grid { header: &header, cells: &cells };
-    assert_eq!(planner.step(input, MissionTime::default()), Outcome::Followed);
-    match planner.step(Input::Pose(&pose(at)), MissionTime::default()) {
-        Outcome::Guidance(guidance) => guidance,
-        outcome => panic!("{outcome:?}"),
-    }
+    assert!(planner.follow(&header, &cells));
+    planner.guidance(&pose(at))
 }
 
 #[test]
@@ -71,14 +71,4 @@ fn a_robot_inside_hazard_leaves_by_the_nearest_free_cell() {
     assert_eq!(guidance.status, u8::from(GuidanceStatus::WayOut));
     assert!(guidance.ex.abs() > 0.8, "{guidance:?}");
     assert!(guidance.speed_limit_m_s < 0.1);
-}
-
-#[test]
-fn without_a_map_the_robot_waits() {
-    let mut planner = Wavefront::new(&mission([0.3, 0.0]));
-    let outcome = planner.step(Input::Pose(&pose([0.0, 0.0])), MissionTime::default());
-    let Outcome::Guidance(guidance) = outcome else {
-        panic!("{outcome:?}");
-    };
-    assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
 }
