@@ -3,11 +3,11 @@
 //! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older
 //! slot, so a kill at any instruction leaves at least one whole; the checksum shows which. Nothing is
 //! synced to the disk: the kernel keeps what a killed process has written, and a robot that lost
-//! power has lost its encoder counts too. The room of both slots is reserved at opening: a disk that is full later does
-//! not keep a state from being saved.
+//! power has lost its encoder counts too. The room of both slots is reserved at opening, so a state can be saved although the
+//! disk is full.
 //!
-//! The last byte of the magic is the version of the states: one of another version, or one that is whole and
-//! cannot be decoded, is refused. To take it for none would lose the state without a word.
+//! The last byte of the magic is the version of the states. A state of another version, or one that is whole and cannot be
+//! decoded, is refused: to start without it would lose the state without a word.
 
 use std::{
     fs::{File, OpenOptions},
@@ -30,49 +30,31 @@ pub enum CheckpointError {
     #[error(
         "cannot {action} checkpoint {file}: {source}; is the run directory writable and not full?"
     )]
-    File {
-        /// What was tried.
-        action: &'static str,
-        /// The file.
-        file: PathBuf,
-        /// What the system reports.
-        source: io::Error,
-    },
-    /// More state than the checkpoint was made for.
+    File { action: &'static str, file: PathBuf, source: io::Error },
+    /// The state is longer than the checkpoint.
     #[error(
         "checkpoint {file} holds at most {capacity} bytes, not {length}; this is a fault in the stage"
     )]
     TooLarge {
-        /// The file.
         file: PathBuf,
         /// Bytes it holds.
         capacity: usize,
         /// Bytes it was given.
         length: usize,
     },
-    /// Its state is whole, and not one of this program.
+    /// The state is whole, and of another program or version.
     #[error(
         "checkpoint {file} was written by another version of this program ({problem}); go on with that version, or start a new run"
     )]
-    Foreign {
-        /// The file.
-        file: PathBuf,
-        /// What shows it.
-        problem: String,
-    },
+    Foreign { file: PathBuf, problem: String },
     /// The state could not be encoded.
     #[error("cannot encode checkpoint {file}: {source}; this is a fault in the stage")]
-    Encode {
-        /// The file.
-        file: PathBuf,
-        /// What the encoder reports.
-        source: postcard::Error,
-    },
+    Encode { file: PathBuf, source: postcard::Error },
 }
 
 /// "firsthand checkpoint", before the version.
 const MAGIC: [u8; 3] = *b"FHC";
-/// The version of the states, of all processes: to be raised when the encoding of one of them changes.
+/// The version of the states of all processes. Raise it when the encoding of one of them changes.
 const VERSION: u8 = b'2';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;
@@ -139,9 +121,6 @@ impl Checkpoint {
     }
 
     /// Save `state` in place of the older of the two held.
-    ///
-    /// # Errors
-    /// When the file system refuses, or the state is larger than was said at opening.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), CheckpointError> {
         let sequence = self.sequence + 1;
         let mut bytes = std::mem::take(&mut self.buffer);
@@ -180,7 +159,7 @@ pub(crate) fn failed(
     move |source| CheckpointError::File { action, file, source }
 }
 
-/// Over everything but the checksum itself.
+/// The checksum of a slot: it covers everything but itself.
 fn checksum(bytes: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&bytes[..16]);
@@ -215,8 +194,7 @@ fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     (word(16)? == checksum(whole)).then(|| (sequence, &whole[HEADER..]))
 }
 
-/// Reserve `length` bytes of the disk for `file`, whose own length stays. Where the file system cannot reserve, nothing
-/// is.
+/// Reserve `length` bytes of the disk for `file`, whose own length stays. Does nothing on a file system that cannot reserve.
 pub(crate) fn reserve(file: &File, length: u64) -> io::Result<()> {
     match fallocate(file, FallocateFlags::KEEP_SIZE, 0, length) {
         Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),

@@ -27,9 +27,6 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The mission of `robot`, whose supervisor only watches.
-///
-/// # Errors
-/// When there is no such supervisor.
 pub fn mission(robot: &RobotName) -> Result<Mission, StageError> {
     let (directory, _stage_lock) = enter_run(&Domain::of(robot.clone()))?;
     Ok(Run::load(&directory)?.mission)
@@ -70,7 +67,7 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined, Sta
     Ok(Joined { generation, run, bus, supervisor: Some(place.supervisor), stage_lock })
 }
 
-/// What the roster says about a free place.
+/// A free place, as the roster shows it.
 struct Place {
     first_tick: u64,
     supervisor: OwnedFd,
@@ -104,7 +101,8 @@ fn gone() -> StageError {
     StageError::Other("the supervisor has ended".to_owned())
 }
 
-/// A descriptor that becomes readable when the supervisor ends. It published a moment ago: the number is still its own.
+/// A descriptor that becomes readable when the supervisor ends. It published a moment ago, so no other process has its
+/// number yet.
 fn watch(pid: u32) -> Result<OwnedFd, StageError> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
     pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())

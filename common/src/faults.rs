@@ -9,18 +9,17 @@ use crate::{
     topics,
 };
 
-/// What the table says of a fault.
+/// A row of the table.
 #[derive(Debug)]
 pub struct Fault {
-    /// Which.
     pub kind: FaultKind,
-    /// What the command line calls it.
+    /// Its name on the command line.
     pub name: &'static str,
     /// The stage that has it; none for every stage.
     pub stage: Option<&'static str>,
-    /// What it does.
+    /// Its effect.
     pub meaning: &'static str,
-    /// What ends it.
+    /// How it ends.
     pub ends: &'static str,
 }
 
@@ -71,20 +70,19 @@ pub static TABLE: [Fault; 6] = [
 ];
 
 /// The fault of that name in `stage`.
-#[must_use]
 pub fn find(stage: &str, name: &str) -> Option<&'static Fault> {
     of(stage).find(|fault| fault.name == name)
 }
 
-/// What can be broken in `stage`.
+/// The faults that `stage` has.
 pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
     TABLE.iter().filter(move |fault| fault.stage.is_none_or(|its| its == stage))
 }
 
-/// What to do with a request, before the stage itself is asked: inject the fault, or give an answer at once.
+/// The fault to inject for a request. The error is the answer to a request that is refused.
 ///
 /// # Errors
-/// With the answer, when the robot is a real one and the request does not say so, or the stage has no such fault.
+/// When the robot is a real one and the request does not say so, or the stage has no such fault.
 pub fn admit(
     request: &FaultSample,
     stage: &str,
@@ -103,9 +101,8 @@ pub fn admit(
 /// A request for a stage.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asked {
-    /// Its id.
     pub(crate) id: u64,
-    /// What to do with it, as [`admit`] says.
+    /// The result of [`admit`].
     pub(crate) fault: Result<FaultKind, FaultAnswer>,
 }
 

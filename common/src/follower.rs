@@ -12,19 +12,19 @@ use crate::{
 
 /// How often a robot that is away is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// A bus that is there and cannot be used for so long is an error: one that is just being removed is gone by then.
+/// It is an error if an existing bus cannot be used for so long: a bus that is being removed is gone by then.
 const REFUSED_FOR: Duration = Duration::from_secs(2);
 
-/// Follows one robot. `Topics` is what it reads: made by `open` for each bus, dropped with it.
+/// Follows one robot. `Topics` holds the readers: `open` opens them on each bus, and they are dropped with it.
 pub struct Follower<Topics, Open> {
     domain: Domain,
     name: String,
     wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
-    /// It is gone, and what was published last is given first.
+    /// The robot is disconnected, and the samples published last are given first.
     ending: bool,
     joined: Option<Joined<Topics>>,
-    /// Since when the bus that is there cannot be used.
+    /// The bus that cannot be used, and since when.
     refused: Option<(BusInstance, Instant)>,
 }
 
@@ -35,21 +35,21 @@ struct Joined<Topics> {
     bus: Bus,
 }
 
-/// What came.
+/// A change of the robot.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event<'a, Topics> {
     /// The robot is there: its bus has just been joined.
     Connected,
     /// Something may have been published: take all there is.
     Samples(&'a mut Topics),
-    /// Nothing, for the time that was given. The robot is as it was: there, or away.
+    /// Nothing came within the given time.
     Nothing,
     /// The robot's run has ended, or its bus was replaced: it is waited for again.
     Disconnected,
 }
 
-/// The topic that wakes for samples on `topic`. For those of each tick that is the state of the link, which ends a tick: no
-/// consumer takes the processor from stages that the tick has still to pass.
+/// The topic that wakes a consumer for samples on `topic`. For samples of each tick that is the state of the link, which ends
+/// a tick: no consumer takes the processor from stages that the tick has still to pass.
 fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
     match topic.spec().rate {
         Rate::EachTick | Rate::EachFrame => &topics::LINK,
@@ -58,8 +58,8 @@ fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
 }
 
 impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Open> {
-    /// Follow the robot of `domain` under a name that `iox2 node list` shows. `open` opens what is read on each bus, and
-    /// the follower wakes for samples on `wake_on`; for those of each tick, when the tick ends.
+    /// Follow the robot of `domain` under a name that `iox2 node list` shows. `open` opens the readers on each bus. The
+    /// follower wakes for samples on `wake_on`; for samples of each tick, when the tick ends.
     pub fn new(domain: Domain, name: &str, wake_on: &'static dyn AnyTopic, open: Open) -> Self {
         Self {
             domain,
@@ -73,16 +73,15 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     }
 
     /// Wake for samples on `topics` too.
-    #[must_use]
     pub fn also_on(mut self, topics: impl IntoIterator<Item = &'static dyn AnyTopic>) -> Self {
         self.wake_on.extend(topics);
         self
     }
 
-    /// Wait for news, up to `timeout`.
+    /// Wait for an event, up to `timeout`.
     ///
     /// # Errors
-    /// When a bus that is there cannot be used: what that is about stays until someone mends it.
+    /// When an existing bus cannot be used. Waiting again does not help until someone has repaired it.
     pub fn wait(&mut self, timeout: Duration) -> Result<Event<'_, Topics>, BusError> {
         let began = Instant::now();
         while self.joined.is_none() {
@@ -123,7 +122,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         })
     }
 
-    /// What is read while the robot is there.
+    /// The readers, while the robot is connected.
     pub fn topics(&mut self) -> Option<&mut Topics> {
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }
@@ -157,7 +156,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     }
 
     fn join(&mut self) -> Result<Joined<Topics>, BusError> {
-        // Readers make files, too. Where there is no lock there is no bus, which is told next.
+        // Readers create files, too. Without a lock there is no bus, and the next line says so.
         let _joining = self.domain.joining();
         let bus = Bus::join(&self.domain, &self.name)?;
         let mut waiter = Waiter::default();

@@ -45,12 +45,12 @@ pub struct GroundTruthTick {
     /// [`GroundTruthTick::AT_REST_M_S`] is at rest.
     #[serde(default)]
     pub stopping_time_s: f64,
-    /// What the radio has done so far; missing where it is perfect.
+    /// The losses of the radio so far; missing where it is perfect.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radio: Option<GroundTruthRadio>,
 }
 
-/// What the radio has done so far, both ways together.
+/// The losses of the radio so far, both ways together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthRadio {
     /// Whether it is out now.
@@ -61,7 +61,7 @@ pub struct GroundTruthRadio {
     pub lost: u64,
     /// The longest outage, seconds.
     pub longest_outage_s: f64,
-    /// Ticks before this one whose frames nobody heard, in lockstep.
+    /// Ticks before this one whose frames were lost, in lockstep.
     #[serde(default)]
     pub missed_ticks: u64,
 }
@@ -72,9 +72,8 @@ impl GroundTruthTick {
     /// Clearance where nothing stands, metres: JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
 
-    /// The number of this tick where ticks are counted that were heard: that of its pose, in lockstep. Of a tick that
-    /// was not heard itself, that of the next one.
-    #[must_use]
+    /// The number of this tick if only ticks count whose frames were received: its pose has this number, in lockstep. A tick
+    /// whose frames were lost has the number of the next one.
     pub const fn heard_tick(&self) -> u64 {
         match self.radio {
             Some(radio) => self.tick.saturating_sub(radio.missed_ticks),
@@ -82,14 +81,12 @@ impl GroundTruthTick {
         }
     }
 
-    /// Whether it is of the tick of `pose`: wheel counts are what both know.
-    #[must_use]
+    /// Whether it is of the tick of `pose`, by the wheel counts, which both have.
     pub const fn is_of(&self, pose: &PoseSample) -> bool {
         self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
     }
 
     /// How far `pose` is from the true position, metres.
-    #[must_use]
     pub fn pose_error_m(&self, pose: &PoseSample) -> f64 {
         (pose.x_m - self.x).hypot(pose.y_m - self.y)
     }

@@ -1,12 +1,13 @@
-//! What each generation of a stage was started from and what its step took, in order, published before anything that
-//! follows from it: the same step, fed with the same, gives the same outputs, in another process and another year.
+//! Topic `inputs`: the state that each generation of a stage started from, and the inputs of its step, in order. They are
+//! published before anything that follows from them. The same step with the same inputs gives the same outputs, so a replay
+//! in another process and another year can compute them again.
 //!
 //! A generation's samples of topic `inputs` are pieces of one stream of bytes, in the order of their sequence. The stream is
-//! entries, each `length u32 | body`, little-endian. The first is what the process was started from, each other one is what
-//! one call of the step took; a body is the `postcard` encoding of the stage's own type, named in its `replay` module.
+//! entries, each `length u32 | body`, little-endian. The first is the start of the process, each other one is the input of
+//! one call of the step. A body is the `postcard` encoding of the stage's [`Entry`](crate::stage::Stage::Entry).
 //!
-//! An entry is published before the first sample that follows from it. Of a process that is killed, entries from
-//! which nothing followed may be missing, and no others.
+//! An entry is published before the first sample that follows from it. When a process is killed, only entries from which
+//! nothing followed can be missing.
 
 use serde::Serialize;
 
@@ -20,14 +21,14 @@ use crate::{
 
 /// A piece has at most so many bytes.
 const PIECE: usize = 16_384;
-/// On a large map that is too little for its keyframes: then one byte for so many cells.
+/// Keyframes of a large map need longer pieces: one byte for so many cells.
 const CELLS_FOR_A_BYTE: usize = 8;
 /// An entry has at most so many bytes: the whole belief of the largest map, and more.
 pub const LONGEST_ENTRY: usize = 1 << 30;
 
-/// Publishes what a step takes.
+/// Publishes the inputs of a step.
 #[derive(Debug)]
-pub struct InputLog {
+pub(crate) struct InputLog {
     writer: SliceWriter<InputsHeader, u8>,
     header: InputsHeader,
     piece: usize,
@@ -35,11 +36,8 @@ pub struct InputLog {
 }
 
 impl InputLog {
-    /// Of the process of `context`, which starts from `start`. Published at once.
-    ///
-    /// # Errors
-    /// When the topic cannot be opened.
-    pub fn begin(context: &Context, start: &impl Serialize) -> Result<Self, StageError> {
+    /// Begin with the `start` of the process of `context`, which is published at once.
+    pub(crate) fn begin(context: &Context, start: &impl Serialize) -> Result<Self, StageError> {
         let generation = &context.generation;
         let cells = context.run.mission.grid_frame().area();
         let piece = PIECE.max(cells / CELLS_FOR_A_BYTE);
@@ -51,16 +49,13 @@ impl InputLog {
         };
         log.append(start)?;
         log.publish(Progress::default())?;
-        // A recorder connects to the new writer now: one that is killed soon is gone soon.
+        // A recorder connects to the new writer now, before this process can be killed.
         log.writer.wake()?;
         Ok(log)
     }
 
     /// The step is about to take `input`, at `at`.
-    ///
-    /// # Errors
-    /// When it cannot be published.
-    pub fn note(&mut self, input: &impl Serialize, at: Progress) -> Result<(), StageError> {
+    pub(crate) fn note(&mut self, input: &impl Serialize, at: Progress) -> Result<(), StageError> {
         self.append(input)?;
         if self.unpublished.len() >= self.piece {
             self.publish(at)?;
@@ -80,11 +75,8 @@ impl InputLog {
         Ok(())
     }
 
-    /// Publish what was noted: something follows from it.
-    ///
-    /// # Errors
-    /// When it cannot be published.
-    pub fn publish(&mut self, at: Progress) -> Result<(), BusError> {
+    /// Publish the inputs that were noted, before something that follows from them.
+    pub(crate) fn publish(&mut self, at: Progress) -> Result<(), BusError> {
         for piece in self.unpublished.chunks(self.piece) {
             self.writer.publish_slice_quietly(at.tick, at.time, self.header, piece)?;
         }
@@ -99,14 +91,12 @@ pub mod sample {
 
     use crate::bus::{Layout, decode_sample, encode_sample};
 
-    /// Write it.
     pub fn serialize<P: Layout, S: Serializer>(sample: &P, to: S) -> Result<S::Ok, S::Error> {
         let mut bytes = Vec::with_capacity(size_of::<P>() + 8);
         encode_sample(sample, &mut bytes);
         to.serialize_bytes(&bytes)
     }
 
-    /// Read it.
     pub fn deserialize<'de, P: Layout, D: Deserializer<'de>>(from: D) -> Result<P, D::Error> {
         let bytes: &[u8] = serde_bytes::deserialize(from)?;
         decode_sample(bytes).ok_or_else(|| D::Error::custom("not a sample of this topic"))
@@ -121,7 +111,6 @@ pub mod slice {
 
     use crate::bus::{Layout, decode_slice, encode_slice};
 
-    /// Write it.
     pub fn serialize<H: Layout, T: Layout + Clone, S: Serializer>(
         (header, slice): &(H, Cow<'_, [T]>),
         to: S,
@@ -131,7 +120,6 @@ pub mod slice {
         to.serialize_bytes(&bytes)
     }
 
-    /// Read it.
     pub fn deserialize<'de, H, T, D>(from: D) -> Result<(H, Cow<'static, [T]>), D::Error>
     where
         H: Layout,

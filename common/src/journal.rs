@@ -1,8 +1,9 @@
 //! A large state that outlives a SIGKILL: a snapshot now and then, and the changes since.
 //!
 //! The state is the fold of its entries. An entry is appended when it happens, which takes the time of a
-//! small write however large the state is; a new process restores the snapshot and folds the later entries into it. An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an
-//! append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
+//! small write however large the state is; a new process restores the snapshot and folds the later entries into it.
+//!
+//! An entry is `number | length | crc32 | body`, little-endian. A kill in the middle of an append leaves a torn tail, which is cut off; a kill between a snapshot and the emptying of the journal
 //! leaves entries that the snapshot holds already, which their numbers show.
 //!
 //! Room is reserved at opening, for a disk that is full later. The journal is emptied by an end mark at its beginning, not by
@@ -25,13 +26,13 @@ const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u32, crc32 u32.
 const HEADER: usize = 16;
-/// Stands after the last entry: no header, whose checksum is not 0 where the rest is.
+/// The end mark, after the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
 /// No entry is longer, bytes.
 const LONGEST: usize = 4096;
 /// Room that is reserved for each entry until the next snapshot, bytes: an entry of the mapper takes 250 at most.
 const ENTRY_ROOM: u64 = 512;
-/// What a snapshot takes besides the state.
+/// Bytes of a snapshot besides the state.
 const NUMBER: usize = 10;
 
 /// The snapshot and the journal of one stage.
@@ -50,12 +51,12 @@ pub struct Journal {
     snapshot_after: u64,
 }
 
-/// What an earlier process saved.
+/// The state that an earlier process saved.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Restored<S, E> {
     /// The last snapshot.
     pub state: Option<S>,
-    /// What happened after it, oldest first.
+    /// The entries after it, oldest first.
     pub entries: Vec<E>,
 }
 
@@ -69,9 +70,6 @@ struct Snapshot<S> {
 impl Journal {
     /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the
     /// journal beside it.
-    ///
-    /// # Errors
-    /// When a file can be neither read nor made.
     pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -103,7 +101,7 @@ impl Journal {
         let mut entries = Vec::new();
         let mut rest = &bytes[..];
         while let Some((number, body, after)) = entry(rest) {
-            // The snapshot holds those before; after a gap nothing can be folded.
+            // The snapshot holds the entries with lower numbers. After a gap nothing can be folded.
             if number == self.number {
                 let Ok(entry) = postcard::from_bytes(body) else {
                     break;
@@ -116,23 +114,20 @@ impl Journal {
             rest = after;
         }
         self.end = (bytes.len() - rest.len()) as u64;
-        // A whole one is left alone: the file system may have to wait for the disk.
+        // A whole tail is left alone: the file system may have to wait for the disk.
         if !rest.is_empty() && !rest.starts_with(&END) {
             self.cut()?;
         }
         Ok(entries)
     }
 
-    /// Whatever follows is no entry.
+    /// End the journal here.
     fn cut(&self) -> Result<(), CheckpointError> {
         let cut = self.file.write_all_at(&END, self.end);
         cut.map_err(failed("write", &self.path))
     }
 
     /// Append an entry.
-    ///
-    /// # Errors
-    /// When the file system refuses.
     pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
         let header = vec![0; HEADER];
         let mut bytes = postcard::to_extend(entry, header)
@@ -159,15 +154,11 @@ impl Journal {
 
     /// Whether there are so many entries since the last snapshot that one is due. Saving it takes the time of
     /// writing the whole state: do it when nobody waits.
-    #[must_use]
     pub const fn is_long(&self) -> bool {
         self.number - self.first >= self.snapshot_after
     }
 
     /// Save `state`, into which every entry so far is folded, and empty the journal.
-    ///
-    /// # Errors
-    /// When the file system refuses, or the state is larger than was said at opening.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
         self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
@@ -193,7 +184,7 @@ fn entry(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
     (checksum(whole) == crc).then(|| (number, &whole[HEADER..], after))
 }
 
-/// Over everything but the checksum itself.
+/// The checksum of an entry: it covers everything but itself.
 fn checksum(bytes: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&bytes[..12]);

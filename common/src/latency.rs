@@ -5,7 +5,7 @@
 pub const BUCKETS: usize = 192;
 const PER_OCTAVE: f64 = 8.0;
 
-/// Counts by bucket: bucket k holds latencies from 2^(k/8) microseconds.
+/// The count of each bucket: bucket k counts latencies from 2^(k/8) microseconds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histogram {
     counts: [u32; BUCKETS],
@@ -29,13 +29,11 @@ impl Histogram {
     }
 
     /// The counts, as samples carry them.
-    #[must_use]
     pub const fn counts(&self) -> &[u32; BUCKETS] {
         &self.counts
     }
 
     /// The longest counted, nanoseconds.
-    #[must_use]
     pub const fn max_ns(&self) -> u64 {
         self.max_ns
     }
@@ -48,9 +46,8 @@ impl Histogram {
         self.max_ns = self.max_ns.max(max_ns);
     }
 
-    /// The upper end of the bucket that holds the `share` quantile, microseconds, never above the
-    /// longest; none of nothing.
-    #[must_use]
+    /// The upper end of the bucket that holds the `share` quantile, microseconds, never above the longest; none if nothing was
+    /// counted.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         let total: u64 = self.counts.iter().map(|&count| u64::from(count)).sum();
         if total == 0 {

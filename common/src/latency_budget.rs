@@ -1,5 +1,5 @@
-//! What a stage's process does with its part of a tick, item by item: for `firsthand bench tick --budget`, and only where
-//! [`ASKED_FOR`] is in its environment. Otherwise nothing is measured and no clock is read.
+//! The time that a stage's process spends on its part of a tick, item by item, for `firsthand bench tick --budget`. Without
+//! [`ASKED_FOR`] in the environment nothing is measured and no clock is read.
 //!
 //! The stage's shell says when each item ends. The times stay in memory, and go into a file of the run's directory when
 //! the process stops. The monotonic clock is the machine's: from one stage's [`TickTimes::published_ns`] to the next one's
@@ -15,21 +15,21 @@ use crate::clock::monotonic_ns;
 /// The environment variable that asks for it; its value does not matter.
 pub const ASKED_FOR: &str = "FIRSTHAND_LATENCY_BUDGET";
 
-/// The times of so many ticks are kept, of 72 bytes each.
+/// The times of at most so many ticks are stored, 72 bytes each.
 const MOST_TICKS: usize = 1 << 16;
 
-/// What a stage's shell spends time on in a tick, in the order of the columns of a file.
+/// An item of a tick, in the order of the columns of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Item {
     /// Taking what came from the bus or the socket.
     Read,
     /// The pure step.
     Step,
-    /// What a successor or a replay needs: inputs, checkpoint, journal; before the output is published.
+    /// Inputs, checkpoint and journal, for a successor or a replay; before the output is published.
     Persist,
     /// The output, until its readers are about to be woken.
     Publish,
-    /// All from then on until the process waits again: to wake the readers, and what nobody waits for.
+    /// Everything after that until the process waits again: it wakes the readers, and does what nobody waits for.
     After,
 }
 
@@ -37,8 +37,7 @@ impl Item {
     /// Every item.
     pub const ALL: [Self; 5] = [Self::Read, Self::Step, Self::Persist, Self::Publish, Self::After];
 
-    /// As a table heads it.
-    #[must_use]
+    /// The heading of its column.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Read => "read",
@@ -50,10 +49,10 @@ impl Item {
     }
 }
 
-/// What an output answers; a tick goes through a stage that has feedback twice.
+/// The input that an output answers. A tick goes twice through a stage that has feedback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Answers {
-    /// The stage's inputs.
+    /// An input of the stage.
     Inputs,
     /// Its feedback, with which the tick ends.
     Feedback,
@@ -62,9 +61,7 @@ pub enum Answers {
 /// One tick's way through a stage, once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickTimes {
-    /// The tick.
     pub tick: u64,
-    /// Which of the ways.
     pub answers: Answers,
     /// When the process was awake, on the monotonic clock.
     pub awake_ns: u64,
@@ -83,7 +80,7 @@ struct Stopwatch {
     awake_ns: u64,
     /// When the last item ended.
     last_ns: u64,
-    /// Of the output that is not published yet.
+    /// Nanoseconds by item for the output that is not published yet.
     items_ns: [u64; Item::ALL.len()],
     /// Whether an output was published since the process last waited.
     published: bool,
@@ -92,7 +89,6 @@ struct Stopwatch {
 
 impl LatencyBudget {
     /// Measures if the environment asks for it.
-    #[must_use]
     pub fn from_environment() -> Self {
         if env::var_os(ASKED_FOR).is_some() { Self::measuring() } else { Self::default() }
     }
@@ -123,7 +119,7 @@ impl LatencyBudget {
     }
 
     fn measure(&self, what: impl FnOnce(&mut Stopwatch, u64)) {
-        // No caller holds it while it calls another.
+        // It is never borrowed already: no caller measures inside a measurement.
         if let Some(stopwatch) = &self.0
             && let Ok(mut stopwatch) = stopwatch.try_borrow_mut()
         {
@@ -132,9 +128,6 @@ impl LatencyBudget {
     }
 
     /// Write what was measured into `file`, if anything was asked for.
-    ///
-    /// # Errors
-    /// When the file system refuses.
     pub fn save(&self, file: &Path) -> io::Result<()> {
         let Some(stopwatch) = &self.0 else {
             return Ok(());
@@ -158,7 +151,7 @@ impl Stopwatch {
         self.published = false;
     }
 
-    /// What was done since the last output belongs to it.
+    /// The time since the last output belongs to that output.
     fn end_after(&mut self, now_ns: u64) {
         if self.published {
             self.end(Item::After, now_ns);
@@ -176,7 +169,7 @@ impl Stopwatch {
     }
 
     fn published(&mut self, tick: u64, answers: Answers, now_ns: u64) {
-        // What is published again nobody waits for.
+        // Nobody waits for an output that is published again.
         let last = self.ticks.last();
         if last.is_some_and(|last| (last.tick, last.answers) == (tick, answers)) {
             self.end(Item::After, now_ns);
@@ -199,7 +192,6 @@ impl Stopwatch {
 }
 
 /// Where the process of generation `number` of `stage` saves its times in the run's `directory`.
-#[must_use]
 pub fn file(directory: &Path, stage: &str, number: u32) -> PathBuf {
     directory.join(format!("{stage}.{number}.budget"))
 }
@@ -218,7 +210,7 @@ impl fmt::Display for TickTimes {
 const INPUTS: &str = "inputs";
 const FEEDBACK: &str = "feedback";
 
-/// A line that is none of a file of times.
+/// A line of a file of times that is wrong.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
 #[error("{0:?} is no line of times; measure again with this version of firsthand")]
 pub struct TickTimesError(String);
@@ -254,7 +246,7 @@ impl FromStr for TickTimes {
 mod tests {
     use super::*;
 
-    /// One tick of a stage that keeps before and after it publishes.
+    /// One tick of a stage that persists before and after it publishes.
     fn tick(stopwatch: &mut Stopwatch, tick: u64, began_ns: u64) {
         stopwatch.awake(began_ns);
         for (item, after_ns) in
@@ -267,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn items_of_a_tick_add_up_from_awake_to_published_and_what_is_kept_later_is_apart() {
+    fn items_of_a_tick_add_up_from_awake_to_published_and_what_is_persisted_later_is_apart() {
         let mut stopwatch = Stopwatch::default();
         tick(&mut stopwatch, 7, 100);
         // A turn without an output, for a heartbeat.

@@ -1,4 +1,4 @@
-//! What firsthand's processes share: only what two of them must agree on.
+//! The code that firsthand's processes share: only what two of them must agree on.
 //!
 //! Three crates lie below this one, and their modules are found under its name too: [`bus`] (writers, readers and wakeups; it alone
 //! names the middleware), [`mission`] (the mission file, geometry, kinematics) and [`x80_protocol`] (here [`wire`]).
@@ -19,12 +19,12 @@
 //! | [`follower`] | a consumer that follows a robot from run to run |
 //! | [`run`] | what the supervisor gives the stages of a run |
 //! | [`start`] | how a stage's process takes its place in a run |
-//! | [`external`] | the same for a stage that the supervisor did not start |
+//! | [`external`] | how a stage that the supervisor did not start takes its place |
 //! | [`stage_command`] | the command line of a stage's process |
 //! | [`wiring`] | what a stage's process opens and persists, declared |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
-//! | [`inputs`], [`replay`] | what every step took, published; what a replay makes of it |
+//! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
 //! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
 
 pub mod checkpoint;

@@ -19,7 +19,7 @@ use crate::{
 
 /// Takes what a stage publishes and persists.
 pub struct Outputs {
-    /// The tick and mission time of what is published next.
+    /// The tick and mission time of the next output.
     pub at: Progress,
     to: Destination,
 }

@@ -1,9 +1,8 @@
-//! What the kernel tells about a process in `/proc/PID/status`.
+//! The state of a process in `/proc/PID/status`.
 
 use std::fs;
 
 /// The value of `field` of process `process`, a number or `self`; none if the process has ended.
-#[must_use]
 pub fn field(process: &str, field: &str) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let mut lines = status.lines().filter_map(|line| line.split_once(':'));

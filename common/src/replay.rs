@@ -1,5 +1,5 @@
-//! What a replay drives instead of a process: a stage's step, fed with the inputs of one generation, giving what that
-//! generation must have published.
+//! The replay of one generation of a stage: the step gets the recorded inputs, and gives the samples that the generation must
+//! have published.
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -14,7 +14,6 @@ use crate::{
 /// A sample that a generation published, or must have.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// On which topic.
     pub topic: &'static str,
     /// The sample as a message of its own (see [`crate::bus::cdr`]), the stamp's generation and sequence 0.
     pub message: Vec<u8>,
@@ -22,7 +21,6 @@ pub struct Output {
 
 impl Output {
     /// `sample` of `topic`, published for `tick` at mission `time`.
-    #[must_use]
     pub fn of<P: Stamped + Layout>(
         topic: &Topic<P>,
         tick: u64,
@@ -40,7 +38,6 @@ impl Output {
     }
 
     /// `header` with `slice` of `topic`, published for `tick` at mission `time`.
-    #[must_use]
     pub fn of_slice<H: Stamped + Layout, T: Layout>(
         topic: &SliceTopic<H, T>,
         tick: u64,
@@ -66,7 +63,7 @@ const fn stamp(tick: u64, time: MissionTime) -> Stamp {
 /// An entry of a generation's inputs cannot be taken.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// It is not of this program.
+    /// It cannot be decoded.
     #[error("not an entry of this version of the stage ({0}); replay with the version that ran")]
     Foreign(#[from] postcard::Error),
     /// The stage could not take it.
@@ -77,22 +74,15 @@ pub enum ReplayError {
 /// One generation of a stage, replayed.
 pub trait Replay {
     /// Take the body of the next entry of its inputs. Gives what the process published because of it, in order.
-    ///
-    /// # Errors
-    /// When it is not an entry of this stage.
     fn take(&mut self, entry: &[u8]) -> Result<Vec<Output>, ReplayError>;
 
-    /// The entry in words, for a reader who looks for what went in.
-    ///
-    /// # Errors
-    /// When it is not an entry of this stage.
+    /// The entry in words, for a reader who looks for the cause of a difference.
     fn describe(&self, entry: &[u8]) -> Result<String, ReplayError>;
 }
 
-/// What the replay of a generation begins with.
+/// The start of a generation's replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Beginning<'a> {
-    /// The run.
     pub run: &'a Run,
     /// The body of the first entry of its inputs.
     pub start: &'a [u8],
@@ -104,9 +94,6 @@ pub struct Beginning<'a> {
 pub type Begin = fn(Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError>;
 
 /// The body of an entry.
-///
-/// # Errors
-/// When it is another.
 pub fn entry<'a, E: Deserialize<'a>>(body: &'a [u8]) -> Result<E, ReplayError> {
     Ok(postcard::from_bytes(body)?)
 }

@@ -20,19 +20,13 @@ pub struct Roster {
 
 impl Roster {
     /// Read the roster on `bus`.
-    ///
-    /// # Errors
-    /// When the topic cannot be read.
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::ROSTER)?);
         Ok(Self { samples: bus.slice_reader(&topics::ROSTER)?, waiter })
     }
 
-    /// What `find` finds in a roster first; none if it finds nothing for `patience`.
-    ///
-    /// # Errors
-    /// When the topic cannot be read any more.
+    /// The first result of `find` in a roster; none if there is no result for `patience`.
     pub fn find<T>(
         &mut self,
         patience: Duration,

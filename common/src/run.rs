@@ -1,5 +1,5 @@
-//! What the supervisor gives the stages of a run: one TOML file in the run directory. Beside it, how many generations
-//! each stage has had.
+//! The run file, with which the supervisor tells the stages of a run what to do: TOML, in the run directory. Beside it is the
+//! count of each stage's generations.
 
 use std::{
     fs::{self, File},
@@ -18,13 +18,12 @@ pub const FILE_NAME: &str = "run.toml";
 /// A run, as its stages need to know it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Whose bus to join.
+    /// The robot whose bus the stages join.
     pub robot: RobotName,
     /// Where the robot answers, and over which transport.
     pub address: Address,
     /// How samples are stamped.
     pub clock: MissionClock,
-    /// What to do.
     pub mission: Mission,
 }
 
@@ -33,29 +32,14 @@ pub struct Run {
 pub enum RunError {
     /// The file system refused.
     #[error("cannot {action} {file}: {source}; is the run directory there and writable?")]
-    File {
-        /// What was tried.
-        action: &'static str,
-        /// The file.
-        file: PathBuf,
-        /// What the system reports.
-        source: io::Error,
-    },
-    /// It is not what a supervisor writes.
+    File { action: &'static str, file: PathBuf, source: io::Error },
+    /// The text is not a run file.
     #[error("{file} is not a run file: {problem}; start the stage through `firsthand run`")]
-    Content {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
+    Content { file: PathBuf, problem: String },
 }
 
 impl Run {
     /// Write it into `directory`.
-    ///
-    /// # Errors
-    /// When the directory does not take it.
     pub fn save(&self, directory: &Path) -> Result<(), RunError> {
         let file = directory.join(FILE_NAME);
         let text = toml::to_string(self).map_err(|error| RunError::Content {
@@ -66,9 +50,6 @@ impl Run {
     }
 
     /// Read it back from `directory`.
-    ///
-    /// # Errors
-    /// When it is missing or not what [`Run::save`] writes.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
         let text = fs::read_to_string(&file).map_err(|source| RunError::File {
@@ -84,10 +65,8 @@ impl Run {
 /// The number of a new generation of `stage` in the run of `directory`: 1 for the first, and counted on when a new
 /// supervisor resumes the run, since readers drop samples of older generations.
 ///
-/// The file holds a line for each: an appended line is there or not, and no file is replaced, which a disk can delay.
-///
-/// # Errors
-/// When the count can be neither read nor written.
+/// The file has a line for each generation. An append is atomic here, and a slow disk does not delay it as it would delay the
+/// replacement of a file.
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {
@@ -104,12 +83,11 @@ pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
 }
 
 /// Where a process of the run in `directory` saves the state that its successor restores.
-#[must_use]
 pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
     directory.join(format!("{process}.checkpoint"))
 }
 
-/// Renamed into place: a kill leaves the old text or the new one.
+/// Write a file and rename it into place: a kill leaves the old text or the new one.
 fn replace(file: &Path, text: &str) -> io::Result<()> {
     let mut new = file.as_os_str().to_owned();
     new.push(".new");

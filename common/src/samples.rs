@@ -8,7 +8,7 @@
 //! Any bit pattern may arrive from another process: states travel as bytes and are read through
 //! `from_byte`, never as Rust enums.
 //!
-//! `robot`, `navigation` and `supervision` hold them; here is what they have in common.
+//! `robot`, `navigation` and `supervision` hold them; this module holds what they have in common.
 #![allow(unsafe_code)]
 
 pub use bus::{Stamp, Stamped};
@@ -23,7 +23,6 @@ macro_rules! payloads {
         #[type_name($type_name)]
         #[repr(C)]
         pub struct $name {
-            /// Which sample.
             pub stamp: $crate::bus::Stamp,
             $($(#[$doc])* pub $field: $kind,)*
         }
@@ -54,13 +53,11 @@ macro_rules! stamped {
     )*};
 }
 
-/// What a byte on the bus stands for; each value may have a text.
+/// An enum that is a byte on the bus. Each value may have a text.
 macro_rules! wire_enum {
     ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident, text = $text:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal $words:literal),* $(,)? }) => {
         wire_enum! { $(#[$meta])* $name, unknown = $unknown { $($(#[$doc])* $variant = $byte),* } }
         impl $name {
-            /// In a few words.
-            #[must_use]
             pub const fn $text(self) -> &'static str {
                 match self { $(Self::$variant => $words),* }
             }
@@ -73,7 +70,6 @@ macro_rules! wire_enum {
         pub enum $name { $($(#[$doc])* $variant = $byte),* }
         impl $name {
             /// The value a byte stands for; an unknown byte is read as the safe one.
-            #[must_use]
             pub const fn from_byte(byte: u8) -> Self {
                 match byte {
                     $($byte => Self::$variant,)*
@@ -89,14 +85,14 @@ macro_rules! wire_enum {
     };
 }
 
-// Below the macros they are written with.
+// These modules use the macros above, so they come after them.
 mod navigation;
 mod robot;
 mod supervision;
 
 pub use self::{navigation::*, robot::*, supervision::*};
 
-// Those whose defaults cannot be derived.
+// Their defaults cannot be derived, so they are not written with `payloads`.
 stamped!(GridHeader, LinkSample);
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The open file of what a stage persists.
+//! The open file that a stage persists its state in.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use crate::{
     journal::Journal,
 };
 
-/// What a stage persists, by [`Persists`](crate::wiring::Persists).
+/// The open file, by [`Persists`](crate::wiring::Persists).
 #[derive(Debug, Default)]
 pub enum Saved {
     /// Nothing is persisted.

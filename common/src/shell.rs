@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
     bus::{
-        AnyTopic, Bus, Layout, Payload, Reader, SliceReader, SliceTopic, SliceWriter, Stamp,
-        Stamped, Topic, Writer,
+        AnyTopic, Bus, Layout, Payload, Reader, SliceReader, SliceTopic, Stamp, Stamped, Topic,
+        Writer,
     },
     checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
@@ -42,13 +42,11 @@ pub use crate::start::StageError;
 /// On a wall clock, a pause of this length without input means that the tick is over: a tick takes a tenth of that.
 const TICK_OVER: Duration = Duration::from_millis(5);
 
-/// What a stage's process is opened with.
+/// The means to open a stage's process.
 pub struct Context {
-    /// Which generation.
     pub generation: Generation,
-    /// The run.
     pub run: Run,
-    /// What wakes the process besides the topics of its wiring.
+    /// Wakes the process. Besides the topics of its wiring, a process can add descriptors.
     pub waiter: Waiter,
     /// The stage tells it when the items of a tick end.
     pub budget: LatencyBudget,
@@ -90,22 +88,7 @@ impl Context {
         Ok(self.bus.writer(topic, self.generation.number)?)
     }
 
-    /// Write slices of at most `longest` elements on a topic of the wiring.
-    pub fn slice_writer<H, T>(
-        &mut self,
-        topic: &SliceTopic<H, T>,
-        longest: usize,
-    ) -> Result<SliceWriter<H, T>, StageError>
-    where
-        H: Payload + Stamped + Layout,
-        T: Payload + Layout,
-    {
-        self.opened.add(Access::Write, topic.spec().name)?;
-        let number = self.generation.number;
-        Ok(self.bus.slice_writer(topic, number, longest)?)
-    }
-
-    /// Open what the stage persists, and give the state that its last process saved.
+    /// Open the checkpoint, and give the state that the stage's last process saved.
     pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>, StageError> {
         let Persists::State(bytes) = self.opened.wiring.persists else {
             return Ok(None);
@@ -115,7 +98,7 @@ impl Context {
         Ok(state)
     }
 
-    /// The open file of what the stage persists, for a process without a [`Runner`](crate::stage::Runner).
+    /// The open checkpoint, for a process without a [`Runner`](crate::stage::Runner).
     pub fn take_saved(&mut self) -> Saved {
         std::mem::take(&mut self.saved)
     }
@@ -136,7 +119,7 @@ impl Context {
     }
 }
 
-/// The tick a stage is at: what its heartbeats are stamped with.
+/// The tick a stage is at. Its heartbeats carry it in their stamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     /// The tick last worked on.
@@ -152,27 +135,17 @@ impl Progress {
     }
 }
 
-/// A stage wired to its topics.
+/// A stage wired to its topics. An error ends the process, and the supervisor restarts the stage.
 pub trait Process: Sized {
-    /// What it opens on the bus, and what it persists.
     const WIRING: &'static Wiring;
 
     /// Open the topics, restore the checkpoint.
-    ///
-    /// # Errors
-    /// When one of them cannot be opened.
     fn open(context: &mut Context) -> Result<Self, StageError>;
 
     /// Take what came, step, publish. Called whenever something may have come, and for each heartbeat.
-    ///
-    /// # Errors
-    /// When the stage cannot go on; it will be restarted.
     fn turn(&mut self) -> Result<Progress, StageError>;
 
     /// Open what nobody waits for. Called once, after the first heartbeat that says ready.
-    ///
-    /// # Errors
-    /// When it cannot be opened.
     fn after_ready(&mut self, context: &mut Context) -> Result<(), StageError> {
         let _ = context;
         Ok(())
@@ -192,34 +165,24 @@ pub trait Process: Sized {
     /// keep the processor from the one it has just woken, so on a wall clock this is called in the pause after a
     /// tick, where [`Process::has_idle_work`] says so; in lockstep, where ticks follow each other at once,
     /// after each turn.
-    ///
-    /// # Errors
-    /// When the stage cannot go on; it will be restarted.
     fn idle(&mut self) -> Result<(), StageError> {
         Ok(())
     }
 
-    /// Break like this, on purpose. Returns whether it could be done: whether the fault is one of this stage's, and
-    /// what it breaks is there.
-    ///
-    /// # Errors
-    /// When the stage cannot go on; it will be restarted.
+    /// Inject a fault. Returns false if the stage has no such fault, or nothing yet to inject it into.
     fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
         let _ = fault;
         Ok(false)
     }
 
     /// Do what must be done before the process ends.
-    ///
-    /// # Errors
-    /// When that fails.
     fn stop(&mut self) -> Result<(), StageError> {
         Ok(())
     }
 }
 
 /// The `main` of an executable that has one stage: takes its place in the run that the command line says, and
-/// runs it until it is asked to stop. An error goes to standard error, which the supervisor keeps as the stage's log.
+/// runs it until it is asked to stop. An error goes to standard error, which the supervisor saves as the stage's log.
 pub fn main<P: Process>() -> ExitCode {
     let stage = P::WIRING.stage;
     let start = match stage_command::start(stage, env::args_os().skip(1)) {
@@ -243,13 +206,10 @@ fn complain(error: &dyn fmt::Display) {
     let _ = writeln!(io::stderr(), "{error}");
 }
 
-/// The exit code of a command line that is none, as that of `firsthand`.
+/// The exit code for a wrong command line; `firsthand` has the same.
 const WRONG_USAGE: u8 = 2;
 
 /// Run a stage until it is asked to stop.
-///
-/// # Errors
-/// What [`Process`] returns, or what keeps it from being opened.
 pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     let Joined { generation, run, bus, supervisor, stage_lock: _stage_lock } = match start {
@@ -280,7 +240,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     let mut process = P::open(&mut context)?;
     tracing::info!(generation = number, "ready");
     let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
-    // Whatever went wrong, the stage is stopped in order: the link then stops the robot.
+    // After an error, too, the stage is stopped in order: the link then stops the robot.
     let stopped = process.stop();
     let Generation { stage, directory, .. } = &context.generation;
     let file = latency_budget::file(directory, stage, number);
@@ -291,7 +251,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     worked.and(stopped)
 }
 
-/// What stops a stage in order: SIGTERM, or the end of a supervisor that is not its parent.
+/// A stage is asked to stop by SIGTERM, or by the end of a supervisor that is not its parent.
 struct StopRequest {
     terminated: Signals,
     supervisor: Option<OwnedFd>,
@@ -313,7 +273,7 @@ fn work(
     let ticks_follow_at_once = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     if ticks_follow_at_once {
-        // What it does between ticks belongs to the tick it has taken, not to the next.
+        // Idle work belongs to the tick before it, not to the next one.
         process.idle()?;
     }
     heartbeat.beat(HealthState::Ready, progress)?;
@@ -354,14 +314,14 @@ fn work(
     heartbeat.beat(HealthState::Stopping, progress)
 }
 
-/// Put the fault that was asked for into `process`, if that may be.
+/// Inject the requested fault into `process`, if that is allowed.
 fn inject(
     process: &mut impl Process,
     request: Result<FaultKind, FaultAnswer>,
 ) -> Result<FaultAnswer, StageError> {
     Ok(match request {
         Err(answer) => answer,
-        // Those that every stage has are done in the work loop.
+        // The work loop injects the faults that every stage has.
         Ok(FaultKind::Spin | FaultKind::Mute) => FaultAnswer::Taken,
         Ok(fault) if process.inject(fault)? => FaultAnswer::Taken,
         Ok(_) => FaultAnswer::Impossible,
@@ -372,7 +332,7 @@ fn inject(
 struct Heartbeat {
     writer: Writer<HealthSample>,
     sample: HealthSample,
-    /// From beat to beat at most, by the table of topics; also the longest that the stage waits.
+    /// The longest time from beat to beat, by the table of topics. The stage waits no longer for input either.
     period: Duration,
     last: Instant,
     /// The tick of the last beat.
@@ -430,7 +390,7 @@ impl Heartbeat {
         Ok(true)
     }
 
-    /// Publish what was made of the fault that was asked for under `id`.
+    /// Publish the answer to the fault request `id`.
     fn answer(
         &mut self,
         id: u64,

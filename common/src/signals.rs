@@ -23,9 +23,6 @@ pub struct Signals {
 impl Signals {
     /// Catch `signals` from now on. SIGHUP stays ignored where whoever started the process
     /// had it ignored, as `nohup` does.
-    ///
-    /// # Errors
-    /// When the process has no descriptor left.
     pub fn catch(signals: &[c_int]) -> io::Result<Self> {
         let (pipe, written_by_handler) = UnixStream::pair()?;
         pipe.set_nonblocking(true)?;

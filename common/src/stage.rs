@@ -22,32 +22,32 @@ use crate::{
     wiring::{Persists, Wiring},
 };
 
-/// What runs a step: the same in a process and in a replay.
+/// A stage around its step. A process and a replay run the same one.
 pub trait Stage: Sized + 'static {
-    /// What a generation starts from.
+    /// The state that a generation starts from.
     type Start: Serialize + DeserializeOwned;
-    /// What one call of the step takes. A recording holds it in this encoding.
+    /// The input of one call of the step. A recording holds it in this encoding.
     type Entry<'a>: Serialize + Deserialize<'a> + Debug;
-    /// What follows from an entry besides outputs, for the process.
+    /// The result of an entry for the process, besides the outputs.
     type Outcome;
 
     /// The stage at the start of `mission`.
     fn new(mission: &Mission) -> Self;
 
-    /// Open what the stage persists, and give what its process starts from.
+    /// Open the file that the stage persists its state in, and give the state that its process starts from.
     fn start(&self, context: &mut Context) -> Result<Self::Start, StageError>;
 
     /// Go on from `start`.
     fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState>;
 
-    /// Step, persist and publish: what follows from `entry`. Sets [`Outputs::at`] where the entry says of which tick it is.
+    /// Step with `entry`, persist and publish. Sets [`Outputs::at`] if the entry says of which tick it is.
     fn take(
         &mut self,
         entry: Self::Entry<'_>,
         out: &mut Outputs,
     ) -> Result<Self::Outcome, StageError>;
 
-    /// Publish what no reader waits for: a process calls it in a pause, a replay after each entry.
+    /// Publish outputs that no stage waits for. A process calls this in a pause, a replay after each entry.
     fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
         let _ = out;
         Ok(())
@@ -61,14 +61,12 @@ pub trait Stage: Sized + 'static {
 
 /// The stage in its process.
 pub struct Runner<S> {
-    /// The stage.
     pub stage: S,
-    /// Its outputs.
     pub out: Outputs,
 }
 
 impl<S: Stage> Runner<S> {
-    /// Open the topics that the stage writes and what it persists, and go on from there. A slice that it publishes has at most
+    /// Open the topics that the stage writes, restore its state, and go on from there. A slice that it publishes has at most
     /// `longest` elements.
     pub fn open(
         context: &mut Context,
@@ -96,7 +94,7 @@ impl<S: Stage> Runner<S> {
         Ok(outcome)
     }
 
-    /// Publish what no reader waits for.
+    /// Publish outputs that no stage waits for.
     pub fn publish_rest(&mut self) -> Result<(), StageError> {
         self.stage.publish_rest(&mut self.out)
     }
@@ -113,7 +111,7 @@ pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, Rep
     let mut stage = S::new(&beginning.run.mission);
     // A stage that persists nothing starts from an entry without bytes.
     if !beginning.start.is_empty() {
-        // The process went on without a foreign state, too.
+        // The process ignored a foreign state, too.
         let _ = stage.begin(entry(beginning.start)?);
     }
     let out = Outputs::of_replay(beginning.fields);
@@ -137,17 +135,11 @@ impl<S: Stage> Replay for Generation<S> {
 
 /// A stage that answers each sample of one topic with a sample of another.
 pub trait Answering: Step<State: Clone + Debug> + 'static {
-    /// What it reads.
     type In: Payload + Stamped + Layout;
-    /// What it writes.
     type Out: Payload + Stamped + Layout;
-    /// Its name.
     const NAME: &'static str;
-    /// The topic it reads.
     const INPUT: &'static Topic<Self::In>;
-    /// The topic it writes.
     const OUTPUT: &'static Topic<Self::Out>;
-    /// What it persists.
     const PERSISTS: Persists = Persists::Nothing;
     /// Whether it skips samples that are not the newest.
     const NEWEST_ONLY: bool = false;
@@ -156,14 +148,13 @@ pub trait Answering: Step<State: Clone + Debug> + 'static {
     fn answer(&mut self, input: &Self::In, now: MissionTime) -> Answer<Self::Out>;
 }
 
-/// What follows from one sample.
+/// The answer to one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer<P> {
-    /// What is published.
     pub sample: P,
-    /// Whether the state must be saved before that. Where it need not, no tick waits for the file.
+    /// Whether the state is saved before the sample is published. Otherwise no tick waits for the file.
     pub saves_first: bool,
-    /// What the log of the process has to say.
+    /// A warning for the log of the process.
     pub warning: Option<&'static str>,
 }
 

@@ -1,4 +1,4 @@
-//! The command line of a stage's process: what the supervisor writes and every executable of a stage reads.
+//! The command line of a stage's process: the supervisor writes it, and every executable of a stage reads it.
 //!
 //! | form | started by |
 //! |---|---|
@@ -29,9 +29,8 @@ pub struct StageCommandError {
     problem: String,
 }
 
-/// What the supervisor `supervisor` gives to the process of `generation`, after the executable's name; `called` is the name of its
-/// stage, or of the baseline in its place.
-#[must_use]
+/// The arguments with which the supervisor, process `supervisor`, starts the process of `generation`. `called` is the name of
+/// its stage, or of the baseline in its place.
 pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<OsString> {
     let Generation { stage: _, directory, number, first_tick } = generation;
     vec![
@@ -50,9 +49,6 @@ pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<
 
 /// The start of `stage` that `arguments` ask for, the words after the executable's name: for an executable that has
 /// this one stage.
-///
-/// # Errors
-/// When they are no command line of a stage, or that of another one.
 pub fn start(
     stage: &'static str,
     arguments: impl IntoIterator<Item = OsString>,
@@ -68,9 +64,6 @@ pub fn start(
 }
 
 /// The start of `stage` with `options`, the words after its name.
-///
-/// # Errors
-/// When an option is unknown, lacks its value, or does not go with the others.
 pub fn start_with(
     stage: &'static str,
     options: impl IntoIterator<Item = OsString>,

@@ -12,7 +12,7 @@ use crate::{
     wiring::WiringError,
 };
 
-/// Which of a stage's processes in a run this is: each start of a stage is a generation.
+/// One of a stage's processes in a run: each start of a stage is a generation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Generation {
     /// The stage's name in the table.
@@ -25,23 +25,17 @@ pub struct Generation {
     pub first_tick: u64,
 }
 
-/// How a stage's process came to be.
+/// How a stage's process was started.
 #[derive(Clone, Debug)]
 pub enum Start {
     /// The supervisor started it.
     Child {
-        /// Which generation it is.
         generation: Generation,
         /// The supervisor's process, its parent: when that ends, this one is to end.
         supervisor: u32,
     },
     /// Something else started it (systemd, a person), for a supervisor that only watches; it finds the rest itself.
-    External {
-        /// Which stage it is.
-        stage: &'static str,
-        /// For which robot.
-        robot: RobotName,
-    },
+    External { stage: &'static str, robot: RobotName },
 }
 
 /// A process that has taken its place.
@@ -69,25 +63,19 @@ pub enum StageError {
     /// The process opens something else than its wiring lists.
     #[error(transparent)]
     Wiring(#[from] WiringError),
-    /// An error of this stage alone, in words.
+    /// An error that only this stage has.
     #[error("{0}")]
     Other(String),
     /// Signals or process attributes.
     #[error("cannot {action}: {source}; this needs Linux 5.4 or newer")]
-    System {
-        /// What was tried.
-        action: &'static str,
-        /// What the system reports.
-        source: std::io::Error,
-    },
+    System { action: &'static str, source: std::io::Error },
 }
 
-/// The exit code of a stage that the bus refused: the supervisor then makes the bus anew.
+/// The exit code of a stage that the bus refused: the supervisor then creates a new bus instance.
 pub const REFUSED: u8 = 8;
 
 impl StageError {
     /// The exit code of a stage's process that ends with this.
-    #[must_use]
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Bus(_) => REFUSED,
@@ -121,7 +109,7 @@ pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> Sta
 /// Take a name that `ps` and `pkill` show, and get SIGTERM when `supervisor` ends.
 ///
 /// # Errors
-/// When the supervisor has ended already, or the system is no Linux.
+/// When the supervisor has ended already, or the system is not Linux.
 pub fn become_child(process_name: &str, supervisor: u32) -> Result<(), StageError> {
     name_process(process_name)?;
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))

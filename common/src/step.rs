@@ -1,4 +1,4 @@
-//! What a stage computes: the one trait that every stage's step implements.
+//! The step of a stage: the one trait that every stage implements.
 //!
 //! A stage is two parts. Its *step* is pure: no shared memory, socket, file, thread or clock. Its *shell*
 //! (a [`Process`](crate::shell::Process)) reads topics, calls the step with what it read, saves the step's state, and
@@ -26,7 +26,7 @@
 //! | `controller` | guidance | command | none |
 //!
 //! # A step of your own
-//! A stage that measures how far the robot has gone, and how its process is replaced by another:
+//! This stage measures how far the robot has gone, and its process is replaced by another:
 //!
 //! ```
 //! use std::path::Path;
@@ -96,24 +96,24 @@ pub trait Step: Sized {
     /// from shared memory for the length of the call.
     type Input<'a>;
 
-    /// What follows from one input: samples to publish (without stamps, which the shell's writer fills in), requests to
-    /// the shell, or why there is no result.
+    /// The result of one input: samples to publish (without stamps, which the writer fills in), requests to the process, or
+    /// the reason why there is no result.
     type Output;
 
-    /// What must survive the process: what cannot be recomputed from the topics that a new process reads. `()` where
-    /// there is nothing.
+    /// The state that must survive the process, because it cannot be recomputed from the topics that a new process reads; `()`
+    /// if there is none.
     type State: Serialize + DeserializeOwned;
 
     /// The step at the start of `mission`, before any input.
     fn new(mission: &Mission) -> Self;
 
-    /// What to save after a step.
+    /// The state to save after a step.
     fn state(&self) -> &Self::State;
 
-    /// Go on from what an earlier process of the same mission saved. Called at most once, before the first input.
+    /// Go on from the state that an earlier process of the same mission saved. Called at most once, before the first input.
     ///
     /// # Errors
-    /// When the state cannot be of this mission; the step is as [`Step::new`] made it.
+    /// When the state cannot be of this mission. Then the step stays as [`Step::new`] created it.
     fn restore(&mut self, state: Self::State) -> Result<(), ForeignState>;
 
     /// Take one input at mission time `now`. An input that was taken before (a tick that is given again) must not

@@ -15,13 +15,13 @@ pub use crate::bus::{
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
-/// Longer than a tick at 7 Hz, so that a stage that answers ticks beats with them and need not wake for a beat alone. Five
-/// fit in the tightest deadline set on them.
+/// Heartbeats are farther apart than ticks at 7 Hz, so a stage that answers ticks beats with them and need not wake for a
+/// beat alone. Five of them fit in the tightest deadline of a heartbeat.
 const BEAT: Duration = Duration::from_millis(150);
-/// So that `firsthand status` is up to date while no ticks come.
+/// The link is published so often while no ticks come, so that `firsthand status` is up to date.
 const LINK_AGAIN: Duration = Duration::from_millis(100);
 
-/// For eyes and loggers: the robot should not wait for it. In mission time.
+/// The field is for displays and recorders; no stage waits for it. In mission time.
 const FIELD_RATE: Rate = Rate::OnChange {
     at_most_every: Duration::from_millis(250),
     again_after: Duration::from_secs(1),
@@ -49,11 +49,11 @@ macro_rules! topics {
         )*
         /// Every topic, in the order of the pipeline.
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
-        /// The same, for consumers that read a topic by its name.
+        /// Every topic, for consumers that read one by its name.
         pub static READABLE: &[&dyn ReadableTopic] = &[$(&$id),*];
         /// Every topic, to be opened from a list.
         pub static OPEN: &[&dyn OpenTopic] = &[$(&$id),*];
-        /// The same, to be read without knowing what they carry.
+        /// Every topic, to be read without knowing its payload.
         pub static ENCODED: &[&dyn EncodedTopic] = &[$(&$id),*];
     };
 }
@@ -127,11 +127,11 @@ topics! {
     STALLS: Topic<StallSample> {
         name: "stalls", writer: SUPERVISOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
-    /// What an operator asks: restart, stop, resume.
+    /// Requests of an operator: restart, stop, resume.
     REQUESTS: Topic<RequestSample> {
         name: "requests", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
-    /// What an operator breaks in a stage on purpose; every stage reads it.
+    /// Requests of an operator to inject a fault into a stage; every stage reads it.
     FAULTS: Topic<FaultSample> {
         name: "faults", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
@@ -139,7 +139,7 @@ topics! {
     WIRE: SliceTopic<WireHeader, u8> {
         name: "wire", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,
     }
-    /// What the step of every stage took, and the checkpoint each generation started from: what a replay needs.
+    /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
     /// Wakes nobody: a reader waits for `link`.
     INPUTS: SliceTopic<InputsHeader, u8> {
         name: "inputs", writer: EVERY_STAGE, rate: Rate::WhenItHappens, limits: Limits::DEEP, logged: Yes,

@@ -13,12 +13,12 @@ use crate::{
 /// Rows of the table of topics.
 pub type Topics = &'static [&'static dyn OpenTopic];
 
-/// What the process of every stage reads besides: the requests of faults.
+/// Every stage's process also reads the requests of faults.
 pub static EVERY_STAGE_READS: Topics = &[&FAULTS];
-/// What the process of every stage writes besides: its heartbeats, and what its step took.
+/// Every stage's process also writes its heartbeats, and the inputs of its step.
 pub static EVERY_STAGE_WRITES: Topics = &[&HEALTH, &INPUTS];
 
-/// What a stage reads, what wakes it, what it writes and what it persists.
+/// The topics that a stage reads, is woken by and writes, and the state that it persists.
 pub struct Wiring {
     /// The stage's name: of the process, of `firsthand stage NAME`, of the folder under `services/`.
     pub stage: &'static str,
@@ -31,27 +31,24 @@ pub struct Wiring {
     /// Topics that it alone writes. The last one that is published each tick answers the tick. Topics that follow each frame
     /// of the robot are opened after the first heartbeat that says ready.
     pub outputs: Topics,
-    /// What its next process goes on from.
     pub persists: Persists,
 }
 
-/// What a stage's next process goes on from, in the file `STAGE.checkpoint` of the run's directory.
+/// The state that a stage's next process goes on from, in the file `STAGE.checkpoint` of the run's directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Persists {
-    /// The next inputs bring everything.
+    /// Nothing is persisted: the next inputs bring everything.
     Nothing,
-    /// Its state, of at most so many bytes, after each step.
+    /// The state, of at most so many bytes, is saved after each step.
     State(usize),
-    /// Its inputs since a snapshot; the mission says how large that is.
+    /// The inputs since a snapshot are saved. The mission says how large a snapshot is.
     Journal,
 }
 
 /// How a process opens a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// It reads.
     Read,
-    /// It writes.
     Write,
 }
 
@@ -93,7 +90,7 @@ impl Wiring {
     }
 }
 
-/// What a process has opened of its wiring.
+/// The topics of its wiring that a process has opened.
 pub(crate) struct Opened {
     pub(crate) wiring: &'static Wiring,
     topics: Vec<(Access, &'static str)>,

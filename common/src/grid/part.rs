@@ -1,4 +1,4 @@
-//! Which part of which version of a map a sample carries.
+//! The part of a map's version that a sample carries.
 //!
 //! Why `unsafe` is allowed here: a [`Part`] lies in shared memory, and deriving `ZeroCopySend` writes an `unsafe impl`
 //! that promises a self-contained type of uniform layout. Its fields are plain numbers in a `repr(C)` struct, so the
@@ -44,7 +44,6 @@ layouts! {
 
 impl Part {
     /// `window` of version `version` of a map that lies as `frame` says.
-    #[must_use]
     pub const fn of(frame: GridFrame, window: Window, version: u64) -> Self {
         Self {
             version,
@@ -61,13 +60,11 @@ impl Part {
     }
 
     /// All of version `version` of a map that lies as `frame` says: a keyframe.
-    #[must_use]
     pub const fn whole(frame: GridFrame, version: u64) -> Self {
         Self { keyframe: 1, ..Self::of(frame, frame.whole(), version) }
     }
 
     /// How the map lies.
-    #[must_use]
     pub const fn frame(&self) -> GridFrame {
         GridFrame {
             cells: self.cells,
@@ -77,13 +74,11 @@ impl Part {
     }
 
     /// The cells that came along, row-major.
-    #[must_use]
     pub const fn window(&self) -> Window {
         Window { col: self.col, row: self.row, width: self.width, height: self.height }
     }
 
     /// Whether they are the whole map.
-    #[must_use]
     pub const fn is_keyframe(&self) -> bool {
         self.keyframe == 1
     }

@@ -4,7 +4,7 @@ use mission::grid::{Cell, GridFrame, MAX_CELLS, Window};
 
 use super::part::Part;
 
-/// What became of a part.
+/// The effect of a part on the copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
     /// The whole map came, and nothing was held before to compare it with.
@@ -24,19 +24,16 @@ pub struct Replica<T> {
 
 impl<T: Copy + PartialEq> Replica<T> {
     /// The frame, once a keyframe has come.
-    #[must_use]
     pub fn frame(&self) -> Option<GridFrame> {
         self.state.map(|(frame, _)| frame)
     }
 
     /// The version held; 0 before the first keyframe.
-    #[must_use]
     pub fn version(&self) -> u64 {
         self.state.map_or(0, |(_, version)| version)
     }
 
     /// All cells, row-major; empty before the first keyframe.
-    #[must_use]
     pub fn cells(&self) -> &[T] {
         &self.cells
     }

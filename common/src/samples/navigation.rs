@@ -26,8 +26,8 @@ payloads! {
         omega_rad_s: f64,
         /// Length of the way so far, metres.
         travelled_m: f64,
-        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. As far as
-        /// the wheels go: `[dead_reckoning]` of the mission says how they are taken to err.
+        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. It covers
+        /// the errors of the wheels, as `[dead_reckoning]` of the mission states them.
         covariance: [f64; 6],
         /// The encoder counts it was computed at.
         left_counts: u16,
@@ -38,20 +38,17 @@ payloads! {
 
 impl PoseSample {
     /// Position and heading.
-    #[must_use]
     pub const fn pose(&self) -> Pose2 {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 
     /// Root of the mean square of the position's error, as the covariance has it, metres.
-    #[must_use]
     pub fn position_rms_m(&self) -> f64 {
         let [xx, _, _, yy, ..] = self.covariance;
         (xx + yy).max(0.0).sqrt()
     }
 
     /// Speeds over the last tick.
-    #[must_use]
     pub const fn twist(&self) -> Twist {
         Twist { v: self.v_m_s, omega: self.omega_rad_s }
     }
@@ -60,7 +57,8 @@ impl PoseSample {
 /// How many readings a `grid` sample carries at most.
 pub const CLEAR_BEAMS: usize = 128;
 
-/// One reading as evidence of free ground. Of the sonar: nothing that is square to the beam stands nearer than `clear_m`.
+/// One reading as evidence of free ground. A reading of the sonar says that nothing square to the beam stands nearer than
+/// `clear_m`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.ClearBeam")]
 #[repr(C)]
@@ -71,11 +69,11 @@ pub struct ClearBeam {
     pub y_m: f32,
     /// Where it looked, radians counter-clockwise from x.
     pub bearing_rad: f32,
-    /// So far nothing answered, metres.
+    /// The distance within which nothing answered, metres.
     pub clear_m: f32,
 }
 
-/// How many rays of infrared rangers a `grid` sample carries at most: those of 32 ticks.
+/// How many rays of infrared rangers a `grid` sample carries at most: the rays of 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * infrared::RANGERS;
 
 /// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
@@ -83,9 +81,7 @@ pub const CLEAR_RAYS: usize = 32 * infrared::RANGERS;
 #[type_name("firsthand.GridHeader")]
 #[repr(C)]
 pub struct GridHeader {
-    /// Which sample.
     pub stamp: Stamp,
-    /// Which part of which version.
     pub part: Part,
     /// Range samples that put a hazard on the map so far.
     pub safety_events: u64,
@@ -104,13 +100,11 @@ pub struct GridHeader {
 
 impl GridHeader {
     /// The newest readings, oldest first.
-    #[must_use]
     pub fn clear_beams(&self) -> &[ClearBeam] {
         counted(&self.clear_beams, self.clear_beam_count)
     }
 
     /// The newest readings of the infrared rangers, oldest first.
-    #[must_use]
     pub fn clear_rays(&self) -> &[ClearBeam] {
         counted(&self.clear_rays, self.clear_ray_count)
     }
@@ -131,14 +125,14 @@ impl Default for GridHeader {
     }
 }
 
-/// The first `count` of `beams`. Shared memory is outside: the count may be anything.
+/// The first `count` of `beams`. The count comes from shared memory and may be anything.
 fn counted(beams: &[ClearBeam], count: u64) -> &[ClearBeam] {
     let count = usize::try_from(count).unwrap_or(beams.len());
     &beams[..count.min(beams.len())]
 }
 
 wire_enum! {
-    /// What the planner says of the pose.
+    /// The planner's answer to a pose.
     GuidanceStatus, unknown = Waiting {
         /// No field yet.
         Waiting = 0,
@@ -164,23 +158,23 @@ payloads! {
         ey: f64,
         /// dst of (14): straight to the target, metres.
         distance_m: f64,
-        /// The most tangential speed that what is believed of the way ahead allows, m/s; infinite for no limit.
+        /// The most tangential speed that the map of the way ahead allows, m/s; infinite for no limit.
         speed_limit_m_s: f64,
         /// A [`GuidanceStatus`].
         status: u8,
         /// Mission time of the pose it was computed for, nanoseconds.
         pose_ns: u64,
-        /// That pose, metres in the mission frame.
+        /// X of that pose, metres in the mission frame.
         x_m: f64,
-        /// That pose, metres in the mission frame.
+        /// Y of that pose, metres in the mission frame.
         y_m: f64,
-        /// That pose, radians counter-clockwise from x; not wrapped.
+        /// Heading of that pose, radians counter-clockwise from x; not wrapped.
         heading_rad: f64,
         /// The version of `grid` it was computed from.
         grid_version: u64,
-        /// That version's safety events.
+        /// Safety events of that version.
         safety_events: u64,
-        /// That version's belief epoch.
+        /// Belief epoch of that version.
         epoch: u64,
         /// Full solves in this generation of the planner.
         full_solves: u64,
@@ -191,7 +185,6 @@ payloads! {
 
 impl GuidanceSample {
     /// No direction yet, for the pose `pose` by the belief `belief`.
-    #[must_use]
     pub fn for_pose(pose: &PoseSample, belief: &GridHeader) -> Self {
         Self {
             pose_ns: pose.stamp.stamp_ns,
@@ -205,7 +198,6 @@ impl GuidanceSample {
     }
 
     /// The pose it was computed for.
-    #[must_use]
     pub const fn pose(&self) -> Pose2 {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
@@ -214,7 +206,6 @@ impl GuidanceSample {
 payloads! {
     /// Topic `field`, header; the slice is one [`FieldCell`] a cell of the window.
     "firsthand.FieldHeader" FieldHeader {
-        /// Which part of which version.
         part: Part,
         /// The version of `grid` it was computed from.
         grid_version: u64,
@@ -267,10 +258,10 @@ payloads! {
         omega_rad_s: f64,
         /// dst of (14), metres.
         distance_m: f64,
-        /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds: the link
-        /// lets no old one move the robot, whatever the stamp says.
+        /// Mission time of the oldest pose it was computed from, the guidance's among them, nanoseconds. The link lets no old
+        /// command move the robot, whatever its stamp says.
         pose_ns: u64,
-        /// Mission time of the guidance it follows, nanoseconds; likewise.
+        /// Mission time of the guidance it follows, nanoseconds. The link checks its age, too.
         guidance_ns: u64,
         /// A [`CommandState`].
         state: u8,

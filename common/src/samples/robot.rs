@@ -1,4 +1,4 @@
-//! What the link publishes: the robot's sensors, and the state of the link itself.
+//! The payloads of the link: the robot's sensors, and the state of the link itself.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::{
 };
 
 wire_enum! {
-    /// What the front sonar measured in a tick.
+    /// The kind of a front sonar reading.
     RangeStatus, unknown = Absent {
         /// No sonar frame came since the last tick: the map stays as it is.
         Absent = 0,
@@ -33,15 +33,15 @@ payloads! {
         status: u8,
         /// The byte as the robot sent it, cm.
         raw_cm: u8,
-        /// The infrared rangers in the order of [`infrared::rangers`], AD counts; all 0, as of rangers that are dead, where none
-        /// came since the last tick.
+        /// The infrared rangers in the order of [`infrared::rangers`], AD counts; all 0 if none came
+        /// since the last tick, as if the rangers were dead.
         infrared_ad: [u16; infrared::RANGERS],
     }
 }
 
 payloads! {
-    /// Topic `wheels`: the encoders. Of a car the left one is that of the driven wheel, the right one that of the steering, 0
-    /// straight ahead and growing to the left.
+    /// Topic `wheels`: the encoders. A car has the encoder of the driven wheel at the left, and that of the steering at the right,
+    /// which is 0 straight ahead and grows to the left.
     "firsthand.Wheels" WheelSample {
         /// Left encoder, counts modulo 32768, growing forward.
         left_counts: u16,
@@ -58,7 +58,7 @@ payloads! {
 }
 
 wire_enum! {
-    /// What the link's failsafe does with the robot, the least severe first.
+    /// The action of the link's failsafe, the least severe first.
     #[derive(PartialOrd, Ord)]
     Action, unknown = Stop, text = effect {
         /// Commands pass as they are.
@@ -99,9 +99,9 @@ wire_enum! {
         GuidanceStale = 10 "guidance stale",
         /// A battery that the robot drives on is low.
         BatteryLow = 11 "battery low",
-        /// What was commanded and what the encoders say disagree.
+        /// The encoders contradict the commands.
         OdometryImplausible = 12 "odometry implausible",
-        /// They have disagreed for so long that the mission ends.
+        /// The encoders have contradicted the commands for so long that the mission ends.
         OdometryGivenUp = 13 "odometry implausible for long",
         /// The robot was told to stand, and its encoders say that it moves.
         RobotDoesNotStop = 14 "robot does not obey",
@@ -111,7 +111,7 @@ wire_enum! {
         FramesSlow = 16 "motor frames too slow",
         /// The front sonar of a mission that senses gives no readings.
         RangeSilent = 17 "front sonar silent",
-        /// What the robot sends is old.
+        /// The robot's frames are old.
         RobotLate = 18 "robot late",
     }
 }
@@ -121,15 +121,14 @@ wire_enum! {
 #[type_name("firsthand.Link")]
 #[repr(C)]
 pub struct LinkSample {
-    /// Which sample.
     pub stamp: Stamp,
     /// 1: the robot answers.
     pub connected: u32,
-    /// What the failsafe does: an [`Action`].
+    /// The failsafe's [`Action`].
     pub action: u8,
-    /// Why: a [`Cause`].
+    /// The [`Cause`] of the action.
     pub cause: u8,
-    /// 1: the encoders say that no wheel turns; 0: one does, or nobody knows.
+    /// 1: the encoders say that no wheel turns; 0: a wheel turns, or it is not known.
     pub at_rest: u8,
     /// Frames received whole.
     pub frames_in: u64,
@@ -143,7 +142,7 @@ pub struct LinkSample {
     pub ignored_samples: u64,
     /// The process that wrote the last of them; 0 for none.
     pub ignored_writer: u32,
-    /// Another port than the robot's, from which its host answered; 0 for none.
+    /// A port that is not the robot's, from which its host answered; 0 for none.
     pub other_port: u32,
     /// Times the robot was lost.
     pub losses: u64,
@@ -200,20 +199,17 @@ impl Default for LinkSample {
 }
 
 impl LinkSample {
-    /// What the failsafe does.
-    #[must_use]
+    /// The failsafe's action.
     pub const fn action(&self) -> Action {
         Action::from_byte(self.action)
     }
 
-    /// Why.
-    #[must_use]
+    /// The cause of the action.
     pub const fn cause(&self) -> Cause {
         Cause::from_byte(self.cause)
     }
 
     /// Whether the link lets no command pass.
-    #[must_use]
     pub fn stopped(&self) -> bool {
         self.action() >= Action::Stop
     }
@@ -224,7 +220,7 @@ payloads! {
     "firsthand.Infrared" InfraredSample {
         /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
         range_m: [f64; infrared::RANGERS],
-        /// As the robot sent them, AD counts.
+        /// The readings as the robot sent them, AD counts.
         raw_ad: [u16; infrared::RANGERS],
     }
 }
@@ -253,7 +249,6 @@ payloads! {
 
 impl PowerSample {
     /// Whether any battery is low.
-    #[must_use]
     pub const fn is_low(&self) -> bool {
         self.board_low == 1 || self.motor_low == 1 || self.servo_low == 1
     }
@@ -274,7 +269,7 @@ payloads! {
 }
 
 wire_enum! {
-    /// Which way bytes went.
+    /// The direction of bytes on the wire.
     Direction, unknown = Received {
         /// From the robot.
         Received = 0,

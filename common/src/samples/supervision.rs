@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 use crate::bus::{ZeroCopySend, layouts};
 
 wire_enum! {
-    /// How a stage is.
+    /// The state of a stage's process.
     HealthState, unknown = Starting {
         /// Opening its topics, or waiting for what it cannot work without.
         Starting = 0,
@@ -20,7 +20,6 @@ wire_enum! {
 pub type Name = [u8; 24];
 
 /// `text` as a [`Name`], cut at 24 bytes.
-#[must_use]
 pub fn name(text: &str) -> Name {
     let mut name = [0; 24];
     for (slot, byte) in name.iter_mut().zip(text.bytes()) {
@@ -30,7 +29,6 @@ pub fn name(text: &str) -> Name {
 }
 
 /// The text of a [`Name`]; what is not UTF-8 is left out.
-#[must_use]
 pub fn name_str(name: &Name) -> &str {
     let text = name.split(|&byte| byte == 0).next().unwrap_or_default();
     std::str::from_utf8(text).unwrap_or_default()
@@ -47,15 +45,15 @@ payloads! {
         state: u8,
         /// Iterations of the work loop.
         turns: u64,
-        /// The fault that this generation was asked for last; 0 for none.
+        /// The newest fault request to this generation; 0 for none.
         last_fault: u64,
-        /// How it answered: a [`FaultAnswer`].
+        /// Its answer: a [`FaultAnswer`].
         fault_answer: u8,
     }
 }
 
 wire_enum! {
-    /// What the supervisor wants of the robot.
+    /// The supervisor's order to the robot.
     Order, unknown = Stop {
         /// Stand still; do not start ticks.
         Hold = 0,
@@ -179,7 +177,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// What the supervisor does about a death.
+    /// The supervisor's action after a death.
     NextStep, unknown = Nothing {
         /// Nothing: the run ends.
         Nothing = 0,
@@ -213,7 +211,6 @@ impl std::fmt::Debug for Words {
 }
 
 /// `text` as [`Words`], cut at 400 bytes.
-#[must_use]
 pub fn words(text: &str) -> Words {
     let mut words = Words::default();
     for (slot, byte) in words.bytes.iter_mut().zip(text.bytes()) {
@@ -224,7 +221,6 @@ pub fn words(text: &str) -> Words {
 
 impl Words {
     /// The text; a character that was cut is replaced.
-    #[must_use]
     pub fn text(&self) -> std::borrow::Cow<'_, str> {
         let text = self.bytes.split(|&byte| byte == 0).next();
         String::from_utf8_lossy(text.unwrap_or_default())
@@ -262,13 +258,13 @@ payloads! {
 }
 
 wire_enum! {
-    /// What is done about a stall.
+    /// A measure against a stall.
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     RecoveryStep, unknown = GiveUp {
         /// A new generation of the planner, which solves the full field.
         Replan = 0,
-        /// What was sensed is forgotten.
+        /// The sensed map is reset.
         Reset = 1,
         /// The mission ends: the target is unreachable.
         GiveUp = 2,
@@ -302,7 +298,7 @@ payloads! {
         epoch: u64,
         /// Generations of the planner started for a stall so far in this mission, this one among them.
         replans: u32,
-        /// Beliefs forgotten so far in this mission, this one among them.
+        /// Resets of the sensed map so far in this mission, this one among them.
         resets: u64,
         /// A [`StallCause`].
         cause: u8,
@@ -313,13 +309,11 @@ payloads! {
 
 impl StallSample {
     /// Why the robot does not get on.
-    #[must_use]
     pub const fn cause(&self) -> StallCause {
         StallCause::from_byte(self.cause)
     }
 
-    /// What is done about it.
-    #[must_use]
+    /// The measure against it.
     pub const fn recovery(&self) -> RecoveryStep {
         RecoveryStep::from_byte(self.recovery)
     }
@@ -342,7 +336,7 @@ impl Serialize for StallSample {
 }
 
 wire_enum! {
-    /// What an operator asks of the supervisor.
+    /// A request of an operator to the supervisor.
     RequestKind, unknown = Nothing {
         /// Nothing.
         Nothing = 0,
@@ -356,7 +350,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `requests`: what an operator asks of the supervisor.
+    /// Topic `requests`: an operator's requests to the supervisor.
     "firsthand.Request" RequestSample {
         /// Identifies the request: the roster's `last_request` says that it was taken. Never 0.
         id: u64,
@@ -368,7 +362,7 @@ payloads! {
 }
 
 wire_enum! {
-    /// What can be broken in a running stage on purpose; [`crate::faults::TABLE`] says where and how.
+    /// A fault that can be injected into a running stage; [`crate::faults::TABLE`] says where and how.
     #[derive(Serialize, Deserialize)]
     FaultKind, unknown = Nothing {
         /// Nothing.
@@ -381,19 +375,19 @@ wire_enum! {
         Saddle = 3,
         /// Hazard believed wherever the robot is.
         HazardAroundRobot = 4,
-        /// A closed wall believed around the target, whatever is forgotten.
+        /// A closed wall believed around the target, also after a reset.
         CutOff = 5,
-        /// Beats, and no output.
+        /// The stage beats, and publishes no output.
         Mute = 6,
     }
 }
 
 wire_enum! {
-    /// How a stage answered a fault it was asked for.
+    /// A stage's answer to a fault request.
     FaultAnswer, unknown = Refused {
-        /// Asked for none.
+        /// No fault was requested.
         None = 0,
-        /// It is broken now.
+        /// The fault is injected.
         Taken = 1,
         /// Not done: the robot is a real one, and the request does not say `although_real`.
         Refused = 2,
@@ -403,7 +397,7 @@ wire_enum! {
 }
 
 payloads! {
-    /// Topic `faults`: break something in a stage, to see the rest cope.
+    /// Topic `faults`: requests to inject a fault into a stage.
     "firsthand.Fault" FaultSample {
         /// Identifies the request: the stage's `last_fault` in `health` says that it was answered. Never 0.
         id: u64,

@@ -1,4 +1,4 @@
-//! Active sensing: what the evidential method does about a direction before the robot goes there.
+//! Active sensing: the evidential method checks a direction before the robot goes there.
 //!
 //! The one sonar looks ahead, the body is wider than its cone where it matters, and a surface at a slant does not answer. So
 //! before the robot drives over ground, the sonar must have been pointed there, and square to every surface that could be

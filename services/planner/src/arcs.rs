@@ -1,5 +1,5 @@
-//! The direction that the evidential method gives a car: that of the arc which the car can drive and which gets farthest
-//! along the field.
+//! The direction that the evidential method gives a car: the car can drive the arc in this direction, and no other arc gets
+//! farther along the field.
 //!
 //! The field turns sharper than a car does. So arcs of several curvatures are followed over the belief, as far as the
 //! car looks ahead. An arc that a hazard cuts off before the car could stop is out. Of the others, the one with the greatest

@@ -23,9 +23,6 @@ pub struct BackgroundSolver {
 
 impl BackgroundSolver {
     /// Start the thread.
-    ///
-    /// # Errors
-    /// When the system has no thread or descriptor left.
     pub fn start() -> io::Result<Self> {
         let mut worker = Worker::default();
         let cancellation = worker.cancellation.clone();

@@ -39,7 +39,7 @@ enum Advisor {
     Steer(Arcs),
 }
 
-/// The planner of (11).
+/// The planner, (11).
 #[derive(Debug)]
 pub struct Planner {
     target: DVec2,
@@ -50,7 +50,7 @@ pub struct Planner {
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
-    /// None before the first keyframe.
+    /// The field and its map; none before the first keyframe.
     live: Option<Live>,
     /// A fault is injected: no direction is given, wherever the robot is.
     on_a_saddle: bool,
@@ -61,7 +61,7 @@ pub struct Planner {
 impl Step for Planner {
     type Input<'a> = Input<'a>;
     type Output = Result<Outcome, SolveError>;
-    /// None: the mapper publishes a keyframe for each new planner.
+    /// The planner persists nothing: the mapper publishes a keyframe for each new planner.
     type State = ();
 
     /// It knows nothing until the first keyframe.
@@ -122,7 +122,7 @@ impl Planner {
         Ok(work)
     }
 
-    /// Solve a map that no field is known of.
+    /// Solve a map without an earlier field.
     fn solve_first(&mut self) -> Result<Work, SolveError> {
         self.live = None;
         let Some(frame) = self.grid.frame() else {
@@ -193,7 +193,7 @@ impl Planner {
         Some(job)
     }
 
-    /// Take the result of a job; that of a job nobody waits for any more changes nothing.
+    /// Take the result of a job. The result of a job that nobody waits for changes nothing.
     fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let awaited = self.live.as_mut().filter(|it| it.awaits(solved.number));
         let Some(live) = awaited else {

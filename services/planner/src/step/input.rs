@@ -90,7 +90,7 @@ pub struct Solved {
     pub number: u64,
     /// The field of the job's map.
     pub field: Result<Arc<Field>, SolveError>,
-    /// How long it took, nanoseconds of wall-clock; nothing is decided by it.
+    /// Wall-clock time of the solve, nanoseconds; no decision depends on it.
     pub took_ns: u64,
 }
 

@@ -68,7 +68,7 @@ impl Live {
         self.frame.area() <= SOLVED_AT_ONCE_CELLS
     }
 
-    /// The map changed; that before it had version `before`.
+    /// The map changed; before, it had version `before`.
     pub(super) fn map_changed(&mut self, before: u64) {
         match &mut self.state {
             State::Current => {
@@ -112,7 +112,7 @@ impl Live {
         }
     }
 
-    /// Status and direction for a robot at `pose` that is to go to `target`; `cells` are those of the newest map.
+    /// Status and direction for a robot at `pose` that is to go to `target`; `cells` are the cells of the newest map.
     pub(super) fn guide(
         &self,
         robot: &Robot,
