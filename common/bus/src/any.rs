@@ -1,4 +1,4 @@
-//! Readers of any topic, for consumers that count or show what comes, whatever it is.
+//! Readers of any topic, for consumers that count or show samples without knowing their payload.
 
 use super::{
     error::BusError,
@@ -11,31 +11,25 @@ use super::{
 
 /// A row of the table that can be read without knowing its payload.
 pub trait ReadableTopic: AnyTopic {
-    /// Read it.
-    ///
-    /// # Errors
-    /// As [`Bus::reader`].
+    /// Opens a reader with [`Bus::reader`] or [`Bus::slice_reader`].
     fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>, BusError>;
 }
 
 /// Receives samples of a topic.
 pub trait AnyReader {
-    /// The next sample in order of publication; none when all were taken.
-    ///
-    /// # Errors
-    /// When a connection to the writer broke.
+    /// The next sample in order of publication; none when all were taken. An error means that the connection to the writer broke.
     fn take(&mut self) -> Result<Option<Box<dyn AnySample>>, BusError>;
 }
 
-/// A sample of a topic. One with a slice stays in shared memory, where its writer cannot reuse it while this is held.
+/// A sample of a topic. A sample with a slice stays in shared memory, and its writer cannot reuse that memory while the sample is
+/// held.
 pub trait AnySample {
-    /// Its stamp.
     fn stamp(&self) -> &Stamp;
-    /// Who wrote it.
+    /// The process that wrote the sample.
     fn author(&self) -> Author;
-    /// What the struct holds, or the header.
+    /// The fields of the struct, or of the header.
     fn value(&self) -> Value;
-    /// What the slice holds; none where the topic carries structs.
+    /// The elements of the slice; none where the topic carries structs.
     fn elements(&self) -> Option<Vec<Value>>;
 }
 

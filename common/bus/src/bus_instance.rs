@@ -1,7 +1,7 @@
-//! One making of a robot's bus. A bus that is made anew, for the next run or in the middle of one, has files of its own:
-//! who leaves the old one later removes nothing of the new one.
+//! The names of one bus instance. A recreated bus has its own files, so a process that leaves the old bus late cannot delete files
+//! of the new one.
 //!
-//! The robot's directory holds the configuration of each making, and a link to that of the bus that is there.
+//! The robot's directory holds the configuration of each instance, and a link to the configuration of the current one.
 
 use std::{
     fs,
@@ -13,13 +13,13 @@ use std::{
 
 use crate::domain::{Domain, SHARED_MEMORY};
 
-/// Before and after a making's name in that of its configuration.
+/// The file name of a configuration is the instance's name between these two.
 const CONFIG: [&str; 2] = ["iceoryx2-", ".toml"];
-/// Letters of a making's name. Paths of sockets hold it twice, and have to be short.
+/// The length of an instance's name. Paths of sockets contain the name twice, and Linux limits their length.
 const LENGTH: usize = 4;
 const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
 
-/// The names of one making's files.
+/// The names of one instance's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BusInstance {
     domain: Domain,
@@ -27,7 +27,7 @@ pub struct BusInstance {
 }
 
 impl BusInstance {
-    /// A new one. Its name is random: nobody can make files of it before.
+    /// A new instance. Its name is random, so nobody can create its files beforehand.
     #[must_use]
     pub fn new(domain: &Domain) -> Self {
         let mut random = RandomState::new().hash_one(std::process::id());
@@ -39,10 +39,7 @@ impl BusInstance {
         Self { domain: domain.clone(), name: name.collect() }
     }
 
-    /// The one whose bus is there.
-    ///
-    /// # Errors
-    /// When the robot has no bus.
+    /// The instance that processes join now; an error if the robot has no bus.
     pub fn current(domain: &Domain) -> io::Result<Self> {
         let link = domain.middleware_config();
         let config = fs::read_link(&link)?;
@@ -59,10 +56,7 @@ impl BusInstance {
         Ok(Self { domain: domain.clone(), name: name.to_owned() })
     }
 
-    /// From now on this is the one that is joined.
-    ///
-    /// # Errors
-    /// When the link cannot be made.
+    /// Make this the instance that processes join.
     pub fn make_current(&self) -> io::Result<()> {
         let link = self.domain.middleware_config();
         let unfinished = link.with_extension("unfinished");
@@ -70,7 +64,7 @@ impl BusInstance {
         fs::rename(unfinished, link)
     }
 
-    /// The robot's.
+    /// The robot's domain.
     #[must_use]
     pub const fn domain(&self) -> &Domain {
         &self.domain
@@ -80,20 +74,20 @@ impl BusInstance {
         CONFIG.join(&self.name)
     }
 
-    /// The middleware's configuration.
+    /// The path of the middleware's configuration.
     #[must_use]
     pub fn config(&self) -> PathBuf {
         self.domain.directory().join(self.config_name())
     }
 
-    /// Starts the name of every file of it in [`SHARED_MEMORY`].
+    /// The names of all files of this instance in [`SHARED_MEMORY`] start with this prefix.
     #[must_use]
     pub fn shared_memory_prefix(&self) -> String {
         format!("{}{}_", self.domain.shared_memory_prefix(), self.name)
     }
 
-    /// Under it lie the node and service files of the middleware: in memory, since it syncs each to the disk,
-    /// and a stage that starts makes twenty.
+    /// The directory of the middleware's node and service files. It is in shared memory because the middleware syncs each file to
+    /// the disk, and a stage that starts creates twenty.
     #[must_use]
     pub fn root(&self) -> PathBuf {
         Path::new(SHARED_MEMORY).join(self.domain.shared_memory_prefix() + &self.name)

@@ -1,8 +1,8 @@
-//! How a payload is written outside shared memory: the little-endian CDR of ROS 2 (OMG DDS-XTYPES 1.3, XCDR version 1), for
-//! which every reader of recordings has a decoder. Numbers are aligned to their own size, counted from the first byte
-//! after the header; structs and arrays have no bytes of their own; a slice begins with its length, a `u32`.
+//! The encoding of payloads outside shared memory: the little-endian CDR of ROS 2 (OMG DDS-XTYPES 1.3, XCDR version 1). Every reader
+//! of recordings can decode it. Numbers are aligned to their own size, counted from the first byte after the header. Structs and
+//! arrays have no bytes of their own. A slice begins with its length, a `u32`.
 
-/// Before every message: little-endian CDR, no options.
+/// The header of every message: little-endian CDR, no options.
 pub const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 /// Writes numbers one after another.
@@ -34,7 +34,7 @@ impl<'a> Encoder<'a> {
     }
 }
 
-/// Reads numbers one after another. What is too short gives none.
+/// Reads numbers one after another; none where too few bytes are left.
 #[derive(Clone, Debug)]
 pub struct Decoder<'a> {
     rest: &'a [u8],
@@ -42,7 +42,7 @@ pub struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// Of a message; none if it is not of this encoding.
+    /// A decoder of `message`; none if the message has another encoding.
     #[must_use]
     pub fn new(message: &'a [u8]) -> Option<Self> {
         let rest = message.strip_prefix(&HEADER)?;
@@ -64,7 +64,7 @@ impl<'a> Decoder<'a> {
         Some(bytes)
     }
 
-    /// Bytes that are left.
+    /// The number of bytes that are left.
     pub(super) const fn left(&self) -> usize {
         self.rest.len()
     }

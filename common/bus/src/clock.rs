@@ -25,24 +25,24 @@ impl MissionTime {
         Self((seconds.max(0.0) * 1e9) as u64)
     }
 
-    /// How long ago `earlier` was; zero if it lies ahead.
+    /// The time from `earlier` to this; zero if `earlier` is later.
     #[must_use]
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }
 }
 
-/// How mission time passes in a simulated run.
+/// The pace of mission time in a simulated run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pace {
     /// As fast as the machine can: each tick waits for the one before, and the run is repeatable.
     Max,
-    /// So many times wall-clock.
+    /// Mission time is wall-clock time multiplied by this.
     Rate(f64),
 }
 
-/// `--pace` was neither `max` nor a rate.
+/// The text is neither `max` nor a valid rate.
 #[derive(Debug, Error)]
 #[error(
     "pace {0:?} is neither `max` nor a rate between 0.05 and 100; give `max`, or 1 for wall-clock"
@@ -76,12 +76,12 @@ impl fmt::Display for Pace {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MissionClock {
-    /// Tick k happens at k periods: a simulated robot at `--pace max`.
+    /// Lockstep, a simulated robot at `--pace max`: tick k happens at k periods.
     Ticks {
         /// Nanoseconds from tick to tick.
         period_ns: u64,
     },
-    /// Wall-clock since the epoch, times a rate: a real robot, or a simulated one at `--pace R`.
+    /// A real robot, or a simulated one at `--pace R`: the wall-clock time since the epoch, multiplied by a rate.
     Wall {
         /// [`monotonic_ns`] when the mission began.
         epoch_ns: u64,
@@ -103,13 +103,13 @@ impl MissionClock {
     }
 }
 
-/// CLOCK_MONOTONIC, nanoseconds: the same for every process of the machine.
+/// CLOCK_MONOTONIC, nanoseconds. All processes of the machine read the same time.
 #[must_use]
 pub fn monotonic_ns() -> u64 {
     nanoseconds(ClockId::Monotonic)
 }
 
-/// CLOCK_BOOTTIME, nanoseconds: as [`monotonic_ns`], and it counts the time that the machine was suspended.
+/// CLOCK_BOOTTIME, nanoseconds. Unlike [`monotonic_ns`] it includes the time that the machine was suspended.
 #[must_use]
 pub fn boot_ns() -> u64 {
     nanoseconds(ClockId::Boottime)

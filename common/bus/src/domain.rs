@@ -17,12 +17,12 @@ use crate::lock_holders::holders;
 
 /// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
-/// Short, because Unix socket paths are; no `_`, because that ends the name in a shared memory prefix.
+/// It is short because Linux limits the length of socket paths. It has no `_` because `_` ends the name in a shared memory prefix.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct RobotName(String);
 
-/// A robot cannot be called that.
+/// The text is not a valid robot name.
 #[derive(Debug, Error)]
 #[error("{0:?} cannot name a robot; use 1 to 16 of a-z, 0-9 and '-'")]
 pub struct RobotNameError(String);
@@ -63,7 +63,7 @@ impl fmt::Display for RobotName {
 /// The directory of shared memory on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
-/// What belongs to one robot on this machine, for one user.
+/// The names of one robot's files on this machine, for one user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
     /// The robot.
@@ -77,28 +77,25 @@ impl Domain {
     #[must_use]
     pub fn of(robot: RobotName) -> Self {
         let user = rustix::process::geteuid().as_raw();
-        // Not $XDG_RUNTIME_DIR: it differs between a login, a service and a container of one user, and
-        // a consumer must find the robot from any of them.
+        // $XDG_RUNTIME_DIR would differ between a login, a service and a container of one user. A consumer must find the robot from
+        // any of them.
         let directory = PathBuf::from(format!("/tmp/firsthand-{user}/{robot}"));
         Self { robot, user, directory }
     }
 
-    /// Holds the files below; only its owner may enter.
+    /// The directory of the domain's files. Only its owner may enter it.
     #[must_use]
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// Locked exclusively by the supervisor as long as it runs.
+    /// The lock that the supervisor holds exclusively as long as it runs.
     #[must_use]
     pub fn lock_file(&self) -> PathBuf {
         self.directory.join("lock")
     }
 
-    /// The process that supervises the robot: whoever holds the lock, whatever the file says. None if nobody does.
-    ///
-    /// # Errors
-    /// When the system does not say.
+    /// The process that holds the supervisor's lock; none if the lock is free.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         let lock = match File::open(self.lock_file()) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -111,7 +108,7 @@ impl Domain {
         }
     }
 
-    /// Whether somebody supervises the robot, for who need not know which process; where the system does not say, true.
+    /// Whether a process holds the supervisor's lock; true if that cannot be found out.
     #[must_use]
     pub fn is_supervised(&self) -> bool {
         match File::open(self.lock_file()) {
@@ -120,68 +117,63 @@ impl Domain {
         }
     }
 
-    /// Locked, shared, by a consumer while it joins, and not while a bus is made or removed: of one that is gone, nobody makes
-    /// files again.
+    /// The lock that consumers share while they join a bus. The supervisor holds it exclusively while it creates or removes a bus, so a
+    /// consumer cannot recreate files of a bus that was removed.
     #[must_use]
     pub fn joining_lock_file(&self) -> PathBuf {
         self.directory.join("joining.lock")
     }
 
-    /// Hold off the making and removing of a bus until the result is dropped or the process ends, for a moment.
-    ///
-    /// # Errors
-    /// When there is no domain.
+    /// Prevent the supervisor from creating or removing a bus until the result is dropped or the process ends. Hold it only briefly. An
+    /// error means that there is no domain.
     pub fn joining(&self) -> io::Result<File> {
         let lock = File::open(self.joining_lock_file())?;
         lock.lock_shared()?;
         Ok(lock)
     }
 
-    /// Locked, shared, by every stage as long as it runs: a new supervisor waits for the stages of the last one.
+    /// The lock that all stages share as long as they run. A new supervisor waits until the stages of the last one have released it.
     #[must_use]
     pub fn stages_lock_file(&self) -> PathBuf {
         self.directory.join("stages.lock")
     }
 
-    /// Count as a process of this domain until the result is dropped or the process ends.
-    ///
-    /// # Errors
-    /// When there is no domain.
+    /// Share the lock of the stages until the result is dropped or the process ends. An error means that there is no domain.
     pub fn enter(&self) -> io::Result<File> {
         let lock = File::open(self.stages_lock_file())?;
         lock.lock_shared()?;
         Ok(lock)
     }
 
-    /// A link to the run directory, made by a supervisor that leaves it to others to start the stages.
+    /// A link to the run directory. A supervisor creates it if another program starts the stages.
     #[must_use]
     pub fn run_link(&self) -> PathBuf {
         self.directory.join("run")
     }
 
-    /// A link to the directory of the run that is under way, for consumers.
+    /// A link to the directory of the present run, for consumers.
     #[must_use]
     pub fn run_directory(&self) -> PathBuf {
         self.directory.join("run-directory")
     }
 
-    /// The middleware's configuration: what a consumer in any language loads first. A link to that of the bus that is
-    /// there: see [`BusInstance`](crate::bus_instance::BusInstance).
+    /// A link to the middleware's configuration of the current [`BusInstance`](crate::bus_instance::BusInstance). A consumer in any
+    /// language loads it first.
     #[must_use]
     pub fn middleware_config(&self) -> PathBuf {
         self.directory.join("iceoryx2.toml")
     }
 
-    /// Starts the name of every file of this domain in [`SHARED_MEMORY`]. No other domain's prefix
-    /// starts with it: names hold no `_`.
+    /// The names of all files of this domain in [`SHARED_MEMORY`] start with this prefix. No other domain's prefix starts with it,
+    /// because robot names have no `_`.
     #[must_use]
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.user, self.robot)
     }
 }
 
-/// The process that holds `lock`, the supervisor's: the one that the system lists, or, where its list misses that, the one
-/// that has written its number into the file.
+/// The process that holds `lock`, the supervisor's. The system's list of locks names it; where the list misses it, the number in the
+/// file does.
 fn holder_of(mut lock: &File) -> io::Result<u32> {
     if let Some(&listed) = holders(lock)?.first() {
         return Ok(listed);

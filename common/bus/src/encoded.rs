@@ -1,5 +1,5 @@
-//! Readers and writers of any topic, whose samples come and go encoded: for what keeps, passes on or plays samples without
-//! knowing what they are.
+//! Readers and writers of any topic that take and give encoded samples. They serve programs that record, forward or replay samples
+//! without knowing their payload.
 
 use super::{
     error::BusError,
@@ -13,16 +13,10 @@ use super::{
 
 /// A topic that can be read and written without knowing what it carries.
 pub trait EncodedTopic: AnyTopic {
-    /// Read it, every generation's samples.
-    ///
-    /// # Errors
-    /// As [`Bus::reader`].
+    /// A reader of the samples of all generations, opened as by [`Bus::reader`].
     fn encoded_reader(&self, bus: &Bus) -> Result<Box<dyn EncodedReader>, BusError>;
 
-    /// Write it: samples that were published before. A slice has at most `longest` elements.
-    ///
-    /// # Errors
-    /// As [`Bus::writer`].
+    /// A writer of samples that were published before, opened as by [`Bus::writer`]. A slice has at most `longest` elements.
     fn encoded_writer(&self, bus: &Bus, longest: usize)
     -> Result<Box<dyn EncodedWriter>, BusError>;
 }
@@ -53,17 +47,13 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedTopic for SliceT
     }
 }
 
-/// Reads a topic, whatever it carries.
+/// Reads samples of a topic as encoded messages.
 pub trait EncodedReader {
-    /// Append the next sample to `bytes` as a message of its own (see [`super::cdr`]) and give its stamp; none when all
+    /// Append the next sample to `bytes` as a message of its own (see [`super::cdr`]). Returns its stamp; none when all samples
     /// were taken.
-    ///
-    /// # Errors
-    /// As [`Reader::take`].
     fn take(&mut self, bytes: &mut Vec<u8>) -> Result<Option<Stamp>, BusError>;
 }
 
-/// Of structs.
 struct SampleReader<P: Payload>(Reader<P>);
 
 impl<P: Payload + Stamped + Layout> EncodedReader for SampleReader<P> {
@@ -76,7 +66,6 @@ impl<P: Payload + Stamped + Layout> EncodedReader for SampleReader<P> {
     }
 }
 
-/// Of headers with slices.
 struct SliceSampleReader<H: Payload, T: Payload>(SliceReader<H, T>);
 
 impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedReader for SliceSampleReader<H, T> {
@@ -89,17 +78,12 @@ impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedReader for Slice
     }
 }
 
-/// Writes a topic, whatever it carries.
+/// Publishes encoded messages on a topic.
 pub trait EncodedWriter {
-    /// Publish the sample of `message` with the stamp that it has, and wake the readers. Says whether it is a message of this
-    /// topic.
-    ///
-    /// # Errors
-    /// As [`Writer::publish`], [`SliceWriter::publish`].
+    /// Publish the sample in `message` with the stamp that it has, and wake the readers. Returns whether `message` is of this topic.
     fn publish(&mut self, message: &[u8]) -> Result<bool, BusError>;
 }
 
-/// Of structs.
 struct SampleWriter<P: Payload>(Writer<P>);
 
 impl<P: Payload + Stamped + Layout> EncodedWriter for SampleWriter<P> {
@@ -109,7 +93,6 @@ impl<P: Payload + Stamped + Layout> EncodedWriter for SampleWriter<P> {
     }
 }
 
-/// Of headers with slices.
 struct SliceSampleWriter<H: Payload, T: Payload>(SliceWriter<H, T>);
 
 impl<H: Payload + Stamped + Layout, T: Payload + Layout> EncodedWriter for SliceSampleWriter<H, T> {

@@ -1,4 +1,4 @@
-//! What can go wrong between a process and shared memory, each with its remedy.
+//! Errors of the bus, each with its remedy.
 
 use std::fmt::Debug;
 
@@ -11,7 +11,7 @@ use thiserror::Error;
 use super::spec::Spec;
 use crate::domain::SHARED_MEMORY;
 
-/// What can go wrong between a process and shared memory.
+/// Errors between a process and shared memory.
 #[derive(Debug, Error)]
 pub enum BusError {
     /// The robot has no bus.
@@ -21,10 +21,10 @@ pub enum BusError {
     NotRunning {
         /// The robot.
         robot: String,
-        /// What was missing.
+        /// The file that is missing, and the system's error.
         detail: String,
     },
-    /// Two builds that do not agree on a payload.
+    /// This program and the bus were built with different payloads.
     #[error(
         "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
     )]
@@ -32,14 +32,14 @@ pub enum BusError {
         /// The topic.
         topic: &'static str,
     },
-    /// All places for readers that consumers may take are taken.
+    /// Consumers already take all the places for readers that they may take.
     #[error(
         "topic {topic:?} has places for {places} readers, and those for consumers are taken; end one that reads it, or read it once and share it"
     )]
     NoPlace {
         /// The topic.
         topic: &'static str,
-        /// How many there are, those of stages among them.
+        /// The number of places, the reserved ones of the stages included.
         places: usize,
     },
     /// A reader holds as many samples as it may.
@@ -49,17 +49,17 @@ pub enum BusError {
     HoldsTooMany {
         /// The topic.
         topic: &'static str,
-        /// How many a reader may hold.
+        /// The number of samples that a reader may hold.
         most: usize,
     },
-    /// The middleware refused.
+    /// The middleware refused an operation.
     #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, `ulimit -n` reached, or the topic's last place taken?", shm = SHARED_MEMORY)]
     Refused {
-        /// What was tried.
+        /// The operation.
         action: &'static str,
         /// The topic.
         topic: &'static str,
-        /// What the middleware reports.
+        /// The middleware's error.
         detail: String,
     },
     /// The process could not join the domain.
@@ -67,7 +67,7 @@ pub enum BusError {
     Join {
         /// The robot.
         robot: String,
-        /// What the middleware reports.
+        /// The middleware's error.
         detail: String,
     },
     /// Waiting failed.
@@ -82,7 +82,7 @@ pub(super) fn refused<E: Debug>(
     move |detail| BusError::Refused { action, topic, detail: format!("{detail:?}") }
 }
 
-/// A reader was not admitted.
+/// Converts the middleware's refusal of a reader.
 pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusError {
     let (topic, places) = (spec.name, spec.limits.readers);
     move |error| match error {
@@ -93,7 +93,7 @@ pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusE
     }
 }
 
-/// A sample could not be taken.
+/// Converts the middleware's refusal to give a sample.
 pub(super) fn taking(spec: &Spec) -> impl FnOnce(ReceiveError) -> BusError {
     let (topic, most) = (spec.name, spec.limits.borrowed);
     move |error| match error {

@@ -1,38 +1,38 @@
-//! How payloads lie in memory, for programs in other languages: names, types and offsets of all fields; what a payload
-//! holds, field by field, for whoever shows it; and how it is written where there is no shared memory.
+//! The layout of payloads in memory, for programs in other languages: names, types and offsets of all fields. The same
+//! description gives the values of a payload, field by field, and encodes it where there is no shared memory.
 
 use super::{
     cdr::{Decoder, Encoder},
     payload::{Payload, Stamp, type_name},
 };
 
-/// A payload, or a part of one, whose layout is known.
+/// A payload or a field whose layout is known.
 pub trait Layout: Copy {
-    /// What it is made of.
+    /// Its type.
     fn kind() -> Kind;
 
-    /// What this one holds.
+    /// Its value.
     fn value(&self) -> Value;
 
-    /// What an array of them holds.
+    /// The value of an array.
     fn array(array: &[Self]) -> Value {
         Value::Array(array.iter().map(Self::value).collect())
     }
 
-    /// Write it, field by field.
+    /// Encode it, field by field.
     fn encode(&self, to: &mut Encoder<'_>);
 
-    /// Read what [`Layout::encode`] wrote; none where that is too short.
+    /// Decode the bytes that [`Layout::encode`] wrote; none where they are too short.
     fn decode(from: &mut Decoder<'_>) -> Option<Self>;
 
-    /// Write all of `items`, one after another.
+    /// Encode all of `items`, one after another.
     fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
         for item in items {
             item.encode(to);
         }
     }
 
-    /// Read into all of `items`.
+    /// Decode into all of `items`.
     fn decode_all(items: &mut [Self], from: &mut Decoder<'_>) -> Option<()> {
         for item in items {
             *item = Self::decode(from)?;
@@ -41,22 +41,22 @@ pub trait Layout: Copy {
     }
 }
 
-/// What a payload, or a part of one, holds.
+/// The value of a payload or a field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// An integer without sign.
+    /// An unsigned integer.
     Unsigned(u64),
-    /// An integer.
+    /// A signed integer.
     Signed(i64),
     /// A number of 32 bits.
     Single(f32),
     /// A number of 64 bits.
     Double(f64),
-    /// An array of bytes in a struct: UTF-8, filled up with zeros. What is not UTF-8 is replaced.
+    /// An array of bytes in a struct: UTF-8, filled up with zeros. Bytes that are not UTF-8 are replaced.
     Text(String),
-    /// Of one kind.
+    /// An array of values of one kind.
     Array(Vec<Self>),
-    /// Its fields by their names, in their order.
+    /// A struct: the names and values of its fields, in their order.
     Struct(Vec<(&'static str, Self)>),
 }
 
@@ -85,19 +85,19 @@ pub fn decode_slice<H: Layout, T: Layout + Default>(message: &[u8]) -> Option<(H
     let mut from = Decoder::new(message)?;
     let header = H::decode(&mut from)?;
     let count = u32::decode(&mut from)? as usize;
-    // Each takes a byte at least: the length may be anything.
+    // The message may state any length, but each element takes at least a byte.
     let count = (count <= from.left()).then_some(count)?;
     let mut slice = vec![T::default(); count];
     T::decode_all(&mut slice, &mut from)?;
     Some((header, slice))
 }
 
-/// What a field is.
+/// The type of a payload or a field.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A number; its name in Rust.
     Number(&'static str),
-    /// So many of one kind.
+    /// An array: the kind and the number of its elements.
     Array(Box<Self>, usize),
     /// A struct.
     Struct(Structure),
@@ -106,34 +106,32 @@ pub enum Kind {
 /// A `repr(C)` struct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// Its name for every language: `firsthand.Pose`.
+    /// Its name in all languages, for example `firsthand.Pose`.
     pub name: &'static str,
-    /// Bytes.
+    /// Its size, bytes.
     pub size: usize,
-    /// In their order.
+    /// Its fields, in their order.
     pub fields: Vec<Field>,
 }
 
 /// A field of a struct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its name.
     pub name: &'static str,
     /// Bytes from the start of the struct.
     pub offset: usize,
-    /// What it is.
     pub kind: Kind,
 }
 
 impl Structure {
-    /// Of `P`, which has these fields.
+    /// The kind of `P`, which has these fields.
     #[must_use]
     pub fn of<P: Payload>(fields: Vec<Field>) -> Kind {
         Kind::Struct(Self { name: type_name::<P>(), size: size_of::<P>(), fields })
     }
 }
 
-/// What the field is that a struct's accessor gives.
+/// The kind of the field that an accessor of the struct returns.
 #[must_use]
 pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
     F::kind()
@@ -215,7 +213,7 @@ impl<T: Layout + Default, const N: usize> Layout for [T; N] {
     }
 }
 
-/// The fields of payloads, all of them: one that is missing here does not compile.
+/// Implements [`Layout`] for payloads from the names of their fields. If a field is missing in the list, the code does not compile.
 #[macro_export]
 macro_rules! layouts {
     ($($payload:ident { $($field:ident)* })*) => {$(

@@ -1,14 +1,13 @@
-//! The files that a process killed while it joined the bus leaves, and that the middleware neither expects nor removes.
+//! Files that a process leaves behind if it is killed while it joins the bus. The middleware neither expects nor removes them:
 //!
-//! - Shared memory that it had made and not yet filled. Root may open such a file, where others are refused, and the
-//!   middleware then waits for ever for it to be filled.
-//! - Files of a node that was not complete: the middleware would look at them, and not remove them, at each start.
+//! - Shared memory that the process had created and not yet filled. Root may open such a file, and the middleware then waits for
+//!   ever for it to be filled; other users are refused.
+//! - Files of an incomplete node. The middleware reads them again at each start and does not remove them.
 //!
-//! Both are found by their names: these hold ids of nodes and ports, and an id holds the number of the process that
-//! made it.
+//! Both are found by their names, which contain ids of nodes and ports. An id contains the number of the process that made it.
 //!
-//! And files that are missing: a consumer that leaves a bus which was replaced, as the last one, removes the file of
-//! each service by its name, which by then is the new bus's file. So each has a backup under a second name.
+//! Service files may also be missing. The last consumer that leaves a bus removes the files of its services by their names, even
+//! if the bus was recreated and the files belong to the new one. Each service file therefore has a backup under a second name.
 
 use std::{
     fs::{self, DirEntry},
@@ -18,18 +17,15 @@ use std::{
     time::Duration,
 };
 
-/// Permissions of shared memory before it is filled: its maker may write, nobody may read.
+/// The permissions of shared memory until it is filled: its creator may write, nobody may read.
 const UNFILLED: u32 = 0o200;
 
-/// Filling a piece of shared memory takes microseconds.
+/// Shared memory that is unfilled for so long stays unfilled, because filling takes microseconds.
 const FILLED: Duration = Duration::from_secs(1);
 
-/// Remove shared memory that was to connect `ended`, a process that must have ended, and was never filled; and that of
-/// any process, if it was made so long ago that it will not be filled. `prefix` starts the names of this robot's files
-/// in `directory`. Returns whether anything unfilled is left, which its maker may be filling just now.
-///
-/// # Errors
-/// When the directory cannot be read, or a file not be removed.
+/// Remove unfilled shared memory from `directory`: all that names the process `ended`, which must have ended, and all that is
+/// older than [`FILLED`]. Only files whose names start with `prefix` are this robot's. Returns whether unfilled memory is left, which
+/// its creator may be about to fill.
 pub(super) fn remove_unfilled(directory: &Path, prefix: &str, ended: u32) -> io::Result<bool> {
     let mut left = false;
     for entry in fs::read_dir(directory)? {
@@ -49,18 +45,15 @@ pub(super) fn remove_unfilled(directory: &Path, prefix: &str, ended: u32) -> io:
     Ok(left)
 }
 
-/// How long it has been unfilled, if it is there and is; it may be removed or filled at any moment.
+/// The time since a file of unfilled shared memory was created; none for other files, and if it was removed or filled meanwhile.
 fn unfilled_for(entry: &DirEntry) -> Option<Duration> {
     let file = entry.metadata().ok()?;
     let unfilled = file.is_file() && file.permissions().mode() & 0o777 == UNFILLED;
-    // A clock that was set back makes it new.
+    // If the clock was set back, the file counts as new.
     unfilled.then(|| file.modified().ok()?.elapsed().ok()).map(Option::unwrap_or_default)
 }
 
-/// Remove from the directory `nodes` what is named after nodes of `ended`, a process that must have ended.
-///
-/// # Errors
-/// When the directory cannot be read, or something not be removed.
+/// Remove the files and directories in `nodes` that belong to nodes of the process `ended`, which must have ended.
 pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     for entry in fs::read_dir(nodes)? {
         let entry = entry?;
@@ -75,10 +68,7 @@ pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     Ok(())
 }
 
-/// Give each file in `services` a second name in `backup`, a directory that must not exist.
-///
-/// # Errors
-/// When the directory cannot be made, or a file not be linked.
+/// Give each file in `services` a second name in the new directory `backup`, which must not exist.
 pub(super) fn back_up(services: &Path, backup: &Path) -> io::Result<()> {
     fs::create_dir(backup)?;
     for entry in fs::read_dir(services)? {
@@ -88,10 +78,7 @@ pub(super) fn back_up(services: &Path, backup: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Give each file in `backup` its name in `services` again where it is missing.
-///
-/// # Errors
-/// When the directory cannot be read, or a file not be linked.
+/// Link the files in `backup` that are missing in `services` back to it.
 pub(super) fn restore(backup: &Path, services: &Path) -> io::Result<()> {
     for entry in fs::read_dir(backup)? {
         let entry = entry?;
@@ -103,7 +90,7 @@ pub(super) fn restore(backup: &Path, services: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A file that another process removed first is removed, too.
+/// Counts a file that another process removed first as removed.
 fn removed(result: io::Result<()>) -> io::Result<()> {
     match result {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -111,7 +98,7 @@ fn removed(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Whether a file's name holds an id that `process` made.
+/// Whether a file's name contains an id that `process` made.
 fn names(file: &str, process: u32) -> bool {
     file.split(['_', '.']).filter_map(|part| part.parse().ok()).any(|id| process_of(id) == process)
 }

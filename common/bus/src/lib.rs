@@ -5,32 +5,32 @@
 //! |---|---|
 //! | [`clock`] | mission time, pace, the monotonic clock |
 //! | [`domain`] | a robot's directory, locks and shared memory on this machine |
-//! | [`lock_holders`] | who holds a lock on a file |
-//! | [`bus_instance`] | the names of one instance of its bus |
+//! | [`lock_holders`] | the processes that hold a lock on a file |
+//! | [`bus_instance`] | the names of one bus instance |
 //! | [`poll`], [`waiter`] | waiting for descriptors; one wait for topics, sockets, signals, processes |
-//! | `payload` | what may lie in shared memory, and the stamp that every sample begins with |
-//! | `layout` | how payloads lie in memory, for other languages; what they hold; how they are written elsewhere |
-//! | [`cdr`] | the encoding they are written in elsewhere |
-//! | `encoded` | readers of any topic, whose samples come encoded |
-//! | `spec` | what a table of topics says of one topic |
-//! | `topic` | what a table of topics is made of |
-//! | `ports` | the middleware's services and ports, compiled once for all payloads |
-//! | `make` | making and joining a bus, and removing what killed processes leave on it |
-//! | `leftovers` | the files such processes leave |
-//! | `ownership` | whose the files are, and who may write them |
+//! | `payload` | the types that samples may have, and the stamp that every sample begins with |
+//! | `layout` | the layout of payloads in memory, for other languages; their values; their encoding |
+//! | [`cdr`] | the encoding of payloads outside shared memory |
+//! | `encoded` | readers and writers of encoded samples of any topic |
+//! | `spec` | the description of a topic |
+//! | `topic` | the rows of a table of topics |
+//! | `ports` | typed publishers and subscribers; in `ports/raw.rs` the middleware's ports, compiled once for all payloads |
+//! | `make` | creating and joining a bus, and removing what killed processes leave on it |
+//! | `leftovers` | the files that killed processes leave |
+//! | `ownership` | checks of the owner and the permissions of a bus's files |
 //! | `write`, `read` | writers; readers and wakeups |
 //! | `any` | readers of any topic |
-//! | `open` | writers of any topic, and who has opened it |
-//! | `error` | what can go wrong |
+//! | `open` | writers of any topic, and the processes that have it open |
+//! | `error` | errors of the bus |
 //!
-//! Rules it follows, each found by experiment:
-//! - a bus made anew has names of its own, and its configuration goes with the node: the process-wide one, which is set
-//!   once, is that of the first bus a process joins;
-//! - services are created by the supervisor alone ([`Bus::make`]) and opened by everyone else, so that no stage
-//!   killed while starting leaves one half made;
-//! - limits have slack, so authorship is checked here: readers drop samples of a writer's older generations, and of
-//!   processes that should not write;
-//! - events only wake; data come from receiving until there is none.
+//! The crate follows these rules, each found by experiment:
+//! - A recreated bus has its own names, and each node is created with the configuration of its bus. The middleware's process-wide
+//!   configuration can be set only once, so it stays that of the first bus that a process joins.
+//! - Only the supervisor creates services ([`Bus::make`]); everyone else opens them. So a stage that is killed while it starts leaves
+//!   no incomplete service.
+//! - The limits on writers are larger than needed, so readers check the author of each sample. They drop samples of older
+//!   generations, and of processes that should not write.
+//! - An event only wakes a reader. The reader then takes samples until there are none.
 
 mod any;
 pub mod bus_instance;

@@ -1,4 +1,4 @@
-//! Who holds a lock on a file, and signals to a holder that reach nobody else.
+//! The processes that hold a lock on a file, and signals that reach only such a process.
 
 use std::{
     collections::BTreeSet,
@@ -9,14 +9,11 @@ use std::{
 
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 
-/// The list of locks is read so often. One that is longer than a page is read in parts, between which it changes: where 180
-/// locks came and went, one reading in 200 missed a lock that was held all the time.
+/// The list of locks is read so often. A list longer than a page is read in parts and may change between them: with 180 locks
+/// that came and went, one reading in 200 missed a lock that was held all the time.
 const READINGS: usize = 5;
 
 /// The processes that hold a lock on `file`.
-///
-/// # Errors
-/// When the system does not say.
 pub fn holders(file: &File) -> io::Result<Vec<u32>> {
     let inode = file.metadata()?.ino();
     let mut found = BTreeSet::new();
@@ -26,8 +23,8 @@ pub fn holders(file: &File) -> io::Result<Vec<u32>> {
     Ok(found.into_iter().collect())
 }
 
-/// The processes that hold a file lock on this inode, as `/proc/locks` lists it: number, kind, mode, access, process,
-/// device and inode. A process that only waits for one has an arrow before the kind.
+/// The processes that hold a lock on the file with this inode. A line of `/proc/locks` has number, kind, mode, access, process,
+/// device and inode. A process that only waits for a lock has an arrow before the kind.
 fn lockers(locks: &str, inode: u64) -> Vec<u32> {
     let holder = |line: &str| {
         let mut words = line.split_ascii_whitespace().skip(1);
@@ -42,15 +39,13 @@ fn lockers(locks: &str, inode: u64) -> Vec<u32> {
     locks.lines().filter_map(holder).collect()
 }
 
-/// Send `signal` to process `pid` if it has `file` open: another may have its number by now, and inodes of two file
-/// systems may have one number.
-///
-/// # Errors
-/// When it has not, or has ended, or may not be signalled.
+/// Send `signal` to process `pid` if it has `file` open. That is checked because another process may have this number by now, and
+/// because [`holders`] may confuse inodes of two file systems. If the process has ended or does not have the file open, the error
+/// is [`io::ErrorKind::NotFound`].
 pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
     let gone = || io::Error::from(io::ErrorKind::NotFound);
     let number = i32::try_from(pid).ok().and_then(Pid::from_raw);
-    // From here on the number is this process's, whatever ends.
+    // The descriptor refers to this process even if the process ends and its number is used again.
     let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty())?;
     let file = file.metadata()?;
     let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten();

@@ -1,4 +1,4 @@
-//! BusInstance and joining a bus, and removing what killed processes leave on it.
+//! Creating and joining a bus, and removing what killed processes leave on it.
 
 use std::{
     any::Any,
@@ -29,16 +29,17 @@ use crate::{
     domain::{Domain, SHARED_MEMORY},
 };
 
-/// A process's place on a robot's bus.
+/// The connection of a process to a robot's bus.
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
-    /// The process that alone writes the supervisor's topics, of a stage; none of a consumer.
+    /// The process of the supervisor, if this is a stage's connection: only its samples are read from the supervisor's topics. None for
+    /// a consumer.
     pub(super) supervisor: Option<u32>,
     instance: BusInstance,
 }
 
-/// The services of every topic, existing as long as this is held.
+/// The services of all topics. They exist as long as this is held.
 pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
 
 fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
@@ -47,12 +48,8 @@ fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
 }
 
 impl Bus {
-    /// Make the bus of a robot: its configuration, which consumers in other languages load too, and the services of
-    /// every topic of `table`. It takes the place of an earlier one; nobody can join it before all are there. Only the
-    /// supervisor calls this.
-    ///
-    /// # Errors
-    /// When a file cannot be written, or shared memory is full.
+    /// Create the bus of a robot: its configuration, which consumers in other languages load too, and the services of all topics of
+    /// `table`. The new bus replaces an earlier one, and nobody can join it before all services exist. Only the supervisor calls this.
     pub fn make(
         domain: &Domain,
         name: &str,
@@ -60,7 +57,7 @@ impl Bus {
     ) -> Result<(Self, Services), BusError> {
         let failed = |error: io::Error| no_join(domain)(error.to_string());
         let instance = BusInstance::new(domain);
-        // Not one that is there: another user may have made it.
+        // A directory that exists is an error, because another user may have created it.
         DirBuilder::new().mode(0o700).create(instance.root()).map_err(failed)?;
         Self::write_config(&instance)?;
         let mut bus = Self::join_instance(instance, name)?;
@@ -84,7 +81,7 @@ impl Bus {
         config.global.set_root_path(&path);
         config.global.prefix = SemanticString::new(prefix.as_bytes())
             .map_err(|error| failed(format!("{error:?} in {prefix:?}")))?;
-        // The supervisor cleans up after processes that were killed: a stage that starts does not wait for it.
+        // The supervisor cleans up after killed processes, so a starting stage does not wait for that.
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
@@ -93,10 +90,8 @@ impl Bus {
         std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
-    /// Join the bus of a robot under a name that `iox2 node list` shows.
-    ///
-    /// # Errors
-    /// When the robot does not run here, is another user's, or shared memory is full.
+    /// Join the bus of a robot under a name that `iox2 node list` shows. It fails if the robot does not run here, if it belongs to
+    /// another user, or if shared memory is full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self, BusError> {
         let not_running = |error: io::Error| BusError::NotRunning {
             robot: domain.robot.to_string(),
@@ -107,17 +102,14 @@ impl Bus {
         Self::join_instance(instance, name)
     }
 
-    /// Join as a stage that process `supervisor` supervises: what others write on the supervisor's topics is ignored,
-    /// and the places that consumers leave free may be taken.
-    ///
-    /// # Errors
-    /// As [`Bus::join`].
+    /// Join with [`Bus::join`] as a stage of the supervisor with the process number `supervisor`. Samples of other processes on the
+    /// supervisor's topics are ignored, and the stage may take the places that consumers leave free.
     pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
         Ok(Self { supervisor: Some(supervisor), ..Self::join(domain, name)? })
     }
 
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
-        // We report what the middleware reports; IOX2_LOG_LEVEL brings its own messages back.
+        // Errors of the middleware are in our own errors; IOX2_LOG_LEVEL turns its messages on again.
         set_log_level_from_env_or(LogLevel::Fatal);
         let join = no_join(instance.domain());
         let failed = |error: io::Error| join(error.to_string());
@@ -125,7 +117,8 @@ impl Bus {
         let file = instance.config();
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
-        // Where a node names none: what killed processes left is then looked for in the first bus.
+        // The middleware uses the global configuration where a node has none of its own. It can be set only once, so it stays that of
+        // the first bus that the process joins.
         Config::setup_global_config_from_file(&path).map_err(|error| join(format!("{error:?}")))?;
         let config = Config::from_file(&path).map_err(|error| join(format!("{error:?}")))?;
         let name = NodeName::new(name).map_err(|error| join(format!("{error:?}")))?;
@@ -135,35 +128,32 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| join(format!("{error:?}")))?;
-        // One that is missing was made anew with the node.
+        // Creating the node may have created the count of nodes, which the middleware opens to everyone.
         ownership::close_to_others(&instance).map_err(failed)?;
         Ok(Self { node: node.into(), supervisor: None, instance })
     }
 
-    /// Whether nothing is published on it any more: another bus has taken its place, of this run or of the robot's next,
-    /// or the robot's run has ended. A consumer drops everything it has of it, and joins again.
+    /// Whether this bus is no longer used: another bus replaced it, in this run or the next one, or the run has ended. A consumer then
+    /// drops everything that it opened on this bus, and joins again.
     #[must_use]
     pub fn is_replaced(&self) -> bool {
         BusInstance::current(self.instance.domain()).map_or(true, |now| now != self.instance)
     }
 
-    /// Where the services' files are.
+    /// The directory of the service files.
     fn services(&self) -> PathBuf {
         let services = self.node.config().global.service_dir();
         PathBuf::from(OsStr::from_bytes(services.as_bytes()))
     }
 
-    /// Where each of them has a second name.
+    /// The directory of the second names of the service files.
     fn backup(&self) -> PathBuf {
         self.services().with_extension("backup")
     }
 
-    /// Before a successor of `process`, which must have ended, is started: remove the shared memory that `process` had
-    /// not finished, for which the successor could wait for ever, and restore service files that are missing. Only the
-    /// supervisor calls this. Returns whether unfinished shared memory of other processes is left.
-    ///
-    /// # Errors
-    /// When files cannot be removed or restored.
+    /// Prepare the bus for a successor of `process`, which must have ended. Shared memory that `process` did not fill is removed, because
+    /// the successor could wait for it for ever, and missing service files are restored. Only the supervisor calls this. Returns
+    /// whether unfilled shared memory of other processes is left.
     pub fn remove_unfinished(&self, process: u32) -> io::Result<bool> {
         leftovers::restore(&self.backup(), &self.services())?;
         self.remove_unfilled(process)
@@ -174,13 +164,9 @@ impl Bus {
         leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
     }
 
-    /// Free what ended processes held: their places on the topics and their memory; and what the processes `killed`,
-    /// which must have ended, left of a start that was cut off. Restore service files that are missing. Only the
-    /// supervisor calls this; it takes a few milliseconds for each process. Returns whether all of it could be done:
-    /// if not, try again later with the same processes.
-    ///
-    /// # Errors
-    /// When files cannot be removed or restored.
+    /// Free the places on topics and the memory of ended processes, remove the files of incomplete starts of the processes `killed`,
+    /// which must have ended, and restore missing service files. Only the supervisor calls this. It takes a few milliseconds for each
+    /// process. Returns whether everything was done; if not, call it again later with the same processes.
     pub fn clear_up(&self, killed: &[u32]) -> io::Result<bool> {
         leftovers::restore(&self.backup(), &self.services())?;
         let config = self.node.config();
@@ -190,9 +176,9 @@ impl Bus {
         let listed = Node::<ipc::Service>::list(config, |node| {
             if let NodeState::Dead(dead) = node {
                 match self.remove_unfilled(leftovers::process_of(dead.id().value())) {
-                    // One that cannot be freed now is listed again next time.
+                    // A node that cannot be freed now is listed again by the next call.
                     Ok(false) => drop(dead.try_remove_stale_resources()),
-                    // The middleware would wait for it to be filled, perhaps for ever; next time it is old.
+                    // The middleware could wait for ever for the unfilled memory. The next call removes it, because it is old by then.
                     Ok(true) => all = false,
                     Err(error) => {
                         outcome = Err(error);
@@ -204,7 +190,7 @@ impl Bus {
         });
         outcome?;
         listed.map_err(|error| io::Error::other(format!("{error:?}")))?;
-        // The places of ended processes are found by these files, so they go last.
+        // The middleware finds the places of ended processes by these files, so they are removed last.
         if all {
             killed.iter().try_for_each(|&process| {
                 self.remove_unfilled(process)?;

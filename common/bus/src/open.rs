@@ -1,4 +1,4 @@
-//! Opening a topic that a list names, and asking the bus who has opened it.
+//! Opening the writer of a topic from a list, and asking the bus which processes have a topic open.
 
 use std::any::Any;
 
@@ -11,9 +11,9 @@ use super::{
     topic::{AnyTopic, SliceTopic, Topic},
 };
 
-/// A row of the table whose writer a process opens from a list, without knowing what it carries.
+/// A topic whose writer a process can open without knowing the payload.
 pub trait OpenTopic: AnyTopic {
-    /// The writer: a [`Writer`](super::Writer) or a [`SliceWriter`](super::SliceWriter) of slices of at most `longest` elements.
+    /// Open a [`Writer`](super::Writer), or a [`SliceWriter`](super::SliceWriter) of slices of at most `longest` elements.
     fn open_writer(
         &self,
         bus: &Bus,
@@ -21,7 +21,7 @@ pub trait OpenTopic: AnyTopic {
         longest: usize,
     ) -> Result<Box<dyn Any>, BusError>;
 
-    /// The processes that have it open.
+    /// The processes that have the topic open.
     fn opened_by(&self, bus: &Bus) -> Result<OpenedBy, BusError> {
         ports::opened_by(&bus.node, self.spec(), &self.carried())
     }

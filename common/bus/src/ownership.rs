@@ -1,5 +1,6 @@
-//! Whose the files of a bus are. The middleware makes one of them for everyone to write (its count of nodes), and all
-//! of them by name in a directory that every user may write to: what this user does not own is not used.
+//! Checks of the owner and the permissions of a bus's files. Every user may create files in the directories of shared memory, so files
+//! of another user are not used. The middleware lets everyone write one file, its count of nodes, so its permissions are
+//! restricted here.
 
 use std::{
     fs,
@@ -10,16 +11,13 @@ use std::{
 
 use crate::{bus_instance::BusInstance, domain::SHARED_MEMORY};
 
-/// Ends the name of the middleware's count of nodes.
+/// The name of the middleware's count of nodes ends with this.
 const COUNT_OF_NODES: &str = ".global_mgmt";
-/// What others than the owner may do, in a file's mode.
+/// The permissions of all users but the owner, in a file's mode.
 const OTHERS: u32 = 0o077;
 
-/// That all which a process opens first to join is this user's, closed to others and whole: the middleware would wait
-/// for what is not.
-///
-/// # Errors
-/// Names what is not.
+/// Check that the files which a process opens first to join belong to this user, are closed to others and are complete. The
+/// middleware would wait for files that are not. The error names the file.
 pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
     let directory = instance.domain().directory();
     let directories = [directory, &instance.root()];
@@ -36,10 +34,7 @@ pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
     Ok(())
 }
 
-/// Close to others what the middleware has opened to them.
-///
-/// # Errors
-/// When a file's mode cannot be set.
+/// Take the permissions of other users away from the middleware's counts of nodes.
 pub(super) fn close_to_others(instance: &BusInstance) -> io::Result<()> {
     for count in counts_of_nodes(instance)? {
         let mut permissions = fs::symlink_metadata(&count)?.permissions();
@@ -74,7 +69,7 @@ fn check_one(path: &Path, directory: bool) -> io::Result<()> {
     if kind.is_symlink() || kind.is_dir() != directory {
         return Err(wrong(path, "is of another kind than a bus has there"));
     }
-    // The configuration is in a directory of the owner's.
+    // Others may read the configuration by its mode, because its directory is closed to them.
     if found.mode() & 0o022 != 0 || directory && found.mode() & OTHERS != 0 {
         return Err(wrong(path, "is open to other users"));
     }

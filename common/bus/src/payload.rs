@@ -1,8 +1,8 @@
-//! What may lie in shared memory, and the stamp that every sample begins with.
+//! The types that samples in shared memory may have, and the stamp that every sample begins with.
 //!
-//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl` that promises a self-contained type
-//! of uniform layout; [`Stamp`] is plain numbers in a `repr(C)` struct, so the promise holds. And a payload's name
-//! can only be asked for through an `unsafe` call, which does nothing but return it.
+//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform
+//! layout. [`Stamp`] is a `repr(C)` struct of numbers, so the promise holds. The name of a payload can be read only through an
+//! `unsafe` call, which does nothing else.
 #![allow(unsafe_code)]
 
 use std::fmt::Debug;
@@ -12,18 +12,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::clock::MissionTime;
 
-/// What a payload must be to lie in shared memory.
+/// A type that may lie in shared memory.
 pub trait Payload: ZeroCopySend + Copy + Debug + Default + 'static {}
 impl<P: ZeroCopySend + Copy + Debug + Default + 'static> Payload for P {}
 
-/// The name of a payload, for every language.
+/// The name of a payload in all languages.
 pub(super) fn type_name<P: Payload>() -> &'static str {
-    // SAFETY: the name is only shown; that the layout is the same everywhere is promised where each payload
-    // derives the trait.
+    // SAFETY: the call only returns the name. Each payload promises its uniform layout where it derives the trait.
     unsafe { <P as ZeroCopySend>::type_name() }
 }
 
-/// Which sample this is, who wrote it and when: the first field of every payload and header.
+/// The tick, the time and the origin of a sample: the first field of every payload and header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.Stamp")]
 #[repr(C)]
@@ -32,9 +31,9 @@ pub struct Stamp {
     pub tick: u64,
     /// Mission time, nanoseconds.
     pub stamp_ns: u64,
-    /// Which generation of its writer: grows by one each time the stage is started.
+    /// The generation of the writer, which grows by one each time the stage is started.
     pub generation: u32,
-    /// Counts the samples of this generation on this topic, from 0.
+    /// The number of samples that this generation published on this topic before.
     pub sequence: u32,
 }
 
@@ -48,8 +47,7 @@ impl Stamp {
 
 /// A payload or header that starts with a [`Stamp`].
 pub trait Stamped {
-    /// The stamp.
     fn stamp(&self) -> &Stamp;
-    /// The stamp, to be filled in by the writer.
+    /// The stamp, which the writer fills in.
     fn stamp_mut(&mut self) -> &mut Stamp;
 }

@@ -1,4 +1,4 @@
-//! Waiting for descriptors: the one place that calls `poll`, and calls it again when a signal interrupts it.
+//! Waiting for descriptors. No other module calls `poll`, and here it is called again when a signal interrupts it.
 
 use std::{
     io,
@@ -11,11 +11,8 @@ use rustix::{
     io::Errno,
 };
 
-/// Wait until one of `descriptors` is readable, closed or broken, or `timeout` has passed; for ever without one.
-/// Returns for each whether it is.
-///
-/// # Errors
-/// When the system refuses to wait.
+/// Wait until one of `descriptors` is readable, closed or broken, or `timeout` has passed; without a timeout, for ever. Returns for
+/// each descriptor whether it is.
 pub fn readable(
     descriptors: &[BorrowedFd<'_>],
     timeout: Option<Duration>,
@@ -29,37 +26,28 @@ pub fn readable(
 }
 
 /// Whether `descriptor` is readable, closed or broken within `timeout`.
-///
-/// # Errors
-/// As [`readable`].
 pub fn is_readable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
     Ok(readable(&[descriptor.as_fd()], Some(timeout))?.contains(&true))
 }
 
 /// Whether `descriptor` is writable, closed or broken within `timeout`.
-///
-/// # Errors
-/// As [`readable`].
 pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
     wait(&mut [PollFd::new(&descriptor, PollFlags::OUT)], Some(timeout))
 }
 
 /// Whether the other end of `descriptor` was closed, or it broke.
-///
-/// # Errors
-/// As [`readable`].
 pub fn is_closed(descriptor: impl AsFd) -> io::Result<bool> {
     let nothing_else = PollFlags::empty();
     let mut polled = [PollFd::new(&descriptor, nothing_else)];
     wait(&mut polled, Some(Duration::ZERO))
 }
 
-/// Whether anything came within `timeout`; it is in the entries of `polled`.
+/// Whether an event occurred within `timeout`; `poll` notes the events in `polled`.
 fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
     let began = Instant::now();
     loop {
         let left = timeout.map(|timeout| timeout.saturating_sub(began.elapsed()));
-        // A time that the system cannot count is for ever.
+        // A timeout too long for the system means no timeout.
         let left = left.and_then(|left| Timespec::try_from(left).ok());
         match poll(polled, left.as_ref()) {
             Err(Errno::INTR) => {}

@@ -1,4 +1,4 @@
-//! Readers and wakeups. A reader gives the samples of the newest generation of the writer only.
+//! Readers and wakeups. A reader returns only samples of the writer's newest generation.
 
 use std::{
     ops::Deref,
@@ -15,18 +15,12 @@ use super::{
 };
 
 impl Bus {
-    /// Read `topic`.
-    ///
-    /// # Errors
-    /// As [`Bus::writer`].
+    /// Read `topic`. It fails if the topic is missing, carries another payload, or has no place left.
     pub fn reader<P: Payload + Stamped>(&self, topic: &Topic<P>) -> Result<Reader<P>, BusError> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
 
-    /// Read `topic`; of samples that are not taken, the newest `buffer` are kept.
-    ///
-    /// # Errors
-    /// As [`Bus::writer`].
+    /// [`Bus::reader`] with a buffer for the newest `buffer` samples that were not taken yet.
     pub(super) fn reader_that_keeps<P: Payload + Stamped>(
         &self,
         topic: &Topic<P>,
@@ -37,10 +31,7 @@ impl Bus {
         Ok(Reader { subscriber: service.subscriber(buffer)?, authors: self.authors(topic.spec) })
     }
 
-    /// Read the slices of `topic`.
-    ///
-    /// # Errors
-    /// As [`Bus::writer`].
+    /// Read the slices of `topic`. It fails if the topic is missing, carries another payload, or has no place left.
     pub fn slice_reader<H: Payload + Stamped, T: Payload>(
         &self,
         topic: &SliceTopic<H, T>,
@@ -48,10 +39,7 @@ impl Bus {
         self.slice_reader_that_keeps(topic, topic.spec.limits.buffer)
     }
 
-    /// As [`Bus::reader_that_keeps`].
-    ///
-    /// # Errors
-    /// As [`Bus::writer`].
+    /// [`Bus::slice_reader`] with a buffer for the newest `buffer` samples that were not taken yet.
     pub(super) fn slice_reader_that_keeps<H: Payload + Stamped, T: Payload>(
         &self,
         topic: &SliceTopic<H, T>,
@@ -65,10 +53,7 @@ impl Bus {
         })
     }
 
-    /// Be woken when something is published on `topic`.
-    ///
-    /// # Errors
-    /// When the topic is missing or has no place left.
+    /// A wakeup that is readable once a sample was published on `topic`. It fails if the topic is missing or has no place left.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup, BusError> {
         let spec = topic.spec();
         let listener = Listener::open(&self.node, spec, |taken| {
@@ -77,7 +62,7 @@ impl Bus {
         Ok(Wakeup { listener })
     }
 
-    /// A consumer takes no place that a stage may need.
+    /// Refuse a consumer the last places, which the stages may need.
     fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result<(), BusError> {
         if self.supervisor.is_none() && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
@@ -101,33 +86,33 @@ impl Bus {
 /// A process that writes a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Author {
-    /// Its number.
+    /// Its process number.
     pub process: u32,
-    /// The generation it stamps.
+    /// The generation in its stamps.
     pub generation: u32,
 }
 
 /// Samples of processes that should not write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ignored {
-    /// So many.
+    /// The number of samples.
     pub samples: u64,
-    /// The process that wrote the last one; 0 for none.
+    /// The process that wrote the last sample; 0 for none.
     pub process: u32,
 }
 
-/// Whose samples a reader gives.
+/// The authors whose samples a reader returns.
 #[derive(Debug)]
 enum Admitted {
-    /// More than one process writes at a time.
+    /// All authors: several processes write the topic at a time.
     All,
-    /// Of the newest generation that was seen.
+    /// The newest generation, and the generation that was newest so far.
     Newest(u32),
-    /// Of this one, and until something of it comes, of the one before.
+    /// One author, and the author before, which is admitted until the first sample of the new author comes.
     One(Author, Option<Author>),
 }
 
-/// Whose samples a reader gives, and what it ignored.
+/// The authors whose samples a reader returns, and the samples that it ignored.
 #[derive(Debug)]
 struct Authors {
     admitted: Admitted,
@@ -135,7 +120,7 @@ struct Authors {
 }
 
 impl Authors {
-    /// Whether a sample of `author` is given. Samples of older generations are dropped: their process has ended.
+    /// Whether a sample of `author` is returned. Samples of older generations are dropped, because their process has ended.
     fn admits(&mut self, author: Author) -> bool {
         match &mut self.admitted {
             Admitted::All => true,
@@ -170,7 +155,7 @@ impl Authors {
     }
 }
 
-/// The process of a sample is in the number of the port that it was written with.
+/// The author of a sample. The process is part of the id of the port that published the sample.
 fn author<H: Payload, T: Payload>(sample: &Sample<H, T>, stamp: &Stamp) -> Author {
     Author { process: sample.process(), generation: stamp.generation }
 }
@@ -183,18 +168,12 @@ pub struct Reader<P: Payload> {
 }
 
 impl<P: Payload + Stamped> Reader<P> {
-    /// The next sample in order of publication; none when all were taken.
-    ///
-    /// # Errors
-    /// When a connection to the writer broke.
+    /// The next sample in order of publication; none when all were taken. An error means that the connection to the writer broke.
     pub fn take(&mut self) -> Result<Option<P>, BusError> {
         Ok(self.take_with_author()?.map(|(_, sample)| sample))
     }
 
-    /// [`Reader::take`], and who wrote it.
-    ///
-    /// # Errors
-    /// As [`Reader::take`].
+    /// [`Reader::take`] with the author of the sample.
     pub fn take_with_author(&mut self) -> Result<Option<(Author, P)>, BusError> {
         while let Some(sample) = self.subscriber.take()? {
             let Some(&payload) = sample.elements().first() else {
@@ -208,30 +187,26 @@ impl<P: Payload + Stamped> Reader<P> {
         Ok(None)
     }
 
-    /// Give samples of `author` only, from now on; of nobody where its process is 0. Those of the author before are given
-    /// until one of this comes.
+    /// Return only samples of `author` from now on; none if its process is 0. Samples of the author before are returned until the first
+    /// one of `author` comes.
     pub const fn follow(&mut self, author: Author) {
         self.authors.follow(author);
     }
 
-    /// Give the samples of every generation, from now on: an older one's may still be on their way when the next one's
-    /// come.
+    /// Return the samples of all generations. Samples of an older generation may arrive after the first of the next one.
     #[must_use]
     pub fn of_all_generations(mut self) -> Self {
         self.authors.admitted = Admitted::All;
         self
     }
 
-    /// What was ignored.
+    /// The samples that were ignored.
     #[must_use]
     pub const fn ignored(&self) -> Ignored {
         self.authors.ignored
     }
 
-    /// The newest sample; those before it are dropped.
-    ///
-    /// # Errors
-    /// As [`Reader::take`].
+    /// Take all samples, and return the newest.
     pub fn newest(&mut self) -> Result<Option<P>, BusError> {
         let mut newest = None;
         while let Some(sample) = self.take()? {
@@ -248,14 +223,13 @@ pub struct SliceReader<H: Payload, T: Payload> {
     authors: Authors,
 }
 
-/// A header with its slice, still in shared memory; the writer cannot reuse it while this is held.
+/// A header with its slice in shared memory, which the writer cannot reuse while this is held.
 #[derive(Debug)]
 pub struct Slice<H: Payload, T: Payload> {
     sample: Sample<H, T>,
 }
 
 impl<H: Payload, T: Payload> Slice<H, T> {
-    /// The header.
     #[must_use]
     pub fn header(&self) -> &H {
         self.sample.header()
@@ -263,7 +237,7 @@ impl<H: Payload, T: Payload> Slice<H, T> {
 }
 
 impl<H: Payload + Stamped, T: Payload> Slice<H, T> {
-    /// Who wrote it.
+    /// The process and the generation that wrote the slice.
     #[must_use]
     pub fn author(&self) -> Author {
         author(&self.sample, self.header().stamp())
@@ -279,22 +253,19 @@ impl<H: Payload, T: Payload> Deref for Slice<H, T> {
 }
 
 impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
-    /// As [`Reader::follow`].
+    /// [`Reader::follow`] for slices.
     pub const fn follow(&mut self, author: Author) {
         self.authors.follow(author);
     }
 
-    /// As [`Reader::of_all_generations`].
+    /// [`Reader::of_all_generations`] for slices.
     #[must_use]
     pub fn of_all_generations(mut self) -> Self {
         self.authors.admitted = Admitted::All;
         self
     }
 
-    /// The next sample; as [`Reader::take`].
-    ///
-    /// # Errors
-    /// As [`Reader::take`].
+    /// [`Reader::take`] for slices.
     pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
         while let Some(sample) = self.subscriber.take()? {
             let author = author(&sample, sample.header().stamp());
@@ -313,7 +284,7 @@ pub struct Wakeup {
 }
 
 impl Wakeup {
-    /// Level-triggered: drain it before looking at the data, or waiting never waits again.
+    /// Clear the wakeup, which stays readable until then. Drain it before taking the samples.
     pub(crate) fn drain(&self) -> Result<(), BusError> {
         self.listener.drain()
     }

@@ -1,96 +1,96 @@
-//! What a table of topics says of one topic.
+//! The description of a topic in the table of topics.
 
 use std::time::Duration;
 
 /// How often a topic is published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rate {
-    /// Once a tick; again for a tick that the link repeats because no command came, and whole for a new reader
-    /// where readers only get changes.
+    /// Once a tick. It is published again for a tick that the link repeats because no command came, and completely for a new reader
+    /// if samples carry only changes.
     EachTick,
-    /// After each frame of the robot that it is read from, driving or not: about once a tick, in a pause of the
-    /// other work. Of several frames between two pauses only the newest is published.
+    /// After each frame of the robot that contains it, about once a tick, whether the robot drives or not. It is published when the
+    /// link has no other work; if several frames came by then, only the newest.
     EachFrame,
-    /// At every change, and again when nothing changes, for readers that joined since. The writer looks at the clock
-    /// once in each turn of its work loop, so a long turn delays it.
+    /// At every change, and again when nothing changes, for readers that joined since. The writer checks the time once in each
+    /// iteration of its loop, so a long iteration delays it.
     OnChange {
-        /// Changes that follow each other sooner are published together; zero: each at once.
+        /// Changes that follow each other sooner are published together. Zero publishes each at once.
         at_most_every: Duration,
-        /// How long after the last sample; after the last whole one, where samples carry changes.
+        /// The time after the last sample, or after the last complete one if samples carry only changes.
         again_after: Duration,
     },
-    /// When something happened, once.
+    /// Once for each event.
     WhenItHappens,
 }
 
-/// Whether a recording keeps a topic.
+/// Whether a recording contains a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Logged {
-    /// Always.
+    /// All recordings contain it.
     Yes,
-    /// Where fields are asked for: they are larger than all else together.
+    /// Only recordings with fields contain it, because fields take more space than all other topics together.
     WithFields,
 }
 
-/// What the table says of a topic.
+/// A topic's description in the table.
 #[derive(Debug)]
 pub struct Spec {
-    /// Its name, and the name of its two services.
+    /// The name of the topic, and of its two services.
     pub name: &'static str,
-    /// Who writes it: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
+    /// The writer: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
     pub writer: &'static str,
-    /// How often.
+    /// How often it is published.
     pub rate: Rate,
-    /// Whether a recording keeps it.
+    /// Whether a recording contains it.
     pub logged: Logged,
-    /// Depth of history and buffers, number of readers.
+    /// The sizes of its buffers, and the number of readers.
     pub limits: Limits,
-    /// What it means.
+    /// Its meaning, for the documentation.
     pub meaning: &'static str,
 }
 
-/// The writer named by topics that all stages write.
+/// The writer of topics that all stages write.
 pub const EVERY_STAGE: &str = "every stage";
-/// The writers that are no stage: whoever uses the command line, one process each time.
+/// The writer of topics that commands of an operator write, each in a process of its own.
 pub const OPERATOR: &str = "operator";
-/// The writer that is no stage.
+/// The writer of topics that the supervisor writes.
 pub const SUPERVISOR: &str = "supervisor";
 
 impl Spec {
-    /// Whether at most one process at a time writes it.
+    /// Whether at most one process at a time writes the topic.
     pub(super) fn has_one_writer(&self) -> bool {
         ![EVERY_STAGE, OPERATOR].contains(&self.writer)
     }
 }
 
-/// How much a topic holds.
+/// The limits of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Samples a reader that falls behind still gets; then the oldest are dropped.
+    /// Samples that wait for a reader; when there are more, the oldest are dropped.
     pub buffer: usize,
-    /// The same of a reader that keeps everything ([`crate::EncodedReader`]).
+    /// Samples that wait for a recorder ([`crate::EncodedReader`]).
     pub recorder_buffer: usize,
-    /// Samples a reader may hold at once.
+    /// Samples that a reader may hold at once.
     pub borrowed: usize,
-    /// Readers at once, stages, dashboards and loggers among them. Consumers leave three places free.
+    /// Readers at once: stages, displays and recorders. Consumers leave three places free.
     pub readers: usize,
 }
 
 impl Limits {
-    /// For topics of one small struct.
+    /// The limits of topics of one small struct.
     pub const SMALL: Self = Self { buffer: 128, recorder_buffer: 1024, borrowed: 2, readers: 16 };
-    /// For what a replay needs whole: a recorder that the machine keeps waiting for a tenth of a second loses nothing.
+    /// The limits of topics that a replay needs without gaps. A recorder that is not scheduled for 0.1 s loses nothing.
     pub const DEEP: Self = Self { buffer: 1024, recorder_buffer: 1024, borrowed: 2, readers: 8 };
-    /// For slices of a whole map.
+    /// The limits of topics whose slices may be a whole map.
     pub const MAP: Self = Self { buffer: 4, recorder_buffer: 256, borrowed: 2, readers: 24 };
-    /// For slices that are most of a whole map each.
+    /// The limits of topics whose every slice is most of a whole map.
     pub const WHOLE_MAP: Self = Self { recorder_buffer: 8, ..Self::MAP };
-    /// Writers at once. One is meant; a kill while starting can leak a place for good.
+    /// Writers at once. One is enough, but a process that is killed while it starts may occupy a place for ever.
     pub(super) const WRITERS: usize = 16;
-    /// Who waits for one topic: consumers of all that a tick publishes wait for the one that ends it.
+    /// Listeners at once on a topic. Many consumers listen to the topic that ends a tick and then read the others.
     pub(super) const LISTENERS: usize = 48;
-    /// Places of readers that consumers leave free, for successors of stages that ended.
+    /// Places that consumers leave free for the successors of stages that ended.
     pub(super) const KEPT_FREE: usize = 3;
-    /// Processes at once on one topic.
+    /// Processes that may have a topic open at once.
     pub(super) const NODES: usize = 64;
 }

@@ -1,4 +1,4 @@
-//! What a table of topics is made of.
+//! The rows of a table of topics.
 
 use std::{marker::PhantomData, time::Duration};
 
@@ -39,25 +39,25 @@ impl<H, T> SliceTopic<H, T> {
     }
 }
 
-/// A row of the table, whatever it carries.
+/// A row of the table, without the type of its payload.
 pub trait AnyTopic: Sync {
-    /// What the table says.
+    /// The topic's description.
     fn spec(&self) -> &'static Spec;
-    /// The name of its payload, for every language: a struct, or a header and a slice of elements.
+    /// The name of its payload in all languages: a struct, or a header and a slice of elements.
     fn payload(&self) -> String;
-    /// What each sample is: a struct; or a header, and what a slice is made of.
+    /// The kind of a sample: a struct, or a header and the kind of a slice's elements.
     fn layout(&self) -> (Kind, Option<Kind>);
-    /// What it is to the middleware; the result has no name outside this crate.
+    /// The types of its samples for the middleware. The result has no name outside this crate.
     #[doc(hidden)]
     fn carried(&self) -> Carried;
-    /// After how long its writer publishes it again when nothing changes; zero where the table does not say.
+    /// The time after which its writer publishes it again if nothing changes; zero if it does not.
     fn restated_every(&self) -> Duration {
         match self.spec().rate {
             Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,
             Rate::OnChange { again_after, .. } => again_after,
         }
     }
-    /// How long its writer waits from one change to the next; zero where the table does not say.
+    /// The least time between two changes that its writer publishes; zero if there is none.
     fn changes_at_most_every(&self) -> Duration {
         match self.spec().rate {
             Rate::EachTick | Rate::EachFrame | Rate::WhenItHappens => Duration::ZERO,

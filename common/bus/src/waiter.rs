@@ -1,4 +1,4 @@
-//! One wait for everything a process waits for: wakeups of topics, sockets, signals, other processes.
+//! A wait for all inputs of a process at once: wakeups of topics, sockets, signals, other processes.
 
 use std::{
     os::fd::{AsFd, BorrowedFd, OwnedFd},
@@ -15,34 +15,25 @@ pub struct Waiter {
 }
 
 impl Waiter {
-    /// Wake for `wakeup`.
+    /// Wait for `wakeup` too.
     pub fn on(&mut self, wakeup: Wakeup) {
         self.wakeups.push(wakeup);
     }
 
-    /// Wake when `descriptor` is readable; the caller reads from it.
-    ///
-    /// # Errors
-    /// When the process has no descriptor left.
+    /// Wait for `descriptor` too, until it is readable; the caller reads from it. An error means that the process has no descriptor left.
     pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result<(), BusError> {
         let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
         self.descriptors.push(own);
         Ok(())
     }
 
-    /// Wait until a wakeup or descriptor is readable or `timeout` has passed; drains the wakeups. Returns whether
-    /// anything came.
-    ///
-    /// # Errors
-    /// When the system refuses to wait.
+    /// Wait until a wakeup or a descriptor is readable or `timeout` has passed, and drain the wakeups. Returns whether anything was
+    /// readable.
     pub fn wait(&self, timeout: Duration) -> Result<bool, BusError> {
         self.wait_also_for(&[], timeout)
     }
 
-    /// [`Waiter::wait`], for `others` too, this once.
-    ///
-    /// # Errors
-    /// As [`Waiter::wait`].
+    /// [`Waiter::wait`] that this once also waits for `others`.
     pub fn wait_also_for(
         &self,
         others: &[BorrowedFd<'_>],

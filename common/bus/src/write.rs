@@ -1,4 +1,4 @@
-//! Writers: they stamp what they publish and wake the readers.
+//! Writers, which stamp their samples and wake the readers.
 
 use std::{collections::HashSet, iter};
 
@@ -13,10 +13,8 @@ use super::{
 };
 
 impl Bus {
-    /// Write `topic` as the `generation`-th process of its stage.
-    ///
-    /// # Errors
-    /// When the topic is missing, carries another payload, or has no place left.
+    /// Write `topic` as the `generation`-th process of its stage. It fails if the topic is missing, carries another payload, or has no
+    /// place left.
     pub fn writer<P: Payload + Stamped>(
         &self,
         topic: &Topic<P>,
@@ -26,10 +24,7 @@ impl Bus {
         Ok(Writer { publisher: service.publisher(1)?, turn: self.turn(topic.spec, generation)? })
     }
 
-    /// Write slices of at most `longest` elements on `topic`.
-    ///
-    /// # Errors
-    /// As [`Bus::writer`].
+    /// [`Bus::writer`] for slices of at most `longest` elements.
     pub fn slice_writer<H: Payload + Stamped, T: Payload>(
         &self,
         topic: &SliceTopic<H, T>,
@@ -55,7 +50,7 @@ impl Bus {
     }
 }
 
-/// The stamp of a writer's next sample, and who is woken for it.
+/// The stamp of a writer's next sample, and the notifier of its readers.
 #[derive(Debug)]
 struct Turn {
     notifier: Notifier,
@@ -85,19 +80,14 @@ pub struct Writer<P: Payload> {
 }
 
 impl<P: Payload + Stamped> Writer<P> {
-    /// Publish `payload` for `tick` at mission `time`, stamped, and wake the readers.
-    ///
-    /// # Errors
-    /// When no memory is left to loan, which slack in the limits rules out unless a reader misbehaves.
+    /// Stamp `payload` with `tick` and the mission time `time`, publish it, and wake the readers. It fails if no memory is left for the
+    /// sample; the limits prevent that unless a reader holds more than it may.
     pub fn publish(&mut self, tick: u64, time: MissionTime, payload: P) -> Result<(), BusError> {
         self.publish_quietly(tick, time, payload)?;
         self.wake()
     }
 
-    /// As [`Writer::publish`], and wakes nobody yet: [`Writer::wake`] does.
-    ///
-    /// # Errors
-    /// As [`Writer::publish`].
+    /// [`Writer::publish`] without waking the readers; [`Writer::wake`] does that.
     pub fn publish_quietly(
         &mut self,
         tick: u64,
@@ -118,10 +108,7 @@ impl<P: Payload + Stamped> Writer<P> {
         self.publisher.send_all((), iter::once(payload))
     }
 
-    /// Wake the readers of what was published quietly.
-    ///
-    /// # Errors
-    /// When the middleware refuses.
+    /// Wake the readers after quiet publications.
     pub fn wake(&self) -> Result<(), BusError> {
         self.turn.wake()
     }
@@ -137,10 +124,7 @@ pub struct SliceWriter<H: Payload, T: Payload> {
 }
 
 impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
-    /// Publish `header` with `cells`, in order; as [`Writer::publish`].
-    ///
-    /// # Errors
-    /// As [`Writer::publish`], and when there are more cells than the writer was made for.
+    /// [`Writer::publish`] for a header and `cells`. It also fails if there are more cells than the writer was opened for.
     pub fn publish(
         &mut self,
         tick: u64,
@@ -152,10 +136,7 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         self.turn.wake()
     }
 
-    /// As [`SliceWriter::publish`], and wakes nobody: for readers that something else wakes.
-    ///
-    /// # Errors
-    /// As [`SliceWriter::publish`].
+    /// [`SliceWriter::publish`] without waking the readers, for readers that another topic wakes.
     pub fn publish_quietly(
         &mut self,
         tick: u64,
@@ -177,10 +158,7 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         self.wake()
     }
 
-    /// As [`SliceWriter::publish_quietly`], copies `cells` in one piece.
-    ///
-    /// # Errors
-    /// As [`SliceWriter::publish`].
+    /// [`SliceWriter::publish_quietly`] that copies `cells` in one piece.
     pub fn publish_slice_quietly(
         &mut self,
         tick: u64,
@@ -192,15 +170,12 @@ impl<H: Payload + Stamped, T: Payload> SliceWriter<H, T> {
         self.publisher.send_slice(header, cells)
     }
 
-    /// Wake the readers of what was published quietly.
-    ///
-    /// # Errors
-    /// When the middleware refuses.
+    /// Wake the readers after quiet publications.
     pub fn wake(&self) -> Result<(), BusError> {
         self.turn.wake()
     }
 
-    /// Whether a reader came since this was last asked: it needs a keyframe.
+    /// Whether a reader joined since the last call. It needs a keyframe.
     pub fn has_new_reader(&mut self) -> bool {
         let now = self.service.readers();
         let new = !now.is_subset(&self.known);

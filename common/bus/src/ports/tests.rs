@@ -1,13 +1,13 @@
-//! The bytes of the bus against the middleware's own typed API.
+//! Tests of the ports of bytes against the middleware's own typed API.
 
 use std::{fs, os::unix::fs::DirBuilderExt as _};
 
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2::prelude::{ServiceName, ZeroCopySend};
 
 use super::*;
 use crate::{
     AnyTopic, Bus, Logged, Rate, SliceTopic, Stamp, Stamped, Topic, bus_instance::BusInstance,
-    clock::MissionTime, domain::Domain, layouts,
+    clock::MissionTime, domain::Domain, layouts, spec::Limits,
 };
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -58,7 +58,7 @@ static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
 static SLICES: SliceTopic<Test, Cell> = SliceTopic::new(&spec("slices"));
 static BYTES: SliceTopic<Test, u8> = SliceTopic::new(&spec("bytes"));
 
-/// A bus of these topics, removed at the end.
+/// Run `test` on a bus of these topics, and remove the bus.
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
     let domain = Domain::of(robot.parse().unwrap());
     fs::DirBuilder::new().recursive(true).mode(0o700).create(domain.directory()).unwrap();

@@ -1,0 +1,362 @@
+//! The middleware's services and ports, compiled once: every payload is bytes here, whose name, size and alignment the middleware is
+//! told when a service is created or opened.
+//!
+//! Why `unsafe` is allowed here, and why it is sound:
+//! - [`samples`] tells the middleware the types of a topic's samples. The middleware refuses to open a service of other types, and
+//!   [`RawService::open`] compares them once more.
+//! - [`RawPublisher::send`] sends a sample only after its header and all its elements were written.
+//! - The descriptor of a listener is borrowed, and the borrow ends before the listener is dropped. Nobody else closes it.
+//! - A port is dropped exactly once, by its [`Drop`].
+#![allow(unsafe_code)]
+
+use std::{
+    any::Any,
+    collections::{BTreeSet, HashSet},
+    fmt,
+    mem::{ManuallyDrop, MaybeUninit},
+    ops::Deref,
+    os::fd::{AsFd, BorrowedFd},
+    ptr,
+};
+
+use iceoryx2::{
+    node::Node,
+    port::{listener, notifier, publisher, subscriber},
+    prelude::{AllocationStrategy, CallbackProgression, FileDescriptorBased, ServiceName, ipc},
+    sample,
+    service::{
+        builder::publish_subscribe::Builder,
+        marker::{CustomHeaderMarker, CustomPayloadMarker},
+        port_factory::{PortFactory as _, event, publish_subscribe::PortFactory},
+        static_config::message_type_details::{TypeDetail, TypeVariant},
+    },
+};
+
+use crate::{
+    error::{BusError, opening, reading, refused, taking},
+    leftovers::process_of,
+    payload::{Payload, type_name},
+    spec::{Limits, Spec},
+};
+
+/// Wraps types so that their destructors are compiled only here. The destructor of a plain field would be compiled again in each
+/// crate that drops the struct around it.
+macro_rules! dropped_here {
+    ($($(#[$doc:meta])* $name:ident($port:ty);)*) => {$(
+        $(#[$doc])*
+        pub(crate) struct $name(ManuallyDrop<$port>);
+
+        impl From<$port> for $name {
+            fn from(port: $port) -> Self {
+                Self(ManuallyDrop::new(port))
+            }
+        }
+
+        impl Deref for $name {
+            type Target = $port;
+
+            fn deref(&self) -> &$port {
+                &self.0
+            }
+        }
+
+        impl Drop for $name {
+            #[inline(never)]
+            fn drop(&mut self) {
+                // SAFETY: nothing else drops the port, and nothing uses it afterwards.
+                unsafe { ManuallyDrop::drop(&mut self.0) }
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(stringify!($name))
+            }
+        }
+    )*};
+}
+
+type Bytes = [CustomPayloadMarker];
+
+dropped_here! {
+    /// A process's node of the middleware.
+    BusNode(Node<ipc::Service>);
+    /// Wakes the readers of a topic.
+    Notifier(notifier::Notifier<ipc::Service>);
+    /// Is readable when a sample was published on a topic.
+    Listener(listener::Listener<ipc::Service>);
+    RawService(PortFactory<ipc::Service, Bytes, CustomHeaderMarker>);
+    RawPublisher(publisher::Publisher<ipc::Service, Bytes, CustomHeaderMarker>);
+    RawSubscriber(subscriber::Subscriber<ipc::Service, Bytes, CustomHeaderMarker>);
+    RawSample(sample::Sample<ipc::Service, Bytes, CustomHeaderMarker>);
+}
+
+/// The description of a payload on which all processes must agree.
+#[derive(Clone, Copy, Debug)]
+struct Type {
+    name: &'static str,
+    size: usize,
+    alignment: usize,
+}
+
+impl Type {
+    fn of<P: Payload>() -> Self {
+        Self { name: type_name::<P>(), size: size_of::<P>(), alignment: align_of::<P>() }
+    }
+
+    fn detail(self, variant: TypeVariant, spec: &Spec) -> Result<TypeDetail, BusError> {
+        TypeDetail::__internal_new_from_parts(variant, self.name, self.size, self.alignment)
+            .map_err(refused("name the payload of", spec.name))
+    }
+
+    fn is_that_of(self, detail: &TypeDetail) -> bool {
+        self.size == detail.size() && detail.alignment().is_multiple_of(self.alignment)
+    }
+}
+
+/// The types of a topic's samples: a header and elements. The samples of a topic of structs have no header and one element.
+#[derive(Clone, Copy, Debug)]
+pub struct Carried {
+    header: Type,
+    element: Type,
+    elements: TypeVariant,
+}
+
+impl Carried {
+    /// A topic of structs.
+    pub(crate) fn one<P: Payload>() -> Self {
+        Self {
+            header: Type::of::<()>(),
+            element: Type::of::<P>(),
+            elements: TypeVariant::FixedSize,
+        }
+    }
+
+    /// A topic of headers with slices.
+    pub(crate) fn slice<H: Payload, T: Payload>() -> Self {
+        Self { header: Type::of::<H>(), element: Type::of::<T>(), elements: TypeVariant::Dynamic }
+    }
+}
+
+/// The builder of the service that carries a topic's samples.
+fn samples(
+    node: &BusNode,
+    spec: &Spec,
+    carried: &Carried,
+) -> Result<Builder<Bytes, CustomHeaderMarker, ipc::Service>, BusError> {
+    let header = carried.header.detail(TypeVariant::FixedSize, spec)?;
+    let element = carried.element.detail(carried.elements, spec)?;
+    let builder = node
+        .service_builder(&service_name(spec)?)
+        .publish_subscribe::<Bytes>()
+        .user_header::<CustomHeaderMarker>();
+    // SAFETY: only this module and its parent read and write samples, and they use these types.
+    let builder = unsafe {
+        builder
+            .__internal_set_payload_type_details(&element)
+            .__internal_set_user_header_type_details(&header)
+    };
+    Ok(builder
+        .subscriber_max_buffer_size(spec.limits.recorder_buffer)
+        .subscriber_max_borrowed_samples(spec.limits.borrowed)
+        .max_subscribers(spec.limits.readers)
+        .max_publishers(Limits::WRITERS)
+        .max_nodes(Limits::NODES)
+        .history_size(1)
+        .enable_safe_overflow(true))
+}
+
+fn service_name(spec: &Spec) -> Result<ServiceName, BusError> {
+    spec.name.try_into().map_err(refused("name", spec.name))
+}
+
+/// Create the services of a topic. They exist as long as the result is held.
+pub(crate) fn create(
+    node: &BusNode,
+    spec: &Spec,
+    carried: &Carried,
+) -> Result<Box<dyn Any>, BusError> {
+    let samples = samples(node, spec, carried)?.create().map_err(refused("create", spec.name))?;
+    let event = node
+        .service_builder(&service_name(spec)?)
+        .event()
+        .max_notifiers(Limits::WRITERS)
+        .max_listeners(Limits::LISTENERS)
+        .max_nodes(Limits::NODES)
+        .create()
+        .map_err(refused("create", spec.name))?;
+    Ok(Box::new((samples, event)))
+}
+
+/// The processes that have a topic open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OpenedBy {
+    /// The processes that read its samples.
+    pub readers: BTreeSet<u32>,
+    /// The processes that write samples.
+    pub writers: BTreeSet<u32>,
+    /// The processes that are woken by samples.
+    pub woken: BTreeSet<u32>,
+}
+
+/// The processes that have a topic open.
+pub(crate) fn opened_by(
+    node: &BusNode,
+    spec: &Spec,
+    carried: &Carried,
+) -> Result<OpenedBy, BusError> {
+    let service = RawService::open(node, spec, carried)?;
+    let event = event(node, spec)?;
+    let mut opened = OpenedBy::default();
+    service.dynamic_config().list_subscribers(|reader| {
+        let process = process_of(reader.subscriber_id.value());
+        opened.readers.insert(process);
+        CallbackProgression::Continue
+    });
+    service.dynamic_config().list_publishers(|writer| {
+        let process = process_of(writer.publisher_id.value());
+        opened.writers.insert(process);
+        CallbackProgression::Continue
+    });
+    event.dynamic_config().list_listeners(|listener| {
+        let process = process_of(listener.listener_id.value());
+        opened.woken.insert(process);
+        CallbackProgression::Continue
+    });
+    Ok(opened)
+}
+
+impl RawService {
+    pub(super) fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self, BusError> {
+        let service = samples(node, spec, carried)?.open().map_err(opening(spec.name))?;
+        let there = service.static_config().message_type_details();
+        let fits = carried.header.is_that_of(&there.user_header)
+            && carried.element.is_that_of(&there.payload)
+            && there.payload.variant() == carried.elements;
+        if !fits {
+            return Err(BusError::Incompatible { topic: spec.name });
+        }
+        Ok(service.into())
+    }
+
+    pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher, BusError> {
+        let publisher = self
+            .publisher_builder()
+            .initial_max_slice_len(longest)
+            .allocation_strategy(AllocationStrategy::Static)
+            .create()
+            .map_err(refused("write", spec.name))?;
+        Ok(publisher.into())
+    }
+
+    pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber, BusError> {
+        let subscriber =
+            self.subscriber_builder().buffer_size(buffer).create().map_err(reading(spec))?;
+        Ok(subscriber.into())
+    }
+
+    pub(super) fn readers(&self) -> HashSet<u128> {
+        let mut readers = HashSet::new();
+        self.dynamic_config().list_subscribers(|reader| {
+            readers.insert(reader.subscriber_id.value());
+            CallbackProgression::Continue
+        });
+        readers
+    }
+
+    pub(super) fn number_of_readers(&self) -> usize {
+        self.dynamic_config().number_of_subscribers()
+    }
+}
+
+/// A sample that is being written.
+pub(super) struct Loan<'a> {
+    pub(super) header: *mut CustomHeaderMarker,
+    pub(super) elements: &'a mut [MaybeUninit<CustomPayloadMarker>],
+}
+
+impl RawPublisher {
+    /// Publish a sample of `elements` elements. `fill` writes the header and all elements, or returns false if they do not fit.
+    pub(super) fn send(
+        &self,
+        topic: &'static str,
+        elements: usize,
+        fill: &mut dyn FnMut(Loan<'_>) -> bool,
+    ) -> Result<(), BusError> {
+        // SAFETY: for a topic of structs, `elements` is 1.
+        let mut sample =
+            unsafe { self.loan_custom_payload(elements) }.map_err(refused("publish on", topic))?;
+        let header = ptr::from_mut(sample.user_header_mut());
+        let elements = sample.payload_mut();
+        if !fill(Loan { header, elements }) {
+            return Err(BusError::Incompatible { topic });
+        }
+        // SAFETY: `fill` has written the header and all elements.
+        unsafe { sample.assume_init() }.send().map(drop).map_err(refused("publish on", topic))
+    }
+}
+
+impl RawSubscriber {
+    #[inline(never)]
+    pub(super) fn take(&self, spec: &Spec) -> Result<Option<RawSample>, BusError> {
+        let sample = self.receive().map_err(taking(spec))?;
+        Ok(sample.map(RawSample::from))
+    }
+}
+
+impl RawSample {
+    #[inline(never)]
+    pub(super) fn header(&self) -> *const CustomHeaderMarker {
+        self.user_header()
+    }
+
+    #[inline(never)]
+    pub(super) fn elements(&self) -> &Bytes {
+        self.payload()
+    }
+
+    #[inline(never)]
+    pub(super) fn process(&self) -> u32 {
+        process_of(self.origin().value())
+    }
+}
+fn event(node: &BusNode, spec: &Spec) -> Result<event::PortFactory<ipc::Service>, BusError> {
+    node.service_builder(&service_name(spec)?).event().open().map_err(refused("open", spec.name))
+}
+
+impl Notifier {
+    pub(crate) fn open(node: &BusNode, spec: &Spec) -> Result<Self, BusError> {
+        let notifier = event(node, spec)?.notifier_builder().create();
+        Ok(notifier.map_err(refused("write", spec.name))?.into())
+    }
+
+    #[inline(never)]
+    pub(crate) fn wake(&self, topic: &'static str) -> Result<(), BusError> {
+        self.notify().map(drop).map_err(refused("wake the readers of", topic))
+    }
+}
+
+impl Listener {
+    /// Listen to a topic if `admit` allows it, which gets the number of the present listeners.
+    pub(crate) fn open(
+        node: &BusNode,
+        spec: &Spec,
+        admit: impl FnOnce(usize) -> Result<(), BusError>,
+    ) -> Result<Self, BusError> {
+        let service = event(node, spec)?;
+        admit(service.dynamic_config().number_of_listeners())?;
+        let listener = service.listener_builder().create();
+        Ok(listener.map_err(refused("listen to", spec.name))?.into())
+    }
+
+    pub(crate) fn drain(&self) -> Result<(), BusError> {
+        self.try_wait(|_| {}).map(drop).map_err(refused("listen to", "a topic"))
+    }
+}
+
+impl AsFd for Listener {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        // SAFETY: the descriptor stays open until the listener is dropped, after the borrow has ended.
+        unsafe { BorrowedFd::borrow_raw(self.file_descriptor().native_handle()) }
+    }
+}
