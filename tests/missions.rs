@@ -69,23 +69,23 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
 #[test]
 fn mission_time_and_timeout_count_the_time_in_which_nobody_hears_the_robot() {
     let out = ["--set", "simulation.radio.outage_share=0.2"];
-    let (_, summary) = run("unheard", "obstacle-course", &out);
+    let (_, summary) = run("silences", "obstacle-course", &out);
     let time_s = summary["mission_time_s"].as_f64().unwrap();
     let heard_s = (summary["ticks"].as_f64().unwrap() - 1.0) / 7.0;
-    let unheard = 1.0 - heard_s / time_s;
-    assert!((0.1..0.3).contains(&unheard), "{unheard}: {summary}");
+    let silent = 1.0 - heard_s / time_s;
+    assert!((0.1..0.3).contains(&silent), "{silent}: {summary}");
 
     let (_, summary) =
-        run("unheard", "obstacle-course", &[&out[..], &["--timeout", "20"]].concat());
+        run("silences", "obstacle-course", &[&out[..], &["--timeout", "20"]].concat());
     let time_s = summary["mission_time_s"].as_f64().unwrap();
     assert_eq!(summary["outcome"], "timeout", "{summary}");
     assert!((19.5..=20.0).contains(&time_s), "{summary}");
 
-    let (_, summary) = run("unheard", "obstacle-course", &[]);
+    let (_, summary) = run("silences", "obstacle-course", &[]);
     let time_s = summary["mission_time_s"].as_f64().unwrap();
     let heard_s = (summary["ticks"].as_f64().unwrap() - 1.0) / 7.0;
     assert!((time_s - heard_s).abs() < 1e-3, "{summary}");
-    assert_nothing_left("unheard");
+    assert_nothing_left("silences");
 }
 
 #[test]

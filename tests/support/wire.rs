@@ -21,14 +21,14 @@ use super::{PATIENCE, firsthand};
 pub struct Robot {
     process: Child,
     pub listening: String,
-    /// Read as it comes: the robot waits for a slow reader.
+    /// The records of ground truth. They are received at once, because the robot waits for a slow reader.
     truth: Receiver<Value>,
     /// Its last known distance from its start, metres.
     went: f64,
 }
 
 impl Robot {
-    /// In the world of the default mission, on a port of its own.
+    /// Start a simulated robot in the world of the default mission, on a port of its own.
     pub fn on_the_course() -> Self {
         Self::start("obstacle-course", "udp", "127.0.0.1:0")
     }
@@ -57,14 +57,14 @@ impl Robot {
         }
     }
 
-    /// Wait until it is `metres` from its start.
+    /// Wait until the robot is `metres` from its start.
     pub fn wait_until_driven(&mut self, metres: f64) {
         while self.went < metres {
             self.went = from_start(&self.truth.recv_timeout(PATIENCE).unwrap());
         }
     }
 
-    /// Kill it; its distance from its start by then.
+    /// Kill the robot. Returns its distance from its start by then.
     pub fn kill(mut self) -> f64 {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
@@ -85,7 +85,7 @@ impl Drop for Robot {
     }
 }
 
-/// Stands between link and robot, until it is dropped.
+/// Passes datagrams on between link and robot until it is dropped.
 #[derive(Debug)]
 pub struct Proxy {
     address: SocketAddr,
@@ -93,7 +93,7 @@ pub struct Proxy {
     threads: Vec<JoinHandle<()>>,
 }
 
-/// Bytes that come, to bytes that are passed on.
+/// Turns the bytes that arrive into the bytes that are passed on.
 type Pass = dyn FnMut(&[u8]) -> Vec<u8> + Send;
 
 impl Proxy {
@@ -125,7 +125,7 @@ impl Proxy {
         Self { address, over, threads }
     }
 
-    /// The assignment that makes it the robot of a mission.
+    /// The assignment of a mission file that makes the proxy the mission's robot.
     pub fn as_robot(&self) -> String {
         format!("robot.address=\"udp://{}\"", self.address)
     }
@@ -140,7 +140,7 @@ impl Drop for Proxy {
     }
 }
 
-/// Take whatever comes on `socket`, until all is over.
+/// Take the datagrams of `socket` until `over` is set.
 fn receive(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
     let often = Some(Duration::from_millis(50));
     socket.set_read_timeout(often).unwrap();
@@ -148,7 +148,7 @@ fn receive(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], So
     while !over.load(Ordering::Relaxed) {
         match socket.recv_from(&mut buffer) {
             Ok((length, from)) => take(&buffer[..length], from),
-            // Nothing came, or the other end is gone for now.
+            // No datagram came, or nobody listens at the other end now.
             Err(error) => assert!(
                 matches!(
                     error.kind(),

@@ -47,7 +47,7 @@ impl Answering for DeadReckoning {
     fn answer(&mut self, wheels: &WheelSample, now: MissionTime) -> Answer<PoseSample> {
         let first = self.state().newest().is_none();
         let Reckoned { pose, rejected } = self.step(wheels, now);
-        let warning = "the encoder counts began anew or jumped; the pose stays";
+        let warning = "the encoder counts restarted or jumped; the pose stays";
         Answer {
             sample: pose,
             saves_first: first || rejected,

@@ -1,8 +1,8 @@
-//! Pauses between attempts, which double up to a longest one.
+//! Pauses between attempts. Each is twice as long as the one before, up to a longest one.
 
 use std::time::Duration;
 
-/// Attempts at something that may never succeed: how many were made, and when the next one is due.
+/// Attempts at an operation that may never succeed: their number, and the time of the next one.
 #[derive(Clone, Debug)]
 pub struct Backoff {
     first: Duration,
@@ -13,25 +13,24 @@ pub struct Backoff {
 }
 
 impl Backoff {
-    /// The first attempt is due at once, the second a `first` pause later, and no pause is longer than
-    /// `longest`.
+    /// The first attempt is due at once, the second after the pause `first`. No pause is longer than `longest`.
     pub const fn new(first: Duration, longest: Duration) -> Self {
         Self { first, longest, pause: first, attempts: 0, next_ns: None }
     }
 
-    /// Whether to try now, at `now_ns` of the monotonic clock.
+    /// Whether an attempt is due at `now_ns` of the monotonic clock.
     pub fn is_due(&self, now_ns: u64) -> bool {
         self.next_ns.is_none_or(|next| now_ns >= next)
     }
 
-    /// An attempt was made.
+    /// Note that an attempt was made.
     pub fn attempted(&mut self, now_ns: u64) {
         self.attempts += 1;
         self.next_ns = Some(now_ns.saturating_add(self.pause.as_nanos() as u64));
         self.pause = (self.pause * 2).min(self.longest);
     }
 
-    /// It succeeded: the pauses start from the shortest again.
+    /// Start from the shortest pause again, after an attempt that succeeded.
     pub const fn reset(&mut self) {
         *self = Self::new(self.first, self.longest);
     }

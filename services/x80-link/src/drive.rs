@@ -1,4 +1,5 @@
-//! The two wheels on the wire, or a car's driven wheel and steering: channels and signs, counts in, timed commands out.
+//! The two wheels of the robot, or a car's driven wheel and steering: counts of motor frames in, timed commands out, each with the
+//! channels and signs of the mission.
 
 use std::time::Duration;
 
@@ -13,14 +14,14 @@ use common::{
 
 use crate::failsafe::stop_monitor::StopMethod;
 
-/// The steering turns by this share of the remaining angle in a tick: below 1, so that the delay of a speed loop does
-/// not make the steering swing.
+/// The share of the remaining angle that the steering turns in a tick. It is below 1 so that the delay of the speed loop does not
+/// make the steering oscillate.
 const STEERING_GAIN: f64 = 0.6;
 
-/// The pulse width at which a wheel stands.
+/// The pulse width at which a wheel does not turn.
 const PWM_STANDS: i16 = 16_384;
 
-/// The drive of one robot.
+/// Converts between samples and the robot's frames for its wheels.
 #[derive(Clone, Debug)]
 pub struct Drive {
     robot: RobotConfig,
@@ -95,9 +96,9 @@ impl Drive {
         }
     }
 
-    /// The speeds of the two channels for `command`, counts/s, at `share` of its speed, where the encoders stand at `wheels`. A
-    /// car's steering is a channel with a speed loop like that of a wheel: it is driven towards its angle, so a timed
-    /// command ends its motion, too.
+    /// The speeds of the two channels for `command` at `share` of its speed, counts/s; `wheels` are the present encoder counts. A car's
+    /// steering is a channel with a speed loop like a wheel's and is driven towards its angle, so its motion ends with a timed
+    /// command too.
     pub fn counts(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let driven = self.counts_per_second(share * command.left_rad_s);
         let Some(steering) = self.body.steering else {
@@ -117,7 +118,7 @@ impl Drive {
         on_the_wire((speed * per_radian).clamp(-top, top))
     }
 
-    /// A timed velocity command: a robot that obeys the time stops by itself when the link is gone.
+    /// A velocity command with a time limit. A robot that respects the limit stops by itself when the link has ended.
     pub fn velocity(&self, [left, right]: [i16; 2], limit: Duration) -> Vec<u8> {
         let mut channels = [None; 2];
         for (channel, counts) in [(self.robot.left, left), (self.robot.right, right)] {
@@ -158,7 +159,7 @@ impl Drive {
 
 /// Round counts/s to a command's integers; NaN gives 0.
 fn on_the_wire(counts: f64) -> i16 {
-    // -32768 and -32767 mean "leave alone".
+    // -32768 and -32767 mean that the channel is not changed.
     counts.round().clamp(-32_766.0, 32_766.0) as i16
 }
 
@@ -175,7 +176,7 @@ mod tests {
 
     use super::*;
 
-    /// Speeds for a car whose steering stands at `counts`, at 7 Hz with 3600 counts a turn.
+    /// The speeds for a car whose steering encoder reads `counts`, at 7 Hz with 3600 counts a turn.
     fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
         let text = "target = [3, 0]\nrobot.model = 'car'";
         let drive = Drive::new(&Mission::parse(text, Path::new("m.toml")).unwrap());

@@ -1,7 +1,7 @@
-//! Whether the robot may move. [`Monitor`]s take note of what happens on the link, a row of [`TABLE`] says what is done
-//! about each cause and until when, and of the causes that apply the worst is acted on.
+//! The decision whether the robot may move. [`Monitor`]s observe the link and say which causes apply. The row of a cause in [`TABLE`]
+//! has its action and its clearing condition. The link takes the worst action of all causes that apply.
 //!
-//! Adding a cause takes a variant of [`Cause`], a row, and a monitor: a file in `failsafe/` and a line in `monitors!`.
+//! A new cause needs a variant of [`Cause`], a row, and a monitor, which is a file in `failsafe/` and a line in `monitors!`.
 
 pub mod battery;
 pub mod latency_monitor;
@@ -23,8 +23,8 @@ use common::{
 
 use self::monitor::{Clears, Moment, Monitor, Observation};
 
-/// The share of its speed that a robot with a low battery goes at. Motors that draw less let the battery give
-/// more; slower still, and wheels begin to stick.
+/// The share of its commanded speed at which a robot with a low battery drives. A battery lasts longer if the motors draw less
+/// current, but at still lower speeds wheels begin to stick.
 pub const SLOW_SHARE: f64 = 0.5;
 
 macro_rules! monitors {
@@ -63,17 +63,17 @@ monitors! {
 pub struct Rule {
     /// The cause.
     pub cause: Cause,
-    /// When it applies, in words.
+    /// The condition in words, for the documentation.
     pub when: &'static str,
     /// The action.
     pub action: Action,
-    /// When it no longer applies.
+    /// The clearing condition.
     pub clears: Clears,
-    /// The monitor that watches for it.
+    /// The monitor that says whether the cause applies.
     monitor: fn(&Monitors) -> &dyn Monitor,
 }
 
-/// Every rule, the worst action first; of those with the same action the first that applies is reported.
+/// All rules, the worst action first. Of the rules with the same action, the first that applies is reported.
 pub const TABLE: &[Rule] = &[
     Rule {
         cause: Cause::MissionOver,
@@ -213,15 +213,15 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Nothing is wrong.
+    /// The decision if no cause applies.
     pub const GO: Self = Self { action: Action::Go, cause: Cause::None };
 
-    /// Whether no command may pass.
+    /// Whether the link passes no command to the robot.
     pub fn stops(self) -> bool {
         self.action >= Action::Stop
     }
 
-    /// The worst action of `applying`, and the first cause of it.
+    /// The worst action of the rules `applying`, and the first cause with this action.
     fn worst<'a>(applying: impl IntoIterator<Item = &'a Rule>) -> Self {
         let mut worst = Self::GO;
         for &Rule { action, cause, .. } in applying {
@@ -242,7 +242,7 @@ pub fn rule(cause: Cause) -> Option<&'static Rule> {
 #[derive(Clone, Debug)]
 pub(crate) struct Failsafe {
     pub(crate) monitors: Monitors,
-    /// Whether each row of [`TABLE`] applied when it was last looked at.
+    /// Whether each row of [`TABLE`] applied at the last decision.
     applied: [bool; TABLE.len()],
 }
 
@@ -260,7 +260,7 @@ impl Failsafe {
         }
     }
 
-    /// Decide what to do now. In lockstep, and while the robot does not answer, its frames are not judged.
+    /// Decide what to do now. In lockstep, and while the robot does not answer, the monitors that judge its frames are not asked.
     pub(crate) fn decide(&mut self, lockstep: bool, now: Moment) -> Decision {
         let judges_frames = !lockstep && self.monitors.presence.connected();
         let monitors = &self.monitors;
@@ -275,13 +275,13 @@ impl Failsafe {
         }))
     }
 
-    /// Whether `cause` applied when it was last looked at.
+    /// Whether `cause` applied at the last decision.
     pub(crate) fn applied(&self, cause: Cause) -> bool {
         let mut rules = TABLE.iter().zip(self.applied);
         rules.any(|(rule, applied)| rule.cause == cause && applied)
     }
 
-    /// An explanation of `cause` with what was seen, and a remedy.
+    /// An explanation of `cause` with the observed values, and a remedy.
     pub(crate) fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         (rule(cause)?.monitor)(&self.monitors).explain(cause, now)
     }

@@ -2,16 +2,16 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`step`] | the link itself, pure: bytes and commands in, samples and bytes out |
-//! | [`drive`] | the two wheels on the wire: channels and signs, counts in, timed commands out |
-//! | [`failsafe`] | THE table of what slows, stops or ends, and why; in `failsafe/` a monitor for each row or several |
+//! | [`step`] | the pure step of the link: bytes and commands in, samples and bytes out |
+//! | [`drive`] | the wheels: counts of motor frames in, timed commands out |
+//! | [`failsafe`] | THE table of causes for which the link slows or stops the robot or ends the mission; in `failsafe/` their monitors |
 //! | [`transport`] | datagrams, a connection or a serial line |
 //! | `rangers` | the readings of a tick that go into the map |
 //! | [`telemetry`] | batteries and the other sensors, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
-//! | `writers` | whose commands and orders are obeyed |
-//! | [`stage`] | what a recording holds of it, and what it publishes |
-//! | [`shell`] | its process: the wire and the topics it reads |
+//! | `writers` | the processes whose commands and orders the link accepts |
+//! | [`stage`] | the link as a stage: the entries of a recording, and the samples that it publishes |
+//! | [`shell`] | the process of the link: the wire and the topics that it reads |
 
 pub mod backoff;
 pub mod drive;

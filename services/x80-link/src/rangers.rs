@@ -1,4 +1,4 @@
-//! The readings of the rangers that go into the map, gathered from several frames for the next tick.
+//! The readings of the rangers for the next tick, collected from several frames.
 
 use common::{
     infrared,
@@ -32,7 +32,7 @@ impl Rangers {
         self.first_infrared = Some(standard.infrared);
     }
 
-    /// Take a custom frame. There is no sample before a standard frame has brought the first ranger.
+    /// Take a custom frame. Returns no sample until a standard frame has brought the first ranger's reading.
     pub(crate) fn take_custom(&mut self, custom: &CustomSensors) -> Option<InfraredSample> {
         let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
         let first = self.first_infrared?;
@@ -45,7 +45,7 @@ impl Rangers {
         })
     }
 
-    /// The readings for a tick. The next tick has none until new ones come.
+    /// Take the readings for a tick. The next tick has none until new ones come.
     pub(crate) fn for_tick(&mut self) -> RangeSample {
         RangeSample {
             infrared_ad: self.infrared.take().unwrap_or_default(),
@@ -54,7 +54,7 @@ impl Rangers {
     }
 }
 
-/// The sample of a sonar byte.
+/// The sample with the reading of a sonar byte.
 fn reading(byte: Option<u8>) -> RangeSample {
     let (status, range_m) = match byte.map(Echo::from_byte) {
         None => (RangeStatus::Absent, None),

@@ -1,4 +1,5 @@
-//! The wire, `command`, `directive`, `tick_limit` and `roster` in; `range`, `wheels`, `link`, telemetry and the wire out.
+//! The process of the link. It reads the wire, `command`, `directive`, `tick_limit` and `roster`, and writes the wire, `range`,
+//! `wheels`, `link` and telemetry.
 
 use std::time::Duration;
 
@@ -28,7 +29,7 @@ use crate::{
     writers::Writers,
 };
 
-/// Without input the link looks at the clock so often: a fifth of the shortest time that it waits for anything.
+/// Without input the link checks its deadlines so often, which is a fifth of the shortest of them.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
 /// The link process.
@@ -39,7 +40,7 @@ pub struct Shell {
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
     runner: Runner<LinkStage>,
-    /// The topics of telemetry are open.
+    /// Whether the topics of telemetry are open.
     has_telemetry: bool,
     clock: MissionClock,
     latency: Histogram,
@@ -94,7 +95,7 @@ impl Process for Shell {
             let reason = HoldReason::from_byte(directive.reason);
             self.take(Event::Order(order, reason), monotonic_ns())?;
         }
-        // After the order: the first limit was published before it.
+        // The limit is read after the order, because the supervisor publishes the first limit before the order.
         if let Some(limit) = self.tick_limit.newest()? {
             self.take(Event::TickLimit(limit.last_tick), monotonic_ns())?;
         }
@@ -132,7 +133,7 @@ impl Process for Shell {
         self.has_telemetry && self.runner.stage.has_telemetry()
     }
 
-    /// Commands are repeated, and the failsafe acts, when it is time.
+    /// The link is called without input to repeat commands and to run the failsafe.
     fn looks_again_after(&self) -> Option<Duration> {
         Some(LOOKS_AGAIN)
     }
@@ -176,7 +177,7 @@ fn log_battery(change: &BatteryChange) {
 fn log_decision(before: Decision, now: Decision) {
     let robot = now.action.effect();
     let cause = now.cause.name();
-    // The end of a mission is no fault.
+    // The end of a mission is no fault, so it is not logged as a warning.
     if now.action > before.action && now.cause != Cause::MissionOver {
         tracing::warn!(robot, cause, "failsafe");
     } else {
@@ -185,7 +186,7 @@ fn log_decision(before: Decision, now: Decision) {
 }
 
 impl Shell {
-    /// Keep the wire open, and let the link know whether it is.
+    /// Reopen a closed wire, and tell the link when the wire opens or closes.
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.maintain(now_ns).map_err(wire_broke)? {
@@ -202,7 +203,7 @@ impl Shell {
         self.carry_out(effects)
     }
 
-    /// Do what the effects leave to the process.
+    /// Carry out the effects that need the process.
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
         for effect in effects {
             match effect {
@@ -217,7 +218,7 @@ impl Shell {
                 Effect::Unlimited { tick } => {
                     tracing::warn!(
                         tick,
-                        "the supervisor does not say that the tick may begin; it begins"
+                        "the supervisor's tick limit did not rise in time; the tick begins without it"
                     );
                 }
                 Effect::Decided { before, now } => {
@@ -235,24 +236,27 @@ impl Shell {
                     self.state()?;
                 }
                 Effect::Connected(false) => {
-                    tracing::warn!("robot lost; it is looked for until it answers");
+                    tracing::warn!("robot lost; it is pinged until it answers");
                     self.state()?;
                 }
                 Effect::Restarted => {
                     let restarts = self.runner.stage.link.restarts();
-                    tracing::warn!(restarts, "the robot restarted: its counts begin anew");
+                    tracing::warn!(restarts, "the robot restarted its encoder counts");
                 }
                 Effect::CountsElsewhere => tracing::warn!(
-                    "the counts jumped farther than wheels turn and go on from there; the pose stays"
+                    "the encoder counts jumped farther than wheels turn and continue from there; the pose stays"
                 ),
                 Effect::StopBy(method) => {
-                    tracing::warn!(by = method.as_str(), "the robot does not stand; told again");
+                    tracing::warn!(
+                        by = method.as_str(),
+                        "the robot does not stop; it is stopped by the next method"
+                    );
                 }
                 Effect::AskedForStreams => {
                     tracing::info!("the robot is asked for its streams again");
                 }
                 Effect::Battery(change) => log_battery(&change),
-                // The stage has published them.
+                // The stage has already published these effects.
                 Effect::Tick { .. }
                 | Effect::Infrared(_)
                 | Effect::Power(_)
@@ -262,7 +266,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Publish how the wire is.
+    /// Publish the state of the link and its wire.
     fn state(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         self.stated_ns = now_ns;
@@ -270,7 +274,7 @@ impl Shell {
         let wire = link.wire_tally();
         let tally = link.tally();
         let absence = link.absence(now_ns);
-        // Of a wire that is not open, the openings; else the pings.
+        // If the wire is closed, these are the attempts to open it; otherwise the pings.
         let (attempts, next_attempt_ns) = match self.transport.attempts(now_ns) {
             Some(openings) => (openings.made, openings.next_ns),
             None => (absence.pings, absence.next_ping_ns),

@@ -1,4 +1,5 @@
-//! The link as a stage: what a recording holds of it, and what it publishes, telemetry and the bytes of the wire included.
+//! The link as a stage: the entries of a recording, and the samples that it publishes, which include telemetry and the bytes of the
+//! wire.
 
 use common::{
     clock::{MissionClock, MissionTime, Pace},
@@ -19,39 +20,39 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Effect, Event, Input, Link, State};
 
-/// A sample of `wire` has at most so many bytes; what is longer takes several.
+/// A sample of `wire` has at most so many bytes. Longer data are published in several samples.
 pub(crate) const WIRE_PIECE: usize = 2048;
 
-/// What the link does. A generation starts from a [`State`].
+/// An entry of a recording, from which the link can be replayed. A generation starts from a [`State`].
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry<'a> {
-    /// The step takes this at this reading of the monotonic clock, nanoseconds, and this mission time.
+    /// The step takes an event at this reading of the monotonic clock, nanoseconds, and this mission time.
     Step(#[serde(borrow)] Taken<'a>, u64, MissionTime),
     /// The newest telemetry is published.
     Telemetry,
-    /// The stage stops, at this reading of the monotonic clock.
+    /// The stage stops at this reading of the monotonic clock, nanoseconds.
     Stop(u64),
 }
 
-/// An [`Event`] in a recording.
+/// An [`Event`] as a recording stores it.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Taken<'a> {
-    /// As [`Event::Datagram`].
+    /// [`Event::Datagram`].
     Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
-    /// As [`Event::Wire`].
+    /// [`Event::Wire`].
     Wire(bool),
-    /// As [`Event::Command`].
+    /// [`Event::Command`].
     Command(#[serde(with = "inputs::sample")] CommandSample),
-    /// As [`Event::Order`], a byte each.
+    /// [`Event::Order`] with the order and the reason as bytes.
     Order(u8, u8),
-    /// As [`Event::TickLimit`].
+    /// [`Event::TickLimit`].
     TickLimit(u64),
-    /// As [`Event::Quiet`].
+    /// [`Event::Quiet`].
     Quiet,
 }
 
 impl<'a> Taken<'a> {
-    /// Of `event`.
+    /// The recorded form of `event`.
     pub(crate) fn of(event: &Event<'a>) -> Self {
         match *event {
             Event::Datagram(bytes) => Self::Datagram(bytes),
@@ -77,14 +78,14 @@ impl<'a> Taken<'a> {
     }
 }
 
-/// The step, and what its effects leave to be published when no stage of the pipeline waits.
+/// The step, and the samples that are published later, when no stage of the pipeline waits for the link.
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
-    /// Bytes received and sent, oldest first.
+    /// The bytes received and sent that are not published yet, oldest first.
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
 }
 
@@ -100,7 +101,7 @@ impl LinkStage {
         self.wire.push((at, header, bytes.to_vec()));
     }
 
-    /// Publish what an effect publishes. Gives it back where the process has to do something.
+    /// Publish the sample of an effect. Returns the effect if the process has to carry it out.
     fn carry_out(
         &mut self,
         effect: Effect,
@@ -142,7 +143,7 @@ impl LinkStage {
 impl Stage for LinkStage {
     type Start = State;
     type Entry<'a> = Entry<'a>;
-    /// What the process has to do, in order.
+    /// The effects that the process has to carry out, in order.
     type Outcome = Vec<Effect>;
 
     fn new(mission: &Mission) -> Self {

@@ -1,9 +1,8 @@
 //! The pure step of the link: events and their times in, samples and bytes for the robot out.
 //!
-//! A tick starts with a motor frame and takes the newest sonar frame with it; it ends with the command
-//! computed from it. In lockstep (a simulated robot at `--pace max`) the robot waits for that
-//! command, so a tick that gets none, because a stage ended, is repeated. On a wall clock the robot
-//! moves on, so an unanswered tick is abandoned for the next.
+//! A tick starts with a motor frame and the newest sonar reading, and ends with the command computed from them. In lockstep (a
+//! simulated robot at `--pace max`) the robot waits for that command, so the link repeats a tick that gets none because a stage
+//! ended. On the wall clock the robot does not wait, so an unanswered tick is dropped when the next one starts.
 
 mod event;
 mod stop;
@@ -35,19 +34,19 @@ use crate::{
 
 pub use event::{Effect, Event, Input, State, Tally};
 
-/// The pause between pings of a robot that owes a tick.
+/// The pause between pings to a robot whose next motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
-/// An open tick without a command is repeated after this: ten times the longest tick measured.
+/// An open tick without a command is repeated after this time, which is ten times the longest tick measured.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
-/// In lockstep a tick waits at most so long for the supervisor's limit to reach it: longer than the planner of a stalled
-/// robot may take to restart. A supervisor that is silent stops the robot before.
+/// In lockstep a tick waits at most so long until the supervisor's limit allows it. This is longer than the planner of a stalled
+/// robot may take to restart. If the supervisor is silent, the failsafe stops the robot earlier.
 const LIMIT_WAITED: Duration = Duration::from_secs(5);
-/// The wire carries whole milliseconds, and to most robots 0 means no limit.
+/// The least time limit of a command. The wire carries whole milliseconds, and for most robots 0 means no limit.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
-/// A new stop is sent so many times: one datagram may be lost.
+/// A new stop is sent so many times, because datagrams may be lost.
 const STOPS: u32 = 3;
-/// While the link stops the robot, the stop is sent again after so long: all of them may be lost in a fade, and a robot
-/// may ignore the time limit of the command before.
+/// While the link stops the robot, it repeats the stop after so long. All stops may be lost while the radio fades, and the robot may
+/// ignore the time limit of its last command.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 /// A tick that waits for its command.
@@ -56,17 +55,17 @@ struct OpenTick {
     range: RangeSample,
     wheels: WheelSample,
     began_ns: u64,
-    /// `None` while it waits for the supervisor's limit.
+    /// The time when the tick was published; `None` while it waits for the supervisor's limit.
     given_ns: Option<u64>,
 }
 
-/// A command that passed, to be sent once more: a datagram may be lost.
+/// A command that was sent and will be repeated once, because a datagram may be lost.
 #[derive(Clone, Copy, Debug)]
 struct Repeat {
     counts: [i16; 2],
-    /// The tick it was computed from.
+    /// Mission time of the tick from which it was computed.
     stamp: MissionTime,
-    /// Half a period after it.
+    /// Mission time of the repetition, half a period after the tick.
     due: MissionTime,
 }
 
@@ -74,7 +73,7 @@ struct Repeat {
 #[derive(Debug)]
 pub struct Link {
     state: State,
-    /// Mission time of the present input.
+    /// The mission time of the present event.
     now: MissionTime,
     drive: Drive,
     half_period_ns: u64,
@@ -95,7 +94,7 @@ pub struct Link {
     repeat: Option<Repeat>,
     decision: Decision,
     stop_sent_ns: Option<u64>,
-    /// In lockstep, motor frames that are due, one for each command and each ping since the order.
+    /// In lockstep, the motor frames that the robot still has to send, one for each command and each ping since the order.
     due: u32,
     tally: Tally,
 }
@@ -124,7 +123,7 @@ impl Step for Link {
             last_tick: None,
             newest_command: None,
             repeat: None,
-            // Nothing has moved yet: no stop needs to be sent.
+            // The robot has not moved yet, so no stop needs to be sent.
             decision: Decision { action: Action::Stop, cause: Cause::NotOrdered },
             stop_sent_ns: None,
             due: 0,
@@ -174,27 +173,27 @@ impl Link {
         self.monitors().presence.connected()
     }
 
-    /// What the failsafe does, and why.
+    /// The failsafe's present decision.
     pub const fn decision(&self) -> Decision {
         self.decision
     }
 
-    /// Counts of the wire.
+    /// The counts of the decoder.
     pub fn wire_tally(&self) -> DecoderTally {
         self.decoder.tally()
     }
 
-    /// Counts of the link.
+    /// The counts of the link.
     pub const fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// Times the robot was seen to have restarted its counts.
+    /// The number of times that the robot restarted its counts.
     pub const fn restarts(&self) -> u32 {
         self.restart.restarts()
     }
 
-    /// Whether the encoders say that no wheel turns. In lockstep a robot that is held is given no time.
+    /// Whether the encoders say that no wheel turns. In lockstep a held robot counts as at rest, because mission time stands still.
     pub fn is_at_rest(&self) -> bool {
         if self.in_ticks() {
             self.decision.stops()
@@ -203,7 +202,7 @@ impl Link {
         }
     }
 
-    /// An explanation of `cause` with what was seen, and a remedy.
+    /// An explanation of `cause` with the observed values, and a remedy.
     pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
         self.failsafe.explain(cause, self.moment(now_ns))
     }
@@ -213,7 +212,7 @@ impl Link {
         self.monitors().presence.absence(now_ns)
     }
 
-    /// Times the robot was lost.
+    /// The number of times that the robot was lost.
     pub fn losses(&self) -> u64 {
         self.monitors().presence.losses()
     }
@@ -239,7 +238,7 @@ impl Link {
         self.monitors().orders.drive()
     }
 
-    /// Whether ticks go on although the robot is to stand: it may be carried meanwhile. In lockstep mission time stands.
+    /// Whether ticks continue while an operator holds the robot, which may be carried meanwhile. In lockstep mission time stands still.
     fn held_by_operator(&self) -> bool {
         !self.in_ticks() && self.monitors().orders.by_operator()
     }
@@ -267,7 +266,7 @@ impl Link {
         }
         self.time = self.now;
         if !self.in_ticks() {
-            // The number is taken whether the tick is answered or not.
+            // The tick uses up its number even if it is never answered.
             self.state.next_tick += 1;
         }
         let wheels =
@@ -298,7 +297,7 @@ impl Link {
         }
         let answers = self.open.is_some() && command.stamp.tick == self.open_number();
         if self.in_ticks() && !answers {
-            // It is a second answer to a tick that was repeated.
+            // This is a second answer to a tick that was repeated.
             return;
         }
         self.newest_command = Some(*command);
@@ -345,12 +344,12 @@ impl Link {
         }
         self.observe(Observation::Directive(order, reason), now_ns);
         if drives && self.in_ticks() {
-            // A robot that waits for commands sends its state again when pinged: tick 0.
+            // A robot that waits for commands answers a ping with its state, which starts tick 0.
             self.ping(now_ns, effects);
         }
     }
 
-    /// Give the open tick to the pipeline when it may begin; in lockstep, repeat it when it has no answer for long.
+    /// Publish the open tick if the supervisor's limit allows it. In lockstep, publish it again if it stays unanswered.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let Some(mut open) = self.open else {
             return;
@@ -376,9 +375,8 @@ impl Link {
         effects.push(self.tick_effect(tick, &open));
     }
 
-    /// Send the newest command once more, halfway to the next tick and with what remains of its time: the
-    /// robot still stands when that has passed since the tick. In lockstep each command draws a
-    /// frame, and none is lost unnoticed.
+    /// Send the newest command once more, halfway to the next tick. Its time limit is what is left of the first one, so the robot stops
+    /// no later. In lockstep commands are not repeated: the robot answers each with a frame, so a loss is noticed.
     fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if self.in_ticks() {
             return;
@@ -388,7 +386,7 @@ impl Link {
             return;
         };
         let left = self.drive.limit().saturating_sub(now.since(repeat.stamp));
-        // With a tick open, the next command is on its way.
+        // While a tick is open, the next command will follow soon.
         let superseded = self.open.is_some();
         if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
             return;
@@ -398,7 +396,7 @@ impl Link {
     }
 }
 
-/// Whether `span` has passed since; it has if there is no since.
+/// Whether `span` has passed since `since_ns`; true if that is `None`.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since| now_ns.saturating_sub(since) >= span.as_nanos() as u64)
 }

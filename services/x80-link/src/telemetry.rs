@@ -1,4 +1,4 @@
-//! Batteries, motor currents and the other sensors that no tick needs, in the units of the topics.
+//! The sensors that no tick needs, in the units of the topics: batteries, motor currents and others.
 
 use common::{
     samples::{PowerSample, SurroundingsSample},
@@ -8,19 +8,19 @@ use common::{
     },
 };
 
-/// The parts of earlier frames that the next sample needs.
+/// The values of earlier frames that the next sample needs.
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
     currents: [u16; 6],
 }
 
 impl Telemetry {
-    /// Take a motor frame: its currents go into the next [`PowerSample`].
+    /// Take the currents of a motor frame for the next [`PowerSample`].
     pub const fn take_motor(&mut self, motor: &MotorSensors) {
         self.currents = motor.currents;
     }
 
-    /// Take a standard frame; `low` says which of the boards', the motors' and the servos' battery is low.
+    /// Take a standard frame; `low` says whether the battery of the boards, of the motors, and of the servos is low.
     pub fn take_standard(
         &mut self,
         standard: &StandardSensors,

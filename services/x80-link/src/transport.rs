@@ -1,13 +1,13 @@
-//! The transport of bytes to the robot: datagrams, a connection or a serial line. Nothing here blocks, and
-//! bytes that cannot be sent now are lost, as on a radio.
+//! The transport of bytes to the robot: datagrams, a connection or a serial line. No call blocks. Bytes that cannot be sent now are
+//! lost, like those of a radio.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `udp` | datagrams from the robot's address, and from nowhere else |
-//! | `stream` | the common part of a connection and a serial line: reopened after each loss, never half a frame |
+//! | `udp` | datagrams from the robot's address only |
+//! | `stream` | the common part of a connection and a serial line: it is reopened after each loss and sends no partial frame |
 //! | `tcp` | a connection |
 //! | `serial` | a serial line |
-//! | `counts` | the counts of each |
+//! | `counts` | the counts of a transport |
 
 mod counts;
 mod serial;
@@ -26,7 +26,7 @@ use thiserror::Error;
 pub use self::counts::{Attempts, Tally};
 use self::{serial::Serial, stream::Stream, tcp::Tcp, udp::Udp};
 
-/// The wire cannot be opened or stays unusable, for a reason that lies with this machine and not with the robot.
+/// The wire cannot be opened or used, and the cause is this machine rather than the robot.
 #[derive(Debug, Error)]
 #[error(
     "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
@@ -43,7 +43,7 @@ pub struct TransportError {
 pub struct Transport {
     address: Address,
     wire: Wire,
-    /// Whether the wire was open when that was last reported.
+    /// The last reported state: whether the wire was open.
     reported: Option<bool>,
     buffer: Box<[u8]>,
 }
@@ -56,7 +56,7 @@ enum Wire {
 }
 
 impl Transport {
-    /// A wire to the robot at `address`. [`Transport::maintain`] opens one that must be opened first.
+    /// A wire to the robot at `address`. [`Transport::maintain`] opens a connection or a serial line.
     pub fn open(address: &Address) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(Wire::Udp),
@@ -72,17 +72,17 @@ impl Transport {
         })
     }
 
-    /// Open a wire that is down when that is due, and send the rest of a message, at `now_ns` of the monotonic clock.
-    /// Returns whether the wire is open if that was not reported yet. No opening hides a closing: both are reported.
+    /// Reopen a closed wire if that is due at `now_ns` of the monotonic clock, and send the rest of a message. Returns whether the wire is
+    /// open if that changed since the last report. If it closed and opened again, both changes are reported one after the other.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
-            let tended = match &mut self.wire {
+            let maintained = match &mut self.wire {
                 Wire::Udp(_) => Ok(()),
                 Wire::Tcp(stream) => stream.maintain(now_ns),
                 Wire::Serial(stream) => stream.maintain(now_ns),
             };
-            tended.map_err(|source| self.broken(source))?;
+            maintained.map_err(|source| self.broken(source))?;
         }
         let open = Some(self.is_open());
         if self.reported == open {
@@ -101,7 +101,7 @@ impl Transport {
         }
     }
 
-    /// The next bytes of the robot; none when all were taken.
+    /// The next bytes from the robot; none when all were taken.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
         let received = match &mut self.wire {
             Wire::Udp(udp) => udp.receive(&mut self.buffer),
@@ -114,7 +114,7 @@ impl Transport {
         }
     }
 
-    /// Send one message of one frame or more.
+    /// Send a message, which has one frame or more.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         let sent = match &mut self.wire {
             Wire::Udp(udp) => udp.send(bytes),
@@ -133,7 +133,7 @@ impl Transport {
         }
     }
 
-    /// Attempts to open a wire that is not open, at `now_ns` of the monotonic clock.
+    /// The attempts to open the wire, at `now_ns` of the monotonic clock; none while it is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         match &self.wire {
             Wire::Udp(_) => None,
@@ -147,7 +147,7 @@ impl Transport {
     }
 }
 
-/// The descriptor is readable when there is something to do, and does not change.
+/// The descriptor is readable when the wire needs attention. It stays the same when the wire is reopened.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
         match &self.wire {

@@ -1,4 +1,5 @@
-//! The link obeys commands and orders only of processes that the supervisor started.
+//! Acceptance of commands and orders: the link takes orders from its supervisor only, and commands from the controller that the
+//! supervisor started.
 
 use common::{
     bus::{Author, BusError, Ignored, Reader, SliceReader},
@@ -7,7 +8,7 @@ use common::{
     topics::{self, AnyTopic as _},
 };
 
-/// The writers that the roster names, and the others that were ignored.
+/// The roster, and the samples of other writers that were ignored.
 #[derive(Debug)]
 pub(crate) struct Writers {
     roster: SliceReader<RosterHeader, RosterEntry>,
@@ -15,7 +16,7 @@ pub(crate) struct Writers {
 }
 
 impl Writers {
-    /// Follow the roster. Until it names the controller, no command is obeyed.
+    /// Follow the roster. No command is accepted until the roster names the controller.
     pub(crate) fn open(
         context: &mut Context,
         command: &mut Reader<CommandSample>,
@@ -24,7 +25,7 @@ impl Writers {
         Ok(Self { roster: context.slice_reader(&topics::ROSTER)?, ignored: Ignored::default() })
     }
 
-    /// Make `command` read from the controller that the roster names.
+    /// Make `command` return only samples of the controller that the roster names.
     pub(crate) fn follow(&mut self, command: &mut Reader<CommandSample>) -> Result<(), BusError> {
         while let Some(entries) = self.roster.take()? {
             let writer = topics::COMMAND.spec().writer;
@@ -37,7 +38,7 @@ impl Writers {
         Ok(())
     }
 
-    /// Sum up the ignored samples of all topics, and warn of each process that is new among their writers.
+    /// Add up the ignored samples of all topics, and warn of each new process among their writers.
     pub(crate) fn tell(&mut self, ignored: [Ignored; 3]) -> Ignored {
         let samples = ignored.iter().map(|topic| topic.samples).sum();
         let changed = samples != self.ignored.samples;

@@ -1,4 +1,4 @@
-//! Whether the batteries give enough.
+//! The battery monitor: which batteries are low or empty.
 
 use std::time::Duration;
 
@@ -11,45 +11,44 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A battery that was low gives enough again this far above its limit, volts: a pack whose motors have just
-/// stopped recovers by less.
+/// A low battery counts as charged again this far above its limit, volts. The voltage rises by less when the motors stop.
 pub(crate) const RECOVERED_V: f64 = 0.3;
-/// The share of the limit below which a battery is empty: 1.0 V a cell where it is low at 1.1 V. A cell that
-/// gives less is damaged, and the voltage falls faster than a robot can be fetched.
+/// A battery is empty below this share of its limit, which is 1.0 V a cell if the limit is 1.1 V. Lower voltages damage cells,
+/// and from there the voltage falls faster than a robot can be fetched.
 pub(crate) const EMPTY_SHARE: f64 = 1.0 / 1.1;
-/// A battery is empty after so long below that, mission time: motors that start draw the voltage down for some tenths of
-/// a second.
+/// A battery is empty after so long below the empty voltage, mission time. Motors that start lower the voltage for some tenths of a
+/// second.
 pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
-/// A supply below this is no empty battery but none, volts: the robot could not speak on it.
+/// Below this voltage there is no battery at all, volts. A robot could not send frames on it.
 const FITTED_V: f64 = 1.0;
 
 /// The charge of a battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Charge {
-    /// Enough, or there is no such battery.
+    /// The battery gives enough, or there is no such battery.
     #[default]
     Enough,
-    /// Little.
+    /// The robot drives slowly.
     Low,
-    /// Nothing to drive on.
+    /// The robot cannot drive any more.
     Empty,
 }
 
-/// A battery of the robot.
+/// One of the robot's batteries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pack {
-    /// The boards'.
+    /// The battery of the boards.
     Board,
-    /// The motors'.
+    /// The battery of the motors.
     Motor,
-    /// The servos'.
+    /// The battery of the servos.
     Servo,
 }
 
 impl Pack {
     const ALL: [Self; 3] = [Self::Board, Self::Motor, Self::Servo];
 
-    /// For logs.
+    /// Its name in logs.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Board => "board",
@@ -59,7 +58,7 @@ impl Pack {
     }
 }
 
-/// A battery became low or empty, or is no longer.
+/// The charge of a battery changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryChange {
     /// The battery.
@@ -70,11 +69,11 @@ pub struct BatteryChange {
     pub charge: Charge,
 }
 
-/// One battery over time.
+/// The state of one battery.
 #[derive(Clone, Copy, Debug, Default)]
 struct Gauge {
     charge: Charge,
-    /// The time since which it has given less than an empty one does.
+    /// The time since which the voltage has been below the empty voltage.
     sunk_since: Option<MissionTime>,
 }
 
@@ -86,7 +85,7 @@ impl Gauge {
         self.sunk_since = sunk.then_some(since);
         let ends = if self.charge == Charge::Enough { limit } else { limit + RECOVERED_V };
         self.charge = if self.charge == Charge::Empty || sunk && now.since(since) >= EMPTY_AFTER {
-            // Its voltage comes back when the robot stands, but nothing to drive on does.
+            // The voltage rises again when the robot stands, but the battery is still empty.
             Charge::Empty
         } else if fitted && volts < ends {
             Charge::Low
@@ -101,13 +100,13 @@ impl Gauge {
 #[derive(Clone, Debug)]
 pub struct Batteries {
     limits: BatteryLimits,
-    /// In the order of [`Pack::ALL`].
+    /// The batteries in the order of [`Pack::ALL`].
     gauges: [Gauge; 3],
     changes: Vec<BatteryChange>,
 }
 
 impl Batteries {
-    /// Whether the boards', the motors' and the servos' battery is low or empty.
+    /// Whether the battery of the boards, of the motors, and of the servos is low or empty.
     pub fn low(&self) -> [bool; 3] {
         self.gauges.map(|gauge| gauge.charge > Charge::Enough)
     }
@@ -117,7 +116,7 @@ impl Batteries {
         std::mem::take(&mut self.changes)
     }
 
-    /// The worst of the batteries that the robot drives on: it drives without its servos.
+    /// The worst charge of the batteries that driving needs, which are all but the servos'.
     fn charge(&self) -> Charge {
         let [board, motor, _] = self.gauges;
         board.charge.max(motor.charge)

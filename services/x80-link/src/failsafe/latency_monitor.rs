@@ -1,9 +1,10 @@
-//! Whether what the robot sends is old: buffers on the way may hold seconds of it, and its frames carry no time.
+//! The latency monitor: whether the robot's frames arrive late. Buffers on the way may delay them by seconds, and frames carry no
+//! time.
 //!
-//! A robot acknowledges every command. After it was lost, and while it is late, the link sends nothing for a window; an
-//! acknowledgement that comes when nothing was sent for as long as a command lasts has taken longer than that. One that
-//! came in time cannot be told from a late one of an earlier command, so only late ones count. A robot that acknowledges
-//! nothing is taken for timely.
+//! A robot acknowledges every command. When a lost robot answers again, and while it is late, the link sends nothing for a window. An
+//! acknowledgement is late if it arrives when nothing was sent for longer than the time limit of a command. An acknowledgement
+//! within that time proves nothing, because it may be a late one of an earlier command. A robot that acknowledges nothing counts
+//! as timely.
 
 use std::time::Duration;
 
@@ -11,22 +12,22 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// Processes are late by so much now and then, however fast mission time runs.
+/// The least limit, machine time: a process may be delayed by so much at any pace of mission time.
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
-/// The window is so much longer than the limit, mission time: commands are sent every 0.2 s to a robot that stands.
+/// The window is longer than the limit by this, mission time. Commands are sent every 0.2 s to a robot that stands.
 const WINDOW: Duration = Duration::from_millis(400);
 /// A late robot is tested again after so long, mission time.
 const AGAIN: Duration = Duration::from_secs(2);
 
-/// Whether the robot is late, as far as known.
+/// The present finding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
-    /// Nothing indicates that it is late.
+    /// Nothing indicates that the robot is late.
     #[default]
     Timely,
-    /// Nothing is sent since this time of the machine's clock, to find out.
+    /// The link has sent nothing since this time of the machine's clock, to see late acknowledgements.
     Testing(u64),
-    /// It is late, as found at this time.
+    /// The robot was found to be late at this time.
     Late(u64),
 }
 
@@ -67,7 +68,7 @@ impl LatencyMonitor {
         }
     }
 
-    /// Whether nothing is to be sent, so that late acknowledgements show.
+    /// Whether the link must send nothing now, so that late acknowledgements can be seen.
     pub const fn is_testing(&self) -> bool {
         matches!(self.state, State::Testing(_))
     }
@@ -137,7 +138,8 @@ mod tests {
         monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
     }
 
-    /// A robot that acknowledges what it gets every 70 ms after `delay_ms`, found at 10 s and then left alone for `quiet_ms`.
+    /// The monitor of a robot that gets a command every 70 ms and acknowledges each after `delay_ms`. It is found at 10 s and then gets
+    /// nothing for `quiet_ms`.
     fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
         let text = "target = [3, 0]";
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();

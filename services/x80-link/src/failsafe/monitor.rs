@@ -27,11 +27,11 @@ pub enum Observation<'a> {
     Time,
     /// The supervisor published a directive.
     Directive(Order, HoldReason),
-    /// An operator lets the robot go on: what was wrong counts as repaired.
+    /// An operator resumed the robot, so faults count as repaired.
     Resumed,
     /// The controller published a newer command.
     Command(&'a CommandSample),
-    /// The wheels were sent these counts/s, forward positive.
+    /// A command with these speeds was sent to the wheels, counts/s, forward positive.
     Commanded([i16; 2]),
     /// Something was sent to the robot.
     Sent,
@@ -41,37 +41,37 @@ pub enum Observation<'a> {
     Motor([u16; 2], Counts),
     /// A standard frame came.
     Standard(&'a StandardSensors),
-    /// The robot answers, and was asked for its streams.
+    /// The robot answers after it did not, and was asked for its streams.
     Found {
-        /// It had been lost before.
+        /// Whether it had answered before.
         again: bool,
     },
     /// The robot does not answer.
     Lost,
 }
 
-/// How the counts of a frame relate to those before.
+/// The relation of a frame's counts to the counts before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counts {
     /// The wheels turned by the difference since the frame before.
     Follow,
     /// The robot restarted: the difference is no motion.
     Restarted {
-        /// It did not answer until now.
+        /// Whether the robot did not answer until this frame.
         was_away: bool,
     },
-    /// Wheels cannot have turned so far, but later frames follow these counts: the difference is no motion.
+    /// The wheels cannot have turned so far, but later frames continue from these counts: the difference is no motion.
     Elsewhere,
-    /// Wheels cannot have turned so far.
+    /// The wheels cannot have turned so far.
     Implausible,
 }
 
 /// Whether the condition of a cause holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
-    /// It holds.
+    /// The condition holds.
     Holds,
-    /// It has not held for so long; `Duration::MAX` if that is not measured.
+    /// The condition has not held for so long; `Duration::MAX` if that is not measured.
     OverFor(Duration),
 }
 
@@ -81,24 +81,25 @@ impl From<bool> for Condition {
     }
 }
 
-/// When a cause that applied applies no longer.
+/// The clearing condition of a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clears {
-    /// When its condition is over.
+    /// The cause clears when its condition is over.
     WithCondition,
-    /// When its condition has been over for so long.
+    /// The cause clears when its condition has been over for so long.
     After(Duration),
-    /// When an operator resumes after a stop, or when its condition has been over for so long, if a time is given.
+    /// The cause clears when an operator resumes the robot after a stop; if a time is given, also when its condition has been over for
+    /// so long.
     OnResume {
-        /// How long it must have been over.
+        /// The time for which the condition must have been over.
         or_after: Option<Duration>,
     },
-    /// With the next mission, in a new process.
+    /// The cause clears with the next mission, in a new process.
     OnNewMission,
 }
 
 impl Clears {
-    /// Whether a cause applies now that did or did not apply before.
+    /// Whether a cause applies now; `before` says whether it applied until now.
     pub fn applies(self, before: bool, condition: Condition) -> bool {
         let Condition::OverFor(over) = condition else {
             return true;
@@ -127,27 +128,27 @@ impl fmt::Display for Clears {
     }
 }
 
-/// Watches for the conditions of one cause or several.
+/// Observes the link and says whether the conditions of its causes hold.
 pub trait Monitor {
-    /// A monitor of the robot of `mission`, of which nothing is known.
+    /// A monitor of the robot of `mission` that has observed nothing yet.
     fn new(mission: &Mission) -> Self
     where
         Self: Sized;
 
-    /// Take note of what happened.
+    /// Note an observation.
     fn observe(&mut self, what: &Observation<'_>, now: Moment);
 
-    /// Whether the condition of `cause`, one of its own, holds.
+    /// Whether the condition of `cause` holds, which must be one of its causes.
     fn condition(&self, cause: Cause, now: Moment) -> Condition;
 
-    /// An explanation with what was seen, and a remedy.
+    /// An explanation with the observed values, and a remedy.
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         let _ = (cause, now);
         None
     }
 
-    /// Whether it judges the robot's frames by their time. It is then not asked while the robot does not answer, nor in
-    /// lockstep.
+    /// Whether the monitor judges the robot's frames by their time. Such a monitor is not asked in lockstep, nor while the robot does
+    /// not answer.
     fn judges_frames(&self) -> bool {
         true
     }

@@ -1,18 +1,21 @@
-//! Whether the wheels turn as they were told, by their own encoders.
+//! The odometry monitor: whether the wheels turn as commanded, by their own encoders.
 //!
-//! Each wheel is compared, and the difference of both, since a robot whose wheels are swapped turns the wrong way. An
-//! interval between two frames is evidence about a wheel once the wheel has been told the same direction for [`SETTLE`],
-//! at [`LEAST_M_S`] or more: 0.07 s of delay and 0.08 s of lag have passed then, and a dead band of 20 counts/s (9 mm/s)
-//! is well below. In it the wheel must roll at least [`LEAST_SHARE`] of what the two newest commands asked for; real
-//! wheels roll 0.75 to 0.8. Evidence against a wheel adds up, evidence for it counts down twice as fast, up to a limit. A
-//! wheel that turns the other way counts twice, and from [`TURNS_AFTER`] on, because a controller whose robot turns away
-//! from where it should changes direction every other tick. At [`SUSPECTED_AFTER`] the robot must stand: at 7 Hz that is
-//! 0.86 s after a motion began, and it is at rest 0.2 s later. A wheel that is told to turn and does not count at all is
-//! suspected after [`STILL_AFTER`], because a controller whose pose turns the wrong way changes direction too often for
-//! the other evidence. Intervals longer than two periods are no evidence, since commands may have been lost as well.
+//! Each wheel is checked, and the difference of both wheels, because a robot whose wheels are swapped turns the wrong way:
+//! - An interval between two frames is evidence about a wheel if the wheel has been commanded in the same direction for [`SETTLE`], at
+//!   [`LEAST_M_S`] or more. A wheel follows a command after 0.07 s of delay and 0.08 s of lag, and its dead band of 20 counts/s
+//!   (9 mm/s) is well below this speed.
+//! - In the interval the wheel must roll at least [`LEAST_SHARE`] of the smaller speed of the two newest commands. Real wheels roll
+//!   0.75 to 0.8 of it.
+//! - Evidence against a wheel adds up. Evidence for it counts down at most twice as fast.
+//! - A wheel that turns the other way counts twice, and already after [`TURNS_AFTER`]: a controller whose robot turns away from the
+//!   target changes direction every other tick.
+//! - At [`SUSPECTED_AFTER`] the robot must stand. At 7 Hz that is 0.86 s after a motion began, and the robot is at rest 0.2 s later.
+//! - A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
+//!   direction too often for the other evidence.
+//! - Intervals longer than two periods are no evidence, because commands may have been lost too.
 //!
-//! Counts that jump farther than wheels turn are dropped one by one ([`super::restart`]); [`MOST_JUMPS`] of them within
-//! [`JUMPS_WITHIN`] are suspected, too.
+//! Single implausible counts, which lie farther off than wheels turn, are dropped ([`super::restart`]). [`MOST_JUMPS`] of them
+//! within [`JUMPS_WITHIN`] lead to a suspicion too.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -25,30 +28,31 @@ use common::{
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// The counts are evidence once a command has held for so long.
+/// The counts are evidence once a command's direction has held for so long.
 const SETTLE: Duration = Duration::from_millis(250);
-/// A real wheel has changed direction after so long, though not reached its speed: 0.6 of it at 7 Hz.
+/// A real wheel has changed its direction after so long, and at 7 Hz has reached 0.6 of its speed.
 const TURNS_AFTER: Duration = Duration::from_millis(100);
 /// The slowest commanded motion that is judged, m/s at the rim.
 const LEAST_M_S: f64 = 0.03;
-/// The least commanded difference of the wheels that is judged, m/s, and as a share of their mean speed: motors of two
-/// wheels differ by some hundredths.
+/// The least commanded difference of the wheels that is judged, m/s.
 const LEAST_TURN_M_S: f64 = 0.1;
+/// The least commanded difference of the wheels that is judged, as a share of their mean speed. The motors of two wheels differ by
+/// some hundredths.
 const LEAST_TURN_SHARE: f64 = 0.25;
-/// A wheel turns at least this share of what it was told.
+/// A plausible wheel turns at least this share of its commanded speed.
 const LEAST_SHARE: f64 = 0.25;
-/// So much evidence is enough: a radio loses commands for a shorter time while its frames are heard.
+/// The amount of evidence that leads to a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// A wheel that is told to turn may count nothing for so long: commands may be lost.
+/// A commanded wheel may count nothing for so long, because commands may be lost.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// So many jumps are too many.
+/// So many jumps lead to a suspicion.
 pub(crate) const MOST_JUMPS: usize = 3;
 /// Jumps are counted within this time.
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
-/// Jumps are over after so long without any.
+/// A suspicion about jumps ends after so long without a jump.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
-/// Jumps may be over by themselves so often: the counts of a robot may jump only while it moves.
-const MOST_MENDED: u32 = 2;
+/// A suspicion about jumps may end by itself so often. The counts of a faulty robot may jump only while it moves.
+const MOST_RECOVERIES: u32 = 2;
 /// A mission whose robot has been suspected for so long ends.
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
@@ -66,17 +70,17 @@ pub enum Suspicion {
 }
 
 impl Suspicion {
-    /// For logs.
+    /// Its text for logs.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
-                "the left wheel was told to turn and its counts do not go along: look at its encoder, its motor, and robot.left"
+                "the left wheel was told to turn and its counts do not follow: check its encoder, its motor, and robot.left"
             }
             Self::Right => {
-                "the right wheel was told to turn and its counts do not go along: look at its encoder, its motor, and robot.right"
+                "the right wheel was told to turn and its counts do not follow: check its encoder, its motor, and robot.right"
             }
             Self::Turn => {
-                "the robot was told to turn and its counts do not: are robot.left and robot.right swapped?"
+                "the robot was told to turn and its counts do not follow: are robot.left and robot.right swapped?"
             }
             Self::Jumps => "the counts jump farther than wheels turn",
         }
@@ -86,12 +90,12 @@ impl Suspicion {
 /// The evidence against one wheel, or against the difference of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
-    /// Speeds that the two newest commands ask for, counts/s.
+    /// The speeds of the two newest commands, counts/s.
     asked: [f64; 2],
-    /// When the direction that is asked for last changed.
+    /// The time when the commanded direction last changed.
     since: MissionTime,
     against_s: f64,
-    /// How long it has counted nothing although it was told to turn.
+    /// The time for which the wheel has counted nothing although it was commanded to turn.
     still_s: f64,
 }
 
@@ -104,7 +108,7 @@ impl Evidence {
         self.asked = [before, counts_s];
     }
 
-    /// The wheel rolled `counts` in `gap_s` until `now`; commands below `least` counts/s are no evidence.
+    /// Add the evidence that the wheel rolled `counts` in the `gap_s` seconds until `now`. Commands below `least` counts/s give none.
     fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, now: MissionTime) {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());
@@ -140,7 +144,7 @@ pub struct Odometry {
     right: Evidence,
     turn: Evidence,
     jumps: VecDeque<MissionTime>,
-    mended: u32,
+    recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
     ordered_to_drive: bool,
 }
@@ -149,7 +153,7 @@ impl Odometry {
     fn commanded(&mut self, [left, right]: [i16; 2], now: MissionTime) {
         let lapsed = |then| now.since(then) > self.limit;
         if self.commanded.is_none_or(lapsed) {
-            self.begin_anew(now);
+            self.restart_evidence(now);
         }
         self.commanded = Some(now);
         let (left, right) = (f64::from(left), f64::from(right));
@@ -168,12 +172,12 @@ impl Odometry {
         let newest_jump = self.jumps.back().copied();
         let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
         if calm
-            && self.mended < MOST_MENDED
+            && self.recoveries < MOST_RECOVERIES
             && matches!(self.suspicion, Some((Suspicion::Jumps, _)))
         {
-            self.mended += 1;
+            self.recoveries += 1;
             self.suspicion = None;
-            self.begin_anew(now);
+            self.restart_evidence(now);
         }
         let Some((before, then)) = self.frame.replace((counts, now)) else {
             return;
@@ -181,8 +185,8 @@ impl Odometry {
         let gap = now.since(then);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
-            // The commands since then may have been lost, or no longer hold.
-            self.begin_anew(now);
+            // Commands since the frame before may have been lost, or have expired.
+            self.restart_evidence(now);
             return;
         }
         let [left, right] =
@@ -218,7 +222,7 @@ impl Odometry {
         }
     }
 
-    /// Forget everything.
+    /// Delete all evidence.
     fn reset(&mut self) {
         self.commanded = None;
         self.frame = None;
@@ -226,11 +230,11 @@ impl Odometry {
         self.right = Evidence::default();
         self.turn = Evidence::default();
         self.jumps.clear();
-        self.mended = 0;
+        self.recoveries = 0;
         self.suspicion = None;
     }
 
-    fn begin_anew(&mut self, now: MissionTime) {
+    fn restart_evidence(&mut self, now: MissionTime) {
         for evidence in [&mut self.left, &mut self.right, &mut self.turn] {
             evidence.since = now;
             evidence.still_s = 0.0;
@@ -252,7 +256,7 @@ impl Monitor for Odometry {
             right: Evidence::default(),
             turn: Evidence::default(),
             jumps: VecDeque::new(),
-            mended: 0,
+            recoveries: 0,
             suspicion: None,
             ordered_to_drive: false,
         }
@@ -276,7 +280,7 @@ impl Monitor for Odometry {
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
         match (cause, self.suspicion, self.jumps.back()) {
-            // Nobody waits for a robot that is not to drive.
+            // A mission does not end while its robot is ordered not to drive.
             (Cause::OdometryGivenUp, Some((_, since)), _) => {
                 (self.ordered_to_drive && now.time.since(since) >= GIVEN_UP_AFTER).into()
             }

@@ -1,4 +1,4 @@
-//! Whether the supervisor wants the robot to drive.
+//! The monitor of the supervisor's directives: whether the robot is ordered to drive.
 
 use std::time::Duration;
 
@@ -9,8 +9,8 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A supervisor that has published nothing for so long is taken for dead: ten times the interval of its directives,
-/// so that a loaded machine does not stop the robot, and a second before systemd's watchdog would kill it.
+/// A supervisor that has published nothing for so long counts as ended. This is ten times the interval of its directives, so that a
+/// loaded machine does not stop the robot, and a second before systemd's watchdog would kill the supervisor.
 pub(crate) const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
 
 /// The supervisor's newest directive.
@@ -28,12 +28,12 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Whether the supervisor orders to drive.
+    /// Whether the robot is ordered to drive.
     pub fn drive(&self) -> bool {
         self.is(Order::Drive)
     }
 
-    /// Whether the reason of the newest directive is an operator's stop.
+    /// Whether the newest directive holds the robot because of an operator's stop.
     pub fn by_operator(&self) -> bool {
         self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
     }

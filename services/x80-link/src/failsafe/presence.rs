@@ -1,4 +1,4 @@
-//! Whether the robot answers, and when it is pinged while it does not.
+//! The presence monitor: whether the robot answers, and when to ping a robot that does not.
 
 use std::time::Duration;
 
@@ -7,29 +7,28 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::Backoff;
 
-/// A robot that has sent nothing for so many command limits is lost: that is longer than a radio's short fade, and the
-/// robot stands by then anyway.
+/// A robot that has sent nothing for so many command limits is lost. That is longer than a short fade of the radio, and the robot's
+/// last command has expired by then.
 pub(crate) const SILENT_LIMITS: u32 = 3;
-/// Processes are late by so much now and then, however fast mission time runs.
+/// The least silence that counts, machine time: a process may be delayed by so much at any pace of mission time.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
 /// The pause between the first two pings of a robot that does not answer.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
-/// The longest pause between pings: a robot that sends something is heard at once, and one that waits for a ping can
-/// wait so long.
+/// The longest pause between pings. A robot that waits for a ping is found only after it; one that sends by itself is found at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
-/// How long the robot has not answered, and the pings since, by the machine's clock.
+/// The absence of a robot that does not answer; times are of the machine's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Absence {
-    /// Nanoseconds since it was lost, or first looked for; 0 while it answers.
+    /// Nanoseconds since the robot was lost, or since the first attempt to find it; 0 while it answers.
     pub lost_ns: u64,
-    /// Pings since.
+    /// Pings since the robot was lost.
     pub pings: u64,
     /// Nanoseconds until the next ping.
     pub next_ping_ns: u64,
 }
 
-/// How long the robot may send nothing.
+/// The longest time for which a present robot sends nothing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Silence {
     mission: Duration,
@@ -49,7 +48,7 @@ impl Silence {
         };
     }
 
-    /// Whether it is over `now_ns` by the machine's clock when the last came at `heard_ns`.
+    /// Whether this time has passed at `now_ns` of the machine's clock if the last frame came at `heard_ns`.
     pub(crate) fn is_over(&self, heard_ns: u64, now_ns: u64) -> bool {
         now_ns.saturating_sub(heard_ns) >= self.machine.as_nanos() as u64
     }
@@ -68,17 +67,17 @@ pub struct Presence {
 }
 
 impl Presence {
-    /// Whether it answers.
+    /// Whether the robot answers.
     pub const fn connected(&self) -> bool {
         self.connected
     }
 
-    /// Times it was lost.
+    /// The number of times that the robot was lost.
     pub const fn losses(&self) -> u64 {
         self.losses
     }
 
-    /// A frame of it came. Returns whether it was away until now.
+    /// Note that a frame came. Returns whether the robot did not answer until now.
     pub fn heard(&mut self, now_ns: u64) -> bool {
         self.heard_ns = Some(now_ns);
         self.lost_since_ns = None;
@@ -86,12 +85,12 @@ impl Presence {
         !std::mem::replace(&mut self.connected, true)
     }
 
-    /// Whether it has sent nothing for longer than a robot that is there does.
+    /// Whether the robot has sent nothing for longer than a present robot does.
     pub fn is_silent(&self, now_ns: u64) -> bool {
         self.heard_ns.is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
     }
 
-    /// Take it for lost. Returns whether that is new.
+    /// Note that the robot is lost. Returns whether that is new.
     pub fn lose(&mut self, now_ns: u64) -> bool {
         let new = std::mem::replace(&mut self.connected, false);
         if new {
@@ -101,13 +100,13 @@ impl Presence {
         new
     }
 
-    /// The wire is open now, or is not. The robot is then pinged at once.
+    /// Note whether the wire is open. After a change the robot is pinged at once.
     pub const fn wire(&mut self, open: bool) {
         self.wire_open = open;
         self.pings.reset();
     }
 
-    /// Whether to ping a robot that does not answer, now.
+    /// Whether a ping to a robot that does not answer is due.
     pub fn wants_ping(&mut self, now_ns: u64) -> bool {
         if self.connected {
             return false;
@@ -116,14 +115,14 @@ impl Presence {
         self.wire_open && self.pings.is_due(now_ns)
     }
 
-    /// It was pinged.
+    /// Note that the robot was pinged.
     pub fn pinged(&mut self, now_ns: u64) {
         if !self.connected {
             self.pings.attempted(now_ns);
         }
     }
 
-    /// How long it has been away.
+    /// The robot's absence.
     pub fn absence(&self, now_ns: u64) -> Absence {
         if self.connected {
             return Absence::default();
@@ -137,7 +136,7 @@ impl Presence {
 }
 
 impl Monitor for Presence {
-    /// It takes the wire for open.
+    /// The wire counts as open until [`Presence::wire`] says otherwise.
     fn new(mission: &Mission) -> Self {
         Self {
             silence: Silence::new(mission),

@@ -1,8 +1,8 @@
-//! Whether the counts of a frame can follow those before.
+//! The classification of a frame's counts: whether they can follow the counts before.
 //!
-//! A robot that was switched off and on, or got another battery, restarts its counts, and the step in the counts is no
-//! motion. Other counts that lie farther off than wheels turn are implausible, and later ones are compared with the last
-//! plausible ones: one old frame between good ones costs nothing.
+//! A robot that was switched off and on, or got another battery, restarts its counts, and the step in the counts is no motion. Other
+//! counts that lie farther off than wheels turn are implausible. The next counts are then compared with the last plausible ones, so
+//! a single outdated frame has no effect.
 
 use common::{
     clock::MissionTime,
@@ -12,27 +12,27 @@ use common::{
 
 use super::monitor::Counts;
 
-/// Counts are implausible from so many times the distance that wheels reach at their top speed.
+/// Counts are implausible from so many times the distance that wheels roll at their top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// Implausible counts that follow each other in so many frames are taken for the robot's own.
+/// Implausible counts are accepted after so many frames in which each can follow the one before.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
-/// The last plausible counts, and whether the robot was lost since.
+/// The last plausible counts, and the implausible ones since.
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
-    /// The newest implausible counts, and how many of them follow each other.
+    /// The newest implausible counts, their time, and the number of frames in which each can follow the one before.
     suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
     restarts: u32,
-    /// Counts of a wheel in a second at its top speed.
+    /// The counts of a wheel in a second at its top speed.
     top_counts: f64,
-    /// Frames come this much too late or too early, seconds.
+    /// The jitter of the frames, seconds.
     jitter_s: f64,
 }
 
 impl RestartWatch {
-    /// For the robot of `mission`.
+    /// A watch of the robot of `mission`.
     pub fn new(mission: &Mission) -> Self {
         let body = mission.body();
         Self {
@@ -45,14 +45,13 @@ impl RestartWatch {
         }
     }
 
-    /// The robot does not answer.
+    /// Note that the robot does not answer.
     pub const fn lost(&mut self) {
         self.away = true;
     }
 
-    /// Classify the counts of channels 0 and 1 of a robot that `was_away` until this frame, or was not. After an absence
-    /// it is enough for a restart that both stand where a robot begins; otherwise they must also have come there faster
-    /// than wheels turn.
+    /// Classify the counts of channels 0 and 1; `was_away` says whether the robot did not answer until this frame. After an absence,
+    /// counts near the value at which robots start mean a restart. Otherwise they must also be farther off than wheels turn.
     pub fn step(&mut self, counts: [u16; 2], was_away: bool, now: MissionTime) -> Counts {
         let away = std::mem::take(&mut self.away);
         let Some((before, then)) = self.last else {
@@ -85,7 +84,7 @@ impl RestartWatch {
         self.restarts += 1;
     }
 
-    /// How far the counts went, over what wheels reach in that time.
+    /// The ratio of the difference of the counts to the most that wheels can turn in that time.
     fn share_of_reach(
         &self,
         before: [u16; 2],
@@ -99,7 +98,7 @@ impl RestartWatch {
         f64::from(farthest.unwrap_or_default()) / reach
     }
 
-    /// Times the counts restarted or went on elsewhere.
+    /// The number of times that the counts restarted or continued elsewhere.
     pub const fn restarts(&self) -> u32 {
         self.restarts
     }
@@ -136,7 +135,7 @@ mod tests {
         watch.lost();
         assert_eq!(watch.step([32_000, 768], false, at(3.0)), Counts::Follow);
         watch.lost();
-        // It stood at its start all the time.
+        // The robot stood at its start all the time.
         watch.step([3, 32_765], false, at(6.0));
         watch.lost();
         assert_eq!(watch.step([0, 0], false, at(9.0)), Counts::Follow);

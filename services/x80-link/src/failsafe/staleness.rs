@@ -1,4 +1,4 @@
-//! Whether the newest command, and what it was computed from, is too old.
+//! The staleness monitor: whether the newest command is too old, or the pose or the guidance from which it was computed.
 
 use std::time::Duration;
 
@@ -13,9 +13,9 @@ use super::monitor::{Condition, Moment, Monitor, Observation};
 /// Mission times of the newest command.
 #[derive(Clone, Copy, Debug)]
 struct Times {
-    /// When the tick began that it answers.
+    /// The time of the tick that the command answers.
     command: MissionTime,
-    /// The oldest pose that it was computed from.
+    /// The time of the oldest pose from which the command was computed.
     pose: MissionTime,
     guidance: MissionTime,
 }
@@ -55,14 +55,14 @@ impl Monitor for Staleness {
         let Some(newest) = self.newest else {
             return (cause == Cause::CommandStale).into();
         };
-        // In lockstep no time passes until the command has come.
+        // In lockstep mission time waits for the command.
         let now = if self.lockstep { newest.command } else { now.time };
         let then = match cause {
             Cause::PoseStale => newest.pose,
             Cause::GuidanceStale => newest.guidance,
             _ => newest.command,
         };
-        // A stamp from the future would never grow old.
+        // A stamp from the future counts as too old, because it would not expire.
         (then > now || now.since(then) > self.limit).into()
     }
 

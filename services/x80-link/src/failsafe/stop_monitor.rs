@@ -1,4 +1,4 @@
-//! Whether the robot comes to rest when it is told to, by its encoders, and what else it is told when it does not.
+//! The stop monitor: whether the robot comes to rest when it is stopped, by its encoders, and the next method if it does not.
 
 use std::time::Duration;
 
@@ -6,32 +6,32 @@ use common::{clock::MissionTime, mission::Mission, samples::Cause, wire::counts_
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// A robot that was told to stand is at rest after this: the delay and the lag of its speed loop, and a stop or two that
-/// were lost.
+/// A stopped robot is at rest after so long. That includes the delay and the lag of its speed loop, and the loss of a stop or two.
 const COMES_TO_REST: Duration = Duration::from_millis(600);
-/// A robot that moves for so long after that does not stop: longer than a stop that is sent again takes to show.
+/// A robot that still moves for so long after [`COMES_TO_REST`] does not stop. A repeated stop has an effect sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
-/// A wheel moves from this speed on, m/s at the rim.
+/// A wheel counts as moving from this speed on, m/s at the rim.
 const MOVES_M_S: f64 = 0.03;
-/// A wheel is at rest below this speed, m/s, or below so many counts between two frames: encoders tremble.
+/// A wheel is at rest below this speed, m/s, or below so many counts between two frames, because the counts of a resting encoder
+/// vary.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
-/// The robot is at rest when its wheels have been for so long.
+/// The robot is at rest when its wheels have been at rest for so long.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// A robot that does not stop is told so by the next method after so long.
+/// The next method is used after so long on a robot that does not stop.
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
-/// A way to make the robot stand. Each is tried in turn.
+/// A way to stop the robot. The methods are tried in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StopMethod {
-    /// Velocity 0.
+    /// The velocity of both wheels is set to 0.
     #[default]
     Velocity,
-    /// Both wheels' motors disabled.
+    /// The motors of both wheels are disabled.
     Disable,
-    /// The pulse width at which a wheel stands.
+    /// Both wheels get the pulse width at which they do not turn.
     Pwm,
-    /// All motors suspended.
+    /// All motors are suspended.
     Suspend,
 }
 
@@ -45,7 +45,7 @@ impl StopMethod {
         }
     }
 
-    /// For logs.
+    /// Its name in logs.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Velocity => "velocity 0",
@@ -56,7 +56,7 @@ impl StopMethod {
     }
 }
 
-/// How one robot obeys when it is told to stand.
+/// The stop monitor of one robot.
 #[derive(Clone, Debug)]
 pub struct StopMonitor {
     counts_per_m: f64,
@@ -73,7 +73,7 @@ impl StopMonitor {
     fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         if counts == [0, 0] {
             if self.told_to_stand.is_none() {
-                // A wheel that rests because the last command does not show yet is not at rest.
+                // A wheel that does not turn yet after the last command must not count as at rest.
                 self.resting = Duration::ZERO;
                 self.told_to_stand = Some(now);
             }
@@ -114,17 +114,17 @@ impl StopMonitor {
         self.resting = Duration::ZERO;
     }
 
-    /// Whether its encoders say that no wheel turns.
+    /// Whether the encoders say that no wheel turns.
     pub fn is_at_rest(&self) -> bool {
         self.resting >= AT_REST_AFTER
     }
 
-    /// How it is told to stand.
+    /// The method by which the robot is stopped now.
     pub const fn method(&self) -> StopMethod {
         self.method
     }
 
-    /// Take the next method when it is time for it; `does_not_stop` says whether the cause applies.
+    /// Change to the next method if it is due, and return it; `does_not_stop` says whether the cause applies.
     pub fn next_method(&mut self, does_not_stop: bool, now: MissionTime) -> Option<StopMethod> {
         if !does_not_stop {
             self.tried = None;

@@ -1,5 +1,5 @@
-//! Whether the robot's streams come, and often enough. Silence is timed by the machine's clock, as in [`super::presence`],
-//! and intervals by mission time.
+//! The monitor of the robot's streams: whether their frames come, and often enough. Silence is measured by the machine's clock, like
+//! that of [`super::presence`], and intervals by mission time.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -11,8 +11,8 @@ use super::{
 };
 use crate::backoff::Backoff;
 
-/// The robot is slow when of so many intervals all but the two shortest are too long. Those of a radio that is out half
-/// of the time are not.
+/// The robot is slow if all but the two shortest of so many intervals are too long. With a radio that is out half of the time, more
+/// than two intervals are short enough.
 const INTERVALS: usize = 9;
 const SHORT_ONES: usize = 2;
 /// The pause between the first two requests for streams that do not come.
@@ -20,15 +20,15 @@ const FIRST_PAUSE: Duration = Duration::from_secs(1);
 /// The longest pause between requests.
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 
-/// How the motor frames come.
+/// The rate of the motor frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Motor {
-    /// Often enough.
+    /// They come often enough.
     #[default]
     Regular,
-    /// None comes although the robot answers.
+    /// No motor frame comes although the robot answers.
     Silent,
-    /// So many a second, which is too few: a command ends before the next frame.
+    /// Only so many come a second that a command expires before the next frame.
     Slow(f64),
 }
 
@@ -58,7 +58,7 @@ impl Streams {
         }
     }
 
-    /// How the motor frames of a robot that answers come.
+    /// The rate of the motor frames of a robot that answers.
     pub fn motor_frames(&self, now_ns: u64) -> Motor {
         let since = self.motor_ns.max(self.found_ns);
         if self.silence.is_over(since, now_ns) {
@@ -75,14 +75,14 @@ impl Streams {
     }
 
     fn range_is_silent(&self, now_ns: u64) -> bool {
-        // A robot that was found a moment ago must send a reading first: older ones say nothing of what stands ahead.
+        // A robot that was just found must send a new reading first. Older readings do not show the obstacles that are ahead now.
         self.sensing && self.silence.is_over(self.range_ns, now_ns)
     }
 
-    /// Whether to ask for the streams again, now. The pauses between requests grow.
+    /// Whether the next request for the streams is due. The pauses between requests grow.
     pub fn wants_request(&mut self, now_ns: u64) -> bool {
         if self.motor_frames(now_ns) == Motor::Regular && !self.range_is_silent(now_ns) {
-            // A robot that streams only while it is asked is asked no faster.
+            // A robot that sends frames only when it is asked is not asked more often.
             return false;
         }
         let due = self.requests.is_due(now_ns);
@@ -115,7 +115,7 @@ impl Monitor for Streams {
             Observation::Motor(..) => self.motor(now.time, now.machine_ns),
             Observation::Standard(standard) => {
                 let byte = standard.ultrasonic.get(usize::from(self.sonar_index));
-                // 0 is no reading; 255 is one: nothing is in range.
+                // 0 means no reading. 255 is a reading and means that nothing is in range.
                 if byte.is_some_and(|&byte| byte != 0) {
                     self.range_ns = now.machine_ns;
                 }

@@ -18,7 +18,7 @@ fn mission() -> Mission {
     Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap()
 }
 
-/// So long before the moment that is looked at.
+/// The moment `ns` nanoseconds before the tested one.
 fn ago(ns: u64) -> Moment {
     let machine_ns = 100_000 * MS - ns;
     Moment { time: MissionTime(machine_ns), machine_ns }
@@ -38,7 +38,7 @@ fn command(tick_ago: u64, pose_ago: u64, guidance_ago: u64) -> CommandSample {
     }
 }
 
-/// A standard frame with this byte of the front sonar, of a robot whose batteries give so many volts.
+/// A standard frame with this byte of the front sonar and these volts of all batteries.
 fn standard(sonar: u8, volts: f64) -> StandardSensors {
     let mut standard = StandardSensors {
         board_battery: (volts / 9.0 * 4095.0).round() as u16,
@@ -48,7 +48,7 @@ fn standard(sonar: u8, volts: f64) -> StandardSensors {
     standard
 }
 
-/// Nothing is wrong, and all is as old as it may be.
+/// A failsafe in which no cause applies, with all inputs as old as they may be.
 fn well() -> Failsafe {
     let mut failsafe = Failsafe::new(&mission());
     failsafe.monitors.presence.heard(now().machine_ns);
@@ -80,7 +80,7 @@ fn jumps(failsafe: &mut Failsafe, when: Moment) {
     }
 }
 
-/// Frames with these counts of both wheels, one every 100 ms.
+/// Take frames with these counts of both wheels, one every 100 ms.
 fn frames(failsafe: &mut Failsafe, counts: impl IntoIterator<Item = u16>, first_ago_ms: u64) {
     for (frame, counts) in (0..).zip(counts) {
         let when = ago((first_ago_ms - 100 * frame) * MS);
@@ -94,7 +94,7 @@ fn does_not_stop(failsafe: &mut Failsafe) {
     frames(failsafe, (1..=30).map(|frame| 50 * frame), 4000);
 }
 
-/// What alone leads to each cause, and its action.
+/// For each cause, a change that alone leads to it, and its action.
 const CASES: &[(Break, Action, Cause)] = &[
     (|it| directive(it, Order::Stop, HoldReason::Ending), Action::End, Cause::MissionOver),
     (
@@ -190,7 +190,7 @@ fn fresh(newest: Option<CommandSample>) -> staleness::Staleness {
     staleness
 }
 
-/// A robot with which only this is wrong.
+/// A failsafe in which only the change `by` was made.
 fn broken(by: Break) -> Failsafe {
     let mut failsafe = well();
     by(&mut failsafe);

@@ -12,13 +12,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::failsafe::{Decision, battery::BatteryChange, stop_monitor::StopMethod};
 
-/// The pace of mission time, given by the run, and the first tick, given by the supervisor, which follows the ticks; so
-/// the link writes no checkpoint.
+/// The state from which a generation starts: the pace of mission time and the number of its first tick. The supervisor gives the
+/// number, because it follows the ticks, so the link writes no checkpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// [`Pace::Max`] is lockstep: the robot waits for each command. Any other is a wall clock, times a rate.
+    /// The pace of mission time. [`Pace::Max`] is lockstep, in which the robot waits for each command. At any other pace mission time is
+    /// wall-clock time multiplied by a rate.
     pub pace: Pace,
-    /// The number of the tick to come.
+    /// The number of the next tick.
     pub next_tick: u64,
 }
 
@@ -40,17 +41,17 @@ pub struct Input<'a> {
 /// An event that the link takes.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
-    /// Bytes of the robot.
+    /// Bytes from the robot.
     Datagram(&'a [u8]),
-    /// Whether the wire is open now. It is taken for open at first; a wire of datagrams always is.
+    /// Whether the wire is open now. It counts as open until the first such event. A wire of datagrams is always open.
     Wire(bool),
-    /// A command of the controller.
+    /// A command from the controller.
     Command(&'a CommandSample),
     /// The supervisor's directive: an order, and the reason for not driving.
     Order(Order, HoldReason),
     /// The supervisor's limit in lockstep: the last tick that may begin.
     TickLimit(u64),
-    /// Nothing; time passed.
+    /// Time passed without input.
     Quiet,
 }
 
@@ -70,30 +71,30 @@ pub enum Effect {
         /// The encoders.
         wheels: WheelSample,
     },
-    /// The command of a tick is on its way.
+    /// The command of a tick was sent.
     Answered {
         /// Reading of the monotonic clock at which the tick began, nanoseconds.
         began_ns: u64,
     },
-    /// A tick begins beyond the supervisor's limit, which was waited for too long.
+    /// A tick begins beyond the supervisor's limit, because the limit did not rise in time.
     Unlimited {
-        /// Its number.
+        /// The number of the tick.
         tick: u64,
     },
-    /// The failsafe decides otherwise than before. The stops that follow are effects of their own.
+    /// The failsafe's decision changed. The stops that follow are separate effects.
     Decided {
         /// The decision before.
         before: Decision,
         /// The decision now.
         now: Decision,
     },
-    /// The robot answers again, or no longer.
+    /// The robot answers now, or no longer.
     Connected(bool),
     /// The robot restarted its encoder counts.
     Restarted,
-    /// The counts jumped farther than wheels turn, and go on from there.
+    /// The counts jumped farther than wheels turn, and continue from there.
     CountsElsewhere,
-    /// The robot does not stop, and was told to by this method.
+    /// The robot does not stop, and was stopped by this next method.
     StopBy(StopMethod),
     /// The robot was asked for its streams again.
     AskedForStreams,
@@ -103,17 +104,17 @@ pub enum Effect {
     Power(PowerSample),
     /// Publish the other sensors.
     Surroundings(SurroundingsSample),
-    /// A battery became low or empty, or is no longer.
+    /// The charge of a battery changed.
     Battery(BatteryChange),
 }
 
-/// Counts for the `link` topic.
+/// The counts of the `link` topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Velocity commands sent.
+    /// The velocity commands that were sent.
     pub commands: u64,
-    /// Velocity commands sent again.
+    /// The velocity commands that were sent again.
     pub repeated_commands: u64,
-    /// Ticks repeated.
+    /// The ticks that were repeated.
     pub repeated_ticks: u64,
 }

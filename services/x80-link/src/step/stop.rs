@@ -1,4 +1,4 @@
-//! Whether the robot may move, and how it is made to stand.
+//! The part of the step that stops the robot when it must not move.
 
 use std::time::Duration;
 
@@ -12,8 +12,8 @@ impl Link {
         self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
     }
 
-    /// Stop the robot when it must not move. In lockstep it waits for commands, and passing none stops its time, too: a run
-    /// that was held goes on as if it had not been.
+    /// Stop the robot when it must not move. In lockstep the link only passes no command, which stops mission time too, so a run that was
+    /// held continues as if it had not been.
     pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.observe(Observation::Time, now_ns);
         let now = self.decide(now_ns);
@@ -29,7 +29,7 @@ impl Link {
         }
     }
 
-    /// Tell the wheels these counts/s.
+    /// Send the wheels these speeds, counts/s.
     pub(super) fn tell(
         &mut self,
         counts: [i16; 2],
@@ -38,7 +38,7 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         if self.monitors().stop.method() != StopMethod::Velocity && counts != [0, 0] {
-            // It was stopped by another method than velocity, and must be set up again.
+            // The robot was stopped by another method than velocity, and must be set up again.
             effects.push(Effect::Send(self.drive.greeting()));
         }
         self.observe(Observation::Commanded(counts), now_ns);
@@ -50,13 +50,13 @@ impl Link {
         if new {
             effects.extend(self.final_stops().into_iter().map(Effect::Send));
         } else if self.monitors().latency.is_testing() && self.stop_sent_ns.is_some() {
-            // The latency monitor waits for late acknowledgements: nothing may be sent.
+            // The latency monitor waits for late acknowledgements, so nothing may be sent.
             return;
         } else if let Some(method) = self.next_stop_method() {
             effects.push(Effect::Send(self.drive.stop_by(method)));
             effects.push(Effect::StopBy(method));
         } else if self.decision.cause == Cause::RobotDoesNotStop {
-            // The last method is given time.
+            // The method that was used last needs time to have an effect.
             return;
         } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
             effects.push(Effect::Send(self.drive.stop_by(self.monitors().stop.method())));

@@ -11,7 +11,7 @@ const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 142_857_142;
 
 fn mission() -> Mission {
-    // 1200 counts a turn; left on channel 0 reversed, right on channel 1: the X80's own.
+    // The X80 has 1200 counts a turn, its left wheel on channel 0, reversed, and its right wheel on channel 1.
     Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap()
 }
 
@@ -33,7 +33,7 @@ fn on_the_wall() -> Link {
     link
 }
 
-/// One event at a reading of the machine's clock, which on the wall began with the mission.
+/// Takes an event at a reading of the machine's clock, which on the wall clock began with the mission.
 trait At {
     fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect>;
 }
@@ -48,7 +48,7 @@ impl At for Link {
     }
 }
 
-/// A datagram of the robot: sonar byte and wheel positions as its channels count.
+/// A datagram of the robot with a sonar byte and the counts of two channels.
 fn datagram(sonar: u8, channel_0: u16, channel_1: u16) -> Vec<u8> {
     let mut standard = StandardSensors::default();
     standard.ultrasonic[1] = sonar;
@@ -73,7 +73,7 @@ fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
     }
 }
 
-/// Connected, ordered to drive.
+/// A link whose robot answers, and which is ordered to drive.
 fn driving(mut link: Link) -> Link {
     link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     link.at(Event::Order(Order::Drive, HoldReason::None), 0);
@@ -166,7 +166,7 @@ fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(link.absence(7960 * MS), Absence::default());
-    // Lost again, it is asked at once and often.
+    // When the robot is lost again, it is pinged at once and often.
     let effects = link.at(Event::Quiet, 8700 * MS);
     assert!(effects.contains(&Effect::Connected(false)) && sent(&effects).contains(&ping));
     assert!(sent(&link.at(Event::Quiet, 8900 * MS)).contains(&ping));
@@ -183,7 +183,7 @@ fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
     assert!(effects.contains(&Effect::Restarted));
     assert_eq!(ticks(&effects)[0].2.restarts, 1);
     assert_eq!(link.restarts(), 1);
-    // Even one that was not missed.
+    // The same holds for a robot whose absence was not noticed.
     link.at(Event::Datagram(&datagram(255, 31_168, 1600)), 3500 * MS);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3600 * MS);
     assert!(effects.contains(&Effect::Restarted));
@@ -205,7 +205,7 @@ fn a_robot_that_comes_back_with_its_counts_has_not_restarted() {
     assert_eq!(ticks(&effects)[0].2.restarts, 0);
 }
 
-/// Target of channel 1 and time limit of each velocity command.
+/// The target of channel 1 and the time limit of each velocity command.
 fn timed(effects: &[Effect]) -> Vec<(Option<i16>, Option<u16>)> {
     let motion = |command: Command| match command {
         Command::Motion(motion) => Some((motion.targets.of(1), motion.limit_ms)),
@@ -221,7 +221,7 @@ fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_it
     let turn = std::f64::consts::TAU;
     let effects = link.at(Event::Command(&command(0, 10 * MS, turn, turn)), 12 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(250))]);
-    // Half of 142.9 ms after the tick.
+    // The command is repeated half of 142.9 ms after the tick.
     assert_eq!(timed(&link.at(Event::Quiet, 81 * MS)), []);
     let effects = link.at(Event::Quiet, 90 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(170))]);
@@ -289,7 +289,7 @@ fn a_tick_has_the_infrared_counts_that_came_with_it_and_the_next_without_any_has
 
 #[test]
 fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
-    // The link before this one died; the robot ignores the time limit of its last command.
+    // The link before this one was killed, and the robot ignores the time limit of its last command.
     let mut link = on_the_wall();
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
@@ -361,7 +361,7 @@ fn no_number_moves_no_wheel() {
     let mut link = driving(on_the_wall());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     let effects = link.at(Event::Command(&command(0, 10 * MS, f64::NAN, 1e300)), 11 * MS);
-    // NaN stands; the rest is cut to the top speed of 1 m/s.
+    // NaN becomes 0, and other speeds are limited to the top speed of 1 m/s.
     assert_eq!(velocities(&effects), [[Some(0), Some(2247)]]);
 }
 

@@ -1,4 +1,4 @@
-//! The robot's frames, and the connection to it.
+//! The part of the step that takes the robot's frames and follows its presence.
 
 use common::wire::{
     COUNT_CYCLE, Command, CustomSensors, MotorSensors, Report, StandardSensors, SystemSignal,
@@ -13,7 +13,7 @@ use crate::{
 impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
-        // Half a frame of one connection does not go on in the next.
+        // The rest of a frame does not follow in the next connection.
         self.decoder.reset();
         if !open {
             self.lose(now_ns, effects);
@@ -32,7 +32,7 @@ impl Link {
                 Ok(Report::System(SystemSignal::Ack)) => {
                     self.observe(Observation::Acknowledged, now_ns);
                 }
-                // Any other frame only shows that the robot is there.
+                // Any other frame only shows that the robot answers.
                 Err(_) => {}
             }
             heard = true;
@@ -47,7 +47,7 @@ impl Link {
         if matches!(counts, Some(Counts::Restarted { .. })) {
             effects.push(Effect::Restarted);
             if self.connected() {
-                // It has the settings that it boots with.
+                // A restarted robot has its default settings.
                 effects.push(Effect::Send(self.drive.greeting()));
             }
         }
@@ -60,11 +60,11 @@ impl Link {
             self.observe(Observation::Found { again }, now_ns);
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.drive.greeting()));
-            // It may be driving still by a command of an earlier link.
+            // The robot may still drive by a command of an earlier link.
             self.stop_sent_ns = None;
             if self.in_ticks() {
-                // These frames answer the greeting, and their number depends on how long the robot took to start.
-                // Ticks begin with the frames that answer the order.
+                // These frames answer the greeting, and their number depends on the time that the robot took to start. Ticks begin with the
+                // frames that answer the order.
                 if motor.is_some() {
                     self.due = self.due.saturating_sub(1);
                 }
@@ -74,7 +74,7 @@ impl Link {
                 return;
             }
         }
-        // Implausible counts give no tick.
+        // Implausible counts start no tick.
         if let Some(sensors) = motor
             && counts != Some(Counts::Implausible)
         {
@@ -82,8 +82,8 @@ impl Link {
         }
     }
 
-    /// Classify the counts. In lockstep the robot is a simulated one that runs as long as its mission, and no time passes by
-    /// which to judge.
+    /// Classify the counts of a frame. In lockstep all counts are plausible: the robot is a simulated one that does not restart, and no
+    /// time passes by which to judge.
     pub(super) fn judge_counts(&mut self, sensors: &MotorSensors, now_ns: u64) -> Counts {
         if self.in_ticks() {
             return Counts::Follow;
@@ -97,7 +97,7 @@ impl Link {
         are
     }
 
-    /// Take from the frames what does not belong to the tick.
+    /// Take the sensors that do not belong to the tick.
     pub(super) fn take_telemetry(
         &mut self,
         motor: Option<&MotorSensors>,
@@ -132,7 +132,7 @@ impl Link {
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let silent = self.monitors().presence.is_silent(now_ns);
-        // A robot that waits for a command is not lost. If it owes a tick, a datagram is.
+        // A robot that waits for a command is not lost. If its next motor frame is missing, a datagram was lost.
         let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
@@ -149,7 +149,7 @@ impl Link {
         if self.failsafe.monitors.presence.wants_ping(now_ns) {
             self.ping(now_ns, effects);
         } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
-            // The frames that were due are lost.
+            // The frames that the robot still had to send are lost.
             self.due = 0;
             self.ping(now_ns, effects);
         }

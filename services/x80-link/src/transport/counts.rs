@@ -1,21 +1,21 @@
-//! Counts of a wire.
+//! The counts of a transport.
 
-/// Counts of a wire.
+/// The counts of a transport.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Datagrams from another address than the robot's, dropped.
+    /// Datagrams that were dropped because they came from another address than the robot's.
     pub foreign_datagrams: u64,
-    /// The port from which the robot's host sent the first of them; 0 for none.
+    /// The port of the first dropped datagram that came from the robot's host; 0 for none.
     pub other_port: u16,
-    /// Messages to the robot that the wire did not take, lost.
+    /// Messages to the robot that were lost because the wire did not accept them.
     pub unsent: u64,
 }
 
-/// Attempts to open a wire that is down.
+/// The attempts to open a closed wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Attempts {
     /// Attempts since the robot last sent something.
     pub made: u64,
-    /// Nanoseconds until the next one; 0 when one is under way.
+    /// Nanoseconds until the next attempt; 0 during an attempt.
     pub next_ns: u64,
 }

@@ -1,7 +1,7 @@
-//! A serial line: 115200 baud, 8 data bits, no parity, 1 stop bit, bytes as they are.
+//! A serial line with 115200 baud, 8 data bits, no parity and 1 stop bit; bytes are not translated.
 //!
-//! By rustix and not by the `serialport` crate: what that opens gives no `BorrowedFd`, and a waiter needs
-//! one; making it out of the raw number would be `unsafe`.
+//! It is opened by rustix instead of the `serialport` crate, whose ports give no `BorrowedFd`. The waiter needs one, and creating it
+//! from the raw number would be `unsafe`.
 
 use std::{
     fmt, io,
@@ -43,7 +43,7 @@ impl fmt::Display for Serial {
 }
 
 impl Dial for Serial {
-    /// An adapter that is pulled out is an error of the line, and a quiet line has nothing to open anew.
+    /// A silent line is not reopened. The system reports an adapter that was unplugged as an error.
     const SILENCE: Option<Duration> = None;
 
     fn dial(&self) -> io::Result<OwnedFd> {
@@ -52,8 +52,8 @@ impl Dial for Serial {
         if !isatty(&line) {
             return Err(Errno::NOTTY.into());
         }
-        // The lock reserves the line for this process. TIOCEXCL would do so, too, but it outlives a killed link for as long as
-        // anyone has the line open, and shuts its successor out; this lock ends with its holder.
+        // The lock reserves the line for this process and ends with it. TIOCEXCL would reserve the line too, but after this process was
+        // killed it would stay in force as long as any process has the line open, and refuse the successor.
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
@@ -63,14 +63,14 @@ impl Dial for Serial {
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS;
         settings.control_modes.remove(flow);
-        // CLOCAL: three wires are enough, nobody dials in.
+        // CLOCAL ignores modem control lines, so three wires are enough.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes.insert(eight);
-        // With no byte there, a read says so instead of saying that the line has ended.
+        // With VMIN = 1 a read without bytes fails with EAGAIN. With 0 it would return 0, which means the end of the line.
         settings.special_codes[SpecialCodeIndex::VMIN] = 1;
         settings.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(&line, OptionalActions::Now, &settings)?;
-        // Bytes for an earlier holder of the line are old.
+        // Bytes that came for an earlier holder of the line are outdated.
         tcflush(&line, QueueSelector::IOFlush)?;
         Ok(line)
     }
@@ -80,7 +80,7 @@ impl Dial for Serial {
     }
 
     fn abandon(&self, line: &OwnedFd) {
-        // A line that is gone has nothing to discard.
+        // An error means that the line no longer exists, so there is nothing to discard.
         let _ = tcflush(line, QueueSelector::IOFlush);
     }
 }

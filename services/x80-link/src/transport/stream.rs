@@ -1,10 +1,10 @@
-//! A wire without datagrams, that is a connection or a serial line; it is reopened whenever it closes.
+//! A stream is a connection or a serial line. It is reopened whenever it closes.
 //!
-//! Frames go out whole or not at all: the rest of a frame that the system took in part goes out before anything
-//! else is sent, for half a frame would garble the next one. Messages that come meanwhile are lost.
+//! Frames are sent completely or not at all, because a partial frame would corrupt the next one. If the system accepts only a part of
+//! a message, the rest is sent before anything else, and messages that come meanwhile are lost.
 //!
-//! Its descriptor changes with every opening, and a waiter needs one that stays: an epoll descriptor,
-//! readable when the present one is ready.
+//! The stream's descriptor changes whenever it is opened, but a waiter needs one that stays the same. That is an epoll descriptor,
+//! which is readable when the present descriptor is ready.
 
 use std::{
     fmt, io,
@@ -21,25 +21,25 @@ use rustix::{
 use super::counts::{Attempts, Tally};
 use crate::backoff::Backoff;
 
-/// The pause between the first two attempts: a robot that restarts its network is back as soon as it can be.
+/// The pause between the first two attempts. It is short, so that a robot which only restarts its network is found at once.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// The longest pause between attempts: nobody waits longer for a robot that is back.
+/// The longest pause between attempts, and so the longest wait for a robot that answers again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-/// An opening that takes longer is given up: no answer comes from a robot that is off.
+/// An attempt that takes longer is given up. A robot that is switched off does not answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A way to open a stream.
 pub(super) trait Dial: fmt::Display {
-    /// An open stream is taken for closed after so much silence; none where the system reports a closing.
+    /// An open stream counts as closed after so much silence; none if the system reports that it closed.
     const SILENCE: Option<Duration>;
 
-    /// Start to open it, without waiting.
+    /// Start to open the stream, without waiting.
     fn dial(&self) -> io::Result<OwnedFd>;
 
-    /// See whether `descriptor`, which is writable now, leads to the robot.
+    /// Check whether `descriptor`, which is writable now, is connected to the robot.
     fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
 
-    /// Discard what `descriptor` has not sent yet: closing it must not wait for that.
+    /// Discard the bytes that `descriptor` has not sent yet, so that closing it does not wait for them.
     fn abandon(&self, descriptor: &OwnedFd);
 }
 
@@ -56,11 +56,11 @@ pub(super) struct Stream<D> {
     dial: D,
     epoll: OwnedFd,
     state: State,
-    /// The rest of a message that went out in part: at most one message.
+    /// The rest of a message that was sent in part.
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
-    /// The error that was logged last: it is not logged again.
+    /// The error that was logged last, which is not logged again.
     logged: Option<Errno>,
 }
 
@@ -94,7 +94,7 @@ impl<D: Dial> Stream<D> {
         Some(Attempts { made: self.backoff.attempts(), next_ns })
     }
 
-    /// Start, finish or give up an opening; send the rest of a message.
+    /// Start, finish or give up an attempt to open the stream, or send the rest of a message.
     pub(super) fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         if matches!(self.state, State::Closed) {
             if !self.backoff.is_due(now_ns) {
@@ -134,7 +134,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Read bytes of the robot into `buffer`. Returns their number; none when there are none.
+    /// Read bytes from the robot into `buffer`. Returns their number, or none if there are no bytes.
     pub(super) fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> Option<usize> {
         let State::Open { descriptor, heard_ns } = &mut self.state else {
             return None;
@@ -143,7 +143,8 @@ impl<D: Dial> Stream<D> {
             Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
             Ok(length) => {
                 *heard_ns = now_ns;
-                // The pauses start from the shortest only now: a peer that closes at once must not be called ten times a second.
+                // The pauses start from the shortest only after bytes came. A peer that closes each connection at once must not be called ten
+                // times a second.
                 self.backoff.reset();
                 self.logged = None;
                 return Some(length);
@@ -154,7 +155,7 @@ impl<D: Dial> Stream<D> {
         None
     }
 
-    /// Send `bytes` if the wire takes them now.
+    /// Send `bytes` if the stream accepts them now.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.flush()?;
         let State::Open { descriptor, .. } = &self.state else {
@@ -180,7 +181,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Send the rest of a message that went out in part.
+    /// Send the rest of a message that was sent in part.
     fn flush(&mut self) -> io::Result<()> {
         let State::Open { descriptor, .. } = &self.state else {
             return Ok(());
@@ -211,7 +212,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Make the waiter wake for `events` of the open stream.
+    /// Wake the waiter for `events` of the open stream.
     fn watch(&self, events: EventFlags) -> io::Result<()> {
         if let State::Open { descriptor, .. } = &self.state {
             epoll::modify(&self.epoll, descriptor, EventData::new_u64(0), events)?;
@@ -219,7 +220,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// Close it. The epoll drops a descriptor that is closed.
+    /// Close the stream. The epoll descriptor drops a closed descriptor by itself.
     fn close(&mut self, error: &io::Error) {
         self.log(error);
         if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
@@ -231,7 +232,7 @@ impl<D: Dial> Stream<D> {
     }
 
     fn log(&mut self, error: &io::Error) {
-        // The end of a stream has no error number.
+        // The end of a stream has no error number, so it gets EPIPE.
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
         if self.logged.replace(errno) != Some(errno) {
             let remedy = remedy(errno);

@@ -1,4 +1,4 @@
-//! A connection to the robot, or to the radio module before it.
+//! A TCP connection to the robot, or to its radio module.
 
 use std::{fmt, io, net::SocketAddr, os::fd::OwnedFd, time::Duration};
 
@@ -12,8 +12,8 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// A connection is not notified when its other end was switched off. The slowest robot a mission allows
-/// sends every 2 s, and answers pings at once.
+/// The system does not report that the other end was switched off. The slowest robot that a mission allows sends every 2 s, and
+/// answers pings at once.
 const SILENCE: Duration = Duration::from_secs(5);
 
 /// The address to connect to.
@@ -49,7 +49,7 @@ impl Dial for Tcp {
 
     fn finish(&self, socket: &OwnedFd) -> io::Result<()> {
         sockopt::socket_error(socket)??;
-        // A socket can connect to itself on a port of this machine that nobody listens on.
+        // A socket can connect to itself if nobody listens on this port of this machine.
         if getpeername(socket)? == Some(getsockname(socket)?) {
             return Err(Errno::CONNREFUSED.into());
         }
@@ -58,6 +58,6 @@ impl Dial for Tcp {
         Ok(())
     }
 
-    /// The system closes connections in the background.
+    /// Nothing needs to be discarded, because the system closes connections in the background.
     fn abandon(&self, _: &OwnedFd) {}
 }

@@ -22,20 +22,20 @@ use super::*;
 
 const MS: u64 = 1_000_000;
 
-/// Wait until something is there to be done.
+/// Wait until the descriptor is readable.
 fn ready(descriptor: impl AsFd) {
     let came = poll::is_readable(descriptor, Duration::from_secs(10)).unwrap();
     assert!(came, "nothing came");
 }
 
-/// Maintain the wire at `now_ns` until it reports that it is open, or is not.
-fn tend_until(transport: &mut Transport, open: bool, now_ns: u64) {
+/// Maintain the wire at `now_ns` until it reports the state `open`.
+fn maintain_until(transport: &mut Transport, open: bool, now_ns: u64) {
     while transport.maintain(now_ns).unwrap() != Some(open) {
         ready(&*transport);
     }
 }
 
-/// Receive at `now_ns` until `wanted` has come.
+/// Receive at `now_ns` until the bytes `wanted` have come.
 fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
     let mut came = Vec::new();
     while came.len() < wanted.len() {
@@ -67,7 +67,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), None);
     assert_eq!(transport.tally().foreign_datagrams, 1);
-    // It may be the robot, whose port was named wrongly.
+    // The sender may be the robot, if the mission has a wrong port.
     let port = other.local_addr().unwrap().port();
     assert_eq!(transport.tally().other_port, port);
     robot.send_to(b"hello", link).unwrap();
@@ -82,7 +82,7 @@ fn listener() -> (TcpListener, SocketAddr) {
 }
 
 fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> TcpStream {
-    tend_until(transport, true, now_ns);
+    maintain_until(transport, true, now_ns);
     listener.accept().unwrap().0
 }
 
@@ -122,7 +122,7 @@ fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     let (mut now, mut pauses) = (0, Vec::new());
     for _ in 0..7 {
-        // Refused at once or in a moment; either way nothing is open.
+        // The connection is refused at once or a moment later, and the wire stays closed.
         while transport.attempts(now).unwrap().next_ns == 0 {
             assert_eq!(transport.maintain(now).unwrap(), None);
         }
@@ -131,7 +131,7 @@ fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
         now += wait;
     }
     assert_eq!(pauses, [100, 200, 400, 800, 1600, 2000, 2000]);
-    // It is switched on.
+    // The robot is switched on.
     let listener = TcpListener::bind(address).unwrap();
     connected(&listener, &mut transport, now);
 }
@@ -146,8 +146,8 @@ fn a_connection_without_a_word_is_taken_for_dead() {
     connected(&listener, &mut transport, 5000 * MS);
 }
 
-/// Send commands to a robot that does not read until some are lost, then let it read, and send more.
-/// What it reads must be whole frames.
+/// Send commands to a robot that does not read until some are lost. Then let it read, send more, and assert that it reads only
+/// complete frames.
 fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) -> Option<usize>) {
     let mut message = Vec::new();
     Command::velocity([Some(400), Some(-400)], 250).encode(Addressing::default(), &mut message);
@@ -185,7 +185,7 @@ fn a_connection_that_takes_no_more_loses_whole_frames_only() {
     overfill(&mut transport, |buffer| robot.read(buffer).ok());
 }
 
-/// A serial port's other end, and a name for the port that outlives it.
+/// The robot's end of a serial line, and a path of the other end that stays the same.
 struct Line {
     robot: OwnedFd,
     name: PathBuf,
@@ -227,7 +227,7 @@ fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {
 fn a_serial_line_carries_every_byte_as_it_is() {
     let line = line();
     let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
-    tend_until(&mut transport, true, 0);
+    maintain_until(&mut transport, true, 0);
     let bytes: Vec<u8> = (0..=255).collect();
     transport.send(&bytes).unwrap();
     assert_eq!(read_from(&line.robot, 256), bytes);
@@ -239,7 +239,7 @@ fn a_serial_line_carries_every_byte_as_it_is() {
 fn a_serial_line_is_set_to_115200_8n1() {
     let line = line();
     let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
-    tend_until(&mut transport, true, 0);
+    maintain_until(&mut transport, true, 0);
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 115_200);
     let character = settings.control_modes
@@ -252,11 +252,11 @@ fn a_serial_line_is_set_to_115200_8n1() {
 fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     let mut line = line();
     let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
-    tend_until(&mut transport, true, 0);
+    maintain_until(&mut transport, true, 0);
     write(&line.robot, b"here").unwrap();
     expect(&mut transport, b"here", 0);
     std::fs::remove_file(&line.name).unwrap();
-    // The last holder of the robot's end goes: the line hangs up.
+    // The line hangs up when the last holder of the robot's end closes it.
     line.robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     expect_closing(&mut transport, 0);
     for now in [0, 100 * MS, 300 * MS] {
@@ -265,7 +265,7 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     assert_eq!(transport.attempts(300 * MS).unwrap().next_ns, 400 * MS);
     line.robot = plug_in(&line.name);
     assert_eq!(transport.maintain(699 * MS).unwrap(), None);
-    tend_until(&mut transport, true, 700 * MS);
+    maintain_until(&mut transport, true, 700 * MS);
     transport.send(b"stand").unwrap();
     assert_eq!(read_from(&line.robot, 5), b"stand");
 }
@@ -274,20 +274,20 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
 fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     let line = line();
     let mut first = Transport::open(&Address::Serial(line.name.clone())).unwrap();
-    tend_until(&mut first, true, 0);
+    maintain_until(&mut first, true, 0);
     let mut second = Transport::open(&Address::Serial(line.name.clone())).unwrap();
     assert_eq!(second.maintain(0).unwrap(), Some(false));
-    // Somebody else has the line open all the time, as a simulated robot has.
+    // Another process has the line open all the time, as a simulated robot does.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
     drop(first);
-    tend_until(&mut second, true, 100 * MS);
+    maintain_until(&mut second, true, 100 * MS);
 }
 
 #[test]
 fn a_line_that_takes_no_more_loses_whole_frames_only() {
     let line = line();
     let mut transport = Transport::open(&Address::Serial(line.name.clone())).unwrap();
-    tend_until(&mut transport, true, 0);
+    maintain_until(&mut transport, true, 0);
     overfill(&mut transport, |buffer| {
         let came = poll::is_readable(&line.robot, Duration::from_millis(200)).unwrap();
         came.then(|| read(&line.robot, buffer).unwrap())

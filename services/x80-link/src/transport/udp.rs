@@ -1,4 +1,4 @@
-//! Datagrams from the robot's address, and from nowhere else.
+//! Datagrams. Only those from the robot's address are accepted.
 
 use std::{
     io,
@@ -22,7 +22,7 @@ impl Udp {
     /// A socket for the robot at `robot`, from any free port.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
         let any = match robot.ip() {
-            // A socket that is bound to loopback gets nothing from outside.
+            // A socket that is bound to loopback receives nothing from other machines.
             IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
             IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
             IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
@@ -33,7 +33,7 @@ impl Udp {
         Ok(Self { socket, robot, tally: Tally::default() })
     }
 
-    /// Read the next datagram of the robot into `buffer`. Returns its length; none when all were taken. Datagrams of others
+    /// Read the next datagram from the robot into `buffer`. Returns its length, or none if all were taken. Datagrams from other addresses
     /// are dropped and counted.
     pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
@@ -58,12 +58,12 @@ impl Udp {
         }
     }
 
-    /// Send one datagram. It is lost if the network does not take it now, as on any radio.
+    /// Send one datagram. It is lost if the network does not accept it now.
     pub(super) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.socket.send_to(bytes, self.robot) {
             Ok(_) => Ok(()),
             Err(error) if Errno::from_io_error(&error) == Some(Errno::BADF) => Err(error),
-            // A full queue, a firewall or a network that is down refuses it.
+            // A full queue, a firewall or a network that is down refuses the datagram.
             Err(_) => {
                 self.tally.unsent += 1;
                 Ok(())
@@ -76,7 +76,7 @@ impl Udp {
     }
 }
 
-/// Whether the error means only that the robot is away or a signal came.
+/// Whether the error is temporary: the robot does not answer, or a signal came.
 fn is_passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

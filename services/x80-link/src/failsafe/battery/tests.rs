@@ -10,7 +10,7 @@ fn batteries(limits: BatteryLimits) -> Batteries {
 }
 
 impl Batteries {
-    /// Voltages at a time in seconds: which are low, and what changed.
+    /// Take voltages at a time in seconds. Returns which batteries are low, and the changes.
     fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(Pack, Charge)>) {
         let ad = |volts: f64, scale: f64| (volts / scale * 4095.0).round() as u16;
         let [board, motor, servo] = volts;
@@ -57,7 +57,7 @@ fn a_battery_that_stays_sunk_is_empty_for_good_and_one_that_dips_is_only_low() {
         batteries.at(seconds, [7.2, motor, 1.2]);
         batteries.charge()
     };
-    // Low below 11 V, empty below 10.
+    // The battery is low below 11 V and empty below 10 V.
     assert_eq!(at(0.0, 12.0), Charge::Enough);
     assert_eq!(at(1.0, 9.9), Charge::Low);
     assert_eq!(at(2.9, 10.1), Charge::Low, "a dip");

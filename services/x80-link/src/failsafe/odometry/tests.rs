@@ -2,9 +2,9 @@ use super::*;
 use common::samples::HoldReason;
 use std::path::Path;
 
-/// From frame to frame, seconds: 7 Hz.
+/// The period of the frames at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
-/// A turn a second: 0.53 m/s.
+/// One turn of a wheel a second, which is 0.53 m/s.
 const TURN: i16 = 1200;
 
 fn odometry() -> Odometry {
@@ -16,7 +16,7 @@ fn suspicion(odometry: &Odometry) -> Option<Suspicion> {
     odometry.suspicion.map(|(suspicion, _)| suspicion)
 }
 
-/// Wheels as measured on a real robot: 0.07 s of delay, 0.08 s of lag, 0.78 of the speed, a dead band of 20 counts/s.
+/// Wheels with the values measured on a real robot: 0.07 s of delay, 0.08 s of lag, 0.78 of the speed, a dead band of 20 counts/s.
 #[derive(Default)]
 struct Wheels {
     speed: [f64; 2],
@@ -55,8 +55,8 @@ impl Wheels {
 
 const COUNTS: u16 = common::wire::COUNT_CYCLE;
 
-/// Ticks of a robot that is told `tells(tick)`, is out of reach where `out` says so, and whose frames say `says` of what
-/// its wheels count. Returns when it is suspected, seconds after the first command, and of what.
+/// Run ticks of a robot that is commanded `tells(tick)` and is out of reach where `out` returns true; `says` turns the counts of its
+/// wheels into the counts of its frames. Returns the first suspicion, and its time in seconds after the first command.
 fn drive(
     ticks: u32,
     tells: impl Fn(u32) -> [i16; 2],
@@ -90,7 +90,8 @@ fn honest(_: u32, counts: [u16; 2]) -> [u16; 2] {
     counts
 }
 
-/// At rest within 1.5 s of the first motion: 0.2 s are left for the wheels to come to rest, and a frame's jitter.
+/// Assert that the robot is at rest within 1.5 s of the first motion. That includes 0.2 s for the wheels to come to rest, and a
+/// frame's jitter.
 fn in_time(suspected: Option<(f64, Suspicion)>, why: Suspicion) {
     let (after, suspicion) = suspected.unwrap();
     assert!(after <= 1.15 && suspicion == why, "{suspicion:?} after {after} s");
@@ -115,7 +116,7 @@ fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
 
 #[test]
 fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_time() {
-    // Bursts of 1 to 8 frames.
+    // The radio is out for bursts of 1 to 8 frames.
     for share in [5, 2] {
         for seed in 1..60_u32 {
             let mut state = seed;
@@ -139,7 +140,7 @@ fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_ti
 
 #[test]
 fn wheels_held_for_half_a_second_are_not_suspected() {
-    // Frames of a robot that something holds repeat; then it goes on from there.
+    // The frames repeat for a while, and then continue from the same counts.
     let mut held = 0;
     let says = |tick: u32, counts: [u16; 2]| {
         if tick == 21 {
@@ -181,12 +182,12 @@ fn a_dead_encoder_is_suspected_though_the_direction_changes_with_every_tick_and_
 fn wheels_that_are_reversed_or_swapped_are_suspected_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
     in_time(drive(40, |_| [TURN, TURN], never, reversed), Suspicion::Left);
-    // As a controller does whose robot turns away from the target.
+    // A controller whose robot turns away from the target gives such commands.
     let chatter = |tick: u32| [if (tick / 2).is_multiple_of(2) { 584 } else { -584 }; 2];
     in_time(drive(40, chatter, never, reversed), Suspicion::Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
     in_time(drive(40, |_| [-TURN, TURN], never, swapped), Suspicion::Left);
-    // In a curve both roll forward as told, but the robot turns the other way.
+    // In a curve both wheels roll forward as commanded, but the robot turns the other way.
     let curve = drive(40, |_| [TURN / 2, TURN], never, swapped);
     in_time(curve, Suspicion::Turn);
 }

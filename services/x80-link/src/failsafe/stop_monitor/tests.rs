@@ -2,22 +2,22 @@ use super::*;
 use crate::failsafe::{monitor::Clears, rule};
 use std::path::Path;
 
-/// From frame to frame, seconds: 7 Hz.
+/// The period of the frames at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
 
 fn stop_monitor() -> StopMonitor {
     StopMonitor::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
 }
 
-/// The monitor and the row of the failsafe.
+/// The monitor and its row of the failsafe table.
 struct Watch {
     monitor: StopMonitor,
     clears: Clears,
     does_not_stop: bool,
 }
 
-/// A robot told to stand at 1 s whose wheels go on at `speed(seconds since)` counts/s. Seconds since then, when it was
-/// found not to stop.
+/// Stop a robot at 1 s whose wheels then turn at `speed(seconds since)` counts/s. Returns the seconds after which the monitor found
+/// that it does not stop.
 fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
     let mut watch = Watch {
         monitor: stop_monitor(),

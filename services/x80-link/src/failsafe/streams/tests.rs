@@ -11,7 +11,7 @@ fn streams(text: &str) -> Streams {
     streams
 }
 
-/// A standard frame with a reading of the front sonar.
+/// Take a standard frame with a reading of the front sonar.
 fn range(streams: &mut Streams, machine_ns: u64) {
     let mut standard = StandardSensors::default();
     standard.ultrasonic[1] = 255;
@@ -19,7 +19,7 @@ fn range(streams: &mut Streams, machine_ns: u64) {
     streams.observe(&Observation::Standard(&standard), now);
 }
 
-/// Motor frames after these intervals, milliseconds. The time of the last.
+/// Take motor frames after these intervals, milliseconds. Returns the time of the last frame.
 fn frames(streams: &mut Streams, intervals: impl IntoIterator<Item = u64>) -> u64 {
     let mut now = 0;
     streams.motor(MissionTime(now), now);

@@ -1,4 +1,4 @@
-//! What the failsafe decides by, and what comes of its decisions.
+//! The inputs of the failsafe in the step, and the effects of its decisions.
 
 use super::*;
 
@@ -6,7 +6,7 @@ const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
 /// A turn a second is 1200 counts/s.
 const TURN: f64 = std::f64::consts::TAU;
 
-/// A tick and its command, of a robot whose wheels have turned as told since 0.
+/// Run a tick and its command for a robot whose wheels have turned as commanded since time 0.
 fn tick(link: &mut Link, number: u64, now_ns: u64) -> Vec<Effect> {
     let rolled = (now_ns / MS * 12 / 10) as u16;
     tick_by(
@@ -23,7 +23,7 @@ fn tick_by(link: &mut Link, now_ns: u64, frames: &[u8], command: &CommandSample)
     effects
 }
 
-/// Frames of a robot whose batteries give so many volts.
+/// The frames of a robot whose batteries have `volts`.
 fn powered(volts: f64) -> Vec<u8> {
     let ad = |scale: f64| (volts / scale * 4095.0).round() as u16;
     let standard = StandardSensors {
@@ -47,7 +47,7 @@ fn a_supervisor_that_says_nothing_stops_the_robot_and_its_next_directive_lets_it
         let effects = tick(&mut link, number, now);
         assert!(!velocities(&effects).contains(&STAND), "{now} {effects:?}");
     }
-    // Between two ticks: the last command is fresh.
+    // Between two ticks the last command is fresh.
     let effects = link.at(Event::Quiet, 2001 * MS);
     assert_eq!(velocities(&effects), [STAND; 3]);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
@@ -85,7 +85,7 @@ fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
     let fresh = command(2, 300 * MS, TURN, TURN);
     let old_pose = CommandSample { pose_ns: 49 * MS, ..fresh };
     let old_guidance = CommandSample { guidance_ns: 49 * MS, ..fresh };
-    // One that does not say how old they are says 0.
+    // A command without these times has 0 in their place.
     let silent = CommandSample { pose_ns: 0, guidance_ns: 0, ..fresh };
     for (command, cause) in [
         (old_pose, Cause::PoseStale),

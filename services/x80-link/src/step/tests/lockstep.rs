@@ -18,7 +18,7 @@ fn in_lockstep_a_second_answer_to_a_ping_is_no_tick() {
     let mut link = in_ticks();
     link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     link.at(Event::Order(Order::Drive, HoldReason::None), 0);
-    // The robot is slow, so it is asked again; then both answers come.
+    // The robot is slow, so it is pinged again. Then both answers come.
     link.at(Event::Order(Order::Hold, HoldReason::Operator), MS);
     link.at(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
     assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());

@@ -1,0 +1,150 @@
+//! The state of a robot: its status, its processes, its files.
+
+use std::{
+    fs,
+    os::unix::fs::PermissionsExt as _,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use common::{bus_instance::BusInstance, domain::Domain};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::commands::output;
+
+/// Every stage, in the order of the pipeline.
+pub const STAGES: [&str; 5] = ["x80-link", "dead-reckoning", "mapper", "planner", "controller"];
+
+/// A wait that takes so long has failed, because no event that a test waits for takes nearly as long.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Call `is_so` until it returns true, for [`PATIENCE`] at most.
+pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !is_so() {
+        assert!(began.elapsed() < PATIENCE, "waited too long until {what}");
+    }
+}
+
+pub fn signal_process(pid: u32, signal: Signal) {
+    let pid = Pid::from_raw(pid as i32).unwrap();
+    kill_process(pid, signal).unwrap();
+}
+
+/// The entry of `stage` in a status.
+pub fn find<'a>(status: &'a Value, stage: &str) -> &'a Value {
+    let stages = status["stages"].as_array().unwrap();
+    stages.iter().find(|entry| entry["name"] == stage).unwrap()
+}
+
+/// The process number of `stage` in a status.
+pub fn pid(status: &Value, stage: &str) -> u32 {
+    find(status, stage)["pid"].as_u64().unwrap() as u32
+}
+
+/// The generation of `stage` in a status.
+pub fn generation(status: &Value, stage: &str) -> u64 {
+    find(status, stage)["generation"].as_u64().unwrap()
+}
+
+/// Whether all stages run.
+pub fn all_run(status: &Value) -> bool {
+    let mut stages = STAGES.iter().map(|stage| find(status, stage));
+    stages.all(|stage| stage["state"] == "running")
+}
+
+/// Replace a file of the middleware by an unfilled one, as it is between its creation and its completion.
+pub fn half_make(path: &Path) {
+    // An existing file may not be writable.
+    let _ = fs::remove_file(path);
+    let file = fs::File::create(path).unwrap();
+    file.set_permissions(fs::Permissions::from_mode(0o200)).unwrap();
+}
+
+pub fn domain(robot: &str) -> Domain {
+    Domain::of(robot.parse().unwrap())
+}
+
+/// The current bus instance of `robot`.
+pub fn bus_instance(robot: &str) -> BusInstance {
+    BusInstance::current(&domain(robot)).unwrap()
+}
+
+/// The files in shared memory whose names start with `prefix`.
+pub fn shared_memory(prefix: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir("/dev/shm").unwrap().flatten();
+    let named = |name: &std::ffi::OsStr| name.as_encoded_bytes().starts_with(prefix.as_bytes());
+    let entries = entries.filter(|entry| named(&entry.file_name()));
+    entries.map(|entry| entry.path()).collect()
+}
+
+/// The answer of `firsthand status --json`; none before the robot has a bus.
+pub fn status_of(robot: &str) -> Option<Value> {
+    let output = output(&["status", "--robot", robot, "--json"]);
+    let text = output.status.success().then_some(output.stdout)?;
+    serde_json::from_slice(&text).ok()
+}
+
+/// Ask for the status of a robot until `is_so` returns true, for a robot without a [`Run`](super::Run).
+pub fn wait_for_status(robot: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+    let began = Instant::now();
+    loop {
+        match status_of(robot) {
+            Some(status) if is_so(&status) => return status,
+            last => assert!(began.elapsed() < PATIENCE, "waited too long: {last:?}"),
+        }
+    }
+}
+
+/// A directory for a run of `robot`. The command lines of all processes of the run contain it.
+pub fn directory_of(robot: &str) -> TempDir {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&mark(robot)).tempdir().unwrap()
+}
+
+/// Assert that no process, no shared memory and no file of `robot` is left.
+#[track_caller]
+pub fn assert_nothing_left(robot: &str) {
+    let domain = domain(robot);
+    let shared = shared_memory(&domain.shared_memory_prefix());
+    assert!(shared.is_empty(), "left in shared memory: {shared:?}");
+    let directory = domain.directory();
+    assert!(!directory.exists(), "{} is left", directory.display());
+    assert_eq!(processes_of(robot), Vec::<String>::new());
+}
+
+/// The names of all directories for runs of `robot` in these tests start with this.
+fn mark(robot: &str) -> String {
+    format!("firsthand-test-{robot}_")
+}
+
+/// The command lines of the processes of `robot`: supervisor, stages, simulator.
+pub fn processes_of(robot: &str) -> Vec<String> {
+    let found = processes(&mark(robot)).into_iter();
+    found.map(|(_, line)| line).collect()
+}
+
+/// The numbers of the processes of `robot`.
+pub fn pids_of(robot: &str) -> Vec<u32> {
+    let found = processes(&mark(robot)).into_iter();
+    found.map(|(pid, _)| pid).collect()
+}
+
+/// Wait until no process of `robot` runs any more.
+pub fn wait_until_all_ended(robot: &str) {
+    wait_until("all have ended", || pids_of(robot).is_empty());
+}
+
+/// The numbers and command lines of the processes whose command lines contain `mark`.
+pub fn processes(mark: &str) -> Vec<(u32, String)> {
+    let entries = fs::read_dir("/proc").unwrap().flatten();
+    let found = entries.filter_map(|entry| {
+        let pid = entry.file_name().to_str()?.parse().ok()?;
+        let line = fs::read(entry.path().join("cmdline")).ok()?;
+        let line = String::from_utf8_lossy(&line).replace('\0', " ");
+        line.contains(mark).then_some((pid, line))
+    });
+    found.collect()
+}

@@ -1,0 +1,231 @@
+//! Runs of missions, and the records they leave.
+
+use std::{
+    fs,
+    io::Read as _,
+    path::{Path, PathBuf},
+    process::{Child, Stdio},
+    time::Instant,
+};
+
+use recording::Recording;
+use rustix::process::Signal;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::{
+    commands::firsthand,
+    robot::{
+        PATIENCE, all_run, assert_nothing_left, directory_of, find, generation, pid,
+        signal_process, status_of,
+    },
+};
+
+/// A run of a mission by a robot that no other test uses.
+pub struct Run {
+    pub robot: String,
+    child: Option<Child>,
+    // It is removed when the test ends.
+    directory: TempDir,
+}
+
+impl Run {
+    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments.
+    pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
+        let directory = directory_of(robot);
+        let out = directory.path().join("run");
+        let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
+            .arg(&out)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Self { robot: robot.to_owned(), child: Some(child), directory }
+    }
+
+    pub fn directory(&self) -> PathBuf {
+        self.directory.path().join("run")
+    }
+
+    /// The lines of a file of records in the run directory.
+    pub fn records(&self, file: &str) -> Vec<Value> {
+        records(&self.directory().join(file))
+    }
+
+    /// Whether a line of the link's log contains all `parts`, which are a level and fields.
+    pub fn link_logged(&self, parts: &[&str]) -> bool {
+        logged(&self.directory(), "x80-link", parts) > 0
+    }
+
+    pub fn is_running(&mut self) -> bool {
+        let child = self.child.as_mut().unwrap();
+        child.try_wait().unwrap().is_none()
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.as_ref().unwrap().id()
+    }
+
+    pub fn status(&self) -> Option<Value> {
+        status_of(&self.robot)
+    }
+
+    /// Ask for the status until `is_so` returns true. Each answer waits for the supervisor's next sample.
+    pub fn wait_until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.status()
+                && is_so(&status)
+            {
+                return status;
+            }
+            let child = self.child.as_mut().unwrap();
+            if let Some(exit) = child.try_wait().unwrap() {
+                let mut said = String::new();
+                let _ = child.stderr.take().unwrap().read_to_string(&mut said);
+                panic!("the run ended ({exit}) before {what}: {said}");
+            }
+            assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
+        }
+    }
+
+    /// Wait until the robot has been under way for `seconds` of mission time.
+    pub fn wait_until_under_way(&mut self, seconds: f64) -> Value {
+        self.wait_until("the robot is under way", |status| {
+            status["mission_time_s"].as_f64().unwrap() >= seconds
+        })
+    }
+
+    pub fn wait_until_driving(&mut self) -> Value {
+        self.wait_until("the robot drives", |status| status["order"] == "driving")
+    }
+
+    /// Wait until all stages run.
+    pub fn wait_until_all_run(&mut self) -> Value {
+        self.wait_until("every stage runs", all_run)
+    }
+
+    /// Wait until the supervisor's process has ended.
+    pub fn reap(&mut self) {
+        self.child.as_mut().unwrap().wait().unwrap();
+    }
+
+    /// Kill the supervisor.
+    pub fn kill(&mut self) {
+        self.signal(Signal::KILL);
+        self.reap();
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        signal_process(self.pid(), signal);
+    }
+
+    /// Kill a stage, or freeze it (`Signal::STOP`), and wait until its successor runs. Returns the status then.
+    pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
+        let status =
+            self.wait_until("the stage runs", |status| find(status, stage)["state"] == "running");
+        self.kill_and_await(stage, signal, &status)
+    }
+
+    /// [`Self::kill_and_await_successor`] for a stage that runs in `status`, without asking for a new status.
+    pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
+        signal_process(pid(status, stage), signal);
+        let before = generation(status, stage);
+        self.wait_until("its successor runs", |status| {
+            generation(status, stage) > before && find(status, stage)["state"] == "running"
+        })
+    }
+
+    /// Wait for the end. Returns the exit code, and the JSON of the last line.
+    pub fn finish(self) -> (Option<i32>, Value) {
+        let (code, summary, _) = self.finish_in();
+        (code, summary)
+    }
+
+    /// [`Self::finish`] that also returns the directory above the run's.
+    pub fn finish_in(mut self) -> (Option<i32>, Value, TempDir) {
+        let output = self.child.take().unwrap().wait_with_output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        let last = text.lines().last().unwrap_or_default();
+        let summary = serde_json::from_str(last).unwrap_or_else(|_| panic!("{output:?}"));
+        let directory = std::mem::replace(&mut self.directory, tempfile::tempdir().unwrap());
+        (output.status.code(), summary, directory)
+    }
+
+    /// Wait for the end, and assert that the robot has reached its target, touched nothing, and left nothing behind.
+    #[track_caller]
+    pub fn arrives(self) -> Value {
+        self.arrives_in().0
+    }
+
+    /// [`Self::arrives`] that also returns the directory above the run's.
+    #[track_caller]
+    pub fn arrives_in(self) -> (Value, TempDir) {
+        let robot = self.robot.clone();
+        let (code, summary, directory) = self.finish_in();
+        assert_reached(code, &summary);
+        assert_nothing_left(&robot);
+        (summary, directory)
+    }
+
+    /// Stop the run with SIGTERM, and assert that it ends in order and leaves nothing behind.
+    #[track_caller]
+    pub fn stop(self) -> Value {
+        self.signal(Signal::TERM);
+        let robot = self.robot.clone();
+        let (code, summary) = self.finish();
+        assert_eq!(code, Some(0), "{summary}");
+        assert_nothing_left(&robot);
+        summary
+    }
+}
+
+/// A test that fails leaves no process behind, because the stages end with their supervisor.
+impl Drop for Run {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// Assert that the robot has reached its target and touched nothing.
+#[track_caller]
+pub fn assert_reached(code: Option<i32>, summary: &Value) {
+    assert_ended(code, summary, 0, "reached");
+    assert_eq!(summary["collisions"].as_u64().unwrap_or(0), 0, "{summary}");
+}
+
+/// Assert that a run ended with that exit code and outcome.
+#[track_caller]
+pub fn assert_ended(code: Option<i32>, summary: &Value, expected: i32, outcome: &str) {
+    let ended = (code, &summary["outcome"]);
+    assert_eq!(ended, (Some(expected), &outcome.into()), "{summary}");
+}
+
+/// The lines of a file of records, each a JSON value. A file that does not exist has none.
+pub fn records(file: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    lines.collect()
+}
+
+/// The number of lines in a process's log in a run's directory that contain all `parts`, which are a level and fields.
+pub fn logged(directory: &Path, process: &str, parts: &[&str]) -> usize {
+    let log = fs::read_to_string(directory.join(format!("{process}.log"))).unwrap_or_default();
+    let has_all = |line: &&str| parts.iter().all(|part| line.contains(part));
+    log.lines().filter(has_all).count()
+}
+
+/// Run a mission to its end.
+pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
+    Run::start(robot, mission, arguments).finish()
+}
+
+/// The committed recording of the first seconds of a mission.
+pub fn golden() -> Recording {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
+    Recording::open(file.as_ref()).unwrap()
+}
