@@ -60,7 +60,7 @@ fn assert_arrives(run: Run) -> Value {
     summary
 }
 
-/// That the bus was recreated is seen on every stage: each was started again.
+/// Assert that the bus was recreated, which starts every stage again.
 fn assert_bus_was_recreated(summary: &Value) {
     for stage in STAGES {
         let restarts = summary["restarts"][stage].as_u64();
@@ -82,7 +82,7 @@ fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
     half_make_connection(&bus, port.unwrap());
     let began = Instant::now();
     run.kill_and_await_successor("mapper", Signal::KILL);
-    // Not after a start-up that was too late.
+    // The successor must run before a blocked start would have been noticed.
     assert!(began.elapsed().as_secs() < 3, "{:?}", began.elapsed());
     let summary = assert_arrives(run);
     assert_eq!(summary["restarts"]["mapper"], 1, "{summary}");
@@ -94,7 +94,7 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
     let mut run = Run::start("block-other", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
     let bus = bus_instance("block-other");
-    // Of the killed mapper, by its tags, but with a number that is not its own.
+    // The port belongs to the mapper by its tags, but its id has another process number.
     let port = 7;
     let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
     let tag = format!("{}{port}.port_tag", bus.shared_memory_prefix());
@@ -165,7 +165,7 @@ fn node_files_of_processes_that_ended_are_removed() {
     let bus = bus_instance("block-nodes");
     let mapper = pid(&status, "mapper");
     let nodes = bus.root().join("nodes");
-    // As left by hundreds of processes killed while they joined; of the number, the process alone counts.
+    // Hundreds of processes that were killed while they joined leave such files. Only the process in an id matters.
     for counter in 1_000..1_300_u128 {
         let id = (counter << 96) | (u128::from(mapper) << 64);
         fs::create_dir(nodes.join(id.to_string())).unwrap();

@@ -55,7 +55,7 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
         let cells = rows.iter().filter_map(|row| row[column(name)].parse::<f64>().ok());
         cells.count()
     };
-    // Only a signal from before the first pose has no mission time.
+    // A signal has no mission time if it was sent before the first pose.
     let timed = rows.iter().skip_while(|row| row[column("time_s")].is_empty());
     assert_eq!(timed.count(), measured("time_s"), "{table}");
     assert!(measured("time_s") >= rows.len() / 2, "{table}");
@@ -86,7 +86,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     let hits: u64 = consumers.as_object().unwrap().values().map(hit).sum();
     assert!(hits >= 5, "{report}");
     assert!(hits + sum(&report["kills"]) >= 30, "{report}");
-    // What is in the recordings of such recorders was replayed, and what is not is told.
+    // The recorded part of such recordings was replayed, and the missing part is reported.
     let partial = &report["replays"]["partial"];
     assert!(number(&partial["equal"]) > 0, "{report}");
     assert!(partial["not_replayed"].is_u64(), "{report}");

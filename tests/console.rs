@@ -149,7 +149,7 @@ fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
         assert!(!reading.line().is_empty(), "{command:?}");
         assert_eq!(reading.close(), (Some(0), String::new()), "{command:?}");
     }
-    // Nothing is ever printed that could tell.
+    // This command never prints anything, so its output cannot show that the reader has gone.
     let silent = Reading::start(&["echo", "stalls", "--robot", robot]);
     assert_eq!(silent.close(), (Some(0), String::new()));
     for command in [

@@ -139,7 +139,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
             assert_eq!(code, Some(0), "{summary}");
             let restarts = summary["restarts"].as_object().unwrap();
             assert!(restarts.values().all(|times| times == 0), "{summary}");
-            // So that it notices: a robot is not started twice in one second.
+            // The pause lets the consumer notice the end of the run; a robot is not started twice within a second.
             std::thread::park_timeout(Duration::from_secs(1));
         }
         let heard = logger.join().unwrap();
@@ -173,7 +173,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
             }
         };
         assert!(matches!(refused, BusError::NoPlace { .. }), "{refused}");
-        // Who needs a place gets one.
+        // A stage that needs a place gets one.
         for stage in ["mapper", "planner"] {
             run.kill_and_await_successor(stage, rustix::process::Signal::KILL);
         }

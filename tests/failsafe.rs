@@ -1,4 +1,4 @@
-//! What stops the robot, seen on the wire: every datagram between link and robot passes through this test.
+//! The stops of the robot as seen on the wire. Every datagram between link and robot passes through this test.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -13,9 +13,9 @@ use common::wire::{Command, Decoder};
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// How long a command moves the robot: `robot.command_limit_s`.
+/// The time for which a command moves the robot: `robot.command_limit_s`.
 const LIMIT: Duration = Duration::from_millis(250);
-/// From tick to tick at 7 Hz.
+/// The time from tick to tick at 7 Hz.
 const PERIOD: Duration = Duration::from_millis(143);
 
 /// A motion command that the link has sent to the robot.

@@ -14,8 +14,8 @@ use common::{
 };
 use serde_json::Value;
 
-/// At this speed the mission has thousands of ticks: seconds to be broken in, in lockstep, which does not
-/// care how loaded the machine is.
+/// At this speed the mission has thousands of ticks, which take seconds in lockstep. That is time enough for a fault, however loaded
+/// the machine is.
 const SLOW: [&str; 4] = ["--set", "controller.speed_m_s=0.004", "--timeout", "20000"];
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
 
@@ -24,7 +24,7 @@ fn inject(robot: &str, stage: &str, fault: &str) {
     operate(robot, &["fault", stage, fault]);
 }
 
-/// How many stalls were met by `recovery`.
+/// The number of stalls with this `recovery`.
 fn count(stalls: &[Value], recovery: &str) -> usize {
     stalls.iter().filter(|stall| stall["recovery"] == recovery).count()
 }

@@ -30,7 +30,7 @@ fn write_map(directory: &Path) -> PathBuf {
     file
 }
 
-/// The same rooms as an image, light where free.
+/// Write the rooms as an image in which free cells are light.
 fn write_image(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.pgm");
     let pixels: Vec<u8> =

@@ -1,4 +1,4 @@
-//! Stages frozen again and again: how soon each is noticed.
+//! Stages are frozen again and again, and each freeze must be noticed soon.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod support;
@@ -7,7 +7,7 @@ use rustix::process::Signal;
 use supervisor::stages::find as find_stage;
 use support::{Run, STAGES};
 
-/// How long after its deadline a freeze may be noticed, seconds.
+/// A freeze may be noticed so long after its deadline, seconds.
 const SLACK: f64 = 0.020;
 
 /// Freeze each stage so often in a mission at the pace of the wall, and print how late each was noticed.
@@ -24,7 +24,7 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
     }
     let deaths = run.records("deaths.jsonl");
     run.stop();
-    // On a machine that stands still for a moment others may be late too.
+    // If the machine stands still for a moment, other stages may be late too.
     assert!(deaths.len() >= times * STAGES.len(), "{deaths:?}");
     let mut late: Vec<f64> = deaths
         .iter()

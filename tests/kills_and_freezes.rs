@@ -1,7 +1,7 @@
-//! The matrix of kills and freezes: which process is hit, with which signal, in which phase of a mission.
+//! The matrix of kills and freezes: the process that gets a signal, the signal, and the phase of the mission.
 //!
-//! Rows of stages are in [`rows`]; those of the supervisor and of everything at once are the tests after it. What the wheels
-//! are told meanwhile is in `failsafe`, how soon a freeze is noticed in `freezes`.
+//! The rows of stages are in [`rows`]. The tests after it are the rows of the supervisor and of all processes at once. `failsafe`
+//! tests the commands to the wheels meanwhile, and `freezes` the time until a freeze is noticed.
 
 use std::{path::Path, process::Stdio};
 
@@ -17,19 +17,19 @@ use crate::support::{
     generation, operate, output, pid, pids_of, processes, records, refused, signal_process,
 };
 
-/// When stages are hit.
+/// The phase in which stages get a signal.
 enum Phase {
-    /// Each as soon as its first process is there.
+    /// Each stage gets it as soon as its first process runs.
     StartUp,
-    /// One after the other while the robot drives.
+    /// The stages get it one after the other while the robot drives.
     Driving,
-    /// One after the other while the robot waits for an operator.
+    /// The stages get it one after the other while the robot waits for an operator.
     Waiting,
-    /// All at once when the supervisor has been told to end.
+    /// All stages get it at once after the supervisor was told to end.
     Stopping,
 }
 
-/// Every stage is hit with each of `signals` in `phase` of a mission.
+/// Every stage gets each of `signals` in `phase` of a mission.
 struct Row {
     phase: Phase,
     signals: &'static [Signal],
@@ -44,7 +44,7 @@ const KILL_AND_FREEZE: &[Signal] = &[Signal::KILL, Signal::STOP];
 /// Mission time runs four times as fast as the wall clock: a mission takes ten seconds.
 const FAST: &[&str] = &["--pace", "4"];
 const CAR: &[&str] = &["--pace", "4", "--set", "robot.model=\"car\""];
-/// At this speed a mission in lockstep has tens of thousands of ticks: seconds to be hit in.
+/// At this speed a mission in lockstep has tens of thousands of ticks, which take seconds. That is time enough for the signals.
 const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
 
 /// A test for each row, called by the promise that it guards.
@@ -117,7 +117,7 @@ impl Row {
                 let status = run.wait_until_under_way(0.5);
                 run.signal(Signal::TERM);
                 for stage in STAGES {
-                    // One that has ended in order already cannot be hit.
+                    // A stage that has already ended in order cannot get a signal.
                     let stage = rustix::process::Pid::from_raw(pid(&status, stage) as i32);
                     let _ = rustix::process::kill_process(stage.unwrap(), self.signals[0]);
                 }
@@ -181,7 +181,7 @@ fn assert_every_generation_replays(directory: &Path, row: &Row) {
     let deaths = records(&directory.join("deaths.jsonl"));
     let hit: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
     assert_eq!(hit[..5], STAGES);
-    // In lockstep nothing waits for the recorder, which may lose samples.
+    // In lockstep no stage waits for the recorder, so it may lose samples.
     if row.arguments == LOCKSTEP {
         return;
     }
@@ -200,7 +200,7 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
         let controller = find(status, "controller");
         controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)
     };
-    // On a busy machine the controller may be replaced before the second command: then again.
+    // On a busy machine the controller may be replaced before the second command. Both are then sent again.
     let goes_on = || {
         let before = run.wait_until("the controller beats", beats);
         operate("kf-thaw", &["freeze", "controller"]);

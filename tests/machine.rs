@@ -18,7 +18,7 @@ use crate::support::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// At this speed a mission outlasts its test, which stops it.
+/// At this speed a mission takes longer than its test, which stops it.
 const SLOW: [&str; 6] =
     ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
 
@@ -183,7 +183,7 @@ fn a_closed_standard_output_is_no_failure_of_any_command() {
     run.stop();
 }
 
-/// How many descriptors a process has.
+/// The number of descriptors of a process.
 fn descriptors(process: u32) -> usize {
     fs::read_dir(format!("/proc/{process}/fd")).unwrap().count()
 }
@@ -195,7 +195,7 @@ fn a_stage_inherits_no_descriptor_of_its_supervisor() {
     // A stage that was started when its supervisor had everything open.
     let status = run.kill_and_await_successor("planner", Signal::KILL);
     let (own, supervisors) = (descriptors(pid(&status, "planner")), descriptors(run.pid()));
-    // By itself it has 61, and its supervisor some 200, of which it inherited 86.
+    // A stage has 61 descriptors of its own and its supervisor some 200, of which a stage would inherit 86.
     assert!(2 * own < supervisors, "{own} of {supervisors}");
     run.stop();
 }
@@ -240,7 +240,7 @@ fn a_run_is_not_resumed_after_the_machine_was_suspended_for_hours() {
     let robot = "mach-susp";
     let runs = directory_of(robot);
     let run = |wrapper: &[&str]| {
-        // One that goes on by mistake ends all the same.
+        // The timeout ends a run that continues by mistake.
         let timed = ["--pace", "1", "--timeout", "20", "--resume-last", "--runs"];
         let mission = ["run", "open-room", "--robot", robot];
         let mut command = firsthand_under(wrapper, &[&mission[..], &timed].concat());

@@ -233,7 +233,7 @@ fn a_latency_budget_has_every_item_of_every_stage() {
     }
     for (number, row) in rows.iter().enumerate() {
         for cell in row["cells"].as_array().unwrap() {
-            // What the robot sent, and when, is not known here.
+            // The robot's frames and their times are not known here.
             let known = number > 0 || cell["item"] != "wake";
             assert_eq!(cell["p50_us"].as_f64().is_some(), known, "{row}");
         }

@@ -76,7 +76,7 @@ fn no_file_of_a_run_is_open_to_other_users() {
     run.wait_until_under_way(0.3);
     let robot = domain("closed");
     for path in shared("closed").into_iter().chain([robot.directory().to_owned()]) {
-        // One that has just gone is not open.
+        // A file that was just removed is not open to others.
         if let Ok(found) = fs::symlink_metadata(&path) {
             assert_eq!(found.mode() & 0o077, 0, "{}", path.display());
         }

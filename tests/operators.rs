@@ -1,4 +1,4 @@
-//! What an operator does to a robot that runs: stop and resume, kill, hold and release.
+//! An operator's actions on a robot that runs: stop and resume, kill, hold and release.
 
 use crate::support::{Run, find, operate, refused};
 
@@ -42,7 +42,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     let mut run = Run::start("held", "open-room", &["--pace", "1"]);
     run.wait_until_under_way(1.0);
-    // From its next generation on it fails when it starts.
+    // The next generation fails when it starts.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();
     std::fs::create_dir(&checkpoint).unwrap();

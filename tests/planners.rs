@@ -11,7 +11,7 @@ use crate::support::{
 
 /// The planners to compare with.
 const BASELINES: [&str; 2] = ["wavefront", "bug"];
-/// In the way, known beforehand: the way around it is the same in every run.
+/// A drum in the way that is known beforehand, so the way around it is the same in every run.
 const DRUM: [&str; 6] = [
     "--set",
     "known.drum=[{at=[1.8, 0.1], radius_m=0.3}]",
@@ -42,7 +42,7 @@ fn a_mission_with_a_planner_of_its_own_arrives_though_the_planner_is_killed_on_t
         let set = planner(name);
         let arguments = [&DRUM[..], &["--pace", "4", "--set", &set]].concat();
         let mut run = Run::start(name, "open-room", &arguments);
-        // At 0.25 m/s it goes around the drum by then.
+        // At 0.25 m/s the robot is on the way around the drum by then.
         run.wait_until_under_way(6.0);
         run.kill_and_await_successor("planner", Signal::KILL);
         let summary = run.arrives();

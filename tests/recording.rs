@@ -56,7 +56,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     let report = replayed(&recording);
     assert_eq!(assert_all_equal(&report), 5);
     for stage in STAGES {
-        // On a loaded machine not every tick is answered.
+        // On a loaded machine some ticks may stay unanswered.
         let least = ticks.len() as u64 / 2;
         assert!(report.stages[stage].compared > least, "{report}");
     }
@@ -122,7 +122,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
     assert_nothing_left("rec-shot");
 }
 
-/// After a change that is meant, `.ci/renew` records it again.
+/// `.ci/renew` records the golden recording again after an intended change.
 #[test]
 fn the_golden_recording_replays_to_the_bit() {
     let report = replayed(&golden());

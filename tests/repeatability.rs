@@ -15,7 +15,7 @@ fn numbers(mut summary: Value) -> Value {
     summary
 }
 
-/// What a consumer receives of a run, and its summary.
+/// The samples that a consumer receives of a run, and the run's summary.
 #[derive(Debug)]
 struct Recording {
     /// Each sample, by topic and tick.
@@ -69,7 +69,7 @@ fn record(robot: &str) -> Recording {
         let over = !run.is_running();
         while let Ok(Some(part)) = grids.take() {
             grid.apply(&part.header().part, &part);
-            // After a part that was missed it holds nothing until the next keyframe.
+            // After a missed part the map is empty until the next keyframe.
             if grid.version() > 0 {
                 received.grids.insert(grid.version(), grid.cells().to_vec());
             }
@@ -167,7 +167,7 @@ fn a_mission_whose_robot_stalls_gives_the_same_summary_to_the_bit() {
 
 #[test]
 fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
-    // At this speed the mission has tens of thousands of ticks: seconds to be stopped in.
+    // At this speed the mission has tens of thousands of ticks, which take seconds. That is time enough to stop it.
     let slow = ["--set", "controller.speed_m_s=0.002", "--timeout", "20000"];
     let (_, undisturbed) = support::run("tick-calm", "open-room", &slow);
     let mut run = Run::start("tick-held", "open-room", &slow);

@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 const ROBOT: &str = "recreated";
 
-/// The next pose heard on `bus`; as the guide's consumer listens.
+/// The next pose on `bus`, received like the guide's consumer does.
 fn next_pose(bus: &Bus) -> PoseSample {
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut waiter = Waiter::default();
@@ -41,7 +41,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         for service in std::fs::read_dir(services).unwrap() {
             half_make(&service.unwrap().path());
         }
-        // Not one that has to do with poses: killed processes count as users of their topics.
+        // The link neither reads nor writes poses. A killed process still counts as a user of its topics.
         signal_process(pid(&status, "x80-link"), Signal::KILL);
         let began = Instant::now();
         while !old.is_replaced() {
@@ -49,7 +49,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
             run.status();
         }
         let new = loop {
-            // Between the two buses there is none.
+            // There may be no bus for a moment between the two.
             match Bus::join(&domain, "logger") {
                 Ok(new) => break new,
                 Err(error) => assert!(began.elapsed() < PATIENCE, "{error}"),
@@ -62,7 +62,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         drop((old_poses, old));
         let before = run.wait_until("all work", |status| status["order"] == "driving");
         let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
-        // One start, not two that were refused and a bus recreated once more.
+        // The stage must start once. If its start was refused twice, the bus would have been recreated once more.
         let generation = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
         for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
             assert_eq!(generation(&after, stage), generation(&before, stage) + more, "{stage}");

@@ -43,7 +43,7 @@ fn a_run_ends_with_a_report_of_every_figure_and_of_a_planner_that_was_killed() {
         }
     }
 
-    // The same from the file alone, which has no summary beside it.
+    // The report must be the same from the file alone, without a summary beside it.
     let alone = tempfile::tempdir().unwrap();
     let file = alone.path().join("drive.mcap");
     fs::copy(directory.path().join("run/recording.mcap"), &file).unwrap();

@@ -23,11 +23,11 @@ const SIZE: (usize, usize) = (24, 80);
 struct Screen {
     child: Child,
     terminal: Option<File>,
-    /// What was written to it.
+    /// The bytes that were written to it.
     written: Vec<u8>,
 }
 
-/// What is on a screen to which this was written: letters where the cursor was moved to. Colours are left out.
+/// The text on a screen to which `written` was written: each letter at the position of the cursor, without colours.
 fn shown(written: &[u8]) -> String {
     let mut letters = vec![vec![' '; SIZE.1]; SIZE.0];
     let (mut row, mut col) = (0, 0);
@@ -71,7 +71,7 @@ impl Screen {
         tcsetwinsize(&terminal, size).unwrap();
         let name = ptsname(&terminal, Vec::new()).unwrap().into_string().unwrap();
         let its = || File::options().read(true).write(true).open(&name).unwrap();
-        // With the terminal as the one that controls it, as from a shell.
+        // The terminal is the command's controlling terminal, as in a shell.
         let child = firsthand_under(&["setsid", "--ctty"], &["top", "--robot", robot])
             .stdin(its())
             .stdout(its())

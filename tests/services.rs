@@ -22,7 +22,7 @@ use crate::{
 use rustix::process::Signal;
 use tempfile::TempDir;
 
-/// What a unit would give as WatchdogSec.
+/// The value of WatchdogSec in a unit.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
 /// The socket where a service reports its state.
@@ -124,7 +124,7 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
     let mut run = command.spawn().unwrap();
     manager.hear_until("READY=1");
     signal_process(run.id(), Signal::STOP);
-    // What was said before it froze.
+    // These messages were sent before it froze.
     manager.socket.set_nonblocking(true).unwrap();
     let mut message = [0; 4096];
     while manager.socket.recv(&mut message).is_ok() {}
@@ -157,7 +157,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     let is_death = |line: &&str| line.contains("stage=\"mapper\"") && line.contains("cause=");
     let death = text.lines().find(is_death).unwrap();
     assert!(death.starts_with("<4>"), "{text}");
-    // Only the mission's title has no priority.
+    // The only line without a priority is the mission's title.
     let bare = text.lines().filter(|line| !line.starts_with('<'));
     assert_eq!(bare.count(), 1, "{text}");
     // The death is in the run directory, too, and stages, which log to files, put no priorities there.
@@ -197,7 +197,7 @@ impl Units {
     }
 }
 
-/// One process of a stage after another, until one ends in order or all is over. Returns how the last one ended.
+/// Start one process of a stage after another until one ends in order or `over` is set. Returns the exit code of the last one.
 fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
     loop {
         let mut append = std::fs::File::options();
@@ -361,7 +361,7 @@ fn a_service_goes_on_with_the_mission_of_a_supervisor_that_was_killed_just_now()
 #[test]
 fn a_service_does_not_begin_a_mission_anew_that_was_cut_off_long_ago_until_told_again() {
     let (runs, service) = killed_service("cut");
-    // As after a start of the machine: nothing says that it was a moment ago.
+    // After a start of the machine, nothing indicates that the save was a moment ago.
     let run = std::fs::read_dir(runs.path()).unwrap().next().unwrap();
     std::fs::remove_file(run.unwrap().path().join("supervisor.checkpoint")).unwrap();
     assert_eq!(service().output().unwrap().status.code(), Some(7));

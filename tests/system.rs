@@ -1,6 +1,7 @@
 //! The system tests: whole runs through real processes. Nothing here reaches inside a stage.
 //!
-//! One executable, since each takes long to link; `freezes`, which measures time, is one of its own, which runs alone.
+//! They are one executable, because each takes long to link. `freezes` is an executable of its own that runs alone, because it
+//! measures time.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod support;

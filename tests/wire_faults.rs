@@ -15,7 +15,7 @@ use common::wire::{
 };
 use serde_json::Value;
 
-/// From the first motion that shows a fault until the last command that moves.
+/// The longest time from the first motion that shows a fault to the last command that moves the robot.
 const BOUND: Duration = Duration::from_millis(1500);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ enum Fault {
     SameFrame,
     /// The right encoder stays at 0.
     DeadEncoder,
-    /// Both wheels count the other way.
+    /// The counts of both wheels have the wrong sign.
     Reversed,
     /// Other counts in every frame.
     Random,
@@ -95,7 +95,7 @@ impl FaultInjector {
         run.wait_until("it moves", |_| self.moved_for() > span);
     }
 
-    /// From the first command that moved to the last.
+    /// The time from the first command that moved the robot to the last.
     fn moved_for(&self) -> Duration {
         let shared = self.shared.lock().unwrap();
         match (shared.first_motion, shared.last_motion) {
@@ -121,7 +121,7 @@ impl Shared {
                     let now = Instant::now();
                     self.first_motion.get_or_insert(now);
                     self.last_motion = Some(now);
-                    // One motor is mounted the other way round.
+                    // One motor is mounted the other way round, so wheels with opposite targets drive straight.
                     self.drove |= motion.targets.of(0) != motion.targets.of(1);
                 }
                 if self.fault == Fault::IgnoresZero && motion.quantity == Quantity::Velocity {
@@ -204,8 +204,8 @@ fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_missio
         run.wait_until("it is suspected", cause_is("odometry implausible"));
         let moved = faults.moved_for();
         println!("{fault:?}: told to move for {} ms", moved.as_millis());
-        // Where both wheels count the other way, the look around can change sides with every tick: what is told then holds too
-        // briefly to be judged. The robot trembles where it stands.
+        // If the counts of both wheels have the wrong sign, the look around can change its direction with every tick. The commands are then
+        // too short to be judged, and the robot hardly moves.
         let trembles = matches!(fault, Fault::Reversed) && !faults.shared.lock().unwrap().drove;
         assert!(moved < BOUND || trembles, "{fault:?}: {moved:?}");
         let (code, summary) = run.finish();

@@ -23,7 +23,7 @@ struct Module {
     words: BTreeSet<String>,
 }
 
-/// What a path leads to.
+/// The target of a path.
 enum Target {
     Module(Names),
     Item(PathBuf),
@@ -106,7 +106,7 @@ pub(super) fn tokens(source: &str) -> Names {
     tokens
 }
 
-/// Where the bracket that opens at `open` is closed.
+/// The index of the bracket that closes the one at `open`.
 fn closing(tokens: &[String], open: usize) -> usize {
     let mut depth = 0;
     for (at, token) in tokens.iter().enumerate().skip(open) {
@@ -274,7 +274,7 @@ impl Crate {
         self.0.insert(name, module);
     }
 
-    /// Where `path`, written in the module `from`, leads; none when out of the crate.
+    /// The target of `path` in the module `from`; none if it is outside the crate.
     fn resolve(&self, from: &[String], path: &[String], depth: usize) -> Option<Target> {
         let (first, rest) = path.split_first()?;
         let mut here = match &**first {
@@ -300,7 +300,7 @@ impl Crate {
         Some(Target::Module(here))
     }
 
-    /// What `name` is in `module`.
+    /// The target of `name` in `module`.
     fn member(&self, module: &[String], name: &String, depth: usize) -> Option<Target> {
         let child = [module, std::slice::from_ref(name)].concat();
         let it = self.0.get(module)?;
@@ -321,7 +321,7 @@ impl Crate {
         }
     }
 
-    /// From each file to the files whose items it names.
+    /// The edges from each file to the files whose items it names.
     fn edges(&self) -> Edges<'_> {
         let mut edges = BTreeMap::<_, BTreeSet<_>>::new();
         for (name, module) in &self.0 {

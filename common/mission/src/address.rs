@@ -10,11 +10,11 @@ use std::{
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use thiserror::Error;
 
-/// How an address may be written, as a remedy.
+/// The valid forms of an address, for the remedy in errors.
 pub const FORMS: &str =
     "give \"host:port\", \"udp://host:port\", \"tcp://host:port\" or \"serial:///dev/ttyUSB0\"";
 
-/// Where a robot answers, and over which transport. `Host` is text in a mission and a number once it is resolved.
+/// The address and the transport of a robot. `Host` is text in a mission and a number once it is resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address<Host = SocketAddr> {
     /// Datagrams, the default: `host:port` or `udp://host:port`.
@@ -25,15 +25,15 @@ pub enum Address<Host = SocketAddr> {
     Serial(PathBuf),
 }
 
-/// Why text is no address, or its host cannot be found.
+/// The text is not an address, or its host cannot be found.
 #[derive(Debug, Error)]
 pub enum AddressError {
     /// It is not written as an address.
     #[error("{address:?} {problem}; {FORMS}")]
     Form {
-        /// As it was given.
+        /// The address in the mission.
         address: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: &'static str,
     },
     /// Its host is not known here.
@@ -41,9 +41,9 @@ pub enum AddressError {
         "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
     )]
     Host {
-        /// As it was given.
+        /// The address in the mission.
         address: String,
-        /// What the resolver reports.
+        /// The resolver's error.
         source: std::io::Error,
     },
 }
@@ -90,10 +90,7 @@ impl FromStr for Address<String> {
 }
 
 impl Address<String> {
-    /// With the host as a number. This asks the resolver, which may take its time.
-    ///
-    /// # Errors
-    /// When the host is not known.
+    /// Ask the resolver for the host's number, which may take seconds.
     pub fn resolve(&self) -> Result<Address, AddressError> {
         let number = |host: &String| {
             let unknown = |source| AddressError::Host { address: self.to_string(), source };

@@ -23,7 +23,7 @@ const MAX_BYTES: u64 = 8 << 20;
 
 fn read_bounded(path: &Path) -> io::Result<String> {
     let mut text = String::new();
-    // To open a pipe waits for who writes to it.
+    // Opening a pipe would wait for its writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("it is no regular file"));
     }
@@ -89,7 +89,7 @@ fn parse(text: &str, origin: &Path) -> Result<Mission, MissionError> {
     }
 }
 
-/// What goes by another name now, and what this robot does not do.
+/// Remarks about old names in a mission, and about requests that this robot cannot fulfil.
 fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> Vec<String> {
     let method = tree.get("method").and_then(|value| value.get_ref().as_str());
     let file = origin.display();

@@ -1,10 +1,10 @@
-//! Why a mission is refused.
+//! Errors of a mission file.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why a mission was refused.
+/// A mission was refused.
 #[derive(Debug, Error)]
 pub enum MissionError {
     /// The file cannot be read.
@@ -36,15 +36,15 @@ pub enum MissionError {
         line: usize,
         /// The key, dotted.
         key: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
 }
 
 impl MissionError {
-    /// The same without file and line, for a value that is not from the file.
+    /// The message without file and line, for a value that is not from the file.
     #[must_use]
     pub fn without_place(&self) -> String {
         match self {

@@ -5,7 +5,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// From which height to which something reaches, and how much of a sound comes back from it.
+/// The heights between which a shape extends, and the share of sound that it reflects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     /// Its lowest height above the floor, metres.
@@ -157,7 +157,7 @@ impl Shapes {
         self.drums.iter().map(Piece::Drum).chain(walls).chain(self.boxes.iter().map(Piece::Box))
     }
 
-    /// Those of which something is between two heights, metres: what a body of that extent can touch.
+    /// The shapes that have a part between two heights, metres. A body between these heights can touch them.
     #[must_use]
     pub fn between(&self, lower_m: f64, upper_m: f64) -> Self {
         let mut shapes = self.clone();
@@ -176,7 +176,7 @@ impl Shapes {
     }
 }
 
-/// One thing: a drum, a straight edge of a wall, a box.
+/// A single shape: a drum, a straight edge of a wall, or a box.
 #[derive(Clone, Copy, Debug)]
 pub enum Piece<'a> {
     /// A disc.

@@ -1,11 +1,11 @@
-//! Cells and metres: what is believed of a cell, windows of cells, and how the cells lie in the mission frame.
+//! Cells and metres: the state of a cell, windows of cells, and the position of the cells in the mission frame.
 
 use std::borrow::Cow;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// What is believed of a cell: (18), (19) and the a-priori map.
+/// The estimated state of a cell, by (18), (19) and the a-priori map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum CellState {
@@ -36,7 +36,7 @@ impl CellState {
         matches!(self, Self::Scanned | Self::Margin)
     }
 
-    /// The state a byte of the `grid` topic stands for; anything unheard of is a hazard.
+    /// The state for a byte of the `grid` topic; an unknown byte counts as a hazard.
     #[must_use]
     pub const fn from_byte(byte: u8) -> Self {
         match byte {
@@ -111,14 +111,14 @@ impl Window {
     }
 }
 
-/// How the N x N cells of the map lie in the mission frame: (19) with the origin at the centre.
+/// The position of the N x N cells of the map in the mission frame: (19) with the origin at the centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridFrame {
     /// N: cells along each side.
     pub cells: u32,
     /// Delta: the side of a cell, metres.
     pub resolution_m: f64,
-    /// Where the centre cell lies in the mission frame, metres.
+    /// The position of the centre cell in the mission frame, metres.
     pub centre: DVec2,
 }
 

@@ -7,9 +7,9 @@ use crate::kinematics::Pose2;
 /// Rangers of the ring.
 pub const RANGERS: usize = 7;
 
-/// Bearing of each ranger from the robot's axis, degrees counter-clockwise, and its distance from the robot's centre as a
-/// share of the body's radius. In the order of the frames, on which two independent drivers agree: from left to right in
-/// front, then right, rear, left. The side ones of an X80 sit 121 mm from the centre, the others at the rim.
+/// The bearing of each ranger from the robot's axis, degrees counter-clockwise, and its distance from the robot's centre as a share
+/// of the body's radius. The order is that of the frames, on which two independent drivers agree: from left to right in front, then
+/// right, rear, left. The rangers at the sides of an X80 are 121 mm from the centre, the others at the rim.
 const RING: [(f64, f64); RANGERS] = [
     (33.75, 1.0),
     (11.25, 1.0),
@@ -20,7 +20,7 @@ const RING: [(f64, f64); RANGERS] = [
     (90.0, 0.121 / 0.19),
 ];
 
-/// Where each ranger of a robot at `pose` with a body of `radius` metres is; its heading is where it looks.
+/// The poses of the rangers of a robot at `pose` with a body of `radius` metres. The heading is the direction of the ray.
 #[must_use]
 pub fn rangers(pose: Pose2, radius: f64) -> [Pose2; RANGERS] {
     RING.map(|(bearing_deg, share)| {

@@ -47,7 +47,7 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mission {
-    /// What it is called; the file's own name if it says nothing.
+    /// The name of the mission; by default the file's name.
     #[serde(default)]
     pub name: String,
     /// One line for `firsthand missions`.
@@ -55,16 +55,16 @@ pub struct Mission {
     pub description: String,
     /// X_T: where to go, metres.
     pub target: DVec2,
-    /// How the robot is brought there.
+    /// The method by which the robot is guided.
     #[serde(default)]
     pub method: Method,
-    /// Whether what the sonar gives is mapped. Without it the robot goes by [`Mission::known`] alone.
+    /// Whether readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
     #[serde(default = "defaults::sensing")]
     pub sensing: bool,
-    /// Which sensors are mapped.
+    /// The sensors whose readings go into the map.
     #[serde(default)]
     pub sensors: Sensors,
-    /// How near the target counts as reached, metres.
+    /// The distance within which the target counts as reached, metres.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
     /// Mission time after which the mission is given up, seconds.
@@ -73,7 +73,7 @@ pub struct Mission {
     /// Seed of everything random in the simulation.
     #[serde(default = "defaults::seed")]
     pub seed: u64,
-    /// How the robot stands at the start.
+    /// The robot's heading at the start.
     #[serde(default)]
     pub start: Start,
     /// Pi: where the robot may operate, and the grid laid over it.
@@ -85,48 +85,47 @@ pub struct Mission {
     /// The front ultrasonic sensor.
     #[serde(default)]
     pub sonar: SonarConfig,
-    /// From wheels to pose.
+    /// The values of dead reckoning, which turns wheel counts into the pose.
     #[serde(default)]
     pub dead_reckoning: DeadReckoning,
-    /// From ranges to hazard cells.
+    /// The values of the mapper, which turns ranges into hazard cells.
     #[serde(default)]
     pub mapper: Mapper,
-    /// From hazard cells to guidance.
+    /// The values of the planner, which turns hazard cells into guidance.
     #[serde(default)]
     pub planner: Planner,
-    /// From guidance to wheel speeds.
+    /// The values of the controller, which turns guidance into wheel speeds.
     #[serde(default)]
     pub controller: Controller,
-    /// What is known of the place beforehand.
+    /// The shapes that the robot knows beforehand.
     #[serde(default, skip_serializing_if = "Shapes::is_empty")]
     pub known: Shapes,
-    /// What really stands there; only the simulator reads it.
+    /// The shapes that really exist. Only the simulator reads them.
     #[serde(default, skip_serializing_if = "Shapes::is_empty")]
     pub world: Shapes,
-    /// How the simulated robot behaves.
+    /// The behaviour of the simulated robot.
     #[serde(default)]
     pub simulation: Simulation,
-    /// What its reader should know of a file that is valid, a line each: keys or values that go by another name now, what
-    /// the robot cannot do.
+    /// Remarks about a valid file, one line each: keys or values that have a new name now, and requests that the robot cannot fulfil.
     #[serde(skip)]
     pub remarks: Vec<String>,
 }
 
-/// How the robot is brought to its target.
+/// The method by which the robot is guided to its target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// It looks before it goes: evidence for and against hazard, ground that was swept, speed that fits
+    /// The robot looks before it drives: evidence for and against hazards, scanned ground, a speed that fits
     /// what is known of the way ahead.
     #[default]
-    #[serde(alias = "careful")] // Its name before; [`Mission::remarks`] says so.
+    #[serde(alias = "careful")] // This was its name before; a remark says so.
     Evidential,
-    /// As printed: every hit is a hazard with its margin, (19), the map only grows, (10), the robot goes
-    /// where the field points, (15), (16).
+    /// The paper's method: every hit is a hazard with its margin, (19), the map only grows, (10), and the robot drives in the direction
+    /// of the field, (15), (16).
     Paper,
 }
 
-/// Which sensors the mapper takes into the evidence. The paper's method has the front sonar alone.
+/// The sensors whose readings the mapper uses as evidence. The paper's method uses only the front sonar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sensors {
     /// The front sonar.
@@ -138,7 +137,7 @@ pub enum Sensors {
     FrontInfrared,
 }
 
-/// How the robot stands at the start.
+/// The robot's heading at the start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Start {
@@ -152,8 +151,8 @@ pub struct Start {
 pub struct Perimeter {
     /// D: side of the square, metres.
     pub width_m: f64,
-    /// N: cells along each side. Without it cells have 0.05 m for a robot that looks first ([`Mission::looks_first`]),
-    /// a quarter of the X80's body, else 0.1 m: [`Mission::grid_frame`].
+    /// N, the number of cells along each side. By default a cell has 0.05 m, a quarter of the X80's body, for a robot that looks first
+    /// ([`Mission::looks_first`]), and 0.1 m for others: see [`Mission::grid_frame`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cells: Option<u32>,
     /// Centre of the square, metres.
@@ -166,7 +165,7 @@ impl Perimeter {
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
-/// How wheel counts become a pose.
+/// The values of dead reckoning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeadReckoning {
@@ -181,7 +180,7 @@ pub struct DeadReckoning {
 }
 
 impl Default for DeadReckoning {
-    /// What the simulation gives a robot in `measured` realism.
+    /// The errors of the simulated robot in `measured` realism.
     fn default() -> Self {
         let wheels = simulation::WheelKeys::default().over(Realism::Measured);
         Self {
@@ -204,7 +203,7 @@ pub enum Integration {
     Euler,
 }
 
-/// How range samples become hazard cells.
+/// The values of the mapper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mapper {
@@ -218,7 +217,7 @@ pub struct Mapper {
     pub map_within_m: Option<f64>,
 }
 
-/// Which planner, and how its field is posed.
+/// The planner's executable, and the values of its field.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
@@ -234,12 +233,11 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// What the evidential method takes where a mission says nothing: short enough that the field keeps
-    /// heading for a gap that an echo narrows.
+    /// The screening length of the evidential method by default. It is so short that the field still leads to a gap that an echo narrows.
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
-/// How guidance becomes wheel speeds, (14)-(17).
+/// The values of the controller, (14)-(17).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Controller {
@@ -248,8 +246,8 @@ pub struct Controller {
     pub speed_m_s: Option<f64>,
     /// wd: the most turn rate asked for, rad/s.
     pub turn_rad_s: f64,
-    /// The evidential method: the most turn rate on the spot, rad/s. At 2.0 a sonar of 7 Hz looks every 16 degrees, and
-    /// hears all of its cone of 15 degrees to either side nearly twice.
+    /// The greatest turn rate on the spot of the evidential method, rad/s. At 2.0 a sonar of 7 Hz measures every 16 degrees, so its cone
+    /// of 15 degrees to either side covers each direction nearly twice.
     pub look_rad_s: f64,
     /// Rc: where slowing down before the target begins, metres.
     pub slow_radius_m: f64,
@@ -321,8 +319,8 @@ impl Mission {
         (cells - 1e-6).ceil().max(0.0) as u32
     }
 
-    /// Whether the robot turns to look before it goes somewhere: by the evidential method, if it senses,
-    /// can turn on the spot, and no other planner leads it. Then it stops within what it has seen, and defaults are bolder.
+    /// Whether the robot turns to look before it drives in a direction. It does so with the evidential method if it senses, can turn on
+    /// the spot, and has no other planner. It can then stop within scanned ground, so its defaults are faster.
     #[must_use]
     pub fn looks_first(&self) -> bool {
         self.method == Method::Evidential
@@ -343,8 +341,8 @@ impl Mission {
         self.controller.speed_m_s.unwrap_or(default)
     }
 
-    /// How far hits are mapped, metres: `mapper.map_within_m`, or by default 0.6 for a robot that looks first, else 1.0.
-    /// Farther out the arc of an echo is wider than the gaps it would close.
+    /// The greatest distance of mapped hits, metres: `mapper.map_within_m`, by default 0.6 for a robot that looks first and 1.0 for
+    /// others. Farther out the arc of an echo is wider than the gaps that it would close.
     #[must_use]
     pub fn map_within_m(&self) -> f64 {
         let default = if self.looks_first() { 0.6 } else { 1.0 };
@@ -372,7 +370,7 @@ impl Mission {
         Pose2 { position: DVec2::ZERO, heading: self.start.heading_deg.to_radians() }
     }
 
-    /// What of the world the robot's body can touch; the rest it passes under or over.
+    /// The shapes of the world that the robot's body can touch. The others are above or below it.
     #[must_use]
     pub fn obstacles(&self) -> Shapes {
         self.simulation.physics().heights.touched(&self.world)

@@ -19,7 +19,7 @@ pub enum Model {
     Car,
 }
 
-/// One wheel's channel on the motor board, or that of a car's steering.
+/// A channel of the motor board: a wheel's, or that of a car's steering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
@@ -35,8 +35,7 @@ pub struct Channel {
 pub struct RobotConfig {
     /// Preset that gives what is not said.
     pub model: Model,
-    /// Where a real robot answers, in one of the forms of [`crate::address::Address`]; without it a
-    /// simulated one is started.
+    /// The address of a real robot, in one of the forms of [`crate::address::Address`]. Without it a simulated robot is started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
     /// Ticks a second the robot's sensors come at.
@@ -53,7 +52,7 @@ pub struct RobotConfig {
     /// The most it steers to either side, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steering_limit_deg: Option<f64>,
-    /// How fast it steers, degrees a second.
+    /// The rate of its steering, degrees a second.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steering_rate_deg_s: Option<f64>,
     /// Encoder counts of a whole turn of the steering; 0 counts are straight ahead.
@@ -78,18 +77,17 @@ pub struct RobotConfig {
     pub low_battery_v: BatteryLimits,
 }
 
-/// The voltages below which the batteries are low, volts; 0 is never. The X80's packs are six NiMH cells,
-/// 7.2 V: at 1.1 V a cell nine tenths of the charge are gone, and what follows goes within minutes.
-/// With a low board or motor battery the robot goes at half speed; with one below 10/11 of this for 2 s, 1.0 V
-/// a cell, its mission ends.
+/// The voltages below which the batteries are low, volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells,
+/// 7.2 V: at 1.1 V a cell nine tenths of the charge are used, and the rest lasts for minutes. With a low board or motor battery the
+/// robot drives at half speed. If one of them is below 10/11 of its limit for 2 s, which is 1.0 V a cell, the mission ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BatteryLimits {
-    /// Of the boards' battery.
+    /// The limit of the boards' battery.
     pub board: f64,
-    /// Of the motors' battery.
+    /// The limit of the motors' battery.
     pub motor: f64,
-    /// Of the servos' battery.
+    /// The limit of the servos' battery.
     pub servo: f64,
 }
 
@@ -135,18 +133,18 @@ pub struct Body {
     pub radius_m: f64,
     /// The most either wheel's rim can do, m/s.
     pub top_speed_m_s: f64,
-    /// Of a car; none of a robot with two driven wheels.
+    /// The steering of a car; none for a robot with two driven wheels.
     pub steering: Option<Steering>,
 }
 
-/// How a car steers.
+/// The steering of a car.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steering {
     /// L, metres.
     pub wheelbase_m: f64,
     /// The most it steers to either side, radians.
     pub limit_rad: f64,
-    /// How fast, rad/s.
+    /// The rate of the steering, rad/s.
     pub rate_rad_s: f64,
     /// Encoder counts of a whole turn of the steering.
     pub counts_per_turn: f64,
@@ -166,7 +164,7 @@ impl Steering {
     }
 }
 
-/// Where a car is asked to turn without the speed for it, it drives at this speed, m/s.
+/// A car that is commanded to turn at a lower speed drives at this speed, m/s.
 const CREEP_M_S: f64 = 0.1;
 
 impl Body {
@@ -276,7 +274,7 @@ pub struct SonarConfig {
 }
 
 impl SonarConfig {
-    /// How it is mounted.
+    /// Its mounting.
     #[must_use]
     pub fn mount(&self) -> Mount {
         Mount { forward_m: self.forward_m, bearing_rad: self.bearing_deg.to_radians() }

@@ -1,8 +1,7 @@
-//! How the simulated robot behaves: its sensors, wheels and radio, and what moves around it.
+//! The behaviour of the simulated robot: its sensors, wheels and radio, and the obstacles that move around it.
 //!
-//! Every number has two presets. `realism = "laboratory"`, the default, is a good day: rough surfaces,
-//! a prompt speed loop, a perfect radio. `realism = "measured"` has the values seen on real robots.
-//! A key that a mission writes overrides its preset.
+//! Every number has two presets. `realism = "laboratory"`, the default, is ideal: rough surfaces, a prompt speed loop, a perfect
+//! radio. `realism = "measured"` has the values of real robots. A key in a mission overrides its preset.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -17,7 +16,7 @@ pub struct Simulation {
     pub realism: Realism,
     /// Whether timed commands last as if they had no time, as one real robot's are said to.
     pub ignores_time: bool,
-    /// After how much silence of the host the motors stop, seconds; without it they never do.
+    /// The silence of the host after which the motors stop, seconds. By default they never do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stops_when_silent_s: Option<f64>,
     /// The ultrasonic rangers' physics.
@@ -26,7 +25,7 @@ pub struct Simulation {
     pub infrared: InfraredKeys,
     /// The wheels' speed loops.
     pub wheels: WheelKeys,
-    /// At which heights the body and its sensors are.
+    /// The heights of the body and its sensors.
     pub heights: HeightKeys,
     /// The batteries.
     pub battery: BatteryKeys,
@@ -40,14 +39,14 @@ pub struct Simulation {
     pub things: Vec<Thing>,
 }
 
-/// How far from ideal the simulated robot is.
+/// The preset of the simulated robot's errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Realism {
     /// A good day in the laboratory.
     #[default]
     Laboratory,
-    /// What was measured on real robots; the radio stays perfect unless it is written.
+    /// The errors were measured on real robots. The radio is perfect unless the mission says otherwise.
     Measured,
 }
 
@@ -67,26 +66,26 @@ pub struct Ranger {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thing {
-    /// What it is, where it stands before any move.
+    /// Its shape, at its position before any move.
     pub shape: Shapes,
-    /// When it appears, seconds; it waits until it would not stand in the robot.
+    /// The time when it appears, seconds. It appears later if the robot is in its place.
     #[serde(default)]
     pub from_s: f64,
-    /// When it vanishes, seconds; without it, never.
+    /// The time when it disappears, seconds; by default never.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
-    /// Where it is when, in order of time; in a straight line between.
+    /// Its positions in order of time. It moves in a straight line between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<Move>,
 }
 
-/// Where a thing is at a time.
+/// The position of a moving shape at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Move {
     /// Mission time, seconds.
     pub at_s: f64,
-    /// How far from where its shape says, metres.
+    /// The displacement from the position of the shape, metres.
     pub by: DVec2,
 }
 
@@ -98,8 +97,8 @@ pub(super) struct OutOfRange {
     pub(super) range: std::ops::RangeInclusive<f64>,
 }
 
-/// One table of keys makes two structs: the settled one that the simulator reads, and the written one
-/// whose keys may all be missing. Columns: key, range, laboratory, measured.
+/// Makes two structs from one table of keys: the settled one that the simulator reads, and the written one, whose keys may all be
+/// missing. The columns of the table are key, range, laboratory, measured.
 macro_rules! section {
     (
         $(#[$about:meta])*
@@ -146,7 +145,7 @@ macro_rules! section {
         }
 
         impl $written {
-            /// What is written, and the preset for the rest.
+            /// The written values, and the preset for the others.
             #[must_use]
             pub fn over(&self, realism: Realism) -> $settled {
                 let preset = $settled::preset(realism);
@@ -169,21 +168,21 @@ section! {
         noise_per_m in 0.0..=1.0 => 0.005, 0.005;
         /// Greatest angle between beam and normal at which a wall answers, degrees; 90 is a rough wall.
         wall_limit_deg in 0.0..=90.0 => 90.0, 22.5;
-        /// The same for drums, which answer over a wider angle.
+        /// The angle for drums, which reflect over a wider angle.
         drum_limit_deg in 0.0..=90.0 => 90.0, 50.0;
         /// Share of pings that an edge answers when its wall does not.
         edge_share in 0.0..=1.0 => 0.0, 0.5;
         /// Farthest an edge answers, metres.
         edge_reach_m in 0.0..=2.55 => 1.2, 1.2;
-        /// Share of pings at a wall too oblique to answer that come back by a second wall.
+        /// Share of pings at a wall too oblique to answer whose echo comes back by a second wall.
         multipath_share in 0.0..=1.0 => 0.0, 0.3;
         /// Share of answers lost one by one.
         dropout_share in 0.0..=1.0 => 0.0, 0.0;
-        /// The same where the answer is weak: near the limits, and from edges.
+        /// The dropout share of weak echoes, which come from near the limits and from edges.
         weak_dropout_share in 0.0..=1.0 => 0.0, 0.1;
-        /// Share of pings answered short by nothing at all.
+        /// Share of pings with a false echo from a shorter distance.
         false_echo_share in 0.0..=1.0 => 0.0, 0.005;
-        /// Share of pings that hear a neighbour's answer.
+        /// Share of pings that receive a neighbour's echo.
         crosstalk_share in 0.0..=1.0 => 0.0, 0.005;
         /// Share of the readings in which a ranger hears nothing, whatever stands there: runs of silence, each ranger's
         /// for itself (a two-state model, E. N. Gilbert 1960). 2 % has been seen on X80s.
@@ -196,12 +195,12 @@ section! {
         /// the 1,402 readings that are echoes of 2.55 m at most or one of these. Without the limit of 0.5 m there is a
         /// fifth, of 17 (2.1 % in all). The longer ones, up to 142, look out into the corridor: geometry makes those.
         silence_mean_s in 0.001..=60.0 => 0.7, 0.7;
-        /// How long before the wheel counts of the same tick a range was measured, seconds; a tick at most. A range that was
-        /// taken at any moment between two ticks of 7 Hz is half a period old on average: nominal, not measured.
+        /// The time from the measurement of a range to the wheel counts of the same tick, seconds, at most a tick. A range that was measured
+        /// at any moment between two ticks of 7 Hz is half a period old on average. This value is nominal, not measured.
         age_s in 0.0..=1.0 => 0.0, 0.07;
-        /// How far a post 3 cm in diameter is heard on the axis, metres. All other echoes follow: see
-        /// `x80_sim::sonar`. Devantech's technical page of the SRF04, another ranger at 40 kHz, gives "more than 2 m" for a
-        /// broom handle of 3 cm; nobody has measured the X80's.
+        /// The greatest distance at which a post 3 cm in diameter is detected on the axis, metres. All other echoes follow from it: see
+        /// `x80_sim::sonar`. Devantech's technical page of the SRF04, another ranger at 40 kHz, gives "more than 2 m" for a broom handle of
+        /// 3 cm. The X80's ranger was not measured.
         post_reach_m in 0.05..=10.0 => 2.55, 2.0;
     }
 }
@@ -252,12 +251,12 @@ section! {
 }
 
 section! {
-    /// At which heights above the floor the body and its sensors are, the same in both presets. The X80's drawing gives
-    /// none: nominal values. They matter where a shape of the world has `bottom_m` or `top_m`.
+    /// The heights of the body and its sensors above the floor, equal in both presets. They are nominal, because the X80's drawing gives
+    /// none. They matter for shapes of the world that have `bottom_m` or `top_m`.
     Heights, written as HeightKeys in "simulation.heights" {
-        /// What is lower passes under the body, metres.
+        /// Shapes below this height pass under the body, metres.
         ground_clearance_m in 0.0..=5.0 => 0.03, 0.03;
-        /// What is higher passes over it, metres.
+        /// Shapes above this height pass over the body, metres.
         body_top_m in 0.01..=5.0 => 0.255, 0.255;
         /// The ultrasonic rangers, metres.
         sonar_m in 0.0..=5.0 => 0.18, 0.18;
@@ -303,7 +302,7 @@ section! {
 }
 
 impl Heights {
-    /// Those of `shapes` that the body can touch.
+    /// The shapes that the body can touch.
     #[must_use]
     pub fn touched(&self, shapes: &Shapes) -> Shapes {
         shapes.between(self.ground_clearance_m, self.body_top_m)
@@ -328,7 +327,7 @@ pub struct Physics {
 }
 
 impl Simulation {
-    /// What is written, and the preset for the rest.
+    /// The written values, and the preset for the others.
     #[must_use]
     pub fn physics(&self) -> Physics {
         Physics {

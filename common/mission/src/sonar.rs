@@ -1,5 +1,4 @@
-//! THE mounting of an ultrasonic ranger, (19): where on the robot it is and which way it looks, for simulator and mapper
-//! alike.
+//! THE mounting of an ultrasonic ranger, (19): its position and direction on the robot, for simulator and mapper.
 //!
 //! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. So the ranger is on that line: at
 //! bearing delta from the robot's axis, W/2 from the centre, looking outward.
@@ -8,7 +7,7 @@ use glam::DVec2;
 
 use crate::kinematics::Pose2;
 
-/// How a ranger is mounted, looking outward.
+/// The mounting of a ranger that looks outward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mount {
     /// Distance from the robot's centre along the bearing, metres; the paper writes W/2.
@@ -18,7 +17,7 @@ pub struct Mount {
 }
 
 impl Mount {
-    /// Where the ranger of a robot at `robot` is; its heading is where it looks.
+    /// The pose of the ranger of a robot at `robot`. The heading is the direction of the beam.
     #[must_use]
     pub fn on(&self, robot: Pose2) -> Pose2 {
         let heading = robot.heading + self.bearing_rad;

@@ -1,4 +1,4 @@
-//! What must hold for any bytes whatever. Shared by the fuzz target and by the plain test that runs the corpus.
+//! The properties of the decoder for all inputs. The fuzz target and the test that runs the corpus share them.
 
 use x80_protocol::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report};
 
@@ -48,7 +48,7 @@ fn drain(decoder: &mut Decoder) {
     }
 }
 
-/// What was understood is written and read once more.
+/// Assert that a decoded message is the same after it was encoded and decoded again.
 fn again(write: impl Fn(&mut Vec<u8>), same: impl Fn(&Frame<'_>)) {
     let mut bytes = Vec::new();
     write(&mut bytes);

@@ -9,14 +9,14 @@ use super::{
 
 /// Channels of the motor board. The wheels are on two of them.
 pub const CHANNELS: usize = 6;
-/// "Leave this channel alone" as it is sent.
+/// The value for a channel that a command does not change.
 const ALONE: i16 = i16::MIN;
-/// The same as one client sends it.
+/// The value that one client sends for such a channel.
 const ALSO_ALONE: i16 = i16::MIN + 1;
-/// Stands before the time of a timed command.
+/// The byte before the time limit of a command.
 const TIME_FOLLOWS: u8 = 28;
 
-/// What a motion command sets.
+/// The quantity that a motion command sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Counts, cyclic 0..32767 with an encoder as feedback.
@@ -27,10 +27,10 @@ pub enum Quantity {
     Velocity,
 }
 
-/// Which channels a motion command sets, and to what.
+/// The channels that a motion command sets, and their values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Targets {
-    /// One channel, 0 to 5.
+    /// A single channel, 0 to 5.
     One {
         /// The channel.
         channel: u8,
@@ -55,18 +55,18 @@ impl Targets {
 /// A motion command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
-    /// What it sets.
+    /// The quantity that it sets.
     pub quantity: Quantity,
-    /// Where, and to what.
+    /// The channels and their values.
     pub targets: Targets,
-    /// After how long it ends, milliseconds; without it, it lasts. Not every robot obeys.
+    /// The time after which the motion ends, milliseconds; none if it does not end. Not all robots respect it.
     pub limit_ms: Option<u16>,
 }
 
-/// What a channel's loop measures itself by.
+/// The sensor from which a channel's loop gets its feedback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Feedback {
-    /// One potentiometer.
+    /// A single potentiometer.
     #[default]
     OnePot,
     /// Two potentiometers.
@@ -75,10 +75,10 @@ pub enum Feedback {
     Encoder,
 }
 
-/// What a channel's loop controls.
+/// The quantity that a channel's loop controls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// Nothing: the pulse width is given.
+    /// The pulse width, without a loop.
     #[default]
     Pwm,
     /// Position.
@@ -105,9 +105,9 @@ pub enum Parameter {
     PositionPid(Gains),
     /// Gains of the velocity loop.
     VelocityPid(Gains),
-    /// What the loop measures itself by.
+    /// The sensor that gives the loop's feedback.
     Feedback(Feedback),
-    /// What the loop controls.
+    /// The quantity that the loop controls.
     Mode(Mode),
     /// Polarity, bumper protection and whatever else: taken, and nothing done.
     Other {
@@ -129,7 +129,7 @@ pub enum Stream {
     All,
 }
 
-/// What to do with a stream.
+/// A request about a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Send for ever.
@@ -149,21 +149,21 @@ pub enum Command {
     Parameter {
         /// 0 to 5.
         channel: u8,
-        /// Which, and to what.
+        /// The parameter and its value.
         parameter: Parameter,
     },
     /// Let motors run, or suspend them.
     Enable {
         /// Whether they may run.
         on: bool,
-        /// One channel; all without it.
+        /// The channel; none for all channels.
         channel: Option<u8>,
     },
     /// Start or stop a sensor stream.
     Stream {
-        /// Which.
+        /// The stream.
         stream: Stream,
-        /// What to do with it.
+        /// The request.
         request: Request,
     },
     /// Ping or acknowledge.

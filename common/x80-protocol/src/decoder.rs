@@ -1,8 +1,8 @@
-//! Bytes to frames: the bytes may come in any pieces, with noise between frames and with bad CRCs.
+//! The decoder turns bytes into frames. The bytes may come in any pieces, with noise between frames and with wrong CRCs.
 //!
-//! A frame is found by its header, LEN and CRC; its end bytes are looked at only where CRC-8 alone is
-//! too weak. One noisy header in 256 passes the CRC, and the good frames behind it would be taken for its
-//! data, so a frame with wrong end bytes is accepted only if no frame with right ones begins inside it.
+//! A frame is found by its header, LEN and CRC. Its end bytes are checked only where CRC-8 alone is too weak: one noisy header in
+//! 256 passes the CRC, and the good frames after it would count as its data. So a frame with wrong end bytes is accepted only if no
+//! frame with right end bytes begins inside it.
 
 use super::{
     crc::crc8,
@@ -40,23 +40,23 @@ pub struct Decoder {
     tally: DecoderTally,
 }
 
-/// What stands at a header.
+/// The bytes at a header.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Candidate {
-    /// LEN data bytes and a right CRC; `end` is the offset behind the CRC.
+    /// A frame with LEN data bytes and a right CRC; `end` is the offset after the CRC.
     Sound { end: usize, ending: Ending },
-    /// The rest of it has not come; it claims `len` data bytes, if that much has.
+    /// An incomplete frame; `len` is the number of data bytes that it announces, as far as it came.
     Half { len: usize },
     /// The CRC is wrong.
     Broken,
 }
 
-/// What follows a CRC.
+/// The bytes after a CRC.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ending {
     /// `5E 0D`, or the `5E 13` that one client sends.
     Right,
-    /// Something else, or so far only the beginning of a right one.
+    /// Other bytes, or only the beginning of right end bytes so far.
     Wrong,
     Missing,
 }
@@ -96,7 +96,7 @@ impl Decoder {
                         self.tally.bad_crc += 1;
                         self.skip(noise + at);
                     }
-                    // What comes next tells which of the two it is.
+                    // The next bytes show which of the two it is.
                     Inside::Frame(_) | Inside::Unknown => {
                         self.skip(noise);
                         return None;
@@ -113,7 +113,7 @@ impl Decoder {
                     };
                     self.skip(at);
                 }
-                // Only the header is skipped: the frame behind a bad one may begin inside it.
+                // Only the header is skipped, because the next frame may begin inside the broken one.
                 Candidate::Broken => {
                     self.tally.bad_crc += 1;
                     self.skip(noise + 1);
@@ -181,17 +181,17 @@ fn is_end(bytes: &[u8]) -> Ending {
     }
 }
 
-/// What begins inside a frame whose end bytes are not right.
+/// The first frame that begins inside a frame with wrong end bytes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
     Nothing,
     /// A sound frame with right end bytes, at this offset.
     Frame(usize),
-    /// A header, or the first byte of one, whose frame has not come whole.
+    /// A header, or the first byte of one, of an incomplete frame.
     Unknown,
 }
 
-/// Look behind the start of `bytes` and before `end`.
+/// Search for a frame that begins after the start of `bytes` and before `end`.
 fn inside(bytes: &[u8], end: usize) -> Inside {
     let mut found = Inside::Nothing;
     for at in 1..end.min(bytes.len()) {

@@ -1,4 +1,4 @@
-//! One frame, and who it is addressed to.
+//! A frame and its addressing.
 
 use thiserror::Error;
 
@@ -13,7 +13,7 @@ pub(super) const BEFORE_DATA: usize = 6;
 /// The longest frame there can be: 255 data bytes with all that surrounds them.
 pub const MAX_FRAME_BYTES: usize = BEFORE_DATA + 255 + 1 + END.len();
 
-/// How robot and host are numbered on this wire. One answers in the form one is addressed in.
+/// The numbering of robot and host on the wire. A receiver answers in the form in which it was addressed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Addressing {
     /// Host 00, motion board 01, multimedia board 08: most robots.
@@ -72,11 +72,11 @@ impl Addressing {
 /// A frame whose CRC was right, or one about to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Who is addressed.
+    /// The addressed device.
     pub rid: u8,
     /// Serial number; everybody sends 0.
     pub sn: u8,
-    /// What the data mean: [`did`].
+    /// The meaning of the data: [`did`].
     pub did: u8,
     /// The data, at most 255 bytes.
     pub data: &'a [u8],
@@ -96,7 +96,7 @@ impl Frame<'_> {
     }
 }
 
-/// What both sides send with DID 255.
+/// The signals that both sides send with DID 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SystemSignal {
     /// 0: are you there?
@@ -123,7 +123,7 @@ impl SystemSignal {
     }
 }
 
-/// Why a frame with a right CRC is no known message. None of these is a reason to stop receiving.
+/// A frame with a right CRC is not a known message. The receiver can continue after any of these errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum MessageError {
     /// Its DID is not in the table.
@@ -147,7 +147,7 @@ pub enum MessageError {
     Value {
         /// The DID.
         did: u8,
-        /// What the byte should have been.
+        /// The expected value of the byte.
         what: &'static str,
         /// The byte.
         value: u8,

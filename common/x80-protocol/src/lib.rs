@@ -4,13 +4,13 @@
 //! 5E 02 | RID | SN | DID | LEN | DATA[LEN] | CRC | 5E 0D
 //! ```
 //!
-//! Little-endian, nothing is escaped. CRC is CRC-8/MAXIM-DOW over RID to the last data byte. RID says
-//! who is addressed, DID what the data mean:
+//! Numbers are little-endian, and nothing is escaped. CRC is CRC-8/MAXIM-DOW over RID to the last data byte. RID is the addressed
+//! device, DID the meaning of the data:
 //!
 //! | DID | host to robot ([`Command`]) | robot to host ([`Report`]) |
 //! |---|---|---|
 //! | 3 / 5 / 26 | position / PWM / velocity of one channel | |
-//! | 4 / 6 / 27 | the same, six channels at once | |
+//! | 4 / 6 / 27 | position / PWM / velocity of six channels at once | |
 //! | 7 | a parameter | |
 //! | 30 | enable motors | |
 //! | 123 | start or stop the motor stream | wheel counts and speeds |
@@ -19,8 +19,8 @@
 //! | 127 | start or stop all three | |
 //! | 255 | ping, acknowledge | ping, acknowledge |
 //!
-//! There is no official document. What is written here comes from the vendor's manual and from
-//! drivers that are in use, so everything is sent in the commonest form and accepted in any of them.
+//! There is no official document. This description comes from the vendor's manual and from drivers that are in use, so every message
+//! is sent in the commonest form and accepted in all forms.
 //!
 //! ```
 //! use x80_protocol::{Addressing, Command, Decoder, Report, SystemSignal};

@@ -1,4 +1,4 @@
-//! What the three sensor frames carry.
+//! The contents of the three sensor frames.
 
 use super::{
     did,
@@ -8,7 +8,7 @@ use super::{
 /// Encoder counts run 0..32767 and begin again.
 pub const COUNT_CYCLE: u16 = 32_768;
 
-/// One wheel's encoder.
+/// The encoder of a wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Encoder {
     /// Counts, cyclic below [`COUNT_CYCLE`]; growing in the channel's positive direction.
@@ -43,14 +43,14 @@ pub fn counts_between(old: u16, new: u16) -> i32 {
     if ahead >= cycle / 2 { ahead - cycle } else { ahead }
 }
 
-/// A robot that has just booted stands: its counts are this near to 0.
+/// The counts of a robot that has just booted are this near to 0, because it stands.
 const BOOTED_WITHIN: i32 = 4;
-/// A step to there that is no longer than this is not worth telling from motion: 14 mm of an X80.
+/// A step that is no longer than this counts as motion. It is 14 mm for an X80.
 const NOT_WORTH_TELLING: i32 = 32;
 
-/// Whether the counts of both wheels look as if the robot booted between `old` and `new`: they stand where
-/// a robot begins, and stood elsewhere. One that drove back to its start looks the same, so this is for
-/// those who have not seen it on the way.
+/// Whether the counts of both wheels indicate that the robot booted between `old` and `new`: the new counts are near the start value
+/// of a booted robot, and the old ones are not. A robot that drove back to its start gives the same counts, so a caller that received
+/// frames in between needs further evidence.
 #[must_use]
 pub fn counts_restarted(old: [u16; 2], new: [u16; 2]) -> bool {
     let at_start = new.iter().all(|&count| counts_between(0, count).abs() <= BOOTED_WITHIN);

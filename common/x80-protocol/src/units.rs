@@ -1,6 +1,6 @@
 //! Bytes and AD counts in metres and volts.
 
-/// What an ultrasonic byte says.
+/// The meaning of an ultrasonic byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Echo {
     /// 1..4: something 4 cm away or nearer.
@@ -12,7 +12,7 @@ pub enum Echo {
 }
 
 impl Echo {
-    /// What `byte` says; 0 is no reading.
+    /// The echo of `byte`; none for 0, which is no reading.
     #[must_use]
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match byte {

@@ -20,8 +20,8 @@ const TURN_GAIN: f64 = 3.0;
 /// A robot farther than this from its target has not arrived beside it, whatever the planner says, metres.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
-/// How the robot stands to the guidance: (14), with the heading in place of the measured velocity, which
-/// is undefined at rest, where every mission starts.
+/// The alignment of the robot with the guidance: (14), with the heading in place of the measured velocity. The velocity has no
+/// direction at rest, where every mission starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
     /// eta_d: cosine of the angle to the guidance.
@@ -37,7 +37,7 @@ impl Alignment {
     }
 }
 
-/// How alignment becomes speed.
+/// The speed as a function of the alignment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SpeedLaw {
     /// The paper's (16): the robot drives while it turns.
@@ -62,7 +62,7 @@ pub struct Controller {
     /// Whether alignment slows the robot by the paper's law.
     modulated: bool,
     law: SpeedLaw,
-    /// Which way an antipodal robot turns: 1 to the left, -1 to the right.
+    /// The direction in which an antipodal robot turns: 1 to the left, -1 to the right.
     side: f64,
     arrived: bool,
 }
@@ -70,7 +70,7 @@ pub struct Controller {
 impl Step for Controller {
     type Input<'a> = &'a GuidanceSample;
     type Output = CommandSample;
-    /// None: a robot that arrived is at the target for its next controller, too.
+    /// The controller has no state. A robot that arrived is at the target for its next controller too.
     type State = ();
 
     fn new(mission: &Mission) -> Self {
@@ -108,8 +108,8 @@ impl Step for Controller {
     fn step(&mut self, guidance: &GuidanceSample, _: MissionTime) -> CommandSample {
         let pose = guidance.pose();
         let distance = pose.position.distance(self.target);
-        // Latched: a robot at rest on the edge of the circle must not start again over a count.
-        // So does one beside a target that is not free, where the planner says that it is as near as it can be.
+        // The arrival is latched, so that a robot at rest on the edge of the circle does not start again because of one count. A robot
+        // beside a target that is not free has arrived too, if the planner says that it is as near as it can be.
         let status = GuidanceStatus::from_byte(guidance.status);
         self.arrived |= distance <= self.tolerance
             || status == GuidanceStatus::AtTarget && distance <= MOST_OFF_TARGET_M;
@@ -148,7 +148,7 @@ impl Step for Controller {
 }
 
 impl Controller {
-    /// How to move under guidance of that status; none to stand.
+    /// The motion under guidance of that status; none to stand.
     fn motion(
         &mut self,
         status: GuidanceStatus,
@@ -183,7 +183,7 @@ impl Controller {
         }
     }
 
-    /// (15): wc. Within the dead zone of the exact antipode the side stays: noise there would make the sign chatter.
+    /// The turn rate wc of (15). Near the exact antipode the side does not change, because noise would change the sign often.
     fn angular(&mut self, alignment: Alignment) -> f64 {
         let Alignment { cosine, sine } = alignment;
         if cosine > 0.0 {

@@ -1,4 +1,4 @@
-//! How far the pose may be off: the covariance of its error, propagated with the motion to first order.
+//! The covariance of the pose's error, propagated with the motion to first order.
 //!
 //! The error has five parts: x, y, theta, and two errors of the robot that stay the same for a mission, of the ratio of
 //! the wheels' diameters and of the track (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation 12(6), 1996). Each
@@ -42,7 +42,7 @@ impl ErrorModel {
         }
     }
 
-    /// Where the mission starts, which is where its frame is: the pose is exact.
+    /// The covariance at the start, where the pose is exact because it defines the mission frame.
     pub(crate) fn start(&self) -> Covariance {
         let [ratio, track] = self.systematic;
         Covariance(SMatrix::from_diagonal(&Error::from([0.0, 0.0, 0.0, ratio, track])))

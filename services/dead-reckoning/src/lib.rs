@@ -2,15 +2,15 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`step`] | the whole of it, pure: one `wheels` sample to one `pose` |
-//! | [`covariance`] | how far the pose may be off |
+//! | [`step`] | the pure step: a `wheels` sample to a `pose` |
+//! | [`covariance`] | the covariance of the pose's error |
 //!
-//! The state is saved after the pose is published: the tick does not wait for the file. A process killed between the two has
-//! published a pose that its state does not hold. That is safe: the counts are cumulative and the link's last sample stays on
-//! the bus, so the successor computes the same pose again from the state before, or, where the next tick has come, the way of
-//! both ticks as one arc, a millimetre or two off. Where the counts begin, at the first tick or when the robot began them anew,
-//! the state before says nothing of them: there it is saved first. A run that is resumed after all its processes were killed
-//! just there counts that tick again.
+//! The state is saved after the pose is published, so that the tick does not wait for the file. A process that is killed in between
+//! has published a pose that its saved state does not contain. That is safe: the counts are cumulative, and the link's last sample
+//! stays on the bus, so the successor computes the same pose again from the state before. If the next tick has come by then, the
+//! successor takes the way of both ticks as one arc, which differs by a millimetre or two. At the first tick, and when the robot
+//! restarted its counts, the state before does not fit the counts, so the new state is saved first. If all processes are killed at
+//! such a tick, a resumed run counts the tick again.
 
 pub mod covariance;
 pub mod step;

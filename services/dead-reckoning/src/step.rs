@@ -1,5 +1,5 @@
-//! Counts to pose: of two wheels, (20), or of a car's driven wheel and steering, (3). Nothing can recompute an integral, so the
-//! checkpoint holds its state.
+//! The step from counts to pose, for two wheels, (20), or for a car's driven wheel and steering, (3). The pose is an integral that
+//! nothing can recompute, so its state is in the checkpoint.
 
 use common::{
     clock::MissionTime,
@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::covariance::{Covariance, ErrorModel};
 
-/// How much faster than its top speed a wheel may seem to turn before the counts are rejected: a
-/// robot that slides or is pushed does not reach it, a counter that restarted nearly always does.
+/// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
+/// below it; a counter that restarted is nearly always above it.
 const PLAUSIBLE: f64 = 2.0;
 /// Counts never rejected, whatever the time between: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
@@ -165,7 +165,7 @@ impl DeadReckoning {
                 drive.twist(WheelSpeeds { left: wheel, right: f64::from(right) * per_count })
             }
             Drive::Ackermann(drive) => {
-                // On the way it steered by the mean of the two angles.
+                // The mean of the two angles is taken as the steering on the way.
                 let middle = f64::from(counts_between(0, last.right)) + f64::from(right) / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
                 drive.twist(SteeredWheel { wheel, steering: angle.unwrap_or_default() })

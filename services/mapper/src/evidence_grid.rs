@@ -1,7 +1,7 @@
 //! The occupancy evidence grid of the evidential method: evidence for and against an obstacle in every cell.
 //!
-//! Its lattice is as fine as the sonar resolves, whatever the grid of the map: the belief must not depend on how finely the
-//! field is solved. Every cell holds the weight of the evidence for an obstacle, the direction of the beam that heard it,
+//! The size of its cells follows the resolution of the sonar and not the grid of the map, because the evidence must not depend on the
+//! resolution of the field. Every cell has the weight of the evidence for an obstacle, the direction of the beam with the last echo,
 //! and whether the sonar ever scanned the cell.
 //!
 //! An echo says that an obstacle stands somewhere on an arc, and that the ground before the arc is free. Every cell of the
@@ -55,11 +55,11 @@ pub(crate) struct EvidenceGrid {
     /// Weights of the [`SonarModel`], offset by 128.
     #[serde(with = "serde_bytes")]
     weight: Vec<u8>,
-    /// Direction of the beam whose echo was heard last, 256ths of a turn.
+    /// Direction of the beam with the last echo, 256ths of a turn.
     #[serde(with = "serde_bytes")]
     side: Vec<u8>,
-    /// From [`SCANNED`] down to [`SonarModel::pointed_enough`] the cell is scanned; below, the value counts how often the
-    /// sonar was pointed here without a result.
+    /// A cell with a value from [`SCANNED`] down to [`SonarModel::pointed_enough`] is scanned. A lower value is the number of times that
+    /// the sonar was pointed at the cell without a result.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
     /// The flags [`OCCUPIED`] and [`SEEN`].
@@ -159,7 +159,7 @@ impl EvidenceGrid {
         let known_to = echo.map_or(scanned_to, |range| range + sonar.behind_m);
         let far = known_to.max(sonar.pointed_m).max(echo.unwrap_or(0.0) + band);
         let came_from = side_of(beam.axis);
-        // Beyond `near`, half a cell's diagonal is narrower than the widest cone.
+        // Farther than `near`, half a cell's diagonal is narrower than the widest cone.
         let near = half_diagonal / sonar.arc.sin();
         let outside = sonar.arc.tan() * (1.0 + 1e-9);
 
@@ -222,7 +222,7 @@ impl EvidenceGrid {
                 continue;
             }
             let more = sonar.hit + (sonar.hit_at_edge - sonar.hit) * off.min(1.0);
-            // A cell that was believed free for long must not need as long to become occupied.
+            // A cell that was free for long must not need as long to become occupied.
             let weight = self.weight_of(index).max(-sonar.pass) + more as i8;
             self.side[index] = came_from;
             self.set(sonar, lattice, cell, weight, flips);

@@ -21,7 +21,7 @@ use crate::{
 pub(crate) struct EvidenceMap {
     evidence: EvidenceGrid,
     pub(crate) beams: ClearBeams,
-    /// Not saved: it is recomputed from the evidence.
+    /// The inflation is not saved, because it is recomputed from the evidence.
     #[serde(skip)]
     inflation: Inflation,
 }
@@ -31,11 +31,11 @@ pub(crate) struct EvidenceMap {
 pub(crate) struct Observed {
     /// The cells of the grid that may look different now.
     pub(crate) window: Window,
-    /// Whether a cell that was believed free became occupied.
+    /// Whether a free cell became occupied.
     pub(crate) safety_event: bool,
 }
 
-/// How evidence becomes states of the grid's cells, for one mission.
+/// Converts evidence to states of the grid's cells, for one mission.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Evidential {
     sonar: SonarModel,
@@ -154,7 +154,7 @@ impl Evidential {
         }
     }
 
-    /// The believed state of a cell of the grid that is neither known nor perimeter.
+    /// The state, by the evidence, of a cell of the grid that is neither known nor perimeter.
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;

@@ -36,7 +36,7 @@ pub(crate) struct SonarModel {
     pub(crate) pass: i8,
     /// Weight taken off a cell at the beam's edge, where the beam may have missed.
     pub(crate) pass_at_edge: i8,
-    /// Half the angle in which a beam is evidence against an echo heard before; farther out it may have missed.
+    /// Half the angle in which a beam is evidence against an earlier echo. Farther out the beam may have missed the obstacle.
     pub(crate) against: f64,
     /// Half the widest angle in which a beam is evidence against an echo at all.
     pub(crate) against_at_edge: f64,

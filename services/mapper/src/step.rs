@@ -29,7 +29,7 @@ pub enum Input {
     /// The pose of a tick with the readings of the rangers.
     Tick {
         pose: PoseSample,
-        /// None if no range sample of this tick came.
+        /// The range sample of this tick; none if none came.
         range: Option<RangeSample>,
     },
     /// The supervisor's reset of the sensed belief.
@@ -44,7 +44,7 @@ pub enum Input {
 /// The part of the map that an input changed and that is published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing changed, and no stage waits for an answer.
+    /// Nothing is published: nothing changed, and no stage waits for an answer.
     None,
     /// This window may have changed; an empty window answers the tick.
     Window(Window),
@@ -64,7 +64,7 @@ enum Sensed {
 /// The state that survives the process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
-    /// One [`CellState`] byte a cell, row-major.
+    /// A [`CellState`] byte for each cell, row-major.
     #[serde(with = "serde_bytes")]
     cells: Vec<u8>,
     /// Grows by one with every change.

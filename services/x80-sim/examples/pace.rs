@@ -1,4 +1,4 @@
-//! How fast the simulated robot can be stepped: `cargo run --release -p x80-sim --example pace`
+//! Measures the speed of the simulated robot: `cargo run --release -p x80-sim --example pace`
 #![allow(clippy::print_stdout, clippy::expect_used, reason = "its one purpose is to print")]
 
 use std::{fmt::Write, path::Path, time::Instant};

@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use crate::world::World;
 
-/// One number for each wheel.
+/// A number for each wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wheels<T> {
     /// The left wheel's.
@@ -70,7 +70,7 @@ impl Body {
         self.touching = self.clearance <= RELEASE_M;
     }
 
-    /// Where it is.
+    /// Its pose.
     pub fn pose(&self) -> Pose2 {
         self.pose
     }
@@ -107,8 +107,8 @@ impl Body {
         Wheels { left: arc - half_turn, right: arc + half_turn }
     }
 
-    /// Move by the arc and turn of `step` (metres, radians), and no farther than `world` lets it. Where it touched something,
-    /// returns how far ahead it has really come, metres.
+    /// Move by the arc and turn of `step` (metres, radians) until something of `world` is in the way. If the body touched something,
+    /// returns the distance that it moved ahead, metres.
     pub fn go(&mut self, step: Twist, world: &World) -> Option<f64> {
         let before = self.pose;
         self.pose = before.along_arc(step.v, step.omega);
@@ -136,7 +136,7 @@ impl Body {
             let Some(outward) = surface.outward(position) else {
                 break;
             };
-            // Without the margin, rounding would find it penetrating for ever.
+            // Without the margin, rounding errors would let the body count as penetrating for ever.
             self.pose.position += outward * (1e-9 - gap);
         }
         self.clearance = world.clearance(self.pose.position) - self.radius;

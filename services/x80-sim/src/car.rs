@@ -14,7 +14,7 @@ use crate::{
     world::World,
 };
 
-/// How a car hangs on its motors.
+/// The motion of a car by its motors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Car {
     /// Its true diameter and wheelbase.

@@ -1,5 +1,4 @@
-//! Between the channels of the motor board and the ground: which channel drives which wheel, which way, and how large that
-//! wheel really is.
+//! The drivetrain between the motor board and the ground: the channel, the direction and the real diameter of each wheel.
 
 use common::{
     mission::{Mission, WheelPhysics},
@@ -8,7 +7,7 @@ use common::{
 
 use crate::{body::Wheels, motor::Motor, noise::Noise};
 
-/// How far the ground goes by when a rim goes `metres` and slips.
+/// The distance over the ground when a rim rolls `metres` and slips.
 pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) -> f64 {
     let lost = noise.normal(physics.slip_noise * metres.abs().sqrt());
     metres * (1.0 - physics.slip_share) + lost
@@ -62,7 +61,7 @@ impl Drivetrain {
         }
     }
 
-    /// How far the rims go when nominal wheels would go `metres`.
+    /// The distances of the real rims when nominal wheels would roll `metres`.
     pub(crate) fn rims(&self, metres: Wheels<f64>) -> Wheels<f64> {
         Wheels { left: metres.left * self.diameter.left, right: metres.right * self.diameter.right }
     }

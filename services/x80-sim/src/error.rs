@@ -18,7 +18,7 @@ pub enum SimError {
         /// The system's error.
         source: io::Error,
     },
-    /// There is no pseudo-terminal.
+    /// The system gives no pseudo-terminal.
     #[error("the simulated robot gets no pseudo-terminal: {0}; mount /dev/pts, or use UDP or TCP")]
     Line(#[source] io::Error),
     /// The transport failed later.

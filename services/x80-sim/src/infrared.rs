@@ -9,7 +9,7 @@ use common::{
 
 use crate::{noise::Noise, world::World};
 
-/// Beyond its reach a ranger reads as if something stood at this distance, metres.
+/// A ranger without an obstacle in reach reads as if one were at this distance, metres.
 const NOTHING_M: f64 = 0.81;
 
 /// Readings of the rangers on a robot of `radius` at `pose`, AD counts.

@@ -8,7 +8,7 @@
 //! | [`body`] | a disc on two wheels or on a car's, and what it touches |
 //! | [`wheel_errors`] | how far its wheels are from what the mission says |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
-//! | [`sonar`], [`infrared`], [`sensors`] | what is heard and seen, as the frames carry it |
+//! | [`sonar`], [`infrared`], [`sensors`] | the readings of the sensors, as the frames carry them |
 //! | [`noise`] | seeded randomness, one stream for each source |
 //! | [`robot`] | all of it as a pure state machine: frames in, time forward, frames out |
 //! | [`radio`] | outages, losses, delays between host and robot |

@@ -1,5 +1,5 @@
-//! One channel of the motor board, and the speed loop of the wheel on it. Everything is in the channel's
-//! own positive direction, in encoder counts and counts per second.
+//! A channel of the motor board and the speed loop of its wheel. All values are in the channel's own positive direction, in encoder
+//! counts and counts per second.
 
 use std::collections::VecDeque;
 
@@ -21,8 +21,8 @@ const POSITION_REACHED: f64 = 0.5;
 /// Below this speed friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
 /// starting is friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
-/// Changes of the target under way through the delay. At 5 ms a step this is more than the longest
-/// delay holds; a host that sends faster overwrites its newest.
+/// The greatest number of delayed changes of the target. At a change every 5 ms this is more than the longest delay needs. A host that
+/// sends faster overwrites the newest one.
 const MOST_PENDING: usize = 1024;
 
 /// PID gains of one loop.
@@ -131,7 +131,7 @@ impl Motor {
         self.turned = turned;
     }
 
-    /// Obey a motion command until mission time `until`. It brings its mode along and lets the motor run.
+    /// Carry out a motion command until mission time `until`. The command sets the mode and lets the motor run.
     pub fn order(&mut self, quantity: Quantity, value: i16, until: Option<f64>) {
         self.enabled = true;
         self.mode = match quantity {

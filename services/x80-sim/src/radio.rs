@@ -9,7 +9,7 @@ use common::{ground_truth::GroundTruthRadio, mission};
 
 use crate::noise::{Noise, Source};
 
-/// At most so many datagrams are under way; further ones are lost.
+/// The greatest number of datagrams under way; further ones are lost.
 const MOST_IN_FLIGHT: usize = 1024;
 /// A datagram that waits for the next one to go behind it, or with it, waits no longer than this, seconds.
 const LONGEST_HOLD_S: f64 = 0.5;
@@ -54,7 +54,7 @@ impl Fading {
             self.out = !self.out;
             self.since = self.until;
             self.until += if self.out {
-                // Without a floor, time would never pass where the mean is 0.
+                // Without a least value, time would never pass if the mean is 0.
                 noise.exponential(self.mean_out).clamp(1e-3, self.longest.max(1e-3))
             } else {
                 noise.exponential(self.mean_good).max(1e-3)
@@ -82,9 +82,9 @@ struct Flight<W> {
 /// The event that a datagram waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
-    /// To arrive behind the next.
+    /// The datagram arrives after the next one.
     Behind,
-    /// To arrive joined to the next.
+    /// The datagram arrives joined to the next one.
     Joined,
 }
 
@@ -149,7 +149,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         lost
     }
 
-    /// How long a datagram takes, seconds.
+    /// The delay of a datagram, seconds.
     pub fn delay(&mut self) -> f64 {
         self.settings.delay_s + self.noise.exponential(self.settings.jitter_s)
     }
@@ -224,7 +224,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         self.in_flight.insert(at, flight);
     }
 
-    /// When the next datagram arrives, mission time.
+    /// The mission time when the next datagram arrives.
     pub fn next_due(&self) -> Option<f64> {
         self.in_flight.front().map(|flight| flight.due)
     }

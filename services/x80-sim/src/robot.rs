@@ -26,13 +26,13 @@ use crate::{
 /// The longest step of the body, seconds.
 const STEP_S: f64 = 0.005;
 
-/// When its process ends, a robot whose commands hold for ever drives on for at most so long, seconds.
+/// At the end of its process, a robot whose last command does not expire drives on for at most so long, seconds.
 const COMES_TO_REST_S: f64 = 3.0;
 
 /// The meaning of a frame from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// Not addressed to a robot.
+    /// The frame is not addressed to a robot.
     Foreign,
     /// An acknowledgement: nothing is answered to it.
     Ack,
@@ -67,7 +67,7 @@ pub struct Robot {
     time: f64,
     tick: u64,
     heard_at: f64,
-    /// When the last motion command came.
+    /// The time when the last motion command came.
     ordered_at: f64,
     stopping_time: f64,
     addressing: Addressing,
@@ -127,9 +127,9 @@ impl Robot {
         robot
     }
 
-    /// The robot of `mission` where an earlier process left it, booted anew but for its counts.
+    /// The robot of `mission` at the place where an earlier process left it. It is in the state of a booted robot except for its counts.
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
-        // Otherwise the noise of the first readings would be repeated.
+        // With the same seed the noise of the first readings would be repeated.
         let seed = mission.seed.wrapping_add(saved.tick + 1);
         let mut robot = Self::with_noise(mission, seed);
         robot.tick = saved.tick;
@@ -182,7 +182,7 @@ impl Robot {
         self.time
     }
 
-    /// From tick to tick, seconds.
+    /// The time from tick to tick, seconds.
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
@@ -192,7 +192,7 @@ impl Robot {
         (self.tick + 1) as f64 / self.rate_hz
     }
 
-    /// One of the six channels of the motor board.
+    /// A channel of the motor board, 0 to 5.
     pub fn motor(&self, channel: u8) -> Option<&Motor> {
         self.motors.get(usize::from(channel))
     }
@@ -293,7 +293,7 @@ impl Robot {
         }
     }
 
-    /// One short step of `dt` seconds.
+    /// A short step of `dt` seconds.
     fn step(&mut self, dt: f64) {
         let silent = self.stops_when_silent.is_some_and(|limit| self.time >= self.heard_at + limit);
         if silent {

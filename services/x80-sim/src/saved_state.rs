@@ -24,7 +24,7 @@ pub struct SavedState {
     pub(crate) turned: [f64; 6],
     /// Times the body has touched something.
     pub(crate) contacts: u64,
-    /// Which ultrasonic rangers are in a run of silence.
+    /// For each ultrasonic ranger, whether it is in a run of silence.
     pub(crate) silent: [bool; 6],
     /// The longest time that a wheel turned after the last motion command, seconds.
     pub(crate) stopping_time_s: f64,

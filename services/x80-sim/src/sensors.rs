@@ -76,7 +76,7 @@ impl Ranging {
         sensors.ultrasonic[self.front]
     }
 
-    /// Which ultrasonic rangers are silent.
+    /// For each ultrasonic ranger, whether it is silent.
     pub fn silent(&self) -> [bool; 6] {
         self.silence.silent()
     }

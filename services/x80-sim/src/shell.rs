@@ -26,14 +26,14 @@ use crate::{
     transport::{Transport, Way},
 };
 
-/// So many datagrams are taken before time and the stop are looked at again.
+/// The greatest number of datagrams that are taken before the time and the stop signal are checked again.
 const MOST_AT_ONCE: usize = 64;
 
 /// The options of a simulated robot.
 pub struct SimOptions {
     /// The mission, seed and all.
     pub mission: Mission,
-    /// How mission time passes.
+    /// The pace of mission time.
     ///
     /// At [`Pace::Max`] it stands still until a motion command comes; then the body moves one period
     /// under that command and the frames of the next tick are sent. A ping is answered with the frames
@@ -149,8 +149,8 @@ impl SimClock {
         Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
     }
 
-    /// When more than a period is owed at machine time `machine_ns`, `due` being the next tick, let
-    /// mission time have waited: a process that was held up must not make the robot race.
+    /// If mission time is more than a period behind at machine time `machine_ns`, shift it so that the next tick `due` is not late. A
+    /// robot whose process was not scheduled must not make up for the lost time.
     fn forgive(&mut self, due: f64, machine_ns: u64) {
         let owed = self.now(machine_ns).map_or(0.0, |now| now - due);
         if let Some((epoch, rate)) = &mut self.runs

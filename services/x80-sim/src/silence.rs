@@ -17,7 +17,7 @@ pub(crate) struct Silence {
 }
 
 impl Silence {
-    /// The chain for readings by `physics` that are `period_s` apart. Nothing is drawn where the share is 0.
+    /// The chain for readings by `physics` that are `period_s` apart. No random number is drawn if the share is 0.
     pub(crate) fn new(physics: &SonarPhysics, period_s: f64, seed: u64) -> Self {
         let share = physics.silence_share;
         let end = (period_s / physics.silence_mean_s).min(1.0);
@@ -30,7 +30,7 @@ impl Silence {
         }
     }
 
-    /// Which rangers are silent at the next reading.
+    /// Advance to the next reading. Returns for each ranger whether it is silent.
     pub(crate) fn step(&mut self) -> [bool; 6] {
         if self.begin > 0.0 {
             for silent in &mut self.silent {
@@ -41,7 +41,7 @@ impl Silence {
         self.silent
     }
 
-    /// Which were silent at the last reading.
+    /// For each ranger, whether it was silent at the last reading.
     pub(crate) fn silent(&self) -> [bool; 6] {
         self.silent
     }

@@ -1,16 +1,15 @@
-//! An ultrasonic ranger: the nearest point in its cone that answers.
+//! An ultrasonic ranger, which measures the distance of the nearest point in its cone that reflects the sound.
 //!
-//! In the laboratory every surface answers wherever the cone meets it. With smooth walls the echo comes
-//! back only from where the wall is square to the sound: a wall answers at the foot of the
-//! perpendicular while that is not too far off the axis, a drum over a wider angle, an edge sometimes.
-//! A surface that does not answer still hides what is behind it.
+//! In the laboratory a surface reflects wherever the cone meets it. A smooth wall reflects only at the foot of the perpendicular, and
+//! only if that is not too far off the axis. A drum reflects over a wider angle, and an edge reflects sometimes. A surface that
+//! does not reflect still hides the surfaces behind it.
 //!
-//! An echo is heard where its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r: the
+//! An echo is detected if its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r: the
 //! mirror image of the transmitter in a plane is 2 r away, and air at 40 kHz takes alpha = 1.3 dB/m (ISO 9613-1, 20 degrees
 //! Celsius, half saturated). A cylinder of radius a spreads the sound further, by sqrt(a / (a + r)): a wave front of radius r
 //! comes back from it with radius a r / (a + 2 r) in the level plane. That is geometrical acoustics, for k a well above
 //! 1: a post of 1.25 cm has k a = 9. A soft surface gives back its share `echo`. The threshold is the amplitude of a post
-//! 3 cm in diameter at `post_reach_m`. A wall is so heard far beyond [`REACH_M`].
+//! 3 cm in diameter at `post_reach_m`. A wall is therefore detected far beyond [`REACH_M`].
 //!
 //! A solid that ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level, from a
 //! distance on. A smooth solid then answers with no more than its edge.
@@ -162,7 +161,7 @@ struct Receiver<'a> {
     lobe: f64,
     /// Above the floor, metres.
     height: f64,
-    /// The least amplitude that is heard.
+    /// The least amplitude that is detected.
     threshold: f64,
 }
 
@@ -178,7 +177,8 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// The distance at which an answer from so far off the axis is heard, metres: full in the cone, then less and less.
+    /// The greatest distance at which an echo from so far off the axis is detected, metres. It is full in the cone and decreases
+    /// outside.
     fn reach(&self, off: f64) -> f64 {
         let cone = self.cone.half;
         if off <= cone + 1e-12 {

@@ -1,4 +1,4 @@
-//! Which sensor streams run, and for how many frames more.
+//! The sensor streams that run, and the number of frames that each has left.
 
 use common::wire::{Request, Stream};
 
@@ -34,7 +34,7 @@ pub(crate) struct Streams {
     standard: Run,
 }
 
-/// Which frames are to be sent.
+/// The frames that are due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Due {
     /// Frame 123.

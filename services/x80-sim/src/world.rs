@@ -9,7 +9,7 @@ use glam::DVec2;
 /// A sensor that is no farther from a surface touches it, metres.
 const TOUCHES_M: f64 = 1e-3;
 
-/// One surface, seen from above.
+/// A surface, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
     /// A disc.
@@ -139,8 +139,8 @@ impl World {
         world
     }
 
-    /// Let things come, go and move until `time`, seconds. Nothing appears inside the robot, a disc of
-    /// `radius` at `centre`: it waits until the place is free.
+    /// Let obstacles appear, disappear and move until `time`, seconds. An obstacle that would appear inside the robot, a disc of `radius`
+    /// at `centre`, appears when its place is free.
     pub fn advance(&mut self, time: f64, centre: DVec2, radius: f64) {
         for visitor in &mut self.things {
             visitor.offset = visitor.thing.offset_at(time);

@@ -54,7 +54,7 @@ const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[s
 #[test]
 fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
     let (bytes, ground_truth) = lock_step(OUT_HALF_THE_TIME, 400, 1);
-    // Also when commands come earlier than they must: they wait until time has passed.
+    // The same must hold when commands come early; they wait until time has passed.
     for (rounds, at_once) in [(400, 1), (200, 2)] {
         let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, rounds, at_once);
         assert!(bytes == again && ground_truth == truth_again, "the same seed gave another run");
@@ -130,7 +130,7 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
     let mut decoder = Decoder::default();
     let mut motor_frames = 0;
     while motor_frames < 100 {
-        // Until one of them comes through there is no peer, and nothing is sent.
+        // The robot has no peer and sends nothing until one of them arrives.
         host.set_read_timeout(Some(std::time::Duration::from_millis(20))).unwrap();
         host.send(&forward(0)).unwrap();
         let mut buffer = [0; 4096];

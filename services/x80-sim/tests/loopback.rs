@@ -224,7 +224,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
     let deadline = std::time::Instant::now() + support::PATIENCE;
     let mut answered = false;
     while !answered && std::time::Instant::now() < deadline {
-        // Until it listens, sending or receiving fails.
+        // Sending or receiving fails until the robot listens.
         let _ = host.send(&encoded(forward(100)));
         answered = host.recv(&mut [0; 2048]).is_ok();
     }

@@ -1,4 +1,4 @@
-//! When the resources of ended processes on the bus are freed: places on topics, shared memory, files of nodes.
+//! The cleanup of the resources of ended processes on the bus: places on topics, shared memory, files of nodes.
 
 use std::time::{Duration, Instant};
 
@@ -39,8 +39,8 @@ impl Cleanup {
         }
     }
 
-    /// Clean up if it is due. After deaths that is once no stage is starting, because a cleanup takes about as long as a start,
-    /// which would wait for it; or earlier, when so many died that places on the bus may run out.
+    /// Clean up if it is due. After deaths it is due once no stage is starting, because a starting stage would wait for the cleanup,
+    /// which takes about as long as a start. It is due earlier if so many processes died that places on the bus may run out.
     pub(crate) fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
         let quiet = deaths > 0 && last.elapsed() >= DELAY && !any_starting;

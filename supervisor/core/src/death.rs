@@ -39,7 +39,7 @@ pub struct Death {
     pub log_tail: String,
 }
 
-/// What the supervisor does next.
+/// The supervisor's next action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Next {

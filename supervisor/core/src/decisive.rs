@@ -1,4 +1,4 @@
-//! Which event ended a mission first, and which part of the run counts. Pure.
+//! The event that ended a mission first, and the part of the run that counts. Pure.
 //!
 //! The stages go on until the supervisor has seen an event and stopped the robot. How far they get by then depends on
 //! the machine; which event came first does not.
@@ -65,7 +65,7 @@ pub(crate) fn first(
     let arrival = record.arrival.map(|command| (command.stamp.tick, reached(command.distance_m)));
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
-    // Of two events at one tick the first of the list counts.
+    // If two events have the same tick, the first of the list counts.
     let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         return undecided(ending);

@@ -22,7 +22,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
         return Ok(());
     };
     let limit = Rlimit { current: Some(hard), maximum: Some(hard) };
-    // Under the service's unit the limit cannot be raised; then the present one counts.
+    // If the limit cannot be raised, as under the service's unit, the present limit stays.
     let _ = setrlimit(Resource::Nofile, limit);
     match limits() {
         Some([soft, _]) if soft < NEEDED => Err(soft),

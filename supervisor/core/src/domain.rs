@@ -167,7 +167,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
 /// Remove all files of the middleware in this domain. Files of another user in shared memory are left: a new bus has
 /// random names, so nobody can have taken them.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
-    // Without a configuration no process can join.
+    // A process cannot join a bus without a configuration.
     remove_file(&domain.middleware_config())?;
     remove_file(&domain.run_link())?;
     remove_file(&domain.run_directory())?;

@@ -33,7 +33,7 @@ pub(crate) struct Snapshot<'a> {
     pub deadline: Deadline,
     /// Mission time advances with ticks, not with the wall clock.
     pub in_ticks: bool,
-    /// When the newest tick was first seen, or the order last changed, whichever is later.
+    /// The time when the newest tick was first seen or the order last changed, whichever is later.
     pub progress: Instant,
     /// The robot was once ready to drive.
     pub was_ready: bool,
@@ -123,7 +123,7 @@ fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
         // A real robot may be out of reach for any time.
         HoldReason::None => !snapshot.simulated,
         HoldReason::Operator => true,
-        // In wall-clock time the mission's timeout ends it.
+        // In wall-clock time the mission's timeout ends such a mission.
         HoldReason::StageHeld => !snapshot.in_ticks,
         HoldReason::Starting | HoldReason::Ending => false,
     };
@@ -166,7 +166,7 @@ impl StopClock {
     }
 }
 
-/// When the newest tick was first seen.
+/// The time when the newest tick was first seen.
 #[derive(Debug)]
 pub(crate) struct TickProgress {
     tick: Option<u64>,

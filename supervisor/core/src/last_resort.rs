@@ -1,9 +1,9 @@
-//! The end of a run whose supervisor hangs: the middleware may wait for ever in a file that somebody truncated, and a
-//! process that waits there does not react to signals.
+//! The end of a run whose supervisor hangs. The middleware may wait for ever for a file that another process truncated, and the
+//! supervisor's loop does not react to signals then.
 //!
-//! A separate thread catches them too. After a signal, if the loop does not turn for [`STUCK`], the thread ends the stages
-//! and the process. The robot stands by then: its link stops it when the supervisor is silent, and a command ends by
-//! itself if no other follows.
+//! A separate thread receives the signals too. If the loop makes no iteration for [`STUCK`] after a signal, the thread ends the
+//! stages and the process. The robot stands by then: its link stops it when the supervisor is silent, and a command expires if no
+//! other follows.
 
 use std::{
     fs,
@@ -29,7 +29,7 @@ const GRACE: Duration = Duration::from_millis(300);
 /// The exit code of a run that ends like this, the same as of any run that failed.
 const FAILED: u8 = 1;
 
-/// Between looks at the loop.
+/// The interval between checks of the loop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// The number of turns of the supervisor's loop, and whether it has ended.

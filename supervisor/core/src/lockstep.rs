@@ -1,4 +1,4 @@
-//! In lockstep: how far the link may go ahead of the supervisor, and the tick from which a recovery step holds.
+//! The limit on ticks in lockstep: how far the link may be ahead of the supervisor, and the tick from which a recovery step holds.
 //! Pure.
 //!
 //! The newest [`TickLimitSample`] names the last tick that the link may begin: [`AHEAD`] ticks after the last tick that was
@@ -10,9 +10,11 @@ use std::time::{Duration, Instant};
 
 use common::samples::{RecoveryStep, StallSample, TickLimitSample};
 
-/// Ticks that the link may be ahead. With this many it seldom waits, and a robot that has not moved for seconds loses little time.
+/// The number of ticks that the link may be ahead. With this number it seldom waits, and a robot that has not moved for seconds
+/// loses little time.
 const AHEAD: u64 = 4;
-/// How long a recovery step waits for its answer: less than the link waits for the limit, and as long as a planner may take to start.
+/// A recovery step waits at most so long for its answer. That is less than the link waits for the limit, and as long as a planner
+/// may take to start.
 const ANSWERED: Duration = Duration::from_secs(3);
 
 /// The newest output of the stages.
@@ -43,7 +45,7 @@ pub(crate) enum Next {
 #[derive(Clone, Copy, Debug)]
 struct Step {
     stall: StallSample,
-    /// When it was carried out, and what was published by then.
+    /// The time when it was carried out, and the samples that were published by then.
     begun: Option<(Instant, Published)>,
 }
 
@@ -112,7 +114,7 @@ impl Lockstep {
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {
-        // Before the next tick there is no pose to guide: a new planner with a field has answered.
+        // There is no pose to guide before the next tick, so a new planner has answered once it has a field.
         RecoveryStep::Replan => {
             now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + AHEAD
         }

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use crate::policy::Now;
 
-/// A wait, or the work between two waits, that takes so much longer than planned does not count. On a machine that is not
-/// overloaded a wait ends within a hundredth of it.
+/// A wait, or the work between two waits, does not count as observed time if it takes so much longer than planned. On a machine that
+/// is not overloaded a wait is late by at most a hundredth of this.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
 /// The clock of the stages' deadlines.
@@ -25,8 +25,8 @@ impl ObservedTime {
         self.observed + self.since(now).min(TOLERANCE)
     }
 
-    /// At `now` a wait ended that should have taken at most `planned`. If it took longer, nobody can say when the machine stood
-    /// still, so only a little of it counts; some must count, or a supervisor that is always late would never notice anything.
+    /// Note that a wait ended at `now` which should have taken at most `planned`. If it took longer, it is unknown when the machine stood
+    /// still, so only a little of it counts. Some of it must count, or a supervisor that is always late would never notice anything.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
         let took = self.since(now);
         self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };

@@ -22,7 +22,7 @@ use crate::{
 
 /// Guidance samples recorded: that of the arrival tick must still be there when its command is read.
 const MOST_GUIDANCE: usize = 1024;
-/// Poses recorded: three hours at 7 Hz. In a longer run every second pose is dropped whenever the record is full.
+/// The greatest number of recorded poses, three hours at 7 Hz. Whenever the record is full, every second pose is dropped.
 const MOST_POSES: usize = 80_000;
 
 pub struct Observer {
@@ -178,7 +178,7 @@ impl Record {
     fn take_guidance(&mut self, guidance: GuidanceSample) {
         let GuidanceSample { stamp, full_solves, .. } = guidance;
         let before = self.planners.insert(stamp.generation, full_solves);
-        // If a sample covers several solves, only the last one's time is known.
+        // If a sample covers several solves, only the time of the last solve is known.
         if full_solves > before.unwrap_or_default() {
             self.full_solves.record(guidance.full_solve_ns);
         }

@@ -20,8 +20,8 @@ pub(crate) struct Snapshot {
 /// The order to the robot and its reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decision {
-    /// The robot was once ready to drive. From then on a stage that is down does not change the order, because the
-    /// link stops the robot itself.
+    /// Whether the robot was ever ready to drive. From then on a stage that is down does not change the order, because the link stops
+    /// the robot itself.
     pub ready: bool,
     pub reason: HoldReason,
 }
@@ -61,7 +61,7 @@ pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
 mod tests {
     use super::*;
 
-    /// Nothing holds the robot, and it is about to drive for the first time.
+    /// A snapshot in which nothing holds the robot, and it is about to drive for the first time.
     const CAN_START: Snapshot = Snapshot {
         was_ready: false,
         all_running: true,

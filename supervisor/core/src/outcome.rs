@@ -1,4 +1,4 @@
-//! How a run ended.
+//! The ending of a run.
 
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use serde::Serialize;
@@ -7,7 +7,7 @@ use serde::Serialize;
 /// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
-/// How a run ended.
+/// The outcome of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -36,7 +36,7 @@ impl Outcome {
     }
 }
 
-/// How a run ended, and why.
+/// The outcome of a run, and its reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ending {
     pub outcome: Outcome,

@@ -1,4 +1,4 @@
-//! Whether each stage answers its inputs: a stage may beat and yet publish nothing. Pure.
+//! A watchdog that checks whether each stage answers its inputs, because a stage may beat and yet publish nothing. Pure.
 //!
 //! A stage must publish an output for each tick that all its inputs have reached. So a stage without input is never late,
 //! and if the pipeline stands still, only the stage that stopped it is blamed: the stages behind it have no input.
@@ -23,7 +23,7 @@ struct StageOutput {
     published: Option<u64>,
     /// Ticks up to this one belong to an earlier generation.
     excused: Option<u64>,
-    /// Since when its input has been unanswered.
+    /// The time since which its input has been unanswered.
     unanswered_since: Option<Now>,
 }
 

@@ -105,7 +105,7 @@ pub enum Phase {
     },
 }
 
-/// For how long a generation was ready before its end.
+/// The time for which a generation was ready before its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stability {
     NeverReady,
@@ -135,7 +135,7 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// For a stage that has never run and has these deadlines.
+    /// The policy of a stage with these deadlines that has never run.
     pub fn new(deadlines: Deadlines) -> Self {
         Self {
             deadlines,
@@ -155,7 +155,7 @@ impl Policy {
         self.phase
     }
 
-    /// When [`Event::Time`] is next due; none when only other events matter.
+    /// The time when [`Event::Time`] is next due; none if only other events matter.
     pub fn deadline(&self) -> Option<Now> {
         match self.phase {
             Phase::Down | Phase::Held => None,
@@ -277,8 +277,7 @@ impl Policy {
         }
     }
 
-    /// A generation has ended that the bus may have blocked. After the bus is recreated, it is not recreated again before a
-    /// generation was ready.
+    /// Note that a generation ended which the bus may have blocked. A recreated bus is not recreated again before a generation was ready.
     fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
         self.blocked_starts = self.blocked_starts.saturating_add(1);
         let next = self.record_death(Stability::NeverReady, now);

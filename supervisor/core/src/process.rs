@@ -69,13 +69,13 @@ pub fn child(program: impl AsRef<OsStr>) -> Command {
 /// A process and the descriptor that becomes readable when it ends.
 #[derive(Debug)]
 pub struct Process {
-    /// None of an external process: its parent reaps it.
+    /// The child; none for an external process, which its parent reaps.
     child: Option<Child>,
     id: u32,
     pidfd: OwnedFd,
 }
 
-/// How a process ended.
+/// The cause of a process's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExitCause {

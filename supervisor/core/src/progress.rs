@@ -13,7 +13,7 @@ pub struct Progress<'a> {
     pub running: (usize, usize),
     /// Whether the robot is ordered to drive.
     pub driving: bool,
-    /// From the start to the target, metres.
+    /// The distance from the start to the target, metres.
     pub straight_m: f64,
 }
 

@@ -34,7 +34,8 @@ pub struct SupervisorState {
     pub resumes: u32,
     /// The boot of the machine it ran in.
     boot: String,
-    /// Time of the last save, [`boot_ns`]. That clock also counts time in which the machine is suspended and the robot may be moved.
+    /// The time of the last save, [`boot_ns`]. Its clock includes the time in which the machine is suspended, when the robot may be
+    /// moved.
     saved_ns: u64,
 }
 
@@ -88,7 +89,7 @@ pub struct RecoveredRun {
     pub time: MissionTime,
 }
 
-/// Why a run cannot be resumed.
+/// A run cannot be resumed.
 #[derive(Debug, Error)]
 pub enum ResumeError {
     #[error("the run in {directory} came to its end, see {SUMMARY} there; start a new one")]

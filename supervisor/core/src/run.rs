@@ -22,13 +22,13 @@ use crate::{
 
 /// The result of a run.
 pub struct Finished {
-    /// How it ended, and why.
+    /// The outcome, and its reason.
     pub ending: Ending,
     /// The last complete tick before the deciding event; none where no tick decided. Later ticks do not count, because their
     /// number depends on how fast the stop was.
     pub last_tick: Option<u64>,
-    /// From the first motion order to the end, seconds of the robot's clock; for a run that was resumed in wall-clock time,
-    /// from the start of the run.
+    /// The time from the first motion order to the end, seconds of the robot's clock. For a run that was resumed in wall-clock time it
+    /// begins at the start of the run.
     pub duration_s: f64,
     pub record: Record,
     /// The ground truth of a simulated robot until then.
@@ -67,7 +67,7 @@ pub fn run(
             Err(error) => break Err(error),
         }
     };
-    // After an error, too, the robot is stopped first, then the stages in order.
+    // After an error too, the robot is stopped first, and then the stages in order.
     let stopped = shutdown::stop(&mut supervisor);
     turns.end();
     let ending = ending?;

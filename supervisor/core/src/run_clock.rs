@@ -10,7 +10,7 @@ use crate::{observer::Record, recovery::RecoveredRun};
 
 /// The clock of a run, from the start of this supervisor on.
 pub(crate) struct RunClock {
-    /// How mission time passes.
+    /// The clock of mission time.
     pub clock: MissionClock,
     /// The first tick that no earlier supervisor has seen.
     first_tick: u64,
@@ -24,7 +24,7 @@ impl RunClock {
         Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
-    /// The clock of a new run. Only a `simulated` robot's time can pass at another pace than the wall clock's.
+    /// The clock of a new run. Only a `simulated` robot can have another pace than the wall clock's.
     pub(crate) fn begin(pace: Pace, rate_hz: f64, simulated: bool) -> Self {
         let clock = match pace {
             Pace::Max if simulated => MissionClock::Ticks { period_ns: (1e9 / rate_hz) as u64 },
@@ -55,8 +55,8 @@ impl RunClock {
         pose.map_or(self.start, |pose| pose.stamp.time())
     }
 
-    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the `truth` until then gives it:
-    /// the simulated robot's time begins with that order, and passes also while nobody receives its data.
+    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the ground `truth` gives this time: the
+    /// simulated robot's time begins with the order, and also passes while the link receives no frames.
     pub(crate) fn duration_s(
         &self,
         last_tick: Option<u64>,

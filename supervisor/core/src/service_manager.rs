@@ -1,12 +1,12 @@
 //! Notifications to systemd, if it started this process: ready, status, watchdog, stopping.
 //!
-//! Without `NOTIFY_SOCKET` every function does nothing.
+//! If `NOTIFY_SOCKET` is not set, the functions do nothing.
 
 use std::time::{Duration, Instant};
 
 use sd_notify::NotifyState;
 
-/// How often the line that `systemctl status` shows is renewed.
+/// The interval at which the line of `systemctl status` is updated.
 const STATUS_EVERY: Duration = Duration::from_secs(1);
 
 /// The service manager, as a receiver of notifications.
@@ -46,7 +46,7 @@ impl ServiceManager {
         }
     }
 
-    /// Feed the watchdog, when that is due. Only the loop may call it: a thread would feed it while the loop hangs.
+    /// Feed the watchdog if that is due. Only the loop may call this, because another thread would feed it while the loop hangs.
     pub(crate) fn feed(&mut self) {
         if self.time_to_feed().is_some_and(|left| left.is_zero()) {
             self.fed = Some(Instant::now());

@@ -1,4 +1,4 @@
-//! One stage of a run: its policy and the process of its current generation.
+//! A stage of a run: its policy and the process of its current generation.
 
 use std::{
     fs::File,
@@ -31,7 +31,7 @@ pub struct StageProcessError {
     source: io::Error,
 }
 
-/// One stage and its current generation. Times are of the owner's clock.
+/// A stage and its current generation. Times are of the owner's clock.
 pub(crate) struct StageProcess {
     pub stage: &'static Stage,
     /// The mission's executable for this stage, if it names one.
@@ -102,7 +102,7 @@ impl StageProcess {
         self.stopping
     }
 
-    /// When its policy needs the next [`Event::Time`].
+    /// The time when its policy needs the next [`Event::Time`].
     pub(crate) fn deadline(&self) -> Option<Now> {
         self.policy.deadline()
     }
@@ -199,8 +199,8 @@ impl StageProcess {
         }
     }
 
-    /// How its process ended, if it has ended. For an external process that did not announce its end, the result comes a turn
-    /// later, because its last beat may have come after the beats of this turn were read.
+    /// The cause of the end of its process, if it has ended. For an external process that did not announce its end, the result comes an
+    /// iteration later, because its last beat may have come after the beats of this iteration were read.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
             return Ok(None);

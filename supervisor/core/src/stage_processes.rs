@@ -26,7 +26,7 @@ use crate::{
 /// Time for a stage to stop in order when its supervisor fails.
 const STOP_GRACE: Duration = Duration::from_millis(300);
 
-/// Who starts and restarts the stages.
+/// The program that starts and restarts the stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starter {
     Supervisor,
@@ -177,7 +177,7 @@ impl StageProcesses {
         std::mem::take(&mut self.start_blocked)
     }
 
-    /// From now on stages that end stay down, until all are started again.
+    /// Do not restart stages that end until all are started again.
     pub fn start_no_more(&mut self) {
         self.ending = true;
     }
@@ -278,7 +278,7 @@ impl StageProcesses {
     }
 }
 
-/// After an error of the supervisor, too, the stages are stopped in reverse order: the link, the last, stops the robot.
+/// After an error of the supervisor too, the stages are stopped in reverse order. The link is the last and stops the robot.
 impl Drop for StageProcesses {
     fn drop(&mut self) {
         while let Some(mut stage) = self.stages.pop() {

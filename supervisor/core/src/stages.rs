@@ -1,6 +1,7 @@
-//! THE table of stages: what runs for a robot, and its deadlines. What each opens and persists is declared where it is opened.
+//! THE table of the stages of a robot, and their deadlines. Each stage declares in its own crate the topics that it opens and the state
+//! that it persists.
 //!
-//! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the tables of the documentation come from it.
+//! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the tables of the documentation come from this table.
 
 use std::{path::Path, time::Duration};
 
@@ -17,7 +18,7 @@ use common::{
 pub struct Stage {
     /// Its name, as its wiring says.
     pub name: &'static str,
-    /// What its process opens on the bus, and what it persists.
+    /// The topics that its process opens on the bus, and the state that it persists.
     pub wiring: &'static Wiring,
     /// Deadlines on a map without cells.
     pub deadlines: Deadlines,
@@ -30,14 +31,14 @@ pub struct Stage {
     pub replay: Begin,
 }
 
-/// How long a stage may take.
+/// The deadlines of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
-    /// From its start to its first beat as ready.
+    /// The longest time from its start to its first beat as ready.
     pub startup: Duration,
-    /// From beat to beat; they come every 150 ms, or with a tick.
+    /// The longest time from beat to beat. Beats come every 150 ms, or with a tick.
     pub heartbeat: Duration,
-    /// From a tick on its inputs to its output of that tick, or of a later one.
+    /// The longest time from a tick on its inputs to its output of that tick, or of a later one.
     pub answers: Duration,
 }
 
@@ -77,7 +78,7 @@ impl Stage {
     }
 }
 
-/// A stage that has not opened its topics by then is stuck, for example by incomplete services. On a loaded machine of two
+/// A stage that has not opened its topics after this time is stuck, for example by incomplete services. On a loaded machine of two
 /// cores the slowest start took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
 /// Five beats. A loaded machine with more stages than cores delays a beat by 200 ms now and then; with 500 ms and a build
@@ -93,17 +94,17 @@ const PLANNER_DEADLINES: Deadlines = Deadlines {
     heartbeat: Duration::from_secs(2),
     answers: Duration::from_secs(4),
 };
-/// The mapper restores its map and publishes all of it in one iteration. At 16.8 million cells no beat was late even
-/// without this allowance.
+/// The allowance of the mapper, which restores its map and publishes all of it in one iteration. At 16.8 million cells no beat was
+/// late even without it.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
-/// At 16.8 million cells the planner did not beat for more than 2 s forty times in a mission, and with this allowance was
-/// never late in a run of 97 s: a full solve, a keyframe of the field and the backlog fall into one iteration.
+/// The allowance of the planner: a full solve, a keyframe of the field and the backlog may fall into one iteration. At 16.8 million
+/// cells it did not beat for more than 2 s forty times in a mission, and with this allowance it was never late in a run of 97 s.
 const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
 /// The name of the stage that gives guidance: a mission may name an executable for it.
 pub const PLANNER: &str = "planner";
 
-/// What the robot does while one of most stages is down.
+/// The robot's behaviour while the stage is down, for most stages.
 const STOPPED: &str = "stopped by the link when the command is stale";
 
 /// Every stage, in the order of the pipeline.
@@ -150,7 +151,7 @@ pub fn start_order() -> Vec<&'static Stage> {
                 !waiting.iter().any(|other| other.name == writer)
             })
         });
-        // If inputs form a circle, there is no such stage; the rest then starts in the table's order.
+        // If the inputs form a circle, there is no such stage, and the others start in the table's order.
         order.extend(next.or(waiting.first()));
     }
     order

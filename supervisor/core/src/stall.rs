@@ -30,13 +30,13 @@ const FIELD_WITHIN: Duration = Duration::from_secs(60);
 const SCAN_TURNS: f64 = 1.2;
 /// Turns at one place, at the slower of its two rates, beyond which a robot makes no progress.
 const TURNS_AT_A_PLACE: f64 = 2.0;
-/// A place ends at this distance, metres. For a slow robot it is less.
+/// Poses within this distance count as the same place, metres. For a slow robot it is less.
 const PLACE_M: f64 = 0.2;
 /// A robot may circle its target. Its place then ends at this many radii of the circle.
 const CIRCLES: f64 = 1.2;
-/// A robot that drove less than this stands still, metres. For a slow robot it is less.
+/// A robot that drove less than this counts as standing, metres. For a slow robot it is less.
 const MOVED_M: f64 = 0.02;
-/// A robot that turned less than this does not turn, radians. For a slow robot it is less.
+/// A robot that turned less than this counts as not turning, radians. For a slow robot it is less.
 const TURNED_RAD: f64 = 0.1;
 /// Share of the motion at full speed that counts as motion: near its target a robot crawls.
 const SHARE: f64 = 0.05;
@@ -89,7 +89,7 @@ pub(crate) struct StallWatch {
     anchor: Option<Anchor>,
     place: Option<Place>,
     cut_off_since: Option<MissionTime>,
-    /// Since when it waits for the planner's field.
+    /// The time since which it waits for the planner's field.
     waits_since: Option<MissionTime>,
     /// Distance travelled when it was first seen in a hazard, metres.
     inside_hazard_since: Option<f64>,

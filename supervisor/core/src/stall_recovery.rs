@@ -18,7 +18,7 @@ impl Supervisor<'_> {
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>, SupervisorError> {
         let in_ticks = self.clock.in_ticks();
         if self.decision.order() != Order::Drive {
-            // In lockstep no time passes meanwhile.
+            // In lockstep mission time stands still meanwhile.
             if !in_ticks && let Some(pose) = &self.bus.observer.record.pose {
                 self.stall_watch.hold(pose.stamp.tick);
             }
@@ -59,7 +59,7 @@ impl Supervisor<'_> {
         let record = &self.bus.observer.record;
         let in_ticks = self.clock.in_ticks();
         let stopped = record.link.is_none_or(|link| link.stopped());
-        // In lockstep no time passes while something holds the robot.
+        // In lockstep mission time stands still while something holds the robot.
         let held = !in_ticks && (stopped || !self.stages.all_running());
         // A tick without its command may be incomplete here.
         let newest = record.published().tick.filter(|_| in_ticks);
@@ -99,8 +99,8 @@ impl Supervisor<'_> {
         Some(Ending::failed(Outcome::Unreachable, reason))
     }
 
-    /// After the run: the tick at which no recovery step was left, and the mission's ending. In lockstep the number of ticks
-    /// that were checked before the end depends on the machine, so the others are checked now.
+    /// Find out after the run at which tick no recovery step was left, and the mission's ending. In lockstep the number of ticks that were
+    /// checked before the end depends on the machine, so the others are checked now.
     pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
         while self.clock.in_ticks()
             && self.stall_watch.gave_up().is_none()

@@ -51,7 +51,7 @@ pub struct WheelTotals {
 }
 
 impl WheelTotals {
-    /// Only driving commands count: every mission begins and ends at rest.
+    /// Add a command. Only driving commands count, because every mission begins and ends at rest.
     pub(crate) fn with(self, command: &CommandSample) -> Self {
         if CommandState::from_byte(command.state) != CommandState::Driving {
             return self;

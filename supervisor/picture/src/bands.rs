@@ -9,7 +9,7 @@ use super::{
     page::{Path, round_up},
 };
 
-/// How the bands look.
+/// The style of the bands.
 #[derive(Debug)]
 pub(super) struct Style {
     /// Bytes this layer may take: a field in shreds is drawn coarser, not larger.
@@ -47,14 +47,14 @@ const BELOW: f64 = 0.02;
 pub(super) struct Levels {
     /// Step between levels, in log2 u.
     pub(super) step: f64,
-    /// How many.
+    /// The number of levels.
     pub(super) count: u32,
     /// Colours from the target outwards, at least two.
     ramp: &'static [[f64; 3]],
 }
 
 impl Levels {
-    /// How many levels lie above `log2_u`, or as many as there are.
+    /// The number of levels above `log2_u`.
     pub(super) fn band(&self, log2_u: f32) -> u32 {
         // Saturating: above the target's own level there is none.
         ((-f64::from(log2_u) / self.step) as u32).min(self.count)
@@ -213,7 +213,7 @@ impl Samples {
 
     /// The area where log2 u is above `level`.
     fn above(&self, lattice: &Lattice, level: f64) -> Path {
-        // For each crossing the one that comes next, the area kept to the left: marching squares.
+        // Marching squares: each crossing has a next one such that the area is on the left.
         let mut next = vec![usize::MAX; 2 * self.values.len()];
         for row in 0..self.down - 1 {
             for col in 0..self.across - 1 {
@@ -237,7 +237,7 @@ impl Samples {
         path
     }
 
-    /// How a level set passes the square whose lower left sample is (col, row).
+    /// The passages of a level set through the square whose lower left sample is (col, row).
     fn passages(&self, col: usize, row: usize, level: f64) -> &'static [(Side, Side)] {
         use Side::{Above, Below, Left, Right};
         let at = row * self.across + col;
@@ -297,8 +297,8 @@ impl Samples {
     }
 }
 
-/// The sum of all samples around one that has none itself. With it the bands run on below the
-/// hazard cells, which are drawn over them, instead of following every step of their outline.
+/// The sum of all samples around a sample without a value. With it the bands continue below the hazard cells, which are drawn over
+/// them, instead of following every step of their outline.
 fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
     let (col, row) = (at % across, at / across);
     (row - 1..=row + 1)

@@ -12,12 +12,12 @@ const HEIGHT: f64 = 230.0;
 /// Points of one series that are drawn at most; of more the least and the greatest of each stretch.
 const MOST_POINTS: usize = 2400;
 
-/// How a series is drawn.
+/// The style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// A solid line, broken where a value is not finite.
     Solid,
-    /// A dashed line, likewise.
+    /// A dashed line from point to point.
     Dashed,
     /// A disc at each point.
     Discs,
@@ -32,7 +32,7 @@ pub enum Mark {
 pub struct Series {
     /// Name for the legend.
     pub name: String,
-    /// How they are drawn.
+    /// The style of the points.
     pub mark: Mark,
     /// x and y, in the units of the axes, in the order of x.
     pub points: Vec<[f64; 2]>,

@@ -18,12 +18,12 @@ pub(super) struct Lattice {
     placing: Placing,
 }
 
-/// How a lattice lies.
+/// The position of a lattice.
 #[derive(Clone, Copy, Debug)]
 enum Placing {
-    /// In the mission frame, metres, y up.
+    /// The lattice lies in the mission frame, metres, y up.
     Mission { frame: GridFrame, view: View },
-    /// As an image: the first row at the top, cells of so many units from a corner of the sheet.
+    /// The lattice lies like an image from a corner of the sheet, with the first row at the top and `cell` units a cell.
     Image { corner: DVec2, cell: f64 },
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Legend<'a> {
     pub(super) view: &'a View,
     pub(super) levels: Option<Levels>,
     pub(super) guidance: bool,
-    /// Whether from some cells that were believed free the target cannot be reached.
+    /// Whether the target cannot be reached from some free cells of the map.
     pub(super) isolated: bool,
     pub(super) hazard: Option<&'a BelievedHazard>,
     pub(super) world: &'a Shapes,
@@ -108,7 +108,7 @@ impl Legend<'_> {
         column.row("target, tolerance", |at| motion::target(at, 9.5));
     }
 
-    /// Rows about hazards, believed and real.
+    /// Rows about the hazards of the map and the real obstacles.
     pub(super) fn hazard_rows(&self, column: &mut Column) {
         let cell = |colour: &'static str| move |at: DVec2| patch(at, &format!("fill=\"{colour}\""));
         if let Some(hazard) = self.hazard {

@@ -1,23 +1,23 @@
-//! The picture of a run: one SVG file without references to others. And the picture of a field on a map.
+//! The picture of a run, an SVG file without references to others, and the picture of a field on a map.
 //!
-//! From the bottom of the page to its top, everything in the mission frame (metres, y up):
+//! The layers from the bottom of the page to its top are in the mission frame (metres, y up):
 //!
 //! | module | draws |
 //! |---|---|
 //! | `bands` | log2 u of the final belief, in bands between level sets |
 //! | `streamlines` | lines of the guidance field E |
-//! | `cells` | what was believed hazardous |
-//! | `world` | what is really there |
+//! | `cells` | the hazard cells of the map |
+//! | `world` | the real obstacles |
 //! | `motion` | trajectories, the robot at regular times, start, target |
-//! | `margin`, `legend` | title, axes, captions; what the symbols mean |
-//! | `page`, `lattice` | the page that all draw on, and where cells are on it |
-//! | [`Scene`] | what is drawn |
+//! | `margin`, `legend` | title, axes, captions; the meaning of the symbols |
+//! | `page`, `lattice` | the page, and the position of cells on it |
+//! | [`Scene`] | the data of a picture |
 //!
-//! [`figure_svg`] is the same without title and captions, and with text that is read on a small page; [`panels_svg`] puts
+//! [`figure_svg`] draws the picture without title and captions, and with text that can be read on a small page. [`panels_svg`] puts
 //! plots of several moments side by side.
 //!
-//! `map` draws the field of a bare map with the same bands and lines, `raster` makes it a PNG. `chart` and `timeline` draw
-//! values and events against time; `plot` is what they have in common.
+//! `map` draws the field of a bare map with the same bands and lines, and `raster` converts it to PNG. `chart` and `timeline` draw
+//! values and events against time; `plot` is their common part.
 //!
 //! A picture shows what is known at the end of a run, however it ended: every layer but the frame may be missing, and
 //! every input gives a valid file.
@@ -64,7 +64,7 @@ use self::{
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
 
-/// Whether any cell believed free cannot reach the target.
+/// Whether the target cannot be reached from a free cell of the map.
 fn has_isolated_cells(
     grid: Option<(GridFrame, &[u8])>,
     field: Option<(GridFrame, &[FieldCell])>,
@@ -100,8 +100,8 @@ pub fn figure_svg(scene: &Scene<'_>) -> String {
     drawn(scene, |view, plot, legend| margin::figure(scene, &plot, view, legend))
 }
 
-/// Plots side by side, two in a row, each below its title. Without axes and legend: those of [`figure_svg`] of the same mission
-/// stand for them.
+/// Plots side by side, two in a row, each below its title. They have no axes and no legend; [`figure_svg`] of the same mission shows
+/// them.
 pub fn panels_svg(title: &str, panels: &[(String, Scene<'_>)]) -> String {
     let plots = panels.iter().map(|(title, scene)| (&title[..], drawn(scene, |_, plot, _| plot)));
     margin::panels(title, &plots.collect::<Vec<_>>())

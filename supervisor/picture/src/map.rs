@@ -148,7 +148,7 @@ fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String
         .collect()
 }
 
-/// Between cells so near to each other that are not parted by a wall u does not change more, in log2 u.
+/// The greatest change of log2 u between cells this near to each other that no wall separates.
 const OPEN: f64 = 8.0;
 
 /// Whether a reachable cell and one across a blocked neighbour lie more than two bands apart, and that for the wall.

@@ -1,4 +1,4 @@
-//! The robot: the ways driven and believed, its body at regular times, start, target, end.
+//! The robot: its true and its estimated trajectory, its body at regular times, start, target, end.
 
 use common::{kinematics::Pose2, mission::Mission};
 use glam::DVec2;
@@ -12,7 +12,7 @@ use super::{
 const MOST_POSES: usize = 4000;
 /// About as many bodies along the way.
 const BODIES: f64 = 16.0;
-/// In a plane 95 % of a normal distribution are within so many standard deviations: the root of -2 ln 0.05.
+/// The number of standard deviations within which 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
 const WITHIN_95: f64 = 2.4477;
 /// Never more, whatever the times say.
 const MOST_BODIES: usize = 200;
@@ -46,7 +46,7 @@ impl<'a> Motion<'a> {
         motion
     }
 
-    /// The true trajectory, or the believed one if nobody knows the true one.
+    /// The true trajectory, or the estimated one if the true one is unknown.
     fn way(&self) -> &'a [Pose2] {
         if self.truth.is_empty() { self.believed } else { self.truth }
     }
@@ -56,12 +56,12 @@ impl<'a> Motion<'a> {
         !self.truth.is_empty()
     }
 
-    /// Whether the robot believed to be anywhere.
+    /// Whether there is an estimated trajectory.
     pub(super) const fn has_belief(&self) -> bool {
         !self.believed.is_empty()
     }
 
-    /// Whether the covariance of the believed end is known.
+    /// Whether the covariance of the estimated end is known.
     pub(super) const fn has_covariance(&self) -> bool {
         self.covariance.is_some() && self.has_belief()
     }
@@ -105,7 +105,7 @@ impl<'a> Motion<'a> {
         outlines.element(BODY)
     }
 
-    /// The ellipse in which its centre is with 95 %, about where it was believed at the end.
+    /// The ellipse about the estimated end in which the robot's centre is with 95 %.
     fn region(&self, view: &View) -> String {
         let (Some([xx, xy, yy]), Some(end)) = (self.covariance, self.believed.last()) else {
             return String::new();
@@ -120,7 +120,7 @@ impl<'a> Motion<'a> {
             return String::new();
         }
         let at = view.place(end.position);
-        // On the sheet y grows downwards.
+        // The sheet's y axis points downwards.
         let angle = Px(-xy.atan2(half).to_degrees() / 2.0);
         format!(
             "<ellipse rx=\"{}\" ry=\"{}\" transform=\"translate({} {}) rotate({angle})\" {}/>\n",
@@ -159,7 +159,7 @@ pub(super) fn final_body() -> String {
     format!("fill=\"{0}\" fill-opacity=\"0.35\" stroke=\"{0}\" stroke-width=\"1.8\"", ink::TRUTH)
 }
 
-/// Attributes of the body at the end, where it was believed.
+/// Attributes of the body at the estimated end.
 fn believed_end() -> String {
     format!(
         "fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-dasharray=\"3 2.4\"",
@@ -167,7 +167,7 @@ fn believed_end() -> String {
     )
 }
 
-/// Attributes of the region about the believed end.
+/// Attributes of the region about the estimated end.
 pub(super) fn region_style() -> String {
     format!(
         "fill=\"{0}\" fill-opacity=\"0.08\" stroke=\"{0}\" stroke-width=\"1.1\" stroke-dasharray=\"1.5 2.5\"",
@@ -180,7 +180,7 @@ pub(super) fn truth_line() -> String {
     line_style(ink::TRUTH, "2.2", "none")
 }
 
-/// Attributes of the believed trajectory.
+/// Attributes of the estimated trajectory.
 pub(super) fn believed_line() -> String {
     line_style(ink::BELIEVED, "2", "7 4.5")
 }
@@ -214,7 +214,7 @@ fn is_shown(view: &View, pose: &Pose2) -> bool {
 /// A disc with a tick from its centre to its rim along the heading.
 pub(super) fn add_body(path: &mut Path, at: DVec2, radius: f64, heading: f64) {
     path.circle(at, radius);
-    // On the sheet y grows downwards.
+    // The sheet's y axis points downwards.
     let axis = DVec2::from_angle(-heading);
     path.move_to(at + axis * (radius * 0.35));
     path.line_to(at + axis * radius);

@@ -14,7 +14,7 @@ pub(super) const PLOT_TOP: f64 = 92.0;
 /// Side of the plot: a square, as the perimeter is.
 pub(super) const PLOT_SIDE: f64 = 800.0;
 
-/// Beyond the plot lines are cut, not only hidden: a far pose must not make far coordinates.
+/// Lines are cut at this distance outside the plot, and not only hidden, so that a far pose gives no far coordinates.
 const OVERHANG: f64 = 20.0;
 /// Steps of a line shorter than this cannot be seen.
 const FINEST: f64 = 0.6;

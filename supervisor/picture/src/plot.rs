@@ -12,22 +12,22 @@ pub(super) const LEFT: f64 = 70.0;
 pub(super) const RIGHT: f64 = WIDTH - 20.0;
 /// Text, px.
 const TEXT: f64 = 14.0;
-/// About the width of a character of the text.
+/// The approximate width of a character of the text.
 const CHARACTER: f64 = 8.6;
 /// Distance between rows of the legend.
 const ROW: f64 = 21.0;
 /// Room of a symbol of the legend, and from one entry to the next.
 const SYMBOL: f64 = 38.0;
 const APART: f64 = 24.0;
-/// Below the plot.
+/// The space below the plot.
 const BELOW: f64 = 52.0;
 /// Characters that surely fit across the sheet.
 const ACROSS: usize = 70;
 
-/// How values lie along an axis.
+/// The scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Equal distances are equal differences.
     Linear,
     /// Logarithmic; values of 0 and less are not drawn.
     Logarithmic,
@@ -38,7 +38,7 @@ pub enum Scale {
 pub struct Axis {
     /// Its quantity and unit, such as `time, s`.
     pub label: String,
-    /// How values lie.
+    /// The scale.
     pub scale: Scale,
 }
 
@@ -82,7 +82,7 @@ impl Range {
         Self { scale, low, high, step }
     }
 
-    /// From 0 to exactly `high`.
+    /// An axis from 0 to exactly `high`.
     pub(super) fn to(high: f64) -> Self {
         let high = if high.is_finite() && high > 0.0 { high } else { 1.0 };
         Self { scale: Scale::Linear, low: 0.0, high, step: round_up(high / 6.0) }
@@ -170,7 +170,7 @@ impl Plot {
         DVec2::new(self.left + x * (RIGHT - self.left), self.top + (1.0 - y) * self.height)
     }
 
-    /// The file: `drawn` between axes. Without a range along y there are no ticks there.
+    /// The file with `drawn` between axes. The y axis has no ticks if it has no range.
     pub(super) fn svg(
         &self,
         x: (&Range, &str),

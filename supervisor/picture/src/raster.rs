@@ -9,7 +9,7 @@ pub enum RasterError {
     /// The SVG is none.
     #[error("the picture could not be read back: {0}; report this map")]
     Drawing(#[from] usvg::Error),
-    /// There is no pixmap of that size.
+    /// A pixmap of that size cannot be allocated.
     #[error("no picture of {width} x {height} pixels can be made; report this map")]
     Size {
         /// Pixels in a row.

@@ -15,7 +15,7 @@ pub struct Scene<'a> {
     pub covariance: Option<[f64; 3]>,
     /// The true poses at the same times; empty with a real robot.
     pub truth: &'a [Pose2],
-    /// How the run went.
+    /// The facts about the run.
     pub facts: Facts<'a>,
     /// Lines below the picture; each is cut where the page ends.
     pub captions: &'a [String],
@@ -24,7 +24,7 @@ pub struct Scene<'a> {
 /// The numbers of the title line.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts<'a> {
-    /// In a word: reached, unreachable, timeout, ...
+    /// The outcome in a word: reached, unreachable, timeout, ...
     pub outcome: &'a str,
     /// Whether that is what was wanted.
     pub reached: bool,

@@ -9,12 +9,12 @@ use super::{
     page::{Path, ink},
 };
 
-/// How the lines look.
+/// The style of the lines.
 #[derive(Debug)]
 pub(super) struct Style {
     /// Bytes the lines may take: a field in shreds is drawn sparser, not larger.
     pub(super) budget: usize,
-    /// Between a line and where the next one is begun, on the sheet.
+    /// The distance from a line to the beginning of the next one, on the sheet.
     pub(super) spacing: f64,
     /// Never nearer than this, in cells: between two cells there is nothing new to see.
     pub(super) least_cells: f64,
@@ -76,7 +76,7 @@ fn paint(lines: &Path, arrowheads: &Path, style: &Style) -> String {
     )) + &arrowheads.element(&format!("fill=\"{colour}\" fill-opacity=\"{head_opacity}\""))
 }
 
-/// One line, its points only where it bends, and its arrowheads.
+/// Draw a line with points only where it bends, and its arrowheads.
 fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
     let Some((&first, rest)) = line.split_first() else {
         return;
@@ -146,7 +146,7 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
 struct Tracer<'a> {
     lattice: &'a Lattice,
     cells: &'a [FieldCell],
-    /// Between two lines, in cells.
+    /// The distance between two lines, in cells.
     spacing: f64,
     /// Points of the lines so far, in square bins of one spacing.
     drawn: Vec<Vec<DVec2>>,
@@ -211,7 +211,7 @@ impl Tracer<'_> {
 
     /// Follow E, or its reverse, from `seed` until there is no guidance or another line is near.
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
-        // Not longer than a cell, so that a wall of one cell is not stepped over.
+        // A step is shorter than a cell, so that it cannot skip a wall of one cell.
         let step = (0.2 * self.spacing).min(0.9) * sense;
         let most = (3.0 * self.lattice.longest() as f64 / step.abs()) as usize;
         let mut points = Vec::new();

@@ -70,11 +70,11 @@ impl Symbol {
 /// A row of the time line.
 #[derive(Clone, Debug, Default)]
 pub struct Lane {
-    /// Whose.
+    /// The name of the process.
     pub name: String,
     /// Intervals in which it was down or standing, seconds.
     pub spans: Vec<[f64; 2]>,
-    /// When something happened, seconds.
+    /// The times of the events, seconds, and their symbols.
     pub marks: Vec<(f64, Symbol)>,
 }
 

@@ -11,14 +11,14 @@ pub(super) const HATCH: &str = "<pattern id=\"hatch\" width=\"6\" height=\"6\" \
      patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
      <path d=\"M0 0V6\" stroke=\"#27313b\" stroke-width=\"2.2\" stroke-opacity=\"0.6\"/></pattern>";
 
-/// How a thing is outlined.
+/// The outline of an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
     /// Hard, from the floor to above the robot.
     Full,
     /// Lower than that, or above the floor.
     Partial,
-    /// As high as the robot, but it absorbs sound.
+    /// The obstacle is as high as the robot, but absorbs sound.
     Soft,
 }
 

@@ -1,13 +1,13 @@
-//! What is wrong with a value of a mission.
+//! Errors of a value in a mission.
 
-/// A value that cannot be, before it is given a line.
+/// An invalid value, before its line in the file is known.
 pub(super) struct Objection {
     pub(super) key: &'static str,
     pub(super) problem: String,
     pub(super) remedy: String,
 }
 
-/// That the value of `key` cannot be.
+/// The error of an invalid value of `key`.
 pub(super) fn objection(
     key: &'static str,
     problem: impl Into<String>,

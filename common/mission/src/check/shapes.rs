@@ -5,7 +5,7 @@ use crate::geometry::{Profile, Shapes};
 
 /// More shapes than this in a file are a mistake.
 const MAX_POINTS: usize = 100_000;
-/// Nothing reaches higher than this, metres.
+/// The greatest height of a shape, metres.
 const HIGHEST_M: f64 = 1000.0;
 
 impl Checker {

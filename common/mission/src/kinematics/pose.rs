@@ -4,7 +4,7 @@ use glam::DVec2;
 use nalgebra::{Rotation2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Where the robot's centre is and which way it faces, in the mission frame.
+/// The position of the robot's centre and its heading in the mission frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2 {
     /// Metres.

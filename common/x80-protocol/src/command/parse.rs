@@ -1,4 +1,4 @@
-//! What a frame asks of the robot, in every form that is in use.
+//! Parsing of commands in all forms that are in use.
 
 use super::{
     ALONE, ALSO_ALONE, CHANNELS, Command, Feedback, Gains, Mode, Motion, Parameter, Quantity,
@@ -10,10 +10,10 @@ use crate::{
 };
 
 impl Command {
-    /// What a frame asks of the robot.
+    /// Parse a command.
     ///
     /// # Errors
-    /// When the frame has a right CRC but is no command: unknown DID, odd length, a byte that means nothing.
+    /// The frame is not a command although its CRC is right: its DID is unknown, its length is wrong, or a byte has no meaning.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, MessageError> {
         command(frame)
     }
@@ -118,7 +118,7 @@ fn parameter(data: &[u8]) -> Result<Command, MessageError> {
             &other => return Err(invalid("mode", other)),
         }),
         (13 | 14, []) => return Err(length(did::PARAMETER, data, "3")),
-        // Not every parameter has a channel in second place: do not judge the byte.
+        // The byte is not checked, because not every parameter has a channel in second place.
         (sub, _) => {
             return Ok(Command::Parameter { channel: number, parameter: Parameter::Other { sub } });
         }

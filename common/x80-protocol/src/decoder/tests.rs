@@ -159,7 +159,7 @@ fn every_byte_is_accounted_for() {
     assert_eq!((tally.frames, tally.bad_crc, tally.noise_bytes), (1, 1, 13));
 }
 
-/// One piece of a stream under test.
+/// A piece of a stream under test.
 #[derive(Clone, Debug)]
 enum Piece {
     Untouched { did: u8, data: Vec<u8> },
@@ -222,7 +222,7 @@ proptest! {
                 Piece::Noise(bytes) => stream.extend(bytes),
             }
         }
-        // What a header that was noise claims has to come before it is known for noise.
+        // The decoder needs as many bytes as a noisy header announces before it can reject the header.
         stream.extend([0; MAX_FRAME_BYTES]);
 
         let mut cuts: Vec<usize> = cuts.iter().map(|cut| cut.index(stream.len())).collect();

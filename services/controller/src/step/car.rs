@@ -8,8 +8,7 @@ use common::{
 use super::{Alignment, Controller};
 
 impl Controller {
-    /// How a car moves under guidance of that status; none to stand, which it does where it would have to turn on the
-    /// spot.
+    /// The motion of a car under guidance of that status; none to stand. A car stands where it would have to turn on the spot.
     pub(super) fn car_motion(
         &mut self,
         status: GuidanceStatus,

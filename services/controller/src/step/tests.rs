@@ -119,7 +119,7 @@ fn equation_17_by_hand() {
     close(command.right_rad_s, 4.0);
 }
 
-/// The same robot, by the evidential method.
+/// The controller of the same robot with the evidential method.
 fn evidential() -> Controller {
     let text = "target = [3, 0]\nrobot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
                 controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4 }";

@@ -126,7 +126,7 @@ fn counters_that_restart_do_not_move_the_robot() {
 fn a_robot_that_restarted_while_it_was_away_does_not_move() {
     let mut reckoning = reckoning("");
     reckoning.take(&wheels(0, 600, 700));
-    // In the 5 s since, wheels could have turned so far.
+    // In the 5 s since then, wheels could have turned so far.
     let after = WheelSample { restarts: 1, ..wheels(10, 0, 1) };
     assert!(reckoning.rejects(&after));
     close(reckoning.take(&after).x_m, 0.0);
@@ -177,7 +177,7 @@ fn equation_3_of_a_car_by_hand() {
     close(pose.x_m, 0.5 * turn.sin());
     close(pose.y_m, 0.5 * (1.0 - turn.cos()));
     close(pose.travelled_m, 0.1 * PI);
-    // On the way from 45 degrees to the left to as much to the right it is straight on the mean.
+    // The steering goes from 45 degrees to the left to 45 degrees to the right, so its mean is straight.
     let mut swung = reckoning(car);
     swung.take(&wheels(0, 100, 450));
     let pose = swung.take(&wheels(1, 600, COUNT_CYCLE - 450));

@@ -5,7 +5,7 @@ use super::*;
 use common::samples::Stamp;
 use std::{f64::consts::FRAC_PI_2, path::Path};
 
-/// One input at a time.
+/// Inputs one at a time.
 impl Mapper {
     fn hear(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
         let (pose, range) = (*pose, range.copied());
@@ -29,7 +29,7 @@ fn mapper(extra: &str) -> Mapper {
     Mapper::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
 }
 
-/// The same place in other cells, with a range so far mapped and `set` as its last lines.
+/// A mapper of the same place with cells of `cell_m` metres; `set` is the end of its mission file.
 fn of(set: &str, cell_m: f64) -> Mapper {
     let text = format!(
         "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = {} }}\n\

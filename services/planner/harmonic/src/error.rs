@@ -5,7 +5,7 @@ use thiserror::Error;
 use crate::cell::{Cell, MAX_SIDE};
 use crate::screening::MIN_SCREENING_CELLS;
 
-/// Why there is no field.
+/// A map is invalid, or a solve has no field.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SolveError {

@@ -1,10 +1,9 @@
 //! The direction to follow at any position, equation (11): grad u / |grad u|.
 //!
-//! At a cell's centre the gradient is the central difference of u, blocked cells counting as 0. Between centres it is
-//! interpolated bilinearly between the free cells among the four centres around, which keeps it continuous; cells that
-//! meet only across a blocked corner are left out. Near a wall its component into the wall decreases with the distance to
-//! 0, so that it never leads into a blocked cell. Only ratios of neighbouring u enter: the common
-//! exponent is taken out first.
+//! At a cell's centre the gradient is the central difference of u, in which blocked cells count as 0. Between centres it is
+//! interpolated bilinearly between the free cells among the four nearest centres, so it is continuous. Cells that meet only across
+//! a blocked corner are left out. Near a wall the component into the wall decreases with the distance and is 0 at the wall, so
+//! the gradient never leads into a blocked cell. Only ratios of neighbouring u matter, so the common exponent is removed first.
 
 use crate::cell::Cell;
 use crate::field::Field;
@@ -152,9 +151,9 @@ impl Field {
 
     /// Removes from `gradient` the component into blocked cells: all of it at the wall, nothing half a cell away.
     ///
-    /// Each blocked neighbour acts through the point of it nearest to the position. A diagonal one counts only where both
-    /// cells beside it are free, else a wall running past the corner would stop the motion along it. At most two of them,
-    /// at right angles, are ever within reach of one position, so their order does not matter.
+    /// Each blocked neighbour acts through its point nearest to the position. A diagonal neighbour counts only if both cells beside it
+    /// are free; otherwise a wall that runs past the corner would stop the motion along it. At most two neighbours, at right angles,
+    /// are within reach of a position, so their order does not matter.
     fn without_wall_component(
         &self,
         here: (i64, i64),

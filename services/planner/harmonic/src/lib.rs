@@ -1,4 +1,4 @@
-//! Harmonic potential fields on grid maps: from free and blocked cells and a target to a direction at any position.
+//! Harmonic potential fields on grid maps: they give a direction at any position from free and blocked cells and a target.
 //!
 //! # The problem
 //! A robot on a map of cells wants a direction wherever it stands, such that following it ends at the target and never
@@ -18,9 +18,8 @@
 //! laplacian u = u / L^2, in which u falls by a further factor of e in the screening length L; [`Screening`] states L, and
 //! k = (h / (2 L))^2 on cells of side h. A short screening length makes the field prefer short ways over wide ones.
 //!
-//! u is a probability: that a random walk which starts at the cell, steps to each neighbour with equal chance, and ends at
-//! every step with chance k / (1 + k), meets the target before it meets a blocked cell. Its gradient, normalised, is the
-//! guidance.
+//! u is the probability that a random walk from the cell meets the target before it meets a blocked cell. The walk steps to each
+//! neighbour with equal chance, and ends at every step with chance k / (1 + k). The normalised gradient of u is the guidance.
 //!
 //! # The range of u
 //! In a corridor of width w, u falls like exp(-pi x / w): in a maze it reaches 1e-70000, and an `f64` ends at 1e-308. So u

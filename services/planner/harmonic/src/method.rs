@@ -1,6 +1,6 @@
 //! The methods a field can be computed by.
 
-/// How a field was computed.
+/// The method by which a field was computed.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub enum Method {

@@ -1,4 +1,4 @@
-//! Multifrontal factorisation, cells in order of decreasing distance from the target.
+//! Multifrontal factorisation with the cells in order of decreasing distance from the target.
 //!
 //! Cells are eliminated from the farthest inwards, a few distances at a time. What has been eliminated beyond a distance
 //! falls into connected pieces, and pieces join as the distance shrinks: a tree of fronts, each a small dense matrix over
@@ -7,12 +7,12 @@
 //! weights of moderate size, of the u of cells nearer to the target. Nothing is iterated, nothing cancels and nothing
 //! underflows, whatever the range of u. The cost is about the cube of the fronts' width: right for corridors, not halls.
 //!
-//! - [`tree`]: which cells go together, and in what order where many passages run side by side.
+//! - [`tree`]: the cells of each front, and the order of the fronts where many passages run side by side.
 //! - [`dense`]: the matrix of a front.
-//! - [`back_substitution`]: from the factors to u.
+//! - [`back_substitution`]: computes u from the factors.
 //! - [`gauss_seidel`]: corrects the cells that `f64` factors cannot reach.
 //! - [`breadth_first`]: the order of the cells.
-//! - [`budget`]: the memory all this may take.
+//! - [`budget`]: the memory that the method may use.
 //! - [`workspace`]: the factors, and memory reused between solves.
 
 mod back_substitution;

@@ -51,7 +51,7 @@ const VISITED_TWICE: Range<usize> = 1..3;
 const OVERCORRECTION: f64 = 1.2;
 const COARSE_OVERCORRECTION: f64 = 1.07;
 
-/// On maps whose longer side is at most this, second visits and second sweeps save fewer cycles than they cost.
+/// The longer side of small maps is at most this. On them second visits and second sweeps save fewer cycles than they cost.
 const SMALL_SIDE: usize = 128;
 
 /// Full sweeps in a pass over the finest level of a large map: all but the first read no more from memory, and dead ends a few
@@ -67,7 +67,7 @@ pub(crate) struct Multigrid<R> {
     finest: Finest<R>,
     coarse: Vec<Coarse<R>>,
     coarsest: Coarsest,
-    /// By level that a next one is set up from, the finest first.
+    /// The products for the set-up of the next level, for all levels but the coarsest, the finest first.
     products: Vec<Products<R>>,
     /// Whether the first coarse level holds a correction of u, and not a first guess or nothing.
     corrects: bool,
@@ -261,8 +261,8 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// One cycle; a cell whose direction its correction turns by more than `tolerance`, radians, counts as unsettled. None
-    /// are counted without one.
+    /// Run a cycle. A cell counts as unsettled if the correction turns its direction by more than `tolerance`, radians. Without a
+    /// tolerance no cells are counted.
     pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> Progress {
         let sweeps = if self.corrects && self.is_large() { SWEEPS } else { 1 };
         let progress = self.pass(sweeps, true, tolerance);
@@ -279,13 +279,13 @@ impl<R: Real> Multigrid<R> {
     /// Solves on a coarse level, from zero, by one cycle through it and those below; on some it is followed by another.
     fn solve_level(&mut self, level: usize) {
         self.visit(level);
-        // None of them is the coarsest of a large map.
+        // The coarsest level of a large map is none of these.
         if self.is_large() && VISITED_TWICE.contains(&level) {
             self.second_visit(level);
         }
     }
 
-    /// One cycle from zero through a coarse level and those below.
+    /// Run a cycle from zero through a coarse level and the levels below.
     fn visit(&mut self, level: usize) {
         if level == self.coarse.len() - 1 {
             return self.coarsest.solve(&mut self.coarse[level]);

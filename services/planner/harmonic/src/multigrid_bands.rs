@@ -46,7 +46,7 @@ pub(crate) fn solve(domain: &Domain, cancellation: &Cancellation) -> Result<Stor
                 break;
             }
         }
-        // One more, for the residuals.
+        // A further cycle computes the residuals.
         levels.cycle(None);
         levels.finish();
         let mut resolved = 0_usize;

@@ -64,7 +64,7 @@ impl PartialOrd for Scaled {
     }
 }
 
-/// 2^`n`, exactly; 0 below the normal range and infinity above it. Without a branch, for loops over vectors.
+/// 2^`n`, exactly; 0 below the normal range and infinity above it. It has no branch, so that loops over it use vectors.
 #[inline(always)]
 pub(crate) fn pow2(n: i32) -> f64 {
     f64::from_bits(((n.clamp(-1023, 1024) + 1023) as u64) << 52)

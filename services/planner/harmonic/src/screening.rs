@@ -10,22 +10,22 @@ pub const MIN_SCREENING_CELLS: f64 = 5e-4;
 /// The screening of a map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Screening {
-    /// None: Laplace's equation.
+    /// There is no screening: Laplace's equation.
     #[default]
     None,
-    /// One screening length for all cells.
+    /// All cells have the same screening length.
     Uniform {
         /// The screening length, in the unit of `cell`.
         length: f64,
         /// The side of a cell; 1 where lengths are in cells.
         cell: f64,
     },
-    /// One screening length a cell, in cells, row-major; infinite where there is none.
+    /// Each cell has its screening length, in cells, row-major; infinite for no screening.
     PerCell(Vec<f32>),
 }
 
 impl Screening {
-    /// One screening length for all cells, in cells; infinite for none.
+    /// The same screening length for all cells, in cells; infinite for no screening.
     pub const fn cells(length: f64) -> Self {
         Self::Uniform { length, cell: 1.0 }
     }
@@ -34,9 +34,9 @@ impl Screening {
 /// The screening coefficients k of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Coefficients {
-    /// One k for all cells.
+    /// The k of all cells.
     Uniform(f64),
-    /// One k a cell, row-major.
+    /// The k of each cell, row-major.
     PerCell(Vec<f32>),
 }
 

@@ -1,5 +1,5 @@
-//! From a domain to its verified field: the method that [`plan()`] chooses, its check, and the costlier methods where the
-//! check fails.
+//! The solver computes a verified field of a domain. It tries the method that [`plan()`] chooses and verifies the field; if that
+//! fails, it tries the costlier methods.
 
 mod plan;
 
@@ -48,10 +48,10 @@ const BETWEEN_CHECKS: f64 = 4.0;
 const SINGLE_CYCLES: usize = 60;
 const DOUBLE_CYCLES: usize = 450;
 
-/// How a solver may work; what full solves compute does not depend on it.
+/// The resources of a solver. The results of full solves do not depend on them.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Threads a solve may use; the result is the same to the bit. Only the verification of large maps uses more than
+    /// The number of threads that a solve may use; the result is the same to the bit. Only the verification of large maps uses more than
     /// one.
     pub threads: NonZeroUsize,
     /// Bytes the multifrontal factorisation may take; a solve that needs more ends in [`SolveError::TooCostly`].
@@ -59,7 +59,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// One thread, 2 GiB.
+    /// One thread and 2 GiB.
     fn default() -> Self {
         Self { threads: NonZeroUsize::MIN, memory_limit: 2 << 30 }
     }
@@ -71,7 +71,7 @@ impl Default for Settings {
 pub enum Phase {
     /// The part that does not depend on the target is ready.
     SetUp,
-    /// One cycle of multigrid has ended.
+    /// A cycle of multigrid has ended.
     Cycled,
     /// A field was computed.
     Solved,
@@ -79,8 +79,7 @@ pub enum Phase {
     Verified,
 }
 
-/// Solves fields. Between solves it holds the set-up, which does not depend on the target, and updates it where cells
-/// changed.
+/// Solves fields. Between solves it stores the set-up, which does not depend on the target, and updates it where cells changed.
 #[derive(Debug, Default)]
 pub struct Solver {
     settings: Settings,

@@ -19,7 +19,7 @@ pub(crate) enum Store {
     Extended { mantissas: Vec<f64>, exponents: Vec<i32> },
 }
 
-/// From u times 2^TOP.
+/// The values are u times 2^TOP.
 impl From<Vec<f32>> for Store {
     fn from(values: Vec<f32>) -> Self {
         let exponent = -f32::TOP;
@@ -27,7 +27,7 @@ impl From<Vec<f32>> for Store {
     }
 }
 
-/// From u times 2^TOP.
+/// The values are u times 2^TOP.
 impl From<Vec<f64>> for Store {
     fn from(values: Vec<f64>) -> Self {
         let exponent = -f64::TOP;
@@ -93,7 +93,7 @@ impl Store {
         for (to, index) in into.iter_mut().zip(cells) {
             let (value, exponent) = self.raw(index);
             let shift = exponent.saturating_sub(reference);
-            // In two steps: the factor may be out of range where the product is not.
+            // The multiplication is done in two steps, because the factor may be out of range where the product is not.
             *to = R::of(value.max(0.0) * pow2(shift / 2) * pow2(shift - shift / 2));
         }
     }

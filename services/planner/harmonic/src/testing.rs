@@ -1,4 +1,4 @@
-//! Generated maps of every kind, and a slow reference to measure the solvers against. For tests and benchmarks only.
+//! Generated maps of every kind, and a slow reference solver. Only tests and benchmarks use them.
 
 mod exact;
 mod maps;

@@ -1,4 +1,4 @@
-//! The verification every field passes before it is handed out.
+//! The verification that every field passes before the solver returns it.
 //!
 //! Two things are checked of every cell: the residual of its equation is small relative to its own u (a norm over the map
 //! says nothing about cells where u is 1e-50), and one of its neighbours has a larger u, so steepest ascent from it ends at
@@ -36,7 +36,7 @@ pub struct Verification {
     /// The largest share of what bends the field that residuals of one sign account for, over tiles of 64 x 64 cells:
     /// 4 |sum of the relative residuals| over the sum of (|grad u| / u)^2.
     pub worst_tile: f64,
-    /// How the field was computed.
+    /// The method by which the field was computed.
     pub method: Method,
     /// Free cells from which the target can be reached, the target's own included.
     pub reachable: usize,

@@ -191,6 +191,6 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
     let toward = |col: usize| field.direction(Cell::new(col, 22)).expect("a direction")[0].signum();
     assert_eq!((toward(100), toward(1400)), (-1.0, 1.0));
     let turn = (100..1400).find(|&col| toward(col) > 0.0).expect("a turning point");
-    // Where both ways cost the same: 0.572 x = 0.0647 * 1500 + 0.572 (1490 - x), roughly.
+    // Both ways cost the same where, roughly, 0.572 x = 0.0647 * 1500 + 0.572 (1490 - x).
     assert!((780..900).contains(&turn), "the way turns at column {turn}");
 }

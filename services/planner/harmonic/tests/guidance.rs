@@ -76,7 +76,7 @@ fn guidance_never_points_into_a_wall_it_touches() {
                         row as f64 + 0.499_999_9 * dr + along * dc,
                     ];
                     if let Guidance::Along(d) = field.guidance(at[0], at[1]) {
-                        // Where the saddle rule decides it may lean towards the cell's centre line, never outwards.
+                        // If the saddle rule decides, the direction may lean towards the cell's centre line, but never outwards.
                         assert!(
                             d[0] * dc + d[1] * dr < 1e-4,
                             "{kind:?}: {d:?} into the wall at {at:?}"

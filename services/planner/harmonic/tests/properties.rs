@@ -91,7 +91,7 @@ proptest! {
         let reference = Reference::solve(&domain);
         prop_assume!(reference.worst_residual < 1e-9);
         let (off, worst) = reference.compare(&field);
-        // On a small map a single cell on a saddle point is more than its share.
+        // On a small map a single cell on a saddle point exceeds the allowed share.
         let cells = off * field.verification().reachable as f64;
         assert!(off <= 1e-3 || cells < 2.5, "{cells} directions are off");
         assert!(worst <= 1.0, "a clear direction is {worst} degrees off");

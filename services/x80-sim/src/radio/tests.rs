@@ -1,4 +1,4 @@
-//! What the radio promises of its shares, durations and order.
+//! Tests of the radio's shares, durations and order.
 
 use common::mission::Realism;
 

@@ -36,7 +36,7 @@ fn send(robot: &mut Robot, command: Command) -> (Heard, Vec<u8>) {
     send_as(robot, command, Addressing::Numbered)
 }
 
-/// Both wheels forward at so many counts per second.
+/// A command that drives both wheels forward at `counts` per second.
 fn forward(counts: i16, limit_ms: impl Into<Option<u16>>) -> Command {
     Command::velocity([Some(-counts), Some(counts)], limit_ms)
 }
@@ -148,7 +148,7 @@ fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
     for _ in 0..7 {
         robot.advance_to_next_tick();
     }
-    // One second: 1000 counts, 2 pi 0.085 / 1200 m each. Channel 0 is reversed and wraps below 0.
+    // In one second the wheels turn 1000 counts of 2 pi 0.085 / 1200 m. Channel 0 is reversed and wraps below 0.
     let sensors = motor(&mut robot);
     assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
     assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
@@ -296,7 +296,7 @@ fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
 #[test]
 fn with_crosstalk_a_ranger_hears_its_neighbours_answer() {
     let sonar = "[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\ncrosstalk_share = 1";
-    // Only the left one, at 45 degrees, has something before it: a drum 1 m from the centre.
+    // Only the left ranger, at 45 degrees, has an obstacle in its cone: a drum 1 m from the centre.
     let mut robot = robot(&format!("{sonar}\n[[world.drum]]\nat = [1, 1]\nradius_m = 0.414213562"));
     let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
         panic!("no standard frame");
@@ -406,7 +406,7 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     let later = next.ground_truth();
     assert_eq!((later.x, later.y), (stands.x, stands.y), "it stands");
     assert!(later.time_s > driving.time_s && later.tick > driving.tick);
-    // One that counted anew would show zero.
+    // A robot that restarted its counts would show zero.
     let rolled = counts_between(driving.left_counts, later.left_counts);
     assert!((50..600).contains(&rolled), "{rolled} counts");
 }

@@ -175,8 +175,8 @@ impl Session {
         Ok(())
     }
 
-    /// A tick in lockstep. When the radio loses its frames no host sends the next command, so time moves
-    /// on by itself until frames come through.
+    /// A tick in lockstep. If the radio loses its frames, the host sends no next command, so mission time passes by itself until the
+    /// radio delivers frames again.
     fn tick_until_heard(&mut self) -> Result<(), SimError> {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;
@@ -215,7 +215,7 @@ impl Session {
         while let Some(frame) = heard.decoder.next_frame() {
             self.on_frame(source, &frame)?;
         }
-        // Only one source besides the peer is remembered.
+        // At most one source besides the peer is stored.
         if self.peer != Some(source) {
             let peer = self.peer;
             self.decoders.retain(|other| Some(other.source) == peer);
@@ -320,7 +320,7 @@ impl Session {
         self.write(&ground_truth);
     }
 
-    /// Write one line of ground truth. When its reader is gone, no further lines are written.
+    /// Write a line of ground truth. After its reader has closed the pipe, no further lines are written.
     fn write(&mut self, record: &impl Serialize) {
         let Some(ground_truth) = &mut self.ground_truth else {
             return;

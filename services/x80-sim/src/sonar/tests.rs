@@ -52,7 +52,7 @@ fn the_nearest_point_in_the_cone_answers() {
 
 #[test]
 fn a_drum_half_out_of_the_cone_answers_with_its_flank() {
-    // At 20 degrees the cone's edge passes 5 degrees beside the centre: 2 cos 5 - sqrt(.25 - (2 sin 5)^2).
+    // The cone's edge passes 5 degrees beside a centre at 20 degrees: 2 cos 5 - sqrt(.25 - (2 sin 5)^2).
     let (sin, cos) = 5_f64.to_radians().sin_cos();
     let want = 2.0 * cos - (0.25 - 4.0 * sin * sin).sqrt();
     close(laboratory(DRUM, 20.0), want);
@@ -137,7 +137,7 @@ fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
     let lost = share(|range| range > REACH_M);
     assert!((lost - 0.1 * 0.95).abs() < 0.01, "{lost} were lost");
     let short = share(|range| range < 1.499);
-    // A lost answer that is invented anew may come out beyond the wall.
+    // The range that replaces a lost echo may be beyond the wall.
     assert!((0.04..=0.055).contains(&short), "{short} were short");
 }
 

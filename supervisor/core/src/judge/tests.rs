@@ -49,7 +49,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
     };
     let starting = || Snapshot { was_ready: false, reason: HoldReason::Starting, ..driving() };
     let held = || Snapshot { reason: HoldReason::StageHeld, held: vec!["mapper"], ..driving() };
-    // How long after the last tick.
+    // These are times after the last tick.
     let (early, late) = (NO_PROGRESS - Duration::from_millis(1), NO_PROGRESS);
     #[rustfmt::skip]
     let rows = [

@@ -74,7 +74,7 @@ fn rear(range_m: f64) -> [u16; 7] {
 fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
     let mut mapper = mapper(INFRARED);
     see(&mut mapper, 0, rear(0.6));
-    // What it sees is at -0.79; the body and its clearance reach 0.22 m and half a cell around.
+    // The echo is at -0.79; the body and its clearance reach 0.22 m and half a cell around it.
     assert_eq!(state(&mapper, -0.4, 0.0), CellState::Scanned);
     assert!(state(&mapper, -0.8, 0.0).is_hazard());
     assert!(!state(&mapper, -0.5, 0.0).is_hazard());
@@ -149,7 +149,7 @@ fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
     for tick in 0..3 {
         hear(&mut mapper, tick, 0.0, 0.0, Some(0.7));
     }
-    // From the other side of it: a smooth wall would say nothing there.
+    // The beam comes from the other side now, from which a smooth wall would give no echo.
     for tick in 3..30 {
         hear(&mut mapper, tick, 1.9, std::f64::consts::PI, None);
     }
@@ -251,7 +251,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     assert!((f64::from(echo.x_m) - 0.2).abs() < 1e-6 && echo.bearing_rad == 0.0);
     assert!((0.6..0.7).contains(&echo.clear_m), "{echo:?}");
     assert!(silence.bearing_rad == 0.5 && silence.clear_m >= 1.5, "{silence:?}");
-    // On the spot, till the wheels have rolled more than a reading is good for.
+    // The robot turns on the spot until the wheels have rolled farther than a reading is valid.
     for tick in 2..200 {
         hear(&mut mapper, tick, 0.0, 0.5 + tick as f64, None);
     }

@@ -1,4 +1,4 @@
-//! How far directions are from the exact ones: after solves from scratch on thousands of maps, and after long sequences of
+//! The angles between computed and exact directions, after solves from scratch on thousands of maps and after long sequences of
 //! updates.
 
 use harmonic::testing::{Angles, Kind, Map, Random, exact, follow};
@@ -23,7 +23,7 @@ pub(crate) const KINDS: [Kind; 10] = [
     Kind::Noise { density: 0.35 },
 ];
 
-/// For each kind of map, the worst of all maps: the median angle, that of 99 in 100 cells, and that of any cell.
+/// Print the worst angles of each kind of map: the median, the 99th percentile and the maximum over the cells.
 pub(crate) fn angle_table() {
     println!(
         "\nDirections of full solves beside exact ones, {MAPS} maps of {SIDE} x {SIDE} cells a row, degrees"
@@ -65,7 +65,7 @@ pub(crate) fn angle_table() {
     }
 }
 
-/// After so many updates the whole map is compared with an exact solution.
+/// The numbers of updates after which the whole map is compared with an exact solution.
 const COMPARED_AFTER: [usize; 3] = [30, 300, 1000];
 
 /// Blocks of 3 x 3 cells that appear and vanish at random: angles to the exact directions over the whole map, and of how many

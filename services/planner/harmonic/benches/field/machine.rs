@@ -13,7 +13,8 @@ pub(crate) fn stream(n: usize) -> f64 {
     })
 }
 
-/// One red-black sweep over n x n cells in four planes by parity, both colours in one pass over memory, masks of a byte.
+/// The time of a red-black sweep over n x n cells in four planes by parity, with both colours in one pass over memory and masks of a
+/// byte.
 pub(crate) fn sweep(n: usize) -> f64 {
     let half = n / 2;
     let stride = half + 32;

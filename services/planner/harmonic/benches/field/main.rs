@@ -1,9 +1,13 @@
-//! `cargo bench -p harmonic --features bench`: times of the solver, beside those of plain passes over the grid and of other algorithms.
+//! `cargo bench -p harmonic --features bench` prints the times of the solver, of plain passes over the grid and of other algorithms.
 //!
-//! Not criterion: what is asked for are ratios, and ratios hold only between times taken in one run, in turn. Every time
-//! is the least of several runs. `cargo bench -p harmonic --features bench -- quick` leaves out the large maps, `-- updates` all but the
-//! updates. `-- accuracy` measures angles instead of times, `-- split` where the time of a solve goes (`quick`: on small maps), `-- growth` time and
-//! memory by the size of the map. `-- --maps DIR` adds the PGM maps of a directory.
+//! It does not use criterion, because the results are ratios, which hold only between times that are measured in turn in one run.
+//! Every time is the least of several runs. Arguments after `--` select the measurements:
+//! - `quick` leaves out the large maps.
+//! - `updates` measures only the updates.
+//! - `accuracy` measures angles instead of times.
+//! - `split` measures the phases of a solve; with `quick` on small maps.
+//! - `growth` measures time and memory by the size of the map.
+//! - `--maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -153,7 +157,7 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
     [upside_down, drums].map(|it| it.expect("a valid map"))
 }
 
-/// One map: times from scratch and with the set-up reused, beside those of other algorithms.
+/// Print the times of a map from scratch and with the set-up reused, and those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool, with_faer: bool) {
     let cells = domain.blocked().len();
     let cancellation = Cancellation::new();

@@ -1,4 +1,4 @@
-//! Where the time of a solve goes, and how time and memory grow with the map.
+//! The times of the phases of a solve, and the growth of time and memory with the map.
 
 use std::process::Command;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use harmonic::{Cancellation, Domain, Phase, Solver};
 
 use crate::{others_than, runs, wavefront};
 
-/// One solve by phases, milliseconds.
+/// The times of a solve's phases, milliseconds.
 #[derive(Clone, Copy, Default)]
 struct Split {
     total: f64,
@@ -68,7 +68,7 @@ fn least(domain: &Domain) -> (Split, &'static str) {
     best
 }
 
-/// Where the time of a solve from scratch goes; `quick` leaves out all but small maps.
+/// Print the times of the phases of a solve from scratch; `quick` leaves out all but small maps.
 pub(crate) fn table(quick: bool, real: Option<Vec<(String, Domain)>>) {
     println!("\nA solve from scratch by phases, ms, and as a multiple of a wavefront's time");
     println!(

@@ -33,7 +33,7 @@ pub(super) fn substitute(
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
     let Workspace { factors, u, .. } = workspace;
-    // By place: the cells of a front lie close together there.
+    // The cells are in order of their place, where the cells of a front lie close together.
     u.clear();
     u.resize(pass.len(), Scaled::ZERO);
     u[0] = Scaled::ONE;

@@ -1,4 +1,4 @@
-//! One breadth-first pass from the target over the free cells.
+//! A breadth-first pass from the target over the free cells.
 
 use super::budget::Budget;
 use crate::cancellation::Cancellation;
@@ -36,7 +36,7 @@ impl BreadthFirst {
         // The place of each cell and the order of the free ones.
         let entries = (width + 2) * (height + 2) + width * height;
         budget.ask((entries * size_of::<u32>()) as u64)?;
-        // One absent cell all around spares every visit the question whether a neighbour exists.
+        // A border of absent cells makes it unnecessary to check whether a neighbour exists.
         const UNSEEN: u32 = u32::MAX - 1;
         let stride = width + 2;
         let mut place = vec![ABSENT; stride * (height + 2)];
@@ -111,7 +111,7 @@ impl BreadthFirst {
             .map(|neighbour| self.place[neighbour])
     }
 
-    /// Mean width of the passages, cells: between two walls each cell has 2 / width blocked neighbours. Of a sample.
+    /// Mean width of the passages, cells, estimated from a sample: between two walls each cell has 2 / width blocked neighbours.
     pub(crate) fn width(&self) -> f64 {
         const EVERY: usize = 16;
         let (mut cells, mut walls) = (0_usize, 0_usize);

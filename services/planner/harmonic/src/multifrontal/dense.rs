@@ -12,8 +12,8 @@ pub(super) struct Matrix {
     size: usize,
     /// Entries from one row to the next: whole blocks.
     stride: usize,
-    /// For each row to be eliminated, the column after its last entry that is not zero, never less than that of the row
-    /// before: the rows of one distance meet those of the next one after the other.
+    /// For each row to be eliminated, the column after its last entry that is not zero. It is never less than that of the row before,
+    /// because the rows of one distance meet those of the next in order.
     ends: Vec<usize>,
     simd: Simd,
 }
@@ -116,8 +116,8 @@ fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
 
 /// Eliminates `P` rows from `start` on and applies them to the rest in one pass over it; returns `P`.
 ///
-/// All goes by whole blocks of columns, so that short rows need no loops for what is left over. What that writes below the
-/// diagonal is never read, and beyond `stop` it adds zeros.
+/// The pass works on whole blocks of columns, so that short rows need no loops for remainders. The values that it writes below the
+/// diagonal are never read, and beyond `stop` it adds zeros.
 #[inline(always)]
 fn panel<const P: usize>(
     entries: &mut [f64],

@@ -1,9 +1,9 @@
 //! Gauss-Seidel relaxation in extended range, for cells that `f64` factors cannot reach.
 //!
-//! A weight below the smallest `f64` becomes zero. That matters only where a cell takes its u from such a weight: in a long
-//! narrow passage whose far end is reached by a much wider one, u grows again towards that end, but cells just behind the
-//! turning point see the wide passage through weights of 1e-400. There the values next to them are right, and a few sweeps
-//! of relaxation in extended range carry them over, because in such passages u changes by orders of magnitude a cell.
+//! A weight below the smallest `f64` becomes zero. This matters only where a cell takes its u from such a weight. In a long narrow
+//! passage whose far end joins a much wider one, u grows again towards that end, but cells just behind the turning point depend on
+//! the wide passage through weights of 1e-400. The values of their neighbours are right, and a few sweeps of relaxation in extended
+//! range propagate them, because in such passages u changes by orders of magnitude a cell.
 
 use super::breadth_first::{ABSENT, BreadthFirst};
 use crate::domain::Domain;

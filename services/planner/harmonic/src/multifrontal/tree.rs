@@ -1,4 +1,4 @@
-//! The tree of fronts: which cells are eliminated together, and at what cost.
+//! The tree of fronts: the cells that are eliminated together, and the cost.
 //!
 //! Cells are eliminated stage by stage, from the farthest inwards. Where the free space is one passage, a stage is a few
 //! distances. Where many passages run side by side and loops join them, everything beyond a distance is one piece, and its
@@ -49,7 +49,7 @@ pub(crate) struct Cost {
     pub bytes: u64,
 }
 
-/// How the distances are divided into stages.
+/// The division of the distances into stages.
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     /// Distances a stage takes at once.
@@ -308,7 +308,7 @@ impl<'a> Builder<'a> {
         stage: &Range<u32>,
         outer: Option<&Range<u32>>,
     ) -> (u32, bool) {
-        // None of a separator's own neighbours remains.
+        // None of the neighbours of a separator remains.
         let (inwards, outer) = outer.map_or((0, 0..0), |outer| (stage.start, outer.clone()));
         let tree = &mut self.tree;
         let index = tree.fronts.len() as u32;
@@ -365,7 +365,7 @@ struct Pieces {
     parent: Vec<u32>,
     /// Piece of each cell.
     piece: Vec<u32>,
-    /// Where the members of each piece end.
+    /// The end of each piece's members.
     ends: Vec<u32>,
     members: Vec<u32>,
     first_child: Vec<u32>,

@@ -31,7 +31,7 @@ impl Workspace {
 /// The rows of the factor that the back substitution needs.
 #[derive(Debug, Default)]
 pub(super) struct Factors {
-    /// For every eliminated cell, the weights of the cells after it in its front, up to the last that is not zero.
+    /// The weights of the cells after each eliminated cell in its front, up to the last that is not zero.
     pub(super) rows: Vec<f64>,
     /// The number of weights of each cell.
     pub(super) lengths: Vec<u32>,

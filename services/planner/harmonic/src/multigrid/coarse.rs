@@ -1,8 +1,9 @@
 //! A coarser level: nine-point equations for the correction of the finer one, solved from a zero guess.
 //!
 //! The four planes are relaxed in turn. On the way down they start from zero, so each plane only sees those before it, and
-//! the residual on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The odd-odd cells come last, so their residual is zero, and first on the way up, so they need no correction:
-//! no interpolation to them is ever stored.
+//! the residual on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The
+//! odd-odd cells are last on the way down, so their residual is zero, and first on the way up, so they need no correction.
+//! Interpolation to them is therefore never stored.
 
 use super::grid::{
     EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Whole, add_products, join, join_row, split,
@@ -273,7 +274,7 @@ impl<R: Real> Coarse<R> {
         gather(into, &terms);
     }
 
-    /// For each step, the couplings and u of the neighbours there.
+    /// The couplings and u of the neighbour at each step.
     #[inline(always)]
     fn terms<const COUNT: usize>(
         &self,
@@ -337,9 +338,9 @@ impl<R: Real> Coarse<R> {
     /// Interpolation along the lines between coarse cells: the couplings across the line are added to those along it,
     /// those straight across are taken off the diagonal.
     ///
-    /// A coarse cell gives only to cells coupled to it: where a wall lies between them, or the coarse cell is itself a
-    /// wall, the couplings to cells beside it would tie the corrections on both sides of the wall together. That costs
-    /// all convergence far from the target.
+    /// A coarse cell gives only to cells coupled to it. If a wall lies between them, or the coarse cell is itself a wall, the couplings
+    /// to cells beside it would couple the corrections on both sides of the wall, and far from the target the cycles would not
+    /// converge.
     #[inline(always)]
     pub(super) fn interpolate(&mut self, rows: std::ops::Range<usize>) {
         let Grid { columns: n, stride: s, .. } = self.grid;

@@ -151,7 +151,7 @@ impl<R: Real> Finest<R> {
         ]
     }
 
-    /// One pass: correction from `next`, sweeps, and residual.
+    /// A pass over the level: correction from `next`, sweeps, and residual.
     #[inline(always)]
     pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> Progress {
         if let Some(span) = self.grid.span() {
@@ -200,7 +200,7 @@ impl<R: Real> Finest<R> {
                 continue;
             }
             let y = y - sweeps;
-            // Beyond the last row the change is that of the margin: none.
+            // The margin beyond the last row does not change.
             change_ee.swap(0, 1);
             change_oo.swap(0, 1);
             if y < rows {

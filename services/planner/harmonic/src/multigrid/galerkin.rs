@@ -4,8 +4,8 @@
 //! interpolation vanishes there: only the rows of the even-even, odd-even and even-odd cells are formed, one row of cells
 //! at a time, and added up with their weights on the coarse cell.
 //!
-//! The finest level has a product of its own: its couplings are 0 or 1 and diagonal ones do not occur. One loop for both
-//! takes 30 % longer for the whole set-up, one loop a term 7 %.
+//! The finest level has a product of its own, because its couplings are 0 or 1 and it has no diagonal ones. A common loop for all
+//! levels takes 30 % longer for the whole set-up, and a loop for each term 7 % longer.
 
 use std::ops::Range;
 
@@ -133,7 +133,7 @@ impl<R: Real> Finest<R> {
         let Grid { columns: n, stride: s, .. } = self.grid;
         products.start();
         let zero = R::default();
-        // One row more before the first: what it leaves behind is added to that one.
+        // The row before the first is included, because its contribution belongs to the first row.
         for y in rows.start.saturating_sub(1)..rows.end {
             products.next_row();
             let o = self.grid.start(y);
@@ -239,7 +239,7 @@ impl<R: Real> Coarse<R> {
         let a = |direction: usize, plane: usize, start: usize| {
             &self.coupling[direction][plane][start..][..n]
         };
-        // One row more before the first: what it leaves behind is added to that one.
+        // The row before the first is included, because its contribution belongs to the first row.
         for y in rows.start.saturating_sub(1)..rows.end {
             products.next_row();
             let o = self.grid.start(y);

@@ -21,7 +21,7 @@ pub(super) const MARGIN: usize = 8;
 /// Largest plane that is gone through as one row, in values.
 const SMALL: usize = 1 << 15;
 
-/// One value a cell, by plane.
+/// A value for each cell, by plane.
 pub(super) type Planes<R> = [Vec<R>; 4];
 
 /// The shape of a level.
@@ -47,7 +47,7 @@ impl Grid {
             height,
             columns,
             rows,
-            // At least one zero between rows.
+            // There is at least one zero between rows.
             stride: (columns + 1).next_multiple_of(8),
         }
     }
@@ -57,7 +57,7 @@ impl Grid {
         self.stride * (self.rows + 2) + MARGIN
     }
 
-    /// Where row `row` of a plane starts.
+    /// The index at which row `row` of a plane starts.
     #[inline(always)]
     pub(super) fn start(&self, row: usize) -> usize {
         (row + 1) * self.stride + MARGIN
@@ -69,9 +69,9 @@ impl Grid {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
     }
 
-    /// Cells of a plane from its first to its last, margins between rows included, where the level is small. Its planes are
-    /// gone through as if each were one row, because what is done once a row, and the values that fill no vector at its end, would
-    /// cost more than the margins do. Those stay zero, as their diagonals and weights are. The results are the same either way.
+    /// The number of cells of a plane from its first to its last with the margins between rows, if the level is small. The planes of a
+    /// small level are processed as a single row, because the work for each row and the partial vectors at its end would cost more
+    /// than the margins. The margins stay zero, because their diagonals and weights are zero. The results are equal either way.
     #[inline(always)]
     pub(super) fn span(&self) -> Option<usize> {
         (self.rows * self.stride <= SMALL)
@@ -83,7 +83,7 @@ impl Grid {
         std::array::from_fn(|_| self.plane())
     }
 
-    /// One plane of zeros.
+    /// A plane of zeros.
     pub(super) fn plane<R: Real>(&self) -> Vec<R> {
         vec![R::default(); self.len()]
     }

@@ -1,4 +1,4 @@
-//! Which method to try first, from the shape of the free space.
+//! The choice of the first method, by the shape of the free space.
 //!
 //! Multigrid costs some nanoseconds a cell for every few orders of magnitude that u spans; the multifrontal
 //! factorisation costs the square of the passages' width a cell, whatever u spans. The mean width of the free space is

@@ -42,8 +42,8 @@ pub struct Angles {
     pub clear_max: f64,
 }
 
-/// From this relative change of u a cell on the direction is clear: nearer to a saddle point, a change of u by a
-/// thousandth turns it by degrees, in any solution.
+/// A direction is clear from this relative change of u a cell on. Nearer to a saddle point, a change of u by a thousandth turns the
+/// direction by degrees in any solution.
 const CLEAR: f64 = 2e-3;
 
 impl Angles {

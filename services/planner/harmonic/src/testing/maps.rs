@@ -8,7 +8,7 @@ use crate::error::SolveError;
 /// A kind of generated map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// Nothing but the outer walls.
+    /// The outer walls only.
     Empty,
     /// Round obstacles over a fifth of the floor.
     Drums,
@@ -16,7 +16,7 @@ pub enum Kind {
     Office,
     /// A spanning tree of corridors of this width, a twentieth of the walls opened again.
     Maze { corridor: usize },
-    /// One corridor of this width, folded over the whole map.
+    /// A corridor of this width, folded over the whole map.
     Serpentine { corridor: usize },
     /// A U-shaped wall that opens away from the target.
     Trap,

@@ -159,7 +159,7 @@ pub fn follow(field: &Field) -> f64 {
             if let Some(known) = arrives[here] {
                 break known;
             }
-            // Not until proven: a walk that meets itself does not arrive.
+            // The cell counts as not arriving until proven, because a walk that meets itself does not arrive.
             arrives[here] = Some(false);
             path.push(here);
             match field.ascent(cell(here)) {

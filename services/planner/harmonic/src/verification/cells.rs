@@ -158,7 +158,7 @@ impl<R: Real> Cells<R> {
             let (across, along) = ((east[x] - west[x]) * scale, (south[x] - north[x]) * scale);
             slopes[x] = quarter * (across * across + along * along);
         }
-        // In lanes: a running maximum over floats is otherwise taken one by one.
+        // The maximum is taken in lanes, because a running maximum over floats is not vectorised.
         let mut worst = [zero; 16];
         let chunks = residuals.chunks_exact(16);
         for (lane, &residual) in worst.iter_mut().zip(chunks.remainder()) {

@@ -117,8 +117,8 @@ impl Window<f64> for ScaledRows {
             let (into, mantissas, theirs) = (&mut into[..n], &mantissas[..n], &theirs[..n]);
             for x in 0..n {
                 let steps = theirs[x].saturating_sub(exponents[x]);
-                // A cell of zero has no exponent: what counts there is only whether a neighbour is larger. Nor has a
-                // neighbour of zero, which stays zero.
+                // A cell of zero has no exponent. The only check there is whether a neighbour is larger. A neighbour of zero has no exponent
+                // either, and stays zero.
                 let known = (u.here[x] > 0.0) & (mantissas[x] > 0.0);
                 into[x] = mantissas[x] * pow2(if known { steps } else { 0 });
             }

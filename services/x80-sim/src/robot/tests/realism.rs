@@ -1,4 +1,4 @@
-//! What makes a robot less than ideal, each by its own key.
+//! Tests of the errors of a robot, each set by its own key.
 
 use super::{Robot, forward, mission, robot, send};
 use common::wire::Command;

@@ -6,7 +6,7 @@ use rand_pcg::{Pcg64, rand_core::Rng as _};
 
 use super::*;
 
-/// One process and its policy: what is true of the process, written down without a look at the phases.
+/// A process and its policy. The state of the process is described independently of the policy's phases.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Model {
     policy: Policy,
@@ -32,7 +32,7 @@ struct Generation {
     /// Asked to stop, for a successor or for good: that is no death.
     stopping: bool,
     aborted: bool,
-    /// When it is to be killed.
+    /// The time when it must be killed.
     kill: Option<Now>,
 }
 
@@ -81,7 +81,7 @@ impl Model {
         }
     }
 
-    /// When the clock must be looked at, by the rules alone.
+    /// The time of the next deadline by the rules alone.
     fn due(&self) -> Option<Now> {
         match &self.generation {
             Some(generation) => Some(generation.kill.unwrap_or_else(|| match generation.ready {
@@ -291,7 +291,7 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
     let mut actions = 0_u64;
     for history in 0..2_000 {
         let mut model = Model::new();
-        // How likely each event is differs from history to history.
+        // The probability of each event differs from history to history.
         let weights: Vec<u64> = EVENTS.iter().map(|_| chance.next_u64() % 100).collect();
         let sum: u64 = weights.iter().sum::<u64>().max(1);
         for _ in 0..1_000 {
