@@ -32,7 +32,7 @@ fn processes(mark: &str) -> Vec<String> {
 fn each_signal_of_chaos_is_a_row_of_its_table() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("results");
-    let arguments = ["chaos", "open-room", "--kills", "12", "--include-startup"];
+    let arguments = ["bench", "chaos", "open-room", "--kills", "12", "--include-startup"];
     let robot = ["--robot", "chd-rows", "--json", "--out", out.to_str().unwrap()];
     let ended = output(&[&arguments[..], &robot, &SLOW].concat());
     let report: Value =
@@ -67,8 +67,9 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
 
 #[test]
 fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_nothing() {
-    let given = format!("'{}' echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
-    let arguments = ["chaos", "open-room", "--kills", "30", "--include-consumers", "--replay"];
+    let given = format!("'{}' topic echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
+    let arguments =
+        ["bench", "chaos", "open-room", "--kills", "30", "--include-consumers", "--replay"];
     let robot = ["--robot", "chd-hit", "--json", "--consumer", &given];
     let ended = output(&[&arguments[..], &robot, &SLOW].concat());
     let report: Value =
@@ -97,14 +98,15 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
 #[test]
 fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let directory = tempfile::tempdir().unwrap();
-    let given = format!("'{}' echo pose --robot chd-cut", env!("CARGO_BIN_EXE_firsthand"));
-    let mut chaos = firsthand(&["chaos", "obstacle-course", "--robot", "chd-cut", "--out"])
-        .arg(directory.path())
-        .args(["--consumer", &given])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let given = format!("'{}' topic echo pose --robot chd-cut", env!("CARGO_BIN_EXE_firsthand"));
+    let mut chaos =
+        firsthand(&["bench", "chaos", "obstacle-course", "--robot", "chd-cut", "--out"])
+            .arg(directory.path())
+            .args(["--consumer", &given])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
     let file = directory.path().join("signals.csv");
     let rows = || fs::read_to_string(&file).unwrap_or_default();
     let began = Instant::now();
@@ -130,13 +132,13 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
 
 #[test]
 fn a_consumer_that_cannot_be_started_and_results_that_are_there_are_refused_with_the_remedy() {
-    let unknown = ["chaos", "--consumer", "no-such-logger x80"];
+    let unknown = ["bench", "chaos", "--consumer", "no-such-logger x80"];
     refused(&unknown, "usage", &["no-such-logger x80", "PATH"]);
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("signals.csv");
     fs::write(&file, "of before\n").unwrap();
     let out = directory.path().to_str().unwrap();
-    let chaos = ["chaos", "--robot", "chd-there", "--out", out];
+    let chaos = ["bench", "chaos", "--robot", "chd-there", "--out", out];
     assert_eq!(refused(&chaos, "", &["signals.csv"]), Some(1));
     assert_eq!(fs::read_to_string(&file).unwrap(), "of before\n");
 }

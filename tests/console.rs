@@ -71,7 +71,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
     let mut run = Run::start(robot, "open-room", &slow);
     run.wait_until_under_way(0.2);
-    let poses = printed(&["echo", "pose", "--robot", robot, "--json", "-n", "3"]);
+    let poses = printed(&["topic", "echo", "pose", "--robot", robot, "--json", "-n", "3"]);
     let ticks: Vec<u64> = poses
         .lines()
         .map(|line| {
@@ -87,7 +87,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
         if ["tick_limit", "deaths", "stalls", "requests", "faults"].contains(&name) {
             continue;
         }
-        let text = printed(&["echo", name, "--robot", robot, "-n", "1"]);
+        let text = printed(&["topic", "echo", name, "--robot", robot, "-n", "1"]);
         assert!(text.starts_with("stamp:\n  tick: ") && text.ends_with("---\n"), "{text}");
         let (header, element) = topic.layout();
         let Kind::Struct(header) = header else {
@@ -101,11 +101,11 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
         }
         assert_eq!(text.contains("\nelements:"), element.is_some(), "{text}");
     }
-    let roster = printed(&["echo", "roster", "--robot", robot, "-n", "1"]);
+    let roster = printed(&["topic", "echo", "roster", "--robot", robot, "-n", "1"]);
     for stage in STAGES {
         assert!(roster.contains(&format!("- {{stage: {stage:?}, pid: ")), "{roster}");
     }
-    let unknown = ["echo", "poses", "--robot", robot];
+    let unknown = ["topic", "echo", "poses", "--robot", robot];
     refused(&unknown, "unknown-topic", &["poses", "pose, grid"]);
     run.stop();
 }
@@ -113,7 +113,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
 #[test]
 fn echo_follows_its_robot_from_run_to_run_and_ends_on_a_signal() {
     let robot = "con-follow";
-    let mut echo = Reading::start(&["echo", "command", "--robot", robot, "--json"]);
+    let mut echo = Reading::start(&["topic", "echo", "command", "--robot", robot, "--json"]);
     let mut waits = String::new();
     echo.said.read_line(&mut waits).unwrap();
     assert!(waits.contains(robot), "{waits}");
@@ -139,10 +139,10 @@ fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
     let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
     run.wait_until_under_way(0.5);
     for command in [
-        &["echo", "pose"][..],
-        &["echo", "field", "--json"],
-        &["hz"],
-        &["hz", "pose", "--json"],
+        &["topic", "echo", "pose"][..],
+        &["topic", "echo", "field", "--json"],
+        &["topic", "hz"],
+        &["topic", "hz", "pose", "--json"],
         &["logs", "-f"],
     ] {
         let mut reading = Reading::start(&[command, &["--robot", robot]].concat());
@@ -150,13 +150,13 @@ fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
         assert_eq!(reading.close(), (Some(0), String::new()), "{command:?}");
     }
     // This command never prints anything, so its output cannot show that the reader has gone.
-    let silent = Reading::start(&["echo", "stalls", "--robot", robot]);
+    let silent = Reading::start(&["topic", "echo", "stalls", "--robot", robot]);
     assert_eq!(silent.close(), (Some(0), String::new()));
     for command in [
-        &["list"][..],
+        &["status", "--all"][..],
         &["completions", "zsh"],
         &["man"],
-        &["echo", "pose", "-n", "1", "--robot", robot],
+        &["topic", "echo", "pose", "-n", "1", "--robot", robot],
     ] {
         let (code, said) = Reading::start(command).close();
         assert!(code == Some(0) && !said.contains("panic"), "{command:?}: {said}");
@@ -169,7 +169,7 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
     let robot = "con-hz";
     let mut run = Run::start(robot, "obstacle-course", &["--pace", "1"]);
     run.wait_until_under_way(0.5);
-    let lines = printed(&["hz", "--robot", robot, "--json", "-n", "2"]);
+    let lines = printed(&["topic", "hz", "--robot", robot, "--json", "-n", "2"]);
     let reports: Vec<Value> =
         lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let names: Vec<_> = reports.iter().map(|report| report["topic"].as_str().unwrap()).collect();
@@ -184,17 +184,17 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
     assert!(second("pose")["missing_ticks"].is_u64(), "{}", second("pose"));
     assert!(second("health")["rate_hz"].as_f64() > Some(5.0), "{}", second("health"));
     assert!(second("stalls")["age_s"].is_null(), "{}", second("stalls"));
-    let text = printed(&["hz", "pose", "--robot", robot, "-n", "1"]);
+    let text = printed(&["topic", "hz", "pose", "--robot", robot, "-n", "1"]);
     assert!(
         text.starts_with("topic") && text.contains("\npose ") && text.contains("  each tick: "),
         "{text}"
     );
 
-    let mut roster = Reading::start(&["hz", "roster", "--robot", robot, "--json"]);
+    let mut roster = Reading::start(&["topic", "hz", "roster", "--robot", robot, "--json"]);
     assert!(!roster.line().is_empty());
-    operate(robot, &["freeze", "supervisor"]);
+    operate(robot, &["stage", "freeze", "supervisor"]);
     while roster.json()["late"] != true {}
-    operate(robot, &["thaw", "supervisor"]);
+    operate(robot, &["stage", "thaw", "supervisor"]);
     while roster.json()["late"] != false {}
     roster.close();
     run.stop();
@@ -206,7 +206,7 @@ fn list_shows_the_robots_that_run_and_where() {
     let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &["--pace", "1"]));
     runs.iter_mut().for_each(|run| drop(run.wait_until_under_way(0.5)));
     let listed = |robot: &str| {
-        let lines = printed(&["list", "--json"]);
+        let lines = printed(&["status", "--all", "--json"]);
         let mut robots = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
         robots.find(|it| it["robot"] == robot)
     };
@@ -218,7 +218,7 @@ fn list_shows_the_robots_that_run_and_where() {
         assert_eq!(robot["run"], directory.to_str().unwrap(), "{robot}");
         assert!(robot["mission_time_s"].as_f64() > Some(0.4), "{robot}");
     }
-    assert!(printed(&["list"]).contains("con-list-2 "));
+    assert!(printed(&["status", "--all"]).contains("con-list-2 "));
     // A supervisor that was killed leaves its bus.
     let [mut killed, ended] = runs;
     killed.signal(Signal::KILL);

@@ -226,7 +226,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
         let mut staying = Vec::new();
         for consumer in 0..10 {
             let topic = ["grid", "field"][consumer % 2];
-            let mut echo = support::firsthand(&["echo", topic, "--robot", robot]);
+            let mut echo = support::firsthand(&["topic", "echo", topic, "--robot", robot]);
             echo.stdout(Stdio::null()).stderr(Stdio::null());
             staying.push(Staying(echo.spawn().unwrap()));
         }

@@ -21,7 +21,7 @@ const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
 
 /// `firsthand stage fault`, which must succeed.
 fn inject(robot: &str, stage: &str, fault: &str) {
-    operate(robot, &["fault", stage, fault]);
+    operate(robot, &["stage", "fault", stage, fault]);
 }
 
 /// The number of stalls with this `recovery`.
@@ -174,11 +174,11 @@ fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor
         let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
         let mut run = Run::start("metal", "open-room", &address);
         run.wait_until("its stages run", |status| find(status, "planner")["state"] == "running");
-        let fault = ["fault", "planner", "saddle", "--robot", "metal"];
+        let fault = ["stage", "fault", "planner", "saddle", "--robot", "metal"];
         refused(&fault, "real-robot", &["--break-a-real-robot"]);
         assert_eq!(ask_planner("metal", false), FaultAnswer::Refused);
         assert_eq!(ask_planner("metal", true), FaultAnswer::Taken);
-        operate("metal", &["fault", "planner", "saddle", "--break-a-real-robot"]);
+        operate("metal", &["stage", "fault", "planner", "saddle", "--break-a-real-robot"]);
         run.stop();
     });
 }
@@ -186,7 +186,7 @@ fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor
 #[test]
 fn a_fault_that_nobody_has_is_refused_with_those_there_are() {
     let fault = |stage, fault, code, names: &[&str]| {
-        refused(&["fault", stage, fault, "--robot", "nobody"], code, names);
+        refused(&["stage", "fault", stage, fault, "--robot", "nobody"], code, names);
     };
     fault("mapper", "saddle", "unknown-fault", &["hazard-around-robot", "spin"]);
     fault("wheel", "spin", "unknown-stage", &["dead-reckoning"]);

@@ -203,8 +203,8 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
     // On a busy machine the controller may be replaced before the second command. Both are then sent again.
     let goes_on = || {
         let before = run.wait_until("the controller beats", beats);
-        operate("kf-thaw", &["freeze", "controller"]);
-        let thaw = output(&["thaw", "controller", "--robot", "kf-thaw"]);
+        operate("kf-thaw", &["stage", "freeze", "controller"]);
+        let thaw = output(&["stage", "thaw", "controller", "--robot", "kf-thaw"]);
         let after = run.wait_until("the controller beats again", beats);
         let same = pid(&before, "controller") == pid(&after, "controller");
         assert!(!same || thaw.status.success(), "{thaw:?}");
@@ -213,7 +213,7 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
     let mut attempts = std::iter::repeat_with(goes_on).take(20).flatten();
     let thawed = attempts.next().unwrap();
     drop(attempts);
-    operate("kf-thaw", &["freeze", "mapper"]);
+    operate("kf-thaw", &["stage", "freeze", "mapper"]);
     let status = run.wait_until("it is replaced", |status| {
         generation(status, "mapper") == 2 && find(status, "mapper")["state"] == "running"
     });

@@ -169,9 +169,9 @@ fn a_closed_standard_output_is_no_failure_of_any_command() {
         &["missions", "trap"],
         &["check", &mission],
         &["install", "--print"],
-        &["topics"],
-        &["stages"],
-        &["failsafe"],
+        &["topic", "list"],
+        &["stage", "list"],
+        &["table", "failsafe"],
         &["help", "tables"],
         &["status", "--robot", "mach-shut"],
         &["status", "--robot", "mach-shut", "--json"],
@@ -303,7 +303,7 @@ fn a_latency_measurement_removes_no_directory_but_its_own() {
     let mut run = Run::start("mach-lat", "open-room", &SLOW);
     run.wait_until_under_way(0.3);
     let robot = user.to_string();
-    support::printed(&["latency", "--robot", &robot, "--rounds", "1", "--json"]);
+    support::printed(&["bench", "tick", "--robot", &robot, "--rounds", "1", "--json"]);
     let root = fs::metadata(format!("/tmp/firsthand-{user}/mach-lat")).unwrap();
     assert!(root.is_dir() && root.uid() == user);
     assert!(run.status().is_some());

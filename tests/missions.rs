@@ -200,7 +200,7 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
 
 #[test]
 fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
-    let arguments = ["latency", "--rounds", "1", "--json", "--robot", "hops"];
+    let arguments = ["bench", "tick", "--rounds", "1", "--json", "--robot", "hops"];
     let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
     for key in ["tick_p50_us", "tick_p99_us", "hops_p50_us", "hops_p99_us", "ratio"] {
         assert!(report[key].as_f64().unwrap() > 0.0, "{key}: {report}");
@@ -210,7 +210,7 @@ fn latency_measures_ticks_beside_bare_hops_and_leaves_nothing() {
 
 #[test]
 fn latency_at_a_rate_prints_ticks_and_bare_hops_at_that_rate_and_their_ratio() {
-    let mut arguments = vec!["latency", "--rate", "7", "--rounds", "1"];
+    let mut arguments = vec!["bench", "tick", "--rate", "7", "--rounds", "1"];
     arguments.extend(["--set", "timeout_s=5", "--robot", "hops-7hz"]);
     arguments.push("--json");
     let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
@@ -223,7 +223,7 @@ fn latency_at_a_rate_prints_ticks_and_bare_hops_at_that_rate_and_their_ratio() {
 
 #[test]
 fn a_latency_budget_has_every_item_of_every_stage() {
-    let mut arguments = vec!["latency", "--rounds", "1", "--budget", "--json"];
+    let mut arguments = vec!["bench", "tick", "--rounds", "1", "--budget", "--json"];
     arguments.extend(["--robot", "tick-budget"]);
     let report: Value = serde_json::from_str(&printed(&arguments)).unwrap();
     assert_eq!(report["regime"], "back to back", "{report}");

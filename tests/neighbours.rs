@@ -130,7 +130,7 @@ fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_
     fs::create_dir_all(robot.directory()).unwrap();
     for stale in [bystander.id().to_string(), "-1".to_owned()] {
         fs::write(robot.lock_file(), stale).unwrap();
-        let killed = support::output(&["kill", "supervisor", "--robot", "stale-lock"]);
+        let killed = support::output(&["stage", "kill", "supervisor", "--robot", "stale-lock"]);
         assert_refused(&killed, "no-process", &["supervisor"]);
         assert!(bystander.try_wait().unwrap().is_none(), "it was killed");
     }

@@ -156,13 +156,13 @@ fn replay_and_diff_print_what_they_found_and_exit_with_1_on_a_difference() {
     let report: serde_json::Value = serde_json::from_slice(&replayed.stdout).unwrap();
     assert_eq!(report["stages"]["planner"]["equal"], 1, "{report}");
     assert!(report["stages"].get("controller").is_none(), "{report}");
-    let same = output(&["diff", file, file]);
+    let same = output(&["runs", "diff", file, file]);
     assert_eq!(same.status.code(), Some(0), "{same:?}");
 
     let other = ["--seed", "9", "--timeout", "8"];
     let (_, _, directory) = Run::start("rec-other", "open-room", &other).finish_in();
     let other = directory.path().join("run/recording.mcap");
-    let parted = output(&["diff", file, other.to_str().unwrap(), "--json"]);
+    let parted = output(&["runs", "diff", file, other.to_str().unwrap(), "--json"]);
     assert_eq!(parted.status.code(), Some(1), "{parted:?}");
     let (_, found) = json_of(&parted);
     assert!(!found[0]["first"].is_null(), "{found:?}");

@@ -1,4 +1,4 @@
-//! Robots with a fault that their link has to notice, through real processes (`firsthand chaos --robot-faults`).
+//! Robots with a fault that their link has to notice, through real processes (`firsthand bench chaos --robot-faults`).
 
 use serde_json::Value;
 
@@ -7,7 +7,7 @@ use crate::support::{assert_nothing_left, json_of, output, refused};
 /// The exit code, and the entry of the stop-time table for a robot with `fault`.
 fn stop_time(robot: &str, fault: &str) -> (Option<i32>, Value) {
     let fault = format!("--robot-faults={fault}");
-    let arguments = ["chaos", "open-room", &fault, "--json", "--robot", robot];
+    let arguments = ["bench", "chaos", "open-room", &fault, "--json", "--robot", robot];
     let (exit, table) = json_of(&output(&arguments));
     assert_nothing_left(robot);
     (exit.code(), table[0]["entries"][0].clone())
@@ -34,6 +34,6 @@ fn a_robot_that_does_not_stop_is_told_as_long_as_it_moves() {
 
 #[test]
 fn an_unknown_robot_fault_is_refused_with_the_known_ones() {
-    let unknown = ["chaos", "--robot-faults=honest"];
+    let unknown = ["bench", "chaos", "--robot-faults=honest"];
     refused(&unknown, "usage", &["honest", "encoder-dead"]);
 }

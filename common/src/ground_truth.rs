@@ -14,7 +14,7 @@ pub struct GroundTruthHeader {
 }
 
 /// One line a tick, written when the tick's frames are made; tick 0 comes before anything has moved.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthTick {
     /// Number of the tick.
     pub tick: u64,

@@ -1,11 +1,29 @@
-//! The state of a process in `/proc/PID/status`.
+//! Facts of a process that the kernel tells in `/proc/PID`; none if the process has ended.
 
-use std::fs;
+use std::{fs, time::Duration};
 
-/// The value of `field` of process `process`, a number or `self`; none if the process has ended.
+use rustix::param::clock_ticks_per_second;
+
+/// The value of `field` in the status of process `process`, a number or `self`.
 pub fn field(process: &str, field: &str) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let mut lines = status.lines().filter_map(|line| line.split_once(':'));
     let (_, value) = lines.find(|(name, _)| *name == field)?;
     Some(value.trim().to_owned())
+}
+
+/// The kibibytes in `field`, such as `VmRSS`.
+pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
+    self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
+}
+
+/// Processor time of all threads of the process, in the kernel and outside.
+pub fn processor_time(process: u32) -> Option<Duration> {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The name in parentheses may have any letters. Numbers follow after the state.
+    let (_, numbers) = stat.rsplit_once(") ")?;
+    let mut times = numbers.split_ascii_whitespace().skip(11);
+    let mut time = || times.next()?.parse::<u64>().ok();
+    let ticks = time()?.saturating_add(time()?);
+    Some(Duration::from_secs_f64(ticks as f64 / clock_ticks_per_second() as f64))
 }

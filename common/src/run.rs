@@ -87,11 +87,11 @@ pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
     directory.join(format!("{process}.checkpoint"))
 }
 
-/// Write a file and rename it into place: a kill leaves the old text or the new one.
-fn replace(file: &Path, text: &str) -> io::Result<()> {
+/// Replace `file`. A kill leaves its old content or the new one.
+pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     let mut new = file.as_os_str().to_owned();
     new.push(".new");
-    fs::write(&new, text)?;
+    fs::write(&new, content)?;
     fs::rename(&new, file)
 }
 

@@ -20,7 +20,7 @@ pub(crate) mod topic;
 use std::{
     ffi::{OsStr, OsString},
     fmt::Write as _,
-    process::ExitCode,
+    process::{ExitCode, Termination as _},
 };
 
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -58,19 +58,19 @@ macro_rules! commands {
 
         impl Command {
             pub(crate) fn execute(&self) -> Result<ExitCode, Failure> {
-                match self {
+                Ok(match self {
                     $(
-                        $(Self::$name(arguments) => $module::main(arguments $(, $whole())?),)*
+                        $(Self::$name(arguments) => $module::main(arguments $(, $whole())?)?.report(),)*
                         $($(
                             #[cfg(feature = "tools")]
-                            Self::$tool(arguments) => $tool_module::main(arguments $(, $tool_whole())?),
+                            Self::$tool(arguments) => $tool_module::main(arguments $(, $tool_whole())?)?.report(),
                         )*)?
                         $(
                             #[cfg(feature = "simulator")]
-                            Self::$sim(arguments) => $sim_module::main(arguments),
+                            Self::$sim(arguments) => $sim_module::main(arguments)?.report(),
                         )?
                     )*
-                }
+                })
             }
         }
     };

@@ -118,18 +118,10 @@ mod tests {
         GroundTruthTick {
             tick,
             time_s: tick as f64,
-            x: 0.0,
-            y: 0.0,
-            heading: 0.0,
-            v: 0.0,
-            omega: 0.0,
-            clearance_m: 1.0,
             contacts,
             left_counts: tick as u16,
             right_counts: tick as u16,
-            sonar_cm: 255,
-            stopping_time_s: 0.0,
-            radio: None,
+            ..GroundTruthTick::default()
         }
     }
 

@@ -49,6 +49,7 @@
 //! | [`simulator`] | the simulated robot as a child process |
 //! | `service_manager` | notifications to systemd |
 //! | `progress` | how far a run has come, as shown to its user |
+//! | [`summary`] | the outcome and the numbers of a run |
 //! | `lockstep` | in lockstep: how far the link may go, and from which tick a recovery step holds, pure |
 //! | `last_resort` | the end of a run whose supervisor hangs |
 //! | `error`, `domain_error` | why a run could not be carried out |
@@ -87,6 +88,7 @@ mod stage_processes;
 pub mod stages;
 mod stall;
 mod stall_recovery;
+pub mod summary;
 mod supervisor;
 pub mod totals;
 

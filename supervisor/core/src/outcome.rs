@@ -1,14 +1,14 @@
 //! The ending of a run.
 
 use common::{ground_truth::GroundTruthTick, mission::Mission};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A simulated robot that reports its arrival and by the ground truth stands farther from its target than this is in the wrong
 /// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
 /// The outcome of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// The robot is within the tolerance of the target: by its own pose, and in simulation also by the ground truth.
@@ -20,6 +20,7 @@ pub enum Outcome {
     Timeout,
     Collision,
     /// Stopped by hand, or something failed.
+    #[default]
     Aborted,
 }
 
@@ -79,22 +80,7 @@ mod tests {
     use std::path::Path;
 
     fn at(x: f64) -> GroundTruthTick {
-        GroundTruthTick {
-            tick: 9,
-            time_s: 9.0,
-            x,
-            y: 0.0,
-            heading: 0.0,
-            v: 0.0,
-            omega: 0.0,
-            clearance_m: 1.0,
-            contacts: 0,
-            left_counts: 0,
-            right_counts: 0,
-            sonar_cm: 255,
-            stopping_time_s: 0.0,
-            radio: None,
-        }
+        GroundTruthTick { x, ..GroundTruthTick::default() }
     }
 
     #[test]

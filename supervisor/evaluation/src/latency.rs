@@ -1,11 +1,11 @@
 //! Latencies of a mission's ticks and solves. They have a table of their own, because they differ in every run.
 
 use serde::{Deserialize, Serialize};
+use supervisor::summary::Summary;
 
 use crate::{
     row::Row,
     statistics::median,
-    summary::Summary,
     table::{Key, Record},
 };
 

@@ -6,7 +6,6 @@
 //! | [`shortest_path`] | whether a body gets through a world, and its shortest path |
 //! | [`trial`] | a mission in a world, and the rules it is judged by |
 //! | [`setting`] | settings that are compared on the same worlds |
-//! | [`summary`] | a run's summary |
 //! | [`row`], [`latency`] | one mission's result; its latencies |
 //! | [`table`], [`results`] | a CSV file of rows; the two tables of an evaluation |
 //! | [`runner`] | the missions, several at a time |
@@ -32,7 +31,6 @@ pub mod runner;
 pub mod setting;
 pub mod shortest_path;
 pub mod statistics;
-pub mod summary;
 pub mod table;
 pub mod totals;
 pub mod trial;

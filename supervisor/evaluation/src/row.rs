@@ -1,10 +1,10 @@
 //! One mission's result: a row of the table.
 
 use serde::{Deserialize, Serialize};
+use supervisor::{outcome::Outcome as Reported, summary::Summary};
 
 use crate::{
     setting::Setting,
-    summary::{Quantiles, Summary},
     table::{Key, Record},
     trial::Trial,
 };
@@ -140,7 +140,7 @@ impl Row {
             wheel_range_rad_s: summary.wheel_range_rad_s,
             looks: summary.looks,
             look_s: summary.look_s,
-            replans: summary.replans,
+            replans: summary.replans.into(),
             resets: summary.resets,
             full_solves: summary.full_solves,
         }
@@ -148,27 +148,7 @@ impl Row {
 
     /// The row of a mission without a summary.
     pub fn aborted(trial: &Trial, seed: u64, setting: &Setting, reason: String) -> Self {
-        let nothing = Summary {
-            outcome: "aborted".to_owned(),
-            reason,
-            mission_time_s: 0.0,
-            path_length_m: 0.0,
-            min_clearance_m: None,
-            pose_error_m: None,
-            pose_error_expected_m: None,
-            true_distance_m: None,
-            departed_s: None,
-            safety_events: 0,
-            sonar_unavailable_share: None,
-            wheel_range_rad_s: None,
-            looks: 0,
-            look_s: 0.0,
-            replans: 0,
-            resets: 0,
-            full_solves: 0,
-            tick_latency_us: Quantiles::default(),
-            full_solve_us: Quantiles::default(),
-        };
+        let nothing = Summary { reason, ..Summary::default() };
         Self::new(trial, seed, setting, &nothing)
     }
 }
@@ -182,13 +162,13 @@ impl Record for Row {
 /// The outcome by the ground truth.
 fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
     let there = summary.true_distance_m.is_some_and(|distance| distance <= success_within_m);
-    match summary.outcome.as_str() {
-        "reached" | "wrong_place" if there => Outcome::Success,
-        "reached" | "wrong_place" => Outcome::WrongPlace,
-        "collision" => Outcome::Collision,
-        "timeout" => Outcome::Timeout,
-        "unreachable" => Outcome::Unreachable,
-        _ => Outcome::Aborted,
+    match summary.outcome {
+        Reported::Reached | Reported::WrongPlace if there => Outcome::Success,
+        Reported::Reached | Reported::WrongPlace => Outcome::WrongPlace,
+        Reported::Collision => Outcome::Collision,
+        Reported::Timeout => Outcome::Timeout,
+        Reported::Unreachable => Outcome::Unreachable,
+        Reported::Aborted => Outcome::Aborted,
     }
 }
 
@@ -226,15 +206,15 @@ mod tests {
         }
     }
 
-    fn summary(outcome: &str, true_distance_m: f64) -> Summary {
-        let text = format!(
-            r#"{{"outcome": "{outcome}", "reason": "", "mission_time_s": 30.0, "path_length_m": 5.0, "min_clearance_m": 0.1,
-            "pose_error_m": 0.1, "pose_error_expected_m": 0.2, "true_distance_m": {true_distance_m}, "departed_s": 6.0, "safety_events": 3,
-            "sonar_unavailable_share": 0.5, "wheel_range_rad_s": 2.0, "looks": 1,
-            "look_s": 2.0, "replans": 0, "resets": 0, "full_solves": 2,
-            "tick_latency_us": {{"p50": 300.0, "p99": 900.5, "max": null}}, "full_solve_us": {{}}}}"#
-        );
-        serde_json::from_str(&text).unwrap()
+    fn summary(outcome: Reported, true_distance_m: f64) -> Summary {
+        Summary {
+            outcome,
+            mission_time_s: 30.0,
+            path_length_m: 5.0,
+            true_distance_m: Some(true_distance_m),
+            departed_s: Some(6.0),
+            ..Summary::default()
+        }
     }
 
     #[test]
@@ -242,24 +222,25 @@ mod tests {
         let outcome = |said, distance| {
             Row::new(&trial(None), 1, &setting(), &summary(said, distance)).outcome
         };
-        assert_eq!(outcome("reached", 0.4), Outcome::Success);
-        assert_eq!(outcome("reached", 0.6), Outcome::WrongPlace);
-        assert_eq!(outcome("collision", 0.1), Outcome::Collision);
-        assert_eq!(outcome("timeout", 0.1), Outcome::Timeout);
+        assert_eq!(outcome(Reported::Reached, 0.4), Outcome::Success);
+        assert_eq!(outcome(Reported::Reached, 0.6), Outcome::WrongPlace);
+        assert_eq!(outcome(Reported::Collision, 0.1), Outcome::Collision);
+        assert_eq!(outcome(Reported::Timeout, 0.1), Outcome::Timeout);
     }
 
     #[test]
     fn metrics_are_those_of_their_definitions() {
-        let row = Row::new(&trial(None), 1, &setting(), &summary("reached", 0.1));
+        let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
         assert_eq!((row.k, row.spl, row.barn_score), (1.25, 0.8, None));
-        let lost = Row::new(&trial(None), 1, &setting(), &summary("timeout", 3.0));
+        let lost = Row::new(&trial(None), 1, &setting(), &summary(Reported::Timeout, 3.0));
         assert_eq!(lost.spl, 0.0);
     }
 
     #[test]
     fn the_barn_clock_starts_with_the_motion_and_the_score_is_clipped() {
-        let row =
-            |optimal| Row::new(&trial(Some(optimal)), 1, &setting(), &summary("reached", 0.1));
+        let row = |optimal| {
+            Row::new(&trial(Some(optimal)), 1, &setting(), &summary(Reported::Reached, 0.1))
+        };
         assert_eq!(row(6.0).time_s, 24.0);
         assert_eq!(row(6.0).barn_score, Some(0.25));
         assert_eq!(row(1.0).barn_score, Some(0.125), "eight optimal times and more");

@@ -8,7 +8,7 @@ use std::{
     thread,
 };
 
-use supervisor::process::firsthand;
+use supervisor::{process::firsthand, summary::Summary};
 use thiserror::Error;
 
 use crate::{
@@ -16,7 +16,6 @@ use crate::{
     results::Results,
     row::{Outcome, Row},
     setting::Setting,
-    summary::Summary,
     table::TableError,
     trial::Trial,
 };

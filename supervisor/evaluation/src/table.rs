@@ -2,11 +2,12 @@
 
 use std::{
     collections::BTreeSet,
-    fs::{self, File},
+    fs::File,
     io,
     path::{Path, PathBuf},
 };
 
+use common::run::replace;
 use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
@@ -79,13 +80,11 @@ impl<R: Record> Table<R> {
 
     /// Replace the file by one with all rows.
     fn save(&self) -> Result<(), TableError> {
-        let unfinished = self.file.with_extension("csv.new");
         let write = || -> Result<(), csv::Error> {
-            let mut writer = csv::Writer::from_path(&unfinished)?;
+            let mut writer = csv::Writer::from_writer(Vec::new());
             self.rows.iter().try_for_each(|row| writer.serialize(row))?;
-            writer.flush()?;
-            fs::rename(&unfinished, &self.file)?;
-            Ok(())
+            let rows = writer.into_inner().map_err(csv::IntoInnerError::into_error)?;
+            Ok(replace(&self.file, rows)?)
         };
         write().map_err(self.failed("write"))
     }

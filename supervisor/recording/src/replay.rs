@@ -10,7 +10,7 @@
 //! | `generation` | one generation, replayed while its inputs are read |
 //! | `pieces` | the entries of a generation's inputs, from their pieces |
 //! | [`driver`] | the replay of a recording |
-//! | [`values`] | the fields of a message as text |
+//! | `values` | the fields of a message as text |
 //! | [`diff`] | where two recordings part |
 //! | `samples` | recorded samples of a tick, and where two of them differ |
 //! | [`live`] | a recording played on a bus, with stages in processes of their own |
@@ -22,9 +22,9 @@ pub mod live;
 mod pieces;
 pub mod report;
 mod samples;
-pub mod values;
+mod values;
 
 pub use self::{
     driver::{Options, replay},
-    report::{Difference, Report, StageReport, Verdict},
+    report::{Difference, Report, StageReport},
 };

@@ -12,7 +12,7 @@
 //! | `series` | the state that the missions share |
 //! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
 //! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
-//! | [`Consumer`], `consumers`, `terminal`, `words` | consumers that are hit and restarted; a terminal for one that draws; a user's command |
+//! | [`Consumer`], `consumers`, `terminal` | consumers that are hit and restarted; a terminal for one that draws |
 //! | `replays` | replays of the missions' recordings |
 //! | `resources`, `leftovers` | resources of a process; files and processes that outlived a mission |
 //! | [`Report`] | the result of all missions |
@@ -44,19 +44,21 @@ mod stop_time_table;
 mod subscriptions;
 mod terminal;
 mod tick_latencies;
-mod words;
 
-pub use consumer::{Consumer, ConsumerError, GivenConsumer, SUBCOMMAND};
+pub use consumer::{Consumer, ConsumerError, GivenConsumer};
 pub use error::ChaosError;
 pub use options::Options;
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
 pub use stop_time_table::{Entry, StopTimeTable};
 
+use std::time::Instant;
+
 use series::Series;
 
 /// Attack missions, one after the other, until enough signals are sent. `show` is called after each.
 pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, ChaosError> {
+    let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {
         let seed = options.seed + series.report.missions();
@@ -66,6 +68,6 @@ pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, C
         series.report.left_behind(left);
         show(&series.report);
     }
-    series.report.end();
+    series.report.took_s = began.elapsed().as_secs_f64();
     Ok(series.report)
 }

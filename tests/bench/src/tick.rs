@@ -27,7 +27,6 @@ pub use regime::{Regime, parse_hz};
 pub use report::Report;
 
 use budget::Budget;
-use mission::Mission;
 
 /// The mission that is measured, and how.
 #[derive(Debug)]
@@ -63,21 +62,13 @@ pub fn measure(options: &Options<'_>) -> Result<Report, TickError> {
         Regime::BackToBack => TRIPS,
         Regime::Rate { .. } => PACED_TRIPS,
     };
-    let mission = Mission {
-        name: options.mission,
-        set: options.set,
-        robot: options.robot,
-        pace: options.regime.pace(options.rate_hz),
-        record: options.record,
-        consumers: options.consumers,
-    };
     let mut budget = options.budget.then(Budget::default);
     let mut hops = Histogram::default();
     let mut rounds = Vec::new();
     for _ in 0..options.rounds {
         let round = hops::measure(options.robot, trips, options.regime.period())?;
         hops.add(round.counts(), round.max_ns());
-        rounds.push(mission.measure(budget.as_mut())?);
+        rounds.push(mission::measure(options, budget.as_mut())?);
     }
     let trips = u64::from(options.rounds) * trips;
     let mut report =

@@ -1,6 +1,6 @@
 //! `firsthand check FILE`.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::path::PathBuf;
 
 use clap::Args;
 use common::mission::Mission;
@@ -17,19 +17,18 @@ pub(crate) struct Arguments {
     file: PathBuf,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mission = Mission::load(&arguments.file)?;
     for remark in &mission.remarks {
         write_stderr(&format!("firsthand: {remark}\n"));
     }
     let frame = mission.grid_frame();
-    print_text(&format!(
+    Ok(print_text(&format!(
         "{}: {} m to the target, {} x {} cells of {:.3} m\n",
         mission.name,
         mission.target.length(),
         frame.cells,
         frame.cells,
         frame.resolution_m
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))?)
 }

@@ -3,7 +3,7 @@
 mod markdown;
 mod pager;
 
-use std::{fmt::Write as _, process::ExitCode};
+use std::fmt::Write as _;
 
 use clap::{Args, Command, error::ErrorKind};
 
@@ -83,7 +83,7 @@ pub(crate) fn pages() -> String {
 }
 
 /// `whole` is the command line of the executable.
-pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Failure> {
     if let [name] = &arguments.page[..]
         && let Some(page) = page(name)
     {
@@ -91,7 +91,7 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<ExitCode
             Some(width) => pager::show(&markdown::render(page.text, width))?,
             None => print_text(page.text)?,
         }
-        return Ok(ExitCode::SUCCESS);
+        return Ok(());
     }
     // Usage lines name the whole command only once it is built.
     whole.build();
@@ -105,7 +105,7 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<ExitCode
             whole.error(ErrorKind::InvalidValue, message).exit();
         }
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// The subcommand of `whole` that `words` name.

@@ -5,7 +5,6 @@
 use std::{
     fs, io,
     path::{Path, PathBuf},
-    process::ExitCode,
 };
 
 use clap::Args;
@@ -73,7 +72,7 @@ struct InstallError {
     source: io::Error,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let executable = std::env::current_exe()?;
     for part in &PARTS {
         let text = part.text_for(&executable);
@@ -87,8 +86,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             print_text(&format!("{}\n", file.display()))?;
         }
     }
-    print_text(&format!("# Then:\n{}\n", remaining()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print_text(&format!("# Then:\n{}\n", remaining()))?)
 }
 
 impl Part {

@@ -4,7 +4,6 @@ mod merged;
 
 use std::{
     path::{Path, PathBuf},
-    process::ExitCode,
     thread,
 };
 
@@ -40,11 +39,10 @@ pub(crate) struct Arguments {
     run: Option<PathBuf>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mut stream = Stream::open()?;
     if arguments.follow {
-        follow(arguments, &mut stream)?;
-        return Ok(ExitCode::SUCCESS);
+        return follow(arguments, &mut stream);
     }
     let directory = match &arguments.run {
         Some(directory) => directory.clone(),
@@ -54,8 +52,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         })?,
     };
     let mut logs = opened(arguments, &directory)?;
-    print_round(&mut logs, &mut stream)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print_round(&mut logs, &mut stream)?)
 }
 
 /// The directory of the robot's present run, or else of its newest.

@@ -1,7 +1,5 @@
 //! `firsthand missions`: the missions that ship with the program.
 
-use std::process::ExitCode;
-
 use clap::Args;
 
 use crate::console::{
@@ -18,16 +16,15 @@ pub(crate) struct Arguments {
     name: Option<String>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(name) = &arguments.name {
         let text =
             missions::shipped(name).ok_or_else(|| LookupError::Unknown { name: name.clone() })?;
-        print_text(text)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(print_text(text)?);
     }
     for (name, _) in SHIPPED {
         let description = missions::load(name, &[])?.description;
         print_text(&format!("{name:<18} {description}\n"))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -1,6 +1,6 @@
 //! `firsthand record`: everything on a robot's bus into a file.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::path::PathBuf;
 
 use clap::Args;
 use common::{
@@ -46,7 +46,7 @@ fn topic(name: &str) -> Result<&'static dyn EncodedTopic, String> {
     })
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mut signals = Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?;
     if let Some(supervisor) = arguments.supervisor {
         become_child("recorder", supervisor)?;
@@ -73,6 +73,5 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
             write_stderr(&format!("firsthand: cannot say so: {error}\n"));
         }
     };
-    recording::record(&options, &mut || signals.came(), &mut tell)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(recording::record(&options, &mut || signals.came(), &mut tell)?)
 }

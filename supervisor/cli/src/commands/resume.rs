@@ -1,7 +1,5 @@
 //! `firsthand resume`.
 
-use std::process::ExitCode;
-
 use clap::Args;
 use common::{domain::RobotName, samples::RequestKind};
 
@@ -15,7 +13,6 @@ pub(crate) struct Arguments {
     robot: RobotName,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    operator::ask(&arguments.robot, RequestKind::Resume, "")?;
-    Ok(ExitCode::SUCCESS)
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    operator::ask(&arguments.robot, RequestKind::Resume, "")
 }

@@ -1,7 +1,6 @@
 //! `firsthand run MISSION`: a mission from start to summary.
 
 mod recorder;
-pub(crate) mod summary;
 mod summary_file;
 
 use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
@@ -13,9 +12,10 @@ use supervisor::{
     outcome::{Ending, Outcome},
     planner_executable,
     recovery::{self, RecoveredRun},
+    summary::Summary,
 };
 
-use self::{recorder::RunRecorder, summary::Summary, summary_file::SummaryFile};
+use self::{recorder::RunRecorder, summary_file::SummaryFile};
 #[cfg(feature = "tools")]
 use crate::tools::run_report;
 use crate::{

@@ -89,7 +89,8 @@ fn list(arguments: &List) -> Result<ExitCode, Failure> {
         );
     }
     if let Some(keep) = arguments.prune {
-        for robot in robots(arguments) {
+        let robots: BTreeSet<_> = chosen(arguments).into_iter().map(|run| run.robot).collect();
+        for robot in robots {
             run_directories::prune(runs, &robot, keep);
         }
     }
@@ -108,11 +109,6 @@ fn chosen(arguments: &List) -> Vec<RunDirectory> {
         runs.retain(|run| run.robot == *robot);
     }
     runs
-}
-
-/// The robots of these runs, each once.
-fn robots(arguments: &List) -> BTreeSet<RobotName> {
-    chosen(arguments).into_iter().map(|run| run.robot).collect()
 }
 
 fn listed(run: &RunDirectory) -> Listed<'_> {

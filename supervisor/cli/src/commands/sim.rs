@@ -1,6 +1,6 @@
 //! `firsthand sim MISSION`: a simulated X80 for any software that speaks its protocol.
 
-use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
+use std::{net::SocketAddr, path::PathBuf};
 
 use clap::{Args, ValueEnum};
 use common::{
@@ -64,7 +64,7 @@ impl From<Transport> for x80_sim::Transport {
     }
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let mut mission = missions::load(&arguments.mission, &arguments.set)?;
     if let Some(seed) = arguments.seed {
         mission.seed = seed;
@@ -84,6 +84,5 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     x80_sim::run(options, &signals).map_err(|error| match error {
         SimError::Bind { .. } => Failure::from(Refused::new("address-in-use", error.to_string())),
         error => error.into(),
-    })?;
-    Ok(ExitCode::SUCCESS)
+    })
 }

@@ -3,7 +3,7 @@
 mod fault;
 mod process;
 
-use std::{ffi::OsString, process::ExitCode};
+use std::ffi::OsString;
 
 use clap::{Args, Subcommand};
 use common::{domain::RobotName, samples::RequestKind};
@@ -68,7 +68,7 @@ impl Arguments {
     }
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     match arguments.command.as_ref().unwrap_or(&Command::List) {
         Command::List => print_text(&table::stages())?,
         Command::Kill { process, signal } => process.send(*signal)?,
@@ -80,7 +80,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Command::Fault(arguments) => fault::main(arguments)?,
         Command::Process(words) => process::run(words)?,
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 impl StageProcess {

@@ -4,7 +4,6 @@ mod all;
 
 use std::{
     fmt,
-    process::ExitCode,
     time::{Duration, Instant},
 };
 
@@ -111,13 +110,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// The link publishes ten times a second, and a robot reports its batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    if arguments.all {
-        all::print(arguments.json)?;
-    } else {
-        print_one(arguments)?;
-    }
-    Ok(ExitCode::SUCCESS)
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.all { all::print(arguments.json) } else { print_one(arguments) }
 }
 
 /// Print the status of one robot.
@@ -161,8 +155,7 @@ fn print_one(arguments: &Arguments) -> Result<(), Failure> {
         power: power.as_ref().map(power_status),
         stages: entries.iter().map(stage_status).collect(),
     };
-    print(&status, arguments.json)?;
-    Ok(())
+    Ok(print(&status, arguments.json)?)
 }
 
 fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {

@@ -1,7 +1,5 @@
 //! `firsthand stop`.
 
-use std::process::ExitCode;
-
 use clap::Args;
 use common::domain::RobotName;
 
@@ -15,7 +13,6 @@ pub(crate) struct Arguments {
     robot: RobotName,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    operator::stand(&arguments.robot)?;
-    Ok(ExitCode::SUCCESS)
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    operator::stand(&arguments.robot)
 }

@@ -4,8 +4,6 @@ mod item;
 #[cfg(feature = "tools")]
 pub(crate) mod stored;
 
-use std::process::ExitCode;
-
 use clap::{Args, Subcommand};
 use common::{
     faults,
@@ -39,16 +37,15 @@ enum Table {
     Capabilities,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    print_text(&match arguments.table {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    Ok(print_text(&match arguments.table {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
         #[cfg(feature = "tools")]
         Table::Results => stored::results(),
         #[cfg(feature = "tools")]
         Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
-    })?;
-    Ok(ExitCode::SUCCESS)
+    })?)
 }
 
 /// What a page of the guide shows behind `<!-- table NAME SECTION -->`; none of an unknown name.

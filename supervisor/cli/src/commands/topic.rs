@@ -5,8 +5,6 @@ mod hz;
 mod python;
 mod sample_text;
 
-use std::process::ExitCode;
-
 use clap::{Args, Subcommand};
 
 use super::table;
@@ -37,19 +35,15 @@ struct List {
     python: bool,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
-        None => arguments.list.print()?,
-        Some(Command::List(list)) => list.print()?,
-        Some(Command::Echo(arguments)) => echo::main(arguments)?,
-        Some(Command::Hz(arguments)) => hz::main(arguments)?,
+        None => list(&arguments.list),
+        Some(Command::List(arguments)) => list(arguments),
+        Some(Command::Echo(arguments)) => echo::main(arguments),
+        Some(Command::Hz(arguments)) => hz::main(arguments),
     }
-    Ok(ExitCode::SUCCESS)
 }
 
-impl List {
-    fn print(&self) -> Result<(), Failure> {
-        print_text(&if self.python { python::module() } else { table::topics() })?;
-        Ok(())
-    }
+fn list(arguments: &List) -> Result<(), Failure> {
+    Ok(print_text(&if arguments.python { python::module() } else { table::topics() })?)
 }

@@ -28,8 +28,8 @@ enum Command {
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
-        Command::Tick(arguments) => tick::main(arguments),
-        Command::Field(arguments) => field::main(arguments),
+        Command::Tick(arguments) => tick::main(arguments).map(|()| ExitCode::SUCCESS),
+        Command::Field(arguments) => field::main(arguments).map(|()| ExitCode::SUCCESS),
         Command::Chaos(arguments) => chaos::main(arguments),
         Command::Consumer(arguments) => consumer::main(arguments),
     }

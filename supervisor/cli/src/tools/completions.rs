@@ -1,7 +1,7 @@
 //! `firsthand completions`: completions of shells. The script of a shell asks this executable at each tab, so that it completes
 //! robots, stages, topics, missions and pages too.
 
-use std::{ffi::OsStr, process::ExitCode};
+use std::ffi::OsStr;
 
 use clap::{
     Arg, Args, Command,
@@ -30,13 +30,12 @@ const VARIABLE: &str = "FIRSTHAND_COMPLETE";
 /// The executable, which the shell finds on PATH.
 const EXECUTABLE: &str = "firsthand";
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let shells = Shells::builtins();
     let shell = shells.completer(&arguments.shell).ok_or("name a shell")?;
     let mut script = Vec::new();
     shell.write_registration(VARIABLE, EXECUTABLE, EXECUTABLE, EXECUTABLE, &mut script)?;
-    print_text(&String::from_utf8_lossy(&script))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print_text(&String::from_utf8_lossy(&script))?)
 }
 
 /// If a shell asks, answer and end the process. `whole` is the command line of the executable, `pages` those of the guide.

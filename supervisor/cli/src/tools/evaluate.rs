@@ -4,7 +4,6 @@ use std::{
     fs,
     num::NonZero,
     path::{Path, PathBuf},
-    process::ExitCode,
 };
 
 use clap::Args;
@@ -92,7 +91,7 @@ pub(crate) struct Arguments {
 /// Free ground on both sides of the body in the narrowest way of a world, metres.
 const MARGIN_M: f64 = 0.05;
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let settings = settings(arguments)?;
     let described = described(arguments, &settings);
     let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
@@ -130,8 +129,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     } else {
         format!("{report}rows and pictures: {}\n", page.display())
     };
-    print_text(&text)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print_text(&text)?)
 }
 
 impl Arguments {

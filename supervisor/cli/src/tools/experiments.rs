@@ -1,6 +1,6 @@
 //! `firsthand experiments`: the paper's experiments, repeated with many seeds.
 
-use std::{fmt::Write as _, fs, num::NonZero, path::PathBuf, process::ExitCode};
+use std::{fmt::Write as _, fs, num::NonZero, path::PathBuf};
 
 use clap::Args;
 use common::mission::Realism;
@@ -56,7 +56,7 @@ fn realism(text: &str) -> Result<Realism, String> {
     }
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let chosen = experiment::named(&arguments.only)?;
     let described = described(arguments, &chosen);
     let directory = directory::claim(&arguments.out, &described, arguments.resume)?;
@@ -90,8 +90,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     } else {
         writeln!(text, "{report}rows and pictures: {}", page.display())?;
     }
-    print_text(&text)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print_text(&text)?)
 }
 
 /// The command that gives these rows.

@@ -6,13 +6,12 @@ use std::{
     io::{self, BufWriter, Write},
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    process::ExitCode,
     str::FromStr,
     time::{Duration, Instant},
 };
 
 use clap::Args;
-use common::samples::FieldCell;
+use common::{process_status::kibibytes, samples::FieldCell};
 use evaluation::maps::{self, Map};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use npyz::WriterBuilder as _;
@@ -20,7 +19,6 @@ use picture::FieldOnMap;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::top::usage::memory_bytes;
 use crate::console::{
     failure::{Failure, Refused},
     output::print,
@@ -91,7 +89,7 @@ enum FieldError {
     Write { file: PathBuf, cause: io::Error },
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let map = maps::load(&arguments.map)?;
     let domain = domain(arguments, &map).map_err(|error| match error {
         FieldError::Target { .. } => Failure::from(Refused::new("target", error.to_string())),
@@ -112,8 +110,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let png = picture::png(&draw(&map, &first))?;
         write(file, |to| to.write_all(&png))?;
     }
-    print(&report, arguments.json)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print(&report, arguments.json)?)
 }
 
 /// What is to be solved.
@@ -225,7 +222,7 @@ impl Report {
             }),
             worst_residual: verification.worst_residual,
             log10_u_min: field.log10_u_min(),
-            peak_memory_bytes: memory_bytes("self", "VmHWM"),
+            peak_memory_bytes: kibibytes("self", "VmHWM").map(|kib| kib * 1024),
         }
     }
 }

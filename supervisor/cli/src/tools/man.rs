@@ -1,6 +1,6 @@
 //! `firsthand man`: the manual page, from the tables that the command line is parsed with.
 
-use std::{io, process::ExitCode};
+use std::io;
 
 use clap::{Args, Command};
 use clap_mangen::Man;
@@ -12,9 +12,8 @@ use crate::console::{failure::Failure, output::print_text};
 pub(crate) struct Arguments {}
 
 /// `whole` is the command line of the executable.
-pub(crate) fn main(_: &Arguments, whole: Command) -> Result<ExitCode, Failure> {
-    print_text(&String::from_utf8_lossy(&page(whole)?))?;
-    Ok(ExitCode::SUCCESS)
+pub(crate) fn main(_: &Arguments, whole: Command) -> Result<(), Failure> {
+    Ok(print_text(&String::from_utf8_lossy(&page(whole)?))?)
 }
 
 /// One page: the whole, and a section for each subcommand.

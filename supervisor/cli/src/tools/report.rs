@@ -1,6 +1,6 @@
 //! `firsthand report RUN|F.mcap`: one page and its figures from a recording.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -18,8 +18,7 @@ pub(crate) struct Arguments {
     out: Option<PathBuf>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let page = report::write(&arguments.run, arguments.out.as_deref())?;
-    print_text(&format!("{}\n", page.display()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print_text(&format!("{}\n", page.display()))?)
 }

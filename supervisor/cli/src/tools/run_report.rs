@@ -6,9 +6,7 @@ use common::{
     ground_truth::GroundTruthTick, kinematics::Pose2, mission::Mission, samples::PoseSample,
 };
 use picture::{Facts, Scene};
-use supervisor::{Finished, Options, outcome::Outcome};
-
-use crate::commands::run::summary::Summary;
+use supervisor::{Finished, Options, outcome::Outcome, summary::Summary};
 
 /// The name of a result and its file.
 type Written = Result<(&'static str, PathBuf), String>;

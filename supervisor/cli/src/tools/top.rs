@@ -15,13 +15,12 @@ mod map;
 mod screen;
 #[cfg(test)]
 mod tests;
-pub(super) mod usage;
+mod usage;
 mod view;
 mod words;
 
 use std::{
     io::{self, IsTerminal as _},
-    process::ExitCode,
     time::{Duration, Instant},
 };
 
@@ -69,14 +68,13 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// The screen is drawn again after this time.
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         let message = "top draws on a terminal; elsewhere there are `firsthand status` and `firsthand topic hz`";
         return Err(Refused::new("no-terminal", message).into());
     }
     let_stages_go_first();
-    show(&arguments.robot)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(show(&arguments.robot)?)
 }
 
 /// Show `robot` until q is pressed, a signal comes, or the terminal is closed.

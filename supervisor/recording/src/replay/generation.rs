@@ -3,6 +3,7 @@
 
 use std::{
     collections::{BTreeMap, VecDeque},
+    fmt::Display,
     rc::Rc,
 };
 
@@ -16,7 +17,7 @@ use supervisor::stages::Stage;
 
 use crate::replay::{
     pieces::Pieces,
-    report::{Difference, StageReport, Verdict},
+    report::{Difference, StageReport},
     samples::{tick_of, time_of},
     values,
 };
@@ -105,20 +106,13 @@ impl Generation {
             return;
         }
         if let Err(broken) = self.pieces.push(sequence, piece) {
-            self.give_up(broken.to_string());
-            return;
+            self.give_up(&broken);
         }
-        loop {
+        while !self.is_over() {
             match self.pieces.entry() {
                 Ok(Some(body)) => self.entry(setting, body),
                 Ok(None) => return,
-                Err(broken) => {
-                    self.give_up(broken.to_string());
-                    return;
-                }
-            }
-            if self.is_over() {
-                return;
+                Err(broken) => self.give_up(&broken),
             }
         }
     }
@@ -129,17 +123,14 @@ impl Generation {
             let beginning = Beginning { run: setting.run, start: &body, fields };
             match (self.stage.replay)(beginning) {
                 Ok(replay) => self.replay = Some(replay),
-                Err(error) => self.give_up(error.to_string()),
+                Err(error) => self.give_up(&error),
             }
             return;
         };
         self.inputs += 1;
         let outputs = match replay.take(&body) {
             Ok(outputs) => outputs,
-            Err(error) => {
-                self.give_up(error.to_string());
-                return;
-            }
+            Err(error) => return self.give_up(&error),
         };
         if self.last_inputs.len() == SHOWN_INPUTS {
             self.last_inputs.pop_front();
@@ -215,9 +206,9 @@ impl Generation {
     fn differs(&mut self, topic: &str, recorded: &[u8], computed: &Computed) {
         let tick = tick_of(recorded);
         let known = topics::TABLE.iter().find(|known| known.spec().name == topic);
-        let (field, was, is) = known.map_or_else(Default::default, |topic| {
-            values::first_difference(*topic, recorded, &computed.message)
-        });
+        let found = known
+            .and_then(|topic| values::first_difference(*topic, [recorded, &computed.message], &[]));
+        let (field, [was, is]) = found.unwrap_or_default();
         let describe = |body: &Body| {
             let said = self.replay.as_ref()?.describe(body).ok()?;
             Some(said.chars().take(SHOWN_LENGTH).collect())
@@ -239,8 +230,8 @@ impl Generation {
         self.not_replayed.is_some() || self.difference.is_some()
     }
 
-    fn give_up(&mut self, why: String) {
-        self.not_replayed = Some(why);
+    fn give_up(&mut self, why: &dyn Display) {
+        self.not_replayed = Some(why.to_string());
         self.reset();
     }
 
@@ -266,14 +257,14 @@ impl Generation {
         report.inputs += self.inputs;
         report.compared += self.compared;
         report.unrecorded += self.unrecorded;
-        let verdict = self.verdict(setting);
-        match verdict {
-            Verdict::Equal => report.equal += 1,
-            Verdict::WithoutStep => report.without_step += 1,
-            Verdict::Different => report.different += 1,
-            Verdict::NotReplayed(why) => {
-                report.not_replayed.insert(self.number, why);
-            }
+        if self.difference.is_some() {
+            report.different += 1;
+        } else if let Some(why) = self.why_not_replayed(setting) {
+            report.not_replayed.insert(self.number, why);
+        } else if self.inputs == 0 {
+            report.without_step += 1;
+        } else {
+            report.equal += 1;
         }
         self.difference
     }
@@ -295,20 +286,12 @@ impl Generation {
         }
     }
 
-    fn verdict(&self, setting: &Setting<'_>) -> Verdict {
-        if self.difference.is_some() {
-            return Verdict::Different;
+    /// None of a generation that was replayed, or that ended before its first input.
+    fn why_not_replayed(&self, setting: &Setting<'_>) -> Option<String> {
+        if self.not_replayed.is_some() || self.pieces_came || !self.worked {
+            return self.not_replayed.clone();
         }
-        if let Some(why) = &self.not_replayed {
-            return Verdict::NotReplayed(why.clone());
-        }
-        if self.pieces_came {
-            return if self.inputs == 0 { Verdict::WithoutStep } else { Verdict::Equal };
-        }
-        if !self.worked {
-            return Verdict::WithoutStep;
-        }
-        Verdict::NotReplayed(match self.stage.executable(&setting.run.mission) {
+        Some(match self.stage.executable(&setting.run.mission) {
             Some(executable) => {
                 format!("it was {}, which publishes no `inputs`", executable.display())
             }

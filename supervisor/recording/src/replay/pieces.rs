@@ -1,6 +1,7 @@
 //! Joins the pieces of a generation's inputs to entries, see [`common::inputs`].
 
 use common::inputs::LONGEST_ENTRY;
+use thiserror::Error;
 
 /// Puts pieces together.
 #[derive(Debug, Default)]
@@ -12,36 +13,18 @@ pub(crate) struct Pieces {
 }
 
 /// Pieces that do not follow each other, or hold no valid entries.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub(crate) enum Broken {
-    /// The recording has no piece before this number.
+    #[error(
+        "its first {0} pieces of `inputs` are not recorded; was the recorder attached when it started?"
+    )]
     NoBeginning(u32),
-    /// So many pieces after this number are missing.
+    #[error("{1} pieces of `inputs` are missing after piece {0}: the recorder lost them")]
     Missing(u32, u32),
-    /// The first piece comes after the second, which is a later one.
+    #[error("piece {0} of its `inputs` stands after piece {1}: no recorder wrote it so")]
     OutOfOrder(u32, u32),
-    /// An entry of this many bytes.
+    #[error("its `inputs` hold an entry of {0} bytes")]
     NoEntry(usize),
-}
-
-impl std::fmt::Display for Broken {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NoBeginning(piece) => write!(
-                to,
-                "its first {piece} pieces of `inputs` are not recorded; was the recorder attached when it started?"
-            ),
-            Self::Missing(after, count) => write!(
-                to,
-                "{count} pieces of `inputs` are missing after piece {after}: the recorder lost them"
-            ),
-            Self::OutOfOrder(piece, after) => write!(
-                to,
-                "piece {piece} of its `inputs` stands after piece {after}: no recorder wrote it so"
-            ),
-            Self::NoEntry(bytes) => write!(to, "its `inputs` hold an entry of {bytes} bytes"),
-        }
-    }
 }
 
 impl Pieces {

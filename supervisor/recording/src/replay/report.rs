@@ -32,18 +32,6 @@ pub struct StageReport {
     pub unrecorded: u64,
 }
 
-/// The result of a replay for one generation.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Verdict {
-    /// Equal to the bit.
-    Equal,
-    /// It ended before its first input.
-    WithoutStep,
-    Different,
-    /// It was not replayed, for this reason.
-    NotReplayed(String),
-}
-
 /// The first difference of a generation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {

@@ -60,18 +60,7 @@ pub(crate) fn difference(topic: &'static dyn AnyTopic, a: &[u8], b: &[u8]) -> Op
     if a.get(..20) == b.get(..20) && a.get(28..) == b.get(28..) {
         return None;
     }
-    let own = |(field, _): &(String, String)| !OWN.iter().any(|own| field.ends_with(own));
-    let one: Vec<_> = values::of(topic, a).into_iter().filter(own).collect();
-    let other: Vec<_> = values::of(topic, b).into_iter().filter(own).collect();
-    let differs = one.iter().zip(&other).find(|(one, other)| one != other);
-    let (field, values) = match differs {
-        Some(((field, one), (_, other))) => (field.clone(), [one.clone(), other.clone()]),
-        None if one.len() == other.len() => return None,
-        None => (
-            "number of elements".to_owned(),
-            [one.len(), other.len()].map(|count| count.to_string()),
-        ),
-    };
+    let (field, values) = values::first_difference(topic, [a, b], &OWN)?;
     Some(First {
         tick: tick_of(a),
         time_s: time_of(a).seconds(),

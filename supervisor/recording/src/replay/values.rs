@@ -1,22 +1,41 @@
 //! The fields of a message as text, to describe a difference.
 
 use common::{
-    bus::{Kind, cdr},
+    bus::{Kind, Layout as _, cdr::Decoder},
     topics::AnyTopic,
 };
 
+/// The first field in which two messages of `topic` differ, and both values. Fields with an end among `left_out` do not count.
+pub(crate) fn first_difference(
+    topic: &dyn AnyTopic,
+    messages: [&[u8]; 2],
+    left_out: &[&str],
+) -> Option<(String, [String; 2])> {
+    let [first, second] = messages.map(|message| {
+        let mut values = of(topic, message);
+        values.retain(|(field, _)| !left_out.iter().any(|end| field.ends_with(end)));
+        values
+    });
+    let differs = first.iter().zip(&second).find(|(one, other)| one != other);
+    let counts = [first.len(), second.len()];
+    match differs {
+        Some(((field, one), (_, other))) => Some((field.clone(), [one.clone(), other.clone()])),
+        None => (counts[0] != counts[1])
+            .then(|| ("number of elements".to_owned(), counts.map(|count| count.to_string()))),
+    }
+}
+
 /// The fields of a message of `topic`: names and values, in order. They end where the message ends.
-pub fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
-    let Some(bytes) = message.strip_prefix(&cdr::HEADER) else {
+fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
+    let Some(from) = Decoder::new(message) else {
         return Vec::new();
     };
-    let mut walk = Walk { bytes, at: 0, values: Vec::new() };
+    let mut walk = Walk { from, values: Vec::new() };
     let (sample, element) = topic.layout();
     if walk.kind("", &sample).is_some()
         && let Some(element) = element
-        && let Some(length) = walk.number(4)
+        && let Some(length) = u32::decode(&mut walk.from)
     {
-        let length = length.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         for index in 0..length {
             if walk.kind(&format!("elements[{index}]"), &element).is_none() {
                 break;
@@ -26,36 +45,12 @@ pub fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
     walk.values
 }
 
-/// The first field in which two messages of `topic` differ: its name, and both values.
-pub fn first_difference(
-    topic: &dyn AnyTopic,
-    first: &[u8],
-    second: &[u8],
-) -> (String, String, String) {
-    let (first, second) = (of(topic, first), of(topic, second));
-    let differs = first.iter().zip(&second).find(|(one, other)| one != other);
-    match differs {
-        Some(((field, one), (_, other))) => (field.clone(), one.clone(), other.clone()),
-        None => {
-            ("number of elements".to_owned(), first.len().to_string(), second.len().to_string())
-        }
-    }
-}
-
 struct Walk<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    from: Decoder<'a>,
     values: Vec<(String, String)>,
 }
 
-impl<'a> Walk<'a> {
-    fn number(&mut self, size: usize) -> Option<&'a [u8]> {
-        let start = self.at.next_multiple_of(size);
-        let number = self.bytes.get(start..start + size)?;
-        self.at = start + size;
-        Some(number)
-    }
-
+impl Walk<'_> {
     fn kind(&mut self, path: &str, kind: &Kind) -> Option<()> {
         match kind {
             Kind::Number(name) => {
@@ -68,13 +63,9 @@ impl<'a> Walk<'a> {
                 }
             }
             Kind::Struct(structure) => {
+                let before = if path.is_empty() { String::new() } else { format!("{path}.") };
                 for field in &structure.fields {
-                    let name = if path.is_empty() {
-                        field.name.to_owned()
-                    } else {
-                        format!("{path}.{}", field.name)
-                    };
-                    self.kind(&name, &field.kind)?;
+                    self.kind(&format!("{before}{}", field.name), &field.kind)?;
                 }
             }
         }
@@ -82,15 +73,16 @@ impl<'a> Walk<'a> {
     }
 
     fn value(&mut self, name: &str) -> Option<String> {
+        let from = &mut self.from;
         Some(match name {
-            "u8" => self.number(1)?.first()?.to_string(),
-            "u16" => u16::from_le_bytes(*self.number(2)?.first_chunk()?).to_string(),
-            "u32" => u32::from_le_bytes(*self.number(4)?.first_chunk()?).to_string(),
-            "u64" => u64::from_le_bytes(*self.number(8)?.first_chunk()?).to_string(),
-            "i32" => i32::from_le_bytes(*self.number(4)?.first_chunk()?).to_string(),
+            "u8" => u8::decode(from)?.to_string(),
+            "u16" => u16::decode(from)?.to_string(),
+            "u32" => u32::decode(from)?.to_string(),
+            "u64" => u64::decode(from)?.to_string(),
+            "i32" => i32::decode(from)?.to_string(),
             // Digits that distinguish any two values.
-            "f32" => format!("{:?}", f32::from_le_bytes(*self.number(4)?.first_chunk()?)),
-            "f64" => format!("{:?}", f64::from_le_bytes(*self.number(8)?.first_chunk()?)),
+            "f32" => format!("{:?}", f32::decode(from)?),
+            "f64" => format!("{:?}", f64::decode(from)?),
             _ => return None,
         })
     }
@@ -111,13 +103,16 @@ mod tests {
         for (message, x_m) in messages.iter_mut().zip([1.5, 1.25]) {
             encode_sample(&PoseSample { x_m, ..PoseSample::default() }, message);
         }
-        let difference = first_difference(&topics::POSE, &messages[0], &messages[1]);
-        assert_eq!(difference, ("x_m".into(), "1.5".into(), "1.25".into()));
+        let difference = |topic, [one, other]: &[Vec<u8>; 2]| {
+            first_difference(topic, [one, other], &[]).unwrap()
+        };
+        let expected = ("x_m".to_owned(), ["1.5", "1.25"].map(str::to_owned));
+        assert_eq!(difference(&topics::POSE as _, &messages), expected);
         let mut messages = [Vec::new(), Vec::new()];
         for (message, cell) in messages.iter_mut().zip([0_u8, 3]) {
             encode_slice(&GridHeader::default(), &[0, cell], message);
         }
-        let difference = first_difference(&topics::GRID, &messages[0], &messages[1]);
-        assert_eq!(difference, ("elements[1]".into(), "0".into(), "3".into()));
+        let expected = ("elements[1]".to_owned(), ["0", "3"].map(str::to_owned));
+        assert_eq!(difference(&topics::GRID, &messages), expected);
     }
 }

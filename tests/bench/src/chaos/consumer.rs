@@ -14,13 +14,7 @@ use supervisor::{
 };
 use thiserror::Error;
 
-use crate::chaos::{
-    terminal,
-    words::{self, WordsError},
-};
-
-/// The subcommand that executes a consumer's program, and ends with its parent.
-pub const SUBCOMMAND: &str = "consumer";
+use crate::chaos::terminal;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Consumer {
@@ -59,8 +53,13 @@ pub struct ConsumerError {
 
 #[derive(Debug, Error)]
 enum ConsumerProblem {
-    #[error(transparent)]
-    Words(#[from] WordsError),
+    #[error("there is nothing in it")]
+    Nothing,
+    #[error("it ends within quotes or after a backslash")]
+    Unfinished,
+    /// No program takes such a word.
+    #[error("it contains a zero byte")]
+    Zero,
     #[error("{program}: {problem}")]
     Program { program: String, problem: ExecutableError },
 }
@@ -70,8 +69,12 @@ impl FromStr for GivenConsumer {
 
     fn from_str(command: &str) -> Result<Self, Self::Err> {
         let found = || {
-            let mut words = words::split(command)?.into_iter();
-            let program = words.next().ok_or(WordsError::Nothing)?;
+            if command.contains('\0') {
+                return Err(ConsumerProblem::Zero);
+            }
+            let words = shlex::split(command).ok_or(ConsumerProblem::Unfinished)?;
+            let mut words = words.into_iter();
+            let program = words.next().ok_or(ConsumerProblem::Nothing)?;
             match executable::find(Path::new(&program)) {
                 Ok(path) => Ok((path, words.collect())),
                 Err(problem) => Err(ConsumerProblem::Program { program, problem }),
@@ -129,7 +132,8 @@ impl Consumer {
                 words
             }
         };
-        let mut command = firsthand(&["bench", SUBCOMMAND, &std::process::id().to_string()]);
+        // The subcommand executes the program, and ends with its parent.
+        let mut command = firsthand(&["bench", "consumer", &std::process::id().to_string()]);
         command.args(words);
         Some(command)
     }
@@ -149,18 +153,23 @@ mod tests {
             };
             assert_eq!(command.split(' ').next(), Some(&**program));
         }
-        for command in ["sh 'x", ""] {
-            let error = command.parse::<GivenConsumer>().unwrap_err();
-            assert_eq!(error.command, command);
-            assert!(matches!(error.problem, ConsumerProblem::Words(_)), "{error}");
+        let problem = |command: &str| command.parse::<GivenConsumer>().unwrap_err().problem;
+        for unfinished in ["sh 'x", "sh \"x\\", "sh \\"] {
+            let problem = problem(unfinished);
+            assert!(matches!(problem, ConsumerProblem::Unfinished), "{problem}");
         }
+        assert!(matches!(problem(" \t"), ConsumerProblem::Nothing));
+        assert!(matches!(problem("sh\0x"), ConsumerProblem::Zero));
     }
 
     #[test]
-    fn a_command_is_its_program_and_its_words() {
-        let given: GivenConsumer = "sh -c 'exit 1'".parse().unwrap();
+    fn a_command_is_its_program_and_its_words_and_nothing_is_expanded() {
+        let given: GivenConsumer =
+            "sh -c 'exit  1' \"d 'e\" f\\ g '' $HOME *.rs | `id`".parse().unwrap();
         assert!(given.program.is_absolute() && given.program.ends_with("sh"));
-        assert_eq!(given.arguments, ["-c", "exit 1"]);
+        let words = ["-c", "exit  1", "d 'e", "f g", "", "$HOME", "*.rs", "|", "`id`"];
+        assert_eq!(given.arguments, words);
+        let given: GivenConsumer = "sh -c 'exit 1'".parse().unwrap();
         assert_eq!(Consumer::Given(given).name(), "sh -c 'exit 1'");
     }
 }

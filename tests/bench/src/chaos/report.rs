@@ -1,10 +1,6 @@
 //! The result of all missions under attack.
 
-use std::{
-    collections::BTreeMap,
-    fmt,
-    time::{Duration, Instant},
-};
+use std::{collections::BTreeMap, fmt};
 
 use common::{latency::Histogram, topics::SUPERVISOR};
 use serde::Serialize;
@@ -21,7 +17,7 @@ pub(crate) const EVERYTHING: &str = "everything";
 const NAMED: usize = 20;
 
 /// The result of all missions under attack. Times in milliseconds.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Report {
     missions: u64,
     reached: u64,
@@ -55,9 +51,7 @@ pub struct Report {
     /// Ticks with and without consumers, if nothing else is hit.
     #[serde(skip_serializing_if = "Option::is_none")]
     tick_latencies: Option<TickLatencies>,
-    took_s: f64,
-    #[serde(skip)]
-    began: Instant,
+    pub(crate) took_s: f64,
 }
 
 /// Counts of a consumer in all missions.
@@ -117,29 +111,6 @@ pub struct End {
 }
 
 impl Report {
-    pub(crate) fn new() -> Self {
-        Self {
-            missions: 0,
-            reached: 0,
-            collisions: 0,
-            wrong: Vec::new(),
-            healthy_aborted: 0,
-            kills: BTreeMap::new(),
-            consumers: BTreeMap::new(),
-            recovery_ms: BTreeMap::new(),
-            worst_pose_excess_m: 0.0,
-            worst_pose_kills: 0,
-            longest_stopping_time_s: 0.0,
-            leftovers: 0,
-            left_behind: Vec::new(),
-            supervisor_growth: Resources::default(),
-            replays: None,
-            tick_latencies: None,
-            took_s: 0.0,
-            began: Instant::now(),
-        }
-    }
-
     pub const fn missions(&self) -> u64 {
         self.missions
     }
@@ -215,10 +186,6 @@ impl Report {
         most.memory_kib = most.memory_kib.max(last.memory_kib - first.memory_kib);
     }
 
-    pub(crate) fn end(&mut self) {
-        self.took_s = self.began.elapsed().as_secs_f64();
-    }
-
     /// Whether every mission reached the target without a contact and knew its pose. The files of other missions stay.
     pub fn is_right(&self) -> bool {
         let replayed = self.replays.as_ref().is_none_or(Replays::all_equal);
@@ -241,31 +208,39 @@ impl Report {
     }
 }
 
-/// Milliseconds of a quantile.
-fn ms(histogram: &Histogram, share: f64) -> Option<f64> {
-    histogram.quantile_us(share).map(|us| us / 1e3)
+/// Milliseconds.
+#[derive(Serialize)]
+struct Quantiles {
+    p50: Option<f64>,
+    p99: Option<f64>,
+    max: Option<f64>,
+}
+
+impl Quantiles {
+    fn of(histogram: &Histogram) -> Self {
+        let ms = |share| histogram.quantile_us(share).map(|us| us / 1e3);
+        Self { p50: ms(0.5), p99: ms(0.99), max: ms(1.0) }
+    }
+}
+
+impl fmt::Display for Quantiles {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.p50, self.p99, self.max) {
+            (Some(p50), Some(p99), Some(max)) => to.pad(&format!("{p50:.1} {p99:.1} {max:.1}")),
+            _ => to.pad("-"),
+        }
+    }
 }
 
 fn recoveries<S: serde::Serializer>(
     all: &BTreeMap<&'static str, Recovery>,
     to: S,
 ) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Quantiles {
-        p50: Option<f64>,
-        p99: Option<f64>,
-        max: Option<f64>,
-    }
-    let quantiles = |histogram: &Histogram| Quantiles {
-        p50: ms(histogram, 0.5),
-        p99: ms(histogram, 0.99),
-        max: ms(histogram, 1.0),
-    };
     to.collect_map(all.iter().map(|(stage, recovery)| {
         let parts = [
-            ("ready", quantiles(&recovery.ready)),
-            ("ready_when_frozen", quantiles(&recovery.after_freeze)),
-            ("output", quantiles(&recovery.output)),
+            ("ready", Quantiles::of(&recovery.ready)),
+            ("ready_when_frozen", Quantiles::of(&recovery.after_freeze)),
+            ("output", Quantiles::of(&recovery.output)),
         ];
         (stage, parts.into_iter().collect::<BTreeMap<_, _>>())
     }))
@@ -273,13 +248,12 @@ fn recoveries<S: serde::Serializer>(
 
 impl fmt::Display for Report {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let took = Duration::from_secs_f64(self.took_s);
         writeln!(
             to,
             "{} signals in {} missions, {:.0} s: {} reached, {} collisions, {} healthy stages aborted, {} leftovers",
             self.signals(),
             self.missions,
-            took.as_secs_f64(),
+            self.took_s,
             self.reached,
             self.collisions,
             self.healthy_aborted,
@@ -302,20 +276,12 @@ impl fmt::Display for Report {
         for name in stages.chain(hit_supervisor) {
             let hit: u32 = self.kills.get(name).map_or(0, |kinds| kinds.values().sum());
             let recovery = self.recovery_ms.get(name).unwrap_or(&nothing);
-            let quantiles = |histogram: &Histogram| match (
-                ms(histogram, 0.5),
-                ms(histogram, 0.99),
-                ms(histogram, 1.0),
-            ) {
-                (Some(p50), Some(p99), Some(max)) => format!("{p50:.1} {p99:.1} {max:.1}"),
-                _ => "-".to_owned(),
-            };
             writeln!(
                 to,
                 "{name:<16} {hit:>6} {:>22} {:>22} {:>22}",
-                quantiles(&recovery.ready),
-                quantiles(&recovery.after_freeze),
-                quantiles(&recovery.output)
+                Quantiles::of(&recovery.ready),
+                Quantiles::of(&recovery.after_freeze),
+                Quantiles::of(&recovery.output)
             )?;
         }
         let mut kinds: BTreeMap<Kind, u32> = BTreeMap::new();

@@ -18,8 +18,7 @@ impl Resources {
     pub(crate) fn of(pid: u32) -> Option<Self> {
         let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as i64;
         // Pages of shared memory belong to the bus and do not count.
-        let memory = process_status::field(&pid.to_string(), "RssAnon")?;
-        let memory_kib = memory.trim_end_matches(" kB").parse().ok()?;
+        let memory_kib = process_status::kibibytes(&pid.to_string(), "RssAnon")? as i64;
         Some(Self { descriptors, memory_kib })
     }
 }

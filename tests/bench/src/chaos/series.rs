@@ -23,7 +23,7 @@ impl<'a> Series<'a> {
         Ok(Self {
             options,
             schedule: Schedule::new(options.seed),
-            report: Report::new(),
+            report: Report::default(),
             signals: out.map(SignalsFile::create).transpose()?,
         })
     }

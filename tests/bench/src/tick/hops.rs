@@ -13,7 +13,7 @@ use common::{
     samples::{CommandSample, GridHeader, GuidanceSample, PoseSample, WheelSample},
     signals::{SIGTERM, Signals},
     start::become_child,
-    topics,
+    topics::{self, AnyTopic},
     waiter::Waiter,
 };
 use supervisor::{
@@ -106,54 +106,61 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<
 /// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
+/// A closure that gives, for each sample from `$from`, what `$publish` publishes on `$to`.
+macro_rules! forward {
+    ($from:expr, $to:expr, |$sample:ident, $writer:ident| $publish:expr) => {{
+        let (mut from, mut $writer) = ($from, $to);
+        Box::new(move || {
+            while let Some($sample) = from.take()? {
+                $publish?;
+            }
+            Ok(())
+        })
+    }};
+}
+
 fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, TickError> {
     let now = MissionTime::default();
-    Ok(match PLACES.iter().position(|name| *name == place) {
-        Some(0) => {
-            waiter.on(bus.wakeup(&topics::WHEELS)?);
-            let (mut from, mut to) = (bus.reader(&topics::WHEELS)?, bus.writer(&topics::POSE, 1)?);
-            Box::new(move || {
-                while let Some(sample) = from.take()? {
-                    to.publish(sample.stamp.tick, now, PoseSample::default())?;
+    let (wakes, forward): (&dyn AnyTopic, Forward) = match PLACES
+        .iter()
+        .position(|name| *name == place)
+    {
+        Some(0) => (
+            &topics::WHEELS,
+            forward!(bus.reader(&topics::WHEELS)?, bus.writer(&topics::POSE, 1)?, |sample, to| {
+                to.publish(sample.stamp.tick, now, PoseSample::default())
+            }),
+        ),
+        Some(1) => (
+            &topics::POSE,
+            forward!(
+                bus.reader(&topics::POSE)?,
+                bus.slice_writer(&topics::GRID, 1, CELLS)?,
+                |sample, to| {
+                    to.publish(sample.stamp.tick, now, GridHeader::default(), std::iter::empty())
                 }
-                Ok(())
-            })
-        }
-        Some(1) => {
-            waiter.on(bus.wakeup(&topics::POSE)?);
-            let mut from = bus.reader(&topics::POSE)?;
-            let mut to = bus.slice_writer(&topics::GRID, 1, CELLS)?;
-            Box::new(move || {
-                while let Some(sample) = from.take()? {
-                    let nothing = std::iter::empty();
-                    to.publish(sample.stamp.tick, now, GridHeader::default(), nothing)?;
+            ),
+        ),
+        Some(2) => (
+            &topics::GRID,
+            forward!(
+                bus.slice_reader(&topics::GRID)?,
+                bus.writer(&topics::GUIDANCE, 1)?,
+                |sample, to| {
+                    to.publish(sample.header().stamp.tick, now, GuidanceSample::default())
                 }
-                Ok(())
-            })
-        }
-        Some(2) => {
-            waiter.on(bus.wakeup(&topics::GRID)?);
-            let mut from = bus.slice_reader(&topics::GRID)?;
-            let mut to = bus.writer(&topics::GUIDANCE, 1)?;
-            Box::new(move || {
-                while let Some(sample) = from.take()? {
-                    let tick = sample.header().stamp.tick;
-                    to.publish(tick, now, GuidanceSample::default())?;
-                }
-                Ok(())
-            })
-        }
-        Some(_) => {
-            waiter.on(bus.wakeup(&topics::GUIDANCE)?);
-            let mut from = bus.reader(&topics::GUIDANCE)?;
-            let mut to = bus.writer(&topics::COMMAND, 1)?;
-            Box::new(move || {
-                while let Some(sample) = from.take()? {
-                    to.publish(sample.stamp.tick, now, CommandSample::default())?;
-                }
-                Ok(())
-            })
-        }
+            ),
+        ),
+        Some(_) => (
+            &topics::GUIDANCE,
+            forward!(
+                bus.reader(&topics::GUIDANCE)?,
+                bus.writer(&topics::COMMAND, 1)?,
+                |sample, to| { to.publish(sample.stamp.tick, now, CommandSample::default()) }
+            ),
+        ),
         None => return Err(TickError::Place(place.to_owned())),
-    })
+    };
+    waiter.on(bus.wakeup(wakes)?);
+    Ok(forward)
 }

@@ -1,34 +1,22 @@
 //! A mission whose ticks are measured.
 
 use std::{
-    fs,
-    path::PathBuf,
     process::{Output, Stdio},
     sync::mpsc::{RecvTimeoutError, channel},
     thread,
     time::Duration,
 };
 
-use common::{clock::Pace, domain::RobotName, latency_budget};
+use common::latency_budget;
 use supervisor::process;
 
 use super::{
+    Options,
     budget::Budget,
     consumers,
     error::{TickError, system},
     process_set::{ProcessSet, Used},
 };
-
-/// The mission, as it is given to `run`.
-pub(super) struct Mission<'a> {
-    pub(super) name: &'a str,
-    pub(super) set: &'a [String],
-    pub(super) robot: &'a RobotName,
-    pub(super) pace: Pace,
-    pub(super) record: bool,
-    /// Processes that read its grid and field.
-    pub(super) consumers: u32,
-}
 
 /// One mission's ticks.
 #[derive(Debug)]
@@ -44,66 +32,49 @@ pub(super) struct Ticks {
 /// Pause between measurements of its processes.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// The directory of the run, removed in the end.
-struct Directory(PathBuf);
-
-impl Directory {
-    /// The name is not `firsthand-UID`, which is the directory of all robots of a user.
-    fn make() -> Result<Self, TickError> {
-        let name = format!("firsthand-latency-{}", std::process::id());
-        let directory = std::env::temp_dir().join(name);
-        fs::create_dir(&directory).map_err(system("make a directory for the mission"))?;
-        Ok(Self(directory))
+/// Run the mission. Its stages measure their items only for a `budget`, because measuring takes time.
+pub(super) fn measure(
+    options: &Options<'_>,
+    budget: Option<&mut Budget>,
+) -> Result<Ticks, TickError> {
+    let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
+    let directory = directory.map_err(system("make a directory for the mission"))?;
+    let pace = options.regime.pace(options.rate_hz).to_string();
+    let mut command = process::firsthand(&["run", options.mission, "--json", "--pace", &pace]);
+    command.args(["--robot", &options.robot.to_string(), "--out"]).arg(directory.path());
+    if !options.record {
+        command.arg("--no-record");
     }
-}
-
-impl Drop for Directory {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
+    for setting in options.set {
+        command.args(["--set", setting]);
     }
-}
-
-impl Mission<'_> {
-    /// Run it. Its stages measure their items only for a `budget`, because measuring takes time.
-    pub(super) fn measure(&self, budget: Option<&mut Budget>) -> Result<Ticks, TickError> {
-        let directory = Directory::make()?;
-        let (robot, pace) = (self.robot.to_string(), self.pace.to_string());
-        let mut command = process::firsthand(&["run", self.name, "--json", "--pace", &pace]);
-        command.args(["--robot", &robot, "--out"]).arg(&directory.0);
-        if !self.record {
-            command.arg("--no-record");
-        }
-        for setting in self.set {
-            command.args(["--set", setting]);
-        }
-        if budget.is_some() {
-            command.env(latency_budget::ASKED_FOR, "1");
-        }
-        // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
-        let _consumers = consumers::start(self.robot, self.consumers)?;
-        let run = command
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(system("start the mission"))?;
-        let mut processes = ProcessSet::of(run.id());
-        let (ended, end) = channel();
-        let waiting = thread::spawn(move || ended.send(run.wait_with_output()));
-        let output = loop {
-            match end.recv_timeout(LOOK_EVERY) {
-                Ok(output) => break output.map_err(system("wait for the mission"))?,
-                Err(RecvTimeoutError::Timeout) => processes.look(),
-                Err(RecvTimeoutError::Disconnected) => return Err(TickError::Nothing),
-            }
-        };
-        // The thread has ended, because it has sent its result.
-        let _ = waiting.join();
-        let ticks = ticks(&output, processes.used())?;
-        if let Some(budget) = budget {
-            budget.add(&directory.0)?;
-        }
-        Ok(ticks)
+    if budget.is_some() {
+        command.env(latency_budget::ASKED_FOR, "1");
     }
+    // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
+    let _consumers = consumers::start(options.robot, options.consumers)?;
+    let run = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(system("start the mission"))?;
+    let mut processes = ProcessSet::of(run.id());
+    let (ended, end) = channel();
+    let waiting = thread::spawn(move || ended.send(run.wait_with_output()));
+    let output = loop {
+        match end.recv_timeout(LOOK_EVERY) {
+            Ok(output) => break output.map_err(system("wait for the mission"))?,
+            Err(RecvTimeoutError::Timeout) => processes.look(),
+            Err(RecvTimeoutError::Disconnected) => return Err(TickError::Nothing),
+        }
+    };
+    // The thread has ended, because it has sent its result.
+    let _ = waiting.join();
+    let ticks = ticks(&output, processes.used())?;
+    if let Some(budget) = budget {
+        budget.add(directory.path())?;
+    }
+    Ok(ticks)
 }
 
 /// The tick latencies of the mission's summary.

@@ -7,7 +7,6 @@ use std::{
 };
 
 use common::process_status;
-use rustix::param::clock_ticks_per_second;
 
 /// Resources of a set of processes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,38 +91,22 @@ impl Count {
             let switches = process_status::field(&thread, "voluntary_ctxt_switches")?;
             waits += switches.parse::<u64>().ok()?;
         }
-        let numbers = stat(process)?;
-        let ticks = numbers.get(USER_TIME)? + numbers.get(USER_TIME + 1)?;
-        let cpu = Duration::from_secs_f64(ticks as f64 / clock_ticks_per_second() as f64);
-        Some(Self { waits, cpu })
+        Some(Self { waits, cpu: process_status::processor_time(process)? })
     }
-}
-
-/// Places in [`stat`] of the parent's id and of the user time, which the system time follows.
-const PARENT: usize = 0;
-const USER_TIME: usize = 10;
-
-/// The numbers of `/proc/PID/stat` from the parent's id on; negative ones as 0.
-fn stat(process: u32) -> Option<Vec<u64>> {
-    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The process's name, in parentheses, may contain anything; after it come the state and then numbers.
-    let (_, rest) = stat.rsplit_once(") ")?;
-    let numbers = rest.split_ascii_whitespace().skip(1);
-    Some(numbers.map(|word| word.parse().unwrap_or(0)).collect())
 }
 
 /// `root` and every process that descends from it.
 fn descendants(root: u32) -> BTreeSet<u32> {
-    let parents: Vec<(u32, u64)> = crate::processes()
-        .filter_map(|process| Some((process, *stat(process)?.get(PARENT)?)))
-        .collect();
+    let parent = |process: u32| process_status::field(&process.to_string(), "PPid")?.parse().ok();
+    let parents: Vec<(u32, u32)> =
+        crate::processes().filter_map(|process| Some((process, parent(process)?))).collect();
     let mut found: BTreeSet<u32> =
         parents.iter().map(|(process, _)| *process).filter(|process| *process == root).collect();
     loop {
         let more: Vec<u32> = parents
             .iter()
             .filter(|(process, _)| !found.contains(process))
-            .filter(|(_, parent)| u32::try_from(*parent).is_ok_and(|it| found.contains(&it)))
+            .filter(|(_, parent)| found.contains(parent))
             .map(|(process, _)| *process)
             .collect();
         if more.is_empty() {

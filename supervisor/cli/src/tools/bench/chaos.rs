@@ -1,6 +1,9 @@
 //! `firsthand bench chaos`: signals to random stages at random times, and what became of the missions.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use bench::chaos::{
     self, Consumer, FaultOptions, GivenConsumer, Options,
@@ -143,16 +146,21 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let table = out.join(signals::FILE_NAME);
         write_stderr(&format!("results: {}\n", table.display()));
     }
-    if report.is_right() {
-        std::fs::remove_dir_all(&directory)?;
-    } else {
-        let directory = directory.display();
-        write_stderr(&format!(
-            "firsthand: the files of the missions that went wrong are in {directory}\n"
-        ));
-    }
+    remove_unless_wrong(report.is_right(), &directory)?;
     print(&report, arguments.json)?;
     Ok(ExitCode::from(if report.is_clean() { 0 } else { NOT_CLEAN }))
+}
+
+/// Remove the `directory` of missions if all were `right`, or else tell where it is.
+fn remove_unless_wrong(right: bool, directory: &Path) -> std::io::Result<()> {
+    if right {
+        return std::fs::remove_dir_all(directory);
+    }
+    let directory = directory.display();
+    write_stderr(&format!(
+        "firsthand: the files of the missions that went wrong are in {directory}\n"
+    ));
+    Ok(())
 }
 
 /// The options of the missions, which run in a new directory.
@@ -203,20 +211,8 @@ fn robot_faults(
     let ended = chaos::run_robot_faults(&options, &mut |table| {
         write_stderr(&format!("{} of {of} missions\n", table.entries.len()));
     });
-    let table = match ended {
-        Ok(table) => table,
-        Err(error) => {
-            return Err(format!("{error}; see {}", directory.display()).into());
-        }
-    };
-    if table.is_kept() {
-        std::fs::remove_dir_all(&directory)?;
-    } else {
-        let directory = directory.display();
-        write_stderr(&format!(
-            "firsthand: the files of the missions that went wrong are in {directory}\n"
-        ));
-    }
+    let table = ended.map_err(|error| format!("{error}; see {}", directory.display()))?;
+    remove_unless_wrong(table.is_kept(), &directory)?;
     print(&table, arguments.json)?;
     Ok(ExitCode::from(if table.is_kept() { 0 } else { NOT_CLEAN }))
 }

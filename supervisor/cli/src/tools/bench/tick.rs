@@ -1,7 +1,5 @@
 //! `firsthand bench tick`: the time of a tick, and of the bus alone.
 
-use std::process::ExitCode;
-
 use bench::tick::{self, Options, Regime, consumers, hops, parse_hz};
 use clap::Args;
 use common::{clock::Pace, domain::RobotName};
@@ -52,18 +50,16 @@ pub(crate) struct Arguments {
     supervisor: Option<u32>,
 }
 
-pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     let robot = match &arguments.robot {
         Some(robot) => robot.clone(),
         None => format!("latency{}", std::process::id()).parse()?,
     };
     if let (true, Some(supervisor)) = (arguments.consumer, arguments.supervisor) {
-        consumers::run(&robot, supervisor)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(consumers::run(&robot, supervisor)?);
     }
     if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
-        hops::run_forwarder(&robot, place, supervisor)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(hops::run_forwarder(&robot, place, supervisor)?);
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
     let report = tick::measure(&Options {
@@ -77,6 +73,5 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         record: arguments.record,
         consumers: arguments.consumers,
     })?;
-    print(&report, arguments.json)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(print(&report, arguments.json)?)
 }

@@ -2,12 +2,10 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     time::{Duration, Instant},
 };
 
-use common::process_status;
-use rustix::param::clock_ticks_per_second;
+use common::process_status::{kibibytes, processor_time};
 
 /// Processor and memory of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,35 +39,18 @@ impl Processes {
         {
             return usage;
         }
-        let Some(used) = cpu_time(process) else {
+        let Some(used) = processor_time(process) else {
             return Usage::default();
         };
         let cpu = before.map(|(at, then, _)| {
             let over = now.saturating_duration_since(at).as_secs_f64();
             used.saturating_sub(then).as_secs_f64() / over
         });
-        let usage = Usage { cpu, memory_bytes: memory_bytes(&process.to_string(), "VmRSS") };
+        let memory_kib = kibibytes(&process.to_string(), "VmRSS");
+        let usage = Usage { cpu, memory_bytes: memory_kib.map(|kib| kib.saturating_mul(1024)) };
         self.seen.insert(process, (now, used, usage));
         usage
     }
-}
-
-/// Processor time of all threads of the process, in the kernel and outside.
-fn cpu_time(process: u32) -> Option<Duration> {
-    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name in parentheses may have any letters. Numbers follow after the state.
-    let (_, numbers) = stat.rsplit_once(") ")?;
-    let mut times = numbers.split_ascii_whitespace().skip(11);
-    let mut time = || times.next()?.parse::<u64>().ok();
-    let ticks = time()?.saturating_add(time()?);
-    Some(Duration::from_secs_f64(ticks as f64 / clock_ticks_per_second() as f64))
-}
-
-/// The bytes that `field` of the status of `process`, a number or `self`, gives in kB.
-pub(crate) fn memory_bytes(process: &str, field: &str) -> Option<u64> {
-    let value = process_status::field(process, field)?;
-    let kilobytes: u64 = value.strip_suffix(" kB")?.trim().parse().ok()?;
-    Some(kilobytes.saturating_mul(1024))
 }
 
 #[cfg(test)]
@@ -85,8 +66,8 @@ mod tests {
         assert_eq!(first[0].cpu, None, "nothing to compare with");
         assert!(first[0].memory_bytes > Some(1 << 20));
         assert_eq!(first[1], Usage::default());
-        let used = cpu_time(own).unwrap();
-        while cpu_time(own).unwrap() < used + Duration::from_millis(200) {}
+        let used = processor_time(own).unwrap();
+        while processor_time(own).unwrap() < used + Duration::from_millis(200) {}
         let second = processes.look(&[own], began + LOOK_EVERY);
         assert!(second[0].cpu >= Some(0.19), "{second:?}");
         assert_eq!(processes.look(&[own], began + LOOK_EVERY), second);

@@ -5,16 +5,16 @@ use std::{collections::BTreeMap, fmt};
 use common::{
     ground_truth::GroundTruthTick, latency::Histogram, mission::Mission, samples::PoseSample,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use supervisor::{Finished, outcome::Outcome, totals::LookTotals};
+use crate::{Finished, outcome::Outcome, totals::LookTotals};
 
 /// Quantiles of a duration, microseconds; none if nothing was measured.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct Quantiles {
-    p50: Option<f64>,
-    p99: Option<f64>,
-    max: Option<f64>,
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quantiles {
+    pub p50: Option<f64>,
+    pub p99: Option<f64>,
+    pub max: Option<f64>,
 }
 
 impl From<&Histogram> for Quantiles {
@@ -29,51 +29,51 @@ impl From<&Histogram> for Quantiles {
 
 /// The last line of `run --json`. Distances are in metres. An unknown value is none (null), such as the ground truth of a real
 /// robot.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Summary {
-    pub(crate) outcome: Outcome,
-    pub(crate) reason: String,
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Summary {
+    pub outcome: Outcome,
+    pub reason: String,
     /// The row of the failsafe table that ended the mission, by its name (`firsthand table failsafe`).
-    pub(crate) cause: Option<&'static str>,
+    pub cause: Option<String>,
     /// From the first motion order to the end by the robot's clock, which goes on while the link is lost.
-    pub(crate) mission_time_s: f64,
-    pub(crate) path_length_m: f64,
-    pub(crate) straight_m: f64,
-    pub(crate) min_clearance_m: Option<f64>,
-    pub(crate) collisions: Option<u64>,
-    pub(crate) pose_error_m: Option<f64>,
+    pub mission_time_s: f64,
+    pub path_length_m: f64,
+    pub straight_m: f64,
+    pub min_clearance_m: Option<f64>,
+    pub collisions: Option<u64>,
+    pub pose_error_m: Option<f64>,
     /// The root mean square of the pose error by the covariance of the last pose.
-    pub(crate) pose_error_expected_m: Option<f64>,
+    pub pose_error_expected_m: Option<f64>,
     /// Distance from the robot's end to the target, by the ground truth.
-    pub(crate) true_distance_m: Option<f64>,
+    pub true_distance_m: Option<f64>,
     /// The time at which the robot had moved 0.1 m, by the ground truth.
-    pub(crate) departed_s: Option<f64>,
+    pub departed_s: Option<f64>,
     /// The longest that a wheel turned after the last command the robot had received: command limit and speed loop
     /// together, in an outage or when a stage is down.
-    pub(crate) stopping_time_s: Option<f64>,
-    pub(crate) safety_events: u64,
-    pub(crate) full_solves: u64,
+    pub stopping_time_s: Option<f64>,
+    pub safety_events: u64,
+    pub full_solves: u64,
     /// Times the robot stopped to look.
-    pub(crate) looks: u64,
+    pub looks: u64,
     /// Mission time spent looking.
-    pub(crate) look_s: f64,
+    pub look_s: f64,
     /// Share of the ticks in which the front sonar gave no distance. It is taken from the ground truth, because a supervisor on a
     /// busy machine may miss samples.
-    pub(crate) sonar_unavailable_share: Option<f64>,
+    pub sonar_unavailable_share: Option<f64>,
     /// The greatest commanded speed of either wheel less the least one, rad/s, in the last supervisor's part.
-    pub(crate) wheel_range_rad_s: Option<f64>,
-    pub(crate) ticks: u64,
-    pub(crate) restarts: BTreeMap<&'static str, u32>,
+    pub wheel_range_rad_s: Option<f64>,
+    pub ticks: u64,
+    pub restarts: BTreeMap<String, u32>,
     /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of the last supervisor's
     /// part; the path is the believed one, which is complete.
-    pub(crate) resumes: u32,
+    pub resumes: u32,
     /// Generations of the planner started because the robot stalled.
-    pub(crate) replans: u32,
+    pub replans: u32,
     /// Times the sensed part of the map was reset.
-    pub(crate) resets: u64,
+    pub resets: u64,
     /// Time from the datagram in to the datagram out.
-    pub(crate) tick_latency_us: Quantiles,
-    pub(crate) full_solve_us: Quantiles,
+    pub tick_latency_us: Quantiles,
+    pub full_solve_us: Quantiles,
 }
 
 /// A robot has departed after this distance, metres.
@@ -81,7 +81,7 @@ const DEPARTED_M: f64 = 0.1;
 
 impl Summary {
     /// The summary of a finished run. Samples after the end was decided do not count.
-    pub(crate) fn new(mission: &Mission, finished: &Finished) -> Self {
+    pub fn new(mission: &Mission, finished: &Finished) -> Self {
         let Finished { ending, record, resumes, .. } = finished;
         let last_tick = finished.last_tick.or(record.newest_tick());
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
@@ -90,11 +90,12 @@ impl Summary {
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
         let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
         let collisions = truth.last().map(|tick| tick.contacts);
+        let restarts = finished.restarts.iter();
         let looks = last_tick.map_or(LookTotals::default(), |tick| record.looks.at(tick));
         Self {
             outcome: ending.outcome,
             reason: ending.reason.clone(),
-            cause: ending.cause,
+            cause: ending.cause.map(str::to_owned),
             mission_time_s: finished.duration_s,
             path_length_m: match ended {
                 Some(_) if *resumes == 0 => path_length(truth),
@@ -127,7 +128,7 @@ impl Summary {
                 .filter(|_| mission.body().steering.is_none())
                 .and_then(|tick| record.wheels.at(tick).range_rad_s()),
             ticks: last_tick.map_or(0, |tick| tick + 1),
-            restarts: finished.restarts.clone(),
+            restarts: restarts.map(|(stage, times)| ((*stage).to_owned(), *times)).collect(),
             resumes: *resumes,
             replans: finished.replans,
             resets: finished.resets,
@@ -137,7 +138,7 @@ impl Summary {
     }
 
     /// Lines below the picture.
-    pub(crate) fn captions(&self) -> Vec<String> {
+    pub fn captions(&self) -> Vec<String> {
         let metres = |value: Option<f64>| {
             value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))
         };
@@ -222,22 +223,7 @@ mod tests {
 
     #[test]
     fn the_sonar_is_unavailable_where_its_byte_is_no_distance() {
-        let tick = |sonar_cm| GroundTruthTick {
-            tick: 0,
-            time_s: 0.0,
-            x: 0.0,
-            y: 0.0,
-            heading: 0.0,
-            v: 0.0,
-            omega: 0.0,
-            clearance_m: 1.0,
-            contacts: 0,
-            left_counts: 0,
-            right_counts: 0,
-            sonar_cm,
-            stopping_time_s: 0.0,
-            radio: None,
-        };
+        let tick = |sonar_cm| GroundTruthTick { sonar_cm, ..GroundTruthTick::default() };
         assert_eq!(sonar_unavailable_share(&[]), None);
         let truth = [255, 0, 255, 254, 4].map(tick);
         assert_eq!(sonar_unavailable_share(&truth), Some(0.6));
