@@ -36,7 +36,7 @@ fn assert_as_recorded(report: &Value, stage: &str) {
 #[test]
 fn live_stages_answer_a_played_recording_as_it_was_recorded() {
     let golden = golden();
-    let file = golden.path().to_str().unwrap();
+    let file = golden.path.to_str().unwrap();
     let played = output(&["replay", file, "--live", "--robot", "live-equal", "--json"]);
     assert_eq!(played.status.code(), Some(0), "{played:?}");
     let report: Value = serde_json::from_slice(&played.stdout).unwrap();
@@ -51,7 +51,7 @@ fn live_stages_answer_a_played_recording_as_it_was_recorded() {
 #[test]
 fn another_constant_or_planner_is_tried_on_a_played_recording_and_the_first_difference_told() {
     let golden = golden();
-    let file = golden.path().to_str().unwrap();
+    let file = golden.path.to_str().unwrap();
     for (stage, topic, set) in [
         ("controller", "command", "controller.speed_m_s=0.3"),
         ("planner", "guidance", "planner.executable=\"bug\""),
@@ -74,7 +74,7 @@ fn a_consumer_reads_a_played_recording_as_it_reads_a_robot() {
     let mut recorder =
         firsthand(&["record", "--robot", "live-read", "--out"]).arg(&copy).spawn().unwrap();
     let golden = golden();
-    let file = golden.path().to_str().unwrap();
+    let file = golden.path.to_str().unwrap();
     let arguments = ["--robot", "live-read", "--stage", "planner", "--pace", "4"];
     let played = output(&[&["replay", file, "--live"], &arguments[..]].concat());
     assert_eq!(played.status.code(), Some(0), "{played:?}");
@@ -89,7 +89,7 @@ fn a_consumer_reads_a_played_recording_as_it_reads_a_robot() {
 #[test]
 fn time_waits_for_a_live_stage_that_stands_still() {
     let golden = golden();
-    let file = golden.path().to_str().unwrap();
+    let file = golden.path.to_str().unwrap();
     let mut played = firsthand(&["replay", file, "--live", "--robot", "live-wait"])
         .args(["--stage", "planner", "--json"])
         .stdout(Stdio::piped())
@@ -109,7 +109,7 @@ fn time_waits_for_a_live_stage_that_stands_still() {
 #[test]
 fn a_live_stage_that_is_killed_ends_the_replay_by_its_name_and_leaves_nothing() {
     let golden = golden();
-    let file = golden.path().to_str().unwrap();
+    let file = golden.path.to_str().unwrap();
     let mut played = firsthand(&["replay", file, "--live", "--robot", "live-killed"])
         .args(["--stage", "mapper", "--pace", "0.1"])
         .stderr(Stdio::piped())

@@ -39,9 +39,9 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     let (code, summary, directory) = run.finish_in();
     assert_eq!(code, Some(0), "{summary}");
     let recording = open(directory.path());
-    assert_eq!(recording.end(), &End::Complete);
-    assert_eq!(recording.run().mission.name, "open-room");
-    assert!(recording.lost().is_empty(), "{:?}", recording.lost());
+    assert_eq!(recording.end, End::Complete);
+    assert_eq!(recording.run.mission.name, "open-room");
+    assert!(recording.lost.is_empty(), "{:?}", recording.lost);
     let poses = recording.samples(&topics::POSE).unwrap();
     let ticks: Vec<u64> = poses.map(|pose| pose.unwrap().sample.stamp.tick).collect();
     let expected: Vec<u64> = (0..ticks.len() as u64).collect();
@@ -49,9 +49,9 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     let mut grids = recording.slices(&topics::GRID).unwrap();
     let first = grids.next().unwrap().unwrap();
     assert!(first.header.part.is_keyframe());
-    assert_eq!(first.elements.len(), recording.run().mission.grid_frame().area());
-    assert!(recording.counts()["log"] > 5);
-    assert!(recording.counts()["wire"] > 2 * ticks.len() as u64);
+    assert_eq!(first.elements.len(), recording.run.mission.grid_frame().area());
+    assert!(recording.counts["log"] > 5);
+    assert!(recording.counts["wire"] > 2 * ticks.len() as u64);
 
     let report = replayed(&recording);
     assert_eq!(assert_all_equal(&report), 5);
@@ -100,14 +100,14 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
         let file = directory.path().join(format!("{shot}.mcap"));
         let file = killed_recorder(&mut run, file, shot * 2);
         let recording = Recording::open(&file).unwrap();
-        if recording.end() == &End::Complete {
+        if recording.end == End::Complete {
             // The mission ended before: the machine is very loaded.
             break;
         }
         cut += 1;
         let messages = recording.messages(&[]).unwrap();
         let messages: Vec<_> = messages.map(Result::unwrap).collect();
-        let counted: u64 = recording.counts().values().sum();
+        let counted: u64 = recording.counts.values().sum();
         assert_eq!(messages.len() as u64, counted);
         read += messages.len();
     }
@@ -133,7 +133,7 @@ fn the_golden_recording_replays_to_the_bit() {
 #[test]
 fn a_constant_that_changes_makes_a_replay_fail_with_stage_tick_topic_field_and_inputs() {
     let recording = golden();
-    let mut run = recording.run().clone();
+    let mut run = recording.run.clone();
     run.mission.controller.speed_m_s = Some(run.mission.speed_m_s() * 1.01);
     let options = Options { run: Some(run), ..Options::default() };
     let report = replay(&recording, &options).unwrap();
@@ -150,7 +150,7 @@ fn a_constant_that_changes_makes_a_replay_fail_with_stage_tick_topic_field_and_i
 #[test]
 fn replay_and_diff_print_what_they_found_and_exit_with_1_on_a_difference() {
     let golden = golden();
-    let file = golden.path().to_str().unwrap();
+    let file = golden.path.to_str().unwrap();
     let replayed = output(&["replay", file, "--stage", "mapper,planner", "--json"]);
     assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
     let report: serde_json::Value = serde_json::from_slice(&replayed.stdout).unwrap();
@@ -178,7 +178,7 @@ fn a_runs_directory_stands_for_its_recording_unless_it_holds_none_or_several() {
     let run = directory.path().to_str().unwrap();
     let replay = || output(&["replay", run, "--stage", "mapper"]);
     assert_refused(&replay(), "no-recording", &[run]);
-    let copy = |name: &str| fs::copy(golden().path(), directory.path().join(name)).unwrap();
+    let copy = |name: &str| fs::copy(&golden().path, directory.path().join(name)).unwrap();
     copy("recording.mcap");
     assert_eq!(replay().status.code(), Some(0));
     copy("recording-2.mcap");

@@ -24,8 +24,8 @@
 //! use recording::{End, Recording};
 //!
 //! let recording = Recording::open("recording.mcap".as_ref())?;
-//! println!("{} with seed {}", recording.run().mission.name, recording.run().mission.seed);
-//! if let End::Cut { after, problem } = recording.end() {
+//! println!("{} with seed {}", recording.run.mission.name, recording.run.mission.seed);
+//! if let End::Cut { after, problem } = &recording.end {
 //!     println!("cut off after {:.1} s: {problem}", after.as_secs_f64());
 //! }
 //! for pose in recording.samples(&topics::POSE)? {

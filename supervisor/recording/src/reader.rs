@@ -41,13 +41,19 @@ pub enum End {
 /// A recording of one run, or of a part of one.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    path: PathBuf,
-    about: BTreeMap<String, String>,
-    run: Run,
-    end: End,
-    counts: BTreeMap<String, u64>,
-    lost: BTreeMap<String, u64>,
-    bounds: Option<(u64, u64)>,
+    pub path: PathBuf,
+    /// The text of the stages' run file.
+    pub run_text: String,
+    /// The run file: mission, clock, robot.
+    pub run: Run,
+    /// The build that recorded it.
+    pub build: String,
+    pub machine: String,
+    pub end: End,
+    /// Numbers of messages by topic.
+    pub counts: BTreeMap<String, u64>,
+    /// Numbers of samples by topic that the recorder lost.
+    pub lost: BTreeMap<String, u64>,
 }
 
 /// A message of any topic.
@@ -136,73 +142,29 @@ impl Recording {
         };
         let foreign =
             |problem: String| RecordingError::Foreign { file: path.to_path_buf(), problem };
-        let Some(about) = about else {
+        let Some(mut about) = about else {
             let problem =
                 problem.unwrap_or_else(|| "it does not say of which run it is".to_owned());
             return Err(foreign(problem));
         };
-        let run = about.get("run_toml").map_or("", String::as_str);
-        let run = toml::from_str(run)
+        let mut about = |key| about.remove(key).unwrap_or_default();
+        let run_text: String = about("run_toml");
+        let run = toml::from_str(&run_text)
             .map_err(|error| foreign(format!("its run is unknown: {}", error.message())))?;
         let after = bounds.map_or(0, |(from, to)| to - from);
         Ok(Self {
             path: path.to_path_buf(),
-            about,
+            run_text,
             run,
+            build: about("build"),
+            machine: about("machine"),
             end: problem.map_or(End::Complete, |problem| End::Cut {
                 after: Duration::from_nanos(after),
                 problem,
             }),
             counts,
             lost,
-            bounds,
         })
-    }
-
-    /// The file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The run file of the stages: mission, clock, robot.
-    pub const fn run(&self) -> &Run {
-        &self.run
-    }
-
-    pub fn run_text(&self) -> &str {
-        self.about("run_toml")
-    }
-
-    /// The build that recorded it.
-    pub fn build(&self) -> &str {
-        self.about("build")
-    }
-
-    pub fn machine(&self) -> &str {
-        self.about("machine")
-    }
-
-    fn about(&self, key: &str) -> &str {
-        self.about.get(key).map_or("", String::as_str)
-    }
-
-    pub const fn end(&self) -> &End {
-        &self.end
-    }
-
-    /// Numbers of messages by topic.
-    pub const fn counts(&self) -> &BTreeMap<String, u64> {
-        &self.counts
-    }
-
-    /// Numbers of samples by topic that the recorder lost.
-    pub const fn lost(&self) -> &BTreeMap<String, u64> {
-        &self.lost
-    }
-
-    /// When the first and the last message were taken, nanoseconds since 1970; none without messages.
-    pub const fn bounds_ns(&self) -> Option<(u64, u64)> {
-        self.bounds
     }
 
     /// The messages of the topics that `wanted` names, or of all without names, in the order of the file. They end where the
@@ -276,38 +238,37 @@ pub struct Messages {
     wanted: Vec<String>,
 }
 
+impl Messages {
+    /// The next message; none at the end of the file, or where it is cut.
+    fn read(&mut self) -> Result<Option<Message>, RecordingError> {
+        let Some(records) = &mut self.records else {
+            return Ok(None);
+        };
+        loop {
+            let (header, data) = match records.next() {
+                Ok(Some(Found::Message(header, data))) => (header, data),
+                Ok(Some(Found::Metadata(..))) => continue,
+                Ok(None) | Err(Stop::Cut(_)) => return Ok(None),
+                Err(Stop::Error(error)) => return Err(error),
+            };
+            let topic = records.topic(&header)?;
+            if self.wanted.is_empty() || self.wanted.iter().any(|name| **name == *topic) {
+                let MessageHeader { log_time: log_ns, sequence, .. } = header;
+                return Ok(Some(Message { topic, log_ns, sequence, data }));
+            }
+        }
+    }
+}
+
 impl Iterator for Messages {
     type Item = Result<Message, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            let records = self.records.as_mut()?;
-            match records.next() {
-                Ok(Some(Found::Message(header, data))) => match records.topic(&header) {
-                    Ok(topic) => {
-                        let wanted = &self.wanted;
-                        if wanted.is_empty() || wanted.iter().any(|name| **name == *topic) {
-                            return Some(Ok(Message {
-                                topic,
-                                log_ns: header.log_time,
-                                sequence: header.sequence,
-                                data,
-                            }));
-                        }
-                    }
-                    Err(error) => {
-                        self.records = None;
-                        return Some(Err(error));
-                    }
-                },
-                Ok(Some(Found::Metadata(..))) => {}
-                Ok(None) | Err(Stop::Cut(_)) => self.records = None,
-                Err(Stop::Error(error)) => {
-                    self.records = None;
-                    return Some(Err(error));
-                }
-            }
+        let read = self.read();
+        if !matches!(read, Ok(Some(_))) {
+            self.records = None;
         }
+        read.transpose()
     }
 }
 

@@ -104,7 +104,7 @@ pub fn record(
             let holder = options.domain.supervisor().ok().flatten();
             // Another supervisor resumes the run, and starts a recorder of its own.
             if options.run.is_some() && supervisor.is_some() && supervisor != holder {
-                if let Some(mut ended) = current.take() {
+                if let Some(ended) = current.take() {
                     ended.finish(tell)?;
                 }
                 return Ok(());
@@ -112,7 +112,7 @@ pub fn record(
             supervisor = holder;
             let run = find_run(options);
             // Samples of a bus that was recreated within the run go into the same file.
-            if let Some(mut ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
+            if let Some(ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
                 ended.finish(tell)?;
             }
             match &mut current {
@@ -132,11 +132,11 @@ pub fn record(
                 run.take(readers)?;
             }
             run.take_logs(stopped)?;
-            run.file()?.flush_if_due()?;
+            run.file.flush_if_due()?;
         }
         let run_over = news == Some(false) && !options.domain.is_supervised();
         if (stopped || run_over)
-            && let Some(mut ended) = current.take()
+            && let Some(ended) = current.take()
         {
             ended.finish(tell)?;
         }
@@ -165,8 +165,7 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
 struct CurrentRun {
     path: PathBuf,
     directory: Option<PathBuf>,
-    /// None if it is complete.
-    file: Option<RecordingFile>,
+    file: RecordingFile,
     drawn: Drawn,
     losses: Losses,
     logs: Option<LogFiles>,
@@ -203,7 +202,7 @@ impl CurrentRun {
         Ok(Self {
             path: path.to_path_buf(),
             directory,
-            file: Some(file),
+            file,
             drawn: Drawn::new(run.map(|run| run.mission)),
             losses: Losses::default(),
             logs,
@@ -216,18 +215,9 @@ impl CurrentRun {
         self.directory.as_deref() == run
     }
 
-    fn file(&mut self) -> Result<&mut RecordingFile, RecordingError> {
-        self.file.as_mut().ok_or_else(|| RecordingError::Write {
-            file: self.path.clone(),
-            problem: "it is complete".to_owned(),
-        })
-    }
-
     /// Record all new samples.
     fn take(&mut self, readers: &mut Readers) -> Result<(), RecordingError> {
-        let Some(file) = &mut self.file else {
-            return Ok(());
-        };
+        let file = &mut self.file;
         for (topic, reader) in readers {
             let spec = topic.spec();
             loop {
@@ -258,7 +248,7 @@ impl CurrentRun {
             return Ok(());
         }
         self.logs_taken = Instant::now();
-        let (Some(file), Some(logs)) = (&mut self.file, &mut self.logs) else {
+        let (file, Some(logs)) = (&mut self.file, &mut self.logs) else {
             return Ok(());
         };
         let mut written = Ok(());
@@ -271,12 +261,10 @@ impl CurrentRun {
         written
     }
 
-    fn finish(&mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<(), RecordingError> {
+    fn finish(mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<(), RecordingError> {
         self.take_logs(true)?;
-        if let Some(file) = self.file.take() {
-            file.finish()?;
-            tell(Happened::Complete(&self.path, self.losses.total()));
-        }
+        self.file.finish()?;
+        tell(Happened::Complete(&self.path, self.losses.total()));
         Ok(())
     }
 }

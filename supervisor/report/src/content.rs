@@ -53,15 +53,15 @@ impl Content {
     }
 
     fn of(recording: &Recording) -> Self {
-        let run = recording.run();
+        let run = &recording.run;
         let simulated = run.mission.robot.address.is_none();
         let mut about =
             vec![("mission", run.mission.name.clone()), ("robot", run.robot.to_string())];
         if simulated {
             about.push(("seed", run.mission.seed.to_string()));
         }
-        about.push(("build", recording.build().to_owned()));
-        about.push(("machine", recording.machine().to_owned()));
+        about.push(("build", recording.build.to_owned()));
+        about.push(("machine", recording.machine.to_owned()));
         Self {
             mission: run.mission.clone(),
             simulated,
@@ -81,15 +81,15 @@ impl Content {
     }
 
     fn part(&mut self, recording: &Recording) -> Result<(), ReportError> {
-        let name = recording.path().file_name().unwrap_or_default();
+        let name = recording.path.file_name().unwrap_or_default();
         let name = name.to_string_lossy();
-        if let End::Cut { after, problem } = recording.end() {
+        if let End::Cut { after, problem } = &recording.end {
             self.remarks.push(format!(
                 "{name} is cut off after {:.1} s: {problem}. What came later is not in this report.",
                 after.as_secs_f64()
             ));
         }
-        let lost: u64 = recording.lost().values().sum();
+        let lost: u64 = recording.lost.values().sum();
         if lost > 0 {
             self.remarks.push(format!("The recorder of {name} lost {lost} samples."));
         }
@@ -97,7 +97,7 @@ impl Content {
             let message = message?;
             if self.take(&message).is_none() {
                 return Err(recording::RecordingError::Message {
-                    file: recording.path().to_path_buf(),
+                    file: recording.path.to_path_buf(),
                     topic: message.topic.to_string(),
                 }
                 .into());

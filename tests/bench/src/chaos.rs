@@ -24,7 +24,6 @@
 mod attack;
 mod consumer;
 mod consumers;
-mod error;
 mod fault_injector;
 mod kind;
 mod leftovers;
@@ -46,7 +45,6 @@ mod terminal;
 mod tick_latencies;
 
 pub use consumer::{Consumer, ConsumerError, GivenConsumer};
-pub use error::ChaosError;
 pub use options::Options;
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
@@ -54,10 +52,11 @@ pub use stop_time_table::{Entry, StopTimeTable};
 
 use std::time::Instant;
 
+use crate::error::BenchError;
 use series::Series;
 
 /// Attack missions, one after the other, until enough signals are sent. `show` is called after each.
-pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, ChaosError> {
+pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, BenchError> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {

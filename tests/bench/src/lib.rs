@@ -4,9 +4,13 @@
 //! |---|---|
 //! | [`chaos`] | signals to random processes at random times; faults of the robot |
 //! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
+//! | [`BenchError`] | why a bench ended early |
 
 pub mod chaos;
+mod error;
 pub mod tick;
+
+pub use error::BenchError;
 
 use std::fs;
 

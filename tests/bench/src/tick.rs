@@ -13,7 +13,6 @@
 
 mod budget;
 pub mod consumers;
-mod error;
 pub mod hops;
 mod mission;
 mod process_set;
@@ -22,10 +21,10 @@ mod report;
 
 use common::{domain::RobotName, latency::Histogram};
 
-pub use error::TickError;
 pub use regime::{Regime, parse_hz};
 pub use report::Report;
 
+use crate::error::BenchError;
 use budget::Budget;
 
 /// The mission that is measured, and how.
@@ -57,7 +56,7 @@ const TRIPS: u64 = 2000;
 const PACED_TRIPS: u64 = 50;
 
 /// Measure missions and bare hops.
-pub fn measure(options: &Options<'_>) -> Result<Report, TickError> {
+pub fn measure(options: &Options<'_>) -> Result<Report, BenchError> {
     let trips = match options.regime {
         Regime::BackToBack => TRIPS,
         Regime::Rate { .. } => PACED_TRIPS,
@@ -72,7 +71,7 @@ pub fn measure(options: &Options<'_>) -> Result<Report, TickError> {
     }
     let trips = u64::from(options.rounds) * trips;
     let mut report =
-        Report::new(options.regime, &hops, trips, &rounds).ok_or(TickError::Nothing)?;
+        Report::new(options.regime, &hops, trips, &rounds).ok_or(BenchError::Nothing)?;
     report.budget = budget.map(Budget::rows);
     Ok(report)
 }

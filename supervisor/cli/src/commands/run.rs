@@ -225,12 +225,17 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         complain(summary_file.write(&format!("{json}\n")));
         // Picture and report come last and have no effect on the result.
         #[cfg(feature = "tools")]
-        for written in run_report::write(&options, &finished, &summary, !arguments.no_record) {
-            complain(written.and_then(|(name, file)| {
+        {
+            let show = |written: run_report::Written| {
+                let (name, file) = written?;
                 let line = format!("{name}: {}\n", file.display());
                 let printed = if arguments.json { Ok(()) } else { print_text(&line) };
                 printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
-            }));
+            };
+            complain(show(run_report::picture(&options, &finished, &summary)));
+            if !arguments.no_record {
+                complain(show(run_report::report(&options)));
+            }
         }
     }
     Ok(exit_code(&summary, &finished.ending))

@@ -86,7 +86,7 @@ fn play(arguments: &Arguments, recording: &Recording) -> Result<ExitCode, Failur
         let named = arguments.stage.iter();
         named.filter_map(|name| stages::find(name)).collect()
     };
-    let mut mission = missions::with(&recording.run().mission, &arguments.set)?;
+    let mut mission = missions::with(&recording.run.mission, &arguments.set)?;
     if let Some(mission) = &mut mission {
         planner_executable::resolve(mission)?;
     }

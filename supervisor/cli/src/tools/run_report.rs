@@ -9,26 +9,16 @@ use picture::{Facts, Scene};
 use supervisor::{Finished, Options, outcome::Outcome, summary::Summary};
 
 /// The name of a result and its file.
-type Written = Result<(&'static str, PathBuf), String>;
+pub(crate) type Written = Result<(&'static str, PathBuf), String>;
 
-/// Write the picture of a run, and its report if it was `recorded`, one after the other.
-pub(crate) fn write(
-    options: &Options,
-    finished: &Finished,
-    summary: &Summary,
-    recorded: bool,
-) -> impl Iterator<Item = Written> {
-    let report = || {
-        let page = report::write(&options.directory, None);
-        let page = page.map_err(|error| format!("no report of this run: {error}"))?;
-        Ok(("report", page))
-    };
-    let report = recorded.then_some(()).into_iter().map(move |()| report());
-    std::iter::once_with(|| draw(options, finished, summary)).chain(report)
+/// Write the report of a recorded run.
+pub(crate) fn report(options: &Options) -> Written {
+    let page = report::write(&options.directory, None);
+    Ok(("report", page.map_err(|error| format!("no report of this run: {error}"))?))
 }
 
 /// Draw the picture of the run.
-fn draw(options: &Options, finished: &Finished, summary: &Summary) -> Written {
+pub(crate) fn picture(options: &Options, finished: &Finished, summary: &Summary) -> Written {
     let picture = options.directory.join("picture.svg");
     let svg = svg(&options.mission, finished, summary);
     if let Err(error) = fs::write(&picture, svg) {

@@ -25,9 +25,9 @@ pub struct Parting {
 /// Find where `first` and `second` part.
 pub fn diff(first: &Recording, second: &Recording) -> Result<Parting, RecordingError> {
     let mut parting =
-        Parting { run: run_differences(first.run_text(), second.run_text()), ..Parting::default() };
-    if first.build() != second.build() {
-        parting.builds = Some([first, second].map(|recording| recording.build().to_owned()));
+        Parting { run: run_differences(&first.run_text, &second.run_text), ..Parting::default() };
+    if first.build != second.build {
+        parting.builds = Some([first, second].map(|recording| recording.build.clone()));
     }
     for topic in COMPARED {
         let (found, ticks) = first_in(topic, first, second)?;

@@ -46,14 +46,14 @@ const NOT_COMPUTED: [&str; 1] = ["link"];
 
 /// Replay `recording`.
 pub fn replay(recording: &Recording, options: &Options) -> Result<Report, RecordingError> {
-    let counts = recording.counts();
+    let counts = &recording.counts;
     let recorded = |topic: &str| counts.contains_key(topic);
-    let cut = match recording.end() {
+    let cut = match &recording.end {
         End::Complete => None,
         End::Cut { after, .. } => Some(after.as_secs_f64()),
     };
     let setting = Setting {
-        run: options.run.as_ref().unwrap_or_else(|| recording.run()),
+        run: options.run.as_ref().unwrap_or(&recording.run),
         recorded: &recorded,
         from: options.from,
         cut: cut.is_some(),
@@ -82,7 +82,7 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report, Record
             wait_for(&message, rate, began);
         }
         generations.take(&setting, message).map_err(|topic| RecordingError::Message {
-            file: recording.path().to_path_buf(),
+            file: recording.path.to_path_buf(),
             topic: topic.to_owned(),
         })?;
     }

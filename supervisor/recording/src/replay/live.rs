@@ -147,7 +147,7 @@ struct Player {
 
 impl Player {
     fn open(recording: &Recording, options: &Options) -> Result<Self, LiveError> {
-        let recorded = recording.run();
+        let recorded = &recording.run;
         let mission = options.mission.as_ref().unwrap_or(&recorded.mission);
         let run = Run {
             robot: options.robot.clone(),
@@ -211,14 +211,9 @@ impl Player {
                 return Ok(false);
             }
             self.check_stages()?;
-            self.wait(POLL)?;
+            self.waiter.wait(POLL)?;
         }
         Ok(true)
-    }
-
-    fn wait(&self, patience: Duration) -> Result<(), LiveError> {
-        self.waiter.wait(patience)?;
-        Ok(())
     }
 
     /// Fails if a live stage has ended.
@@ -264,7 +259,7 @@ impl Player {
                 told = true;
                 tell(Happened::Waiting(stage, self.tick));
             }
-            self.wait(POLL)?;
+            self.waiter.wait(POLL)?;
         }
         for live in &mut self.stages {
             live.compare(self.tick);
@@ -296,7 +291,7 @@ impl Player {
                 return Ok(false);
             }
             self.look()?;
-            self.wait(left.min(POLL))?;
+            self.waiter.wait(left.min(POLL))?;
         }
     }
 
@@ -319,7 +314,7 @@ impl Player {
             && !writer.publish(&message.data)?
         {
             return Err(RecordingError::Message {
-                file: recording.path().to_path_buf(),
+                file: recording.path.to_path_buf(),
                 topic: name.to_owned(),
             }
             .into());

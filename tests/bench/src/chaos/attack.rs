@@ -23,7 +23,6 @@ use supervisor::{
 
 use crate::chaos::{
     consumers::Consumers,
-    error::{ChaosError, system},
     kind::Kind,
     recovery::{PendingRecovery, StartupHit},
     report::{EVERYTHING, Report},
@@ -32,6 +31,7 @@ use crate::chaos::{
     signals::Row,
     subscriptions::{POLL, Subscriptions},
 };
+use crate::error::{BenchError, system};
 
 /// The generation of a supervisor's samples. Its successor has a bus of its own.
 const NEWEST: u32 = u32::MAX;
@@ -75,7 +75,7 @@ impl Attack {
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
         patience: Duration,
-    ) -> Result<(), ChaosError> {
+    ) -> Result<(), BenchError> {
         let began = Instant::now();
         self.supervisor_hit = false;
         self.driving = false;
@@ -126,7 +126,7 @@ impl Attack {
         &mut self,
         series: &mut Series<'_>,
         robot: Option<&Simulator>,
-    ) -> Result<(), ChaosError> {
+    ) -> Result<(), BenchError> {
         for mut row in std::mem::take(&mut self.measured) {
             row.pose_error_m = robot.and_then(|robot| self.pose_error(robot.truth()));
             series.keep(&row)?;
@@ -139,7 +139,7 @@ impl Attack {
         &mut self,
         series: &mut Series<'_>,
         robot: Option<&Simulator>,
-    ) -> Result<(), ChaosError> {
+    ) -> Result<(), BenchError> {
         self.consumers.end();
         let pending = self.pending.drain(..);
         self.measured.extend(pending.map(|recovery| recovery.row));
@@ -189,7 +189,7 @@ impl Attack {
         &mut self,
         subscriptions: &mut Subscriptions,
         report: &mut Report,
-    ) -> Result<(), ChaosError> {
+    ) -> Result<(), BenchError> {
         while let Some(death) = subscriptions.deaths.take()? {
             let (stage, generation) = (name_str(&death.stage), death.generation);
             let mut pending = self.pending.iter_mut();
@@ -232,19 +232,13 @@ impl Attack {
             self.on_sign(writer, sample.stamp.generation, false, report);
             self.pose = Some(sample);
         }
-        while let Some(sample) = subscriptions.grid.take()? {
-            let writer = topics::GRID.spec().writer;
-            let generation = sample.header().stamp.generation;
-            self.on_sign(writer, generation, false, report);
-        }
-        while let Some(sample) = subscriptions.guidance.take()? {
-            let writer = topics::GUIDANCE.spec().writer;
-            self.on_sign(writer, sample.stamp.generation, false, report);
-        }
-        while let Some(sample) = subscriptions.command.take()? {
-            let writer = topics::COMMAND.spec().writer;
-            self.on_sign(writer, sample.stamp.generation, false, report);
-            self.on_supervisor_sign(false, report);
+        for (writer, reader) in &mut subscriptions.outputs {
+            while let Some(sample) = reader.take()? {
+                self.on_sign(writer, sample.stamp().generation, false, report);
+                if *writer == topics::COMMAND.spec().writer {
+                    self.on_supervisor_sign(false, report);
+                }
+            }
         }
         Ok(())
     }
@@ -302,7 +296,7 @@ impl Attack {
     }
 
     /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
-    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), ChaosError> {
+    fn hit(&mut self, series: &mut Series<'_>) -> Result<(), BenchError> {
         let Series { options, schedule, report, .. } = series;
         if let Some((index, kind, pause)) =
             schedule.consumer(self.consumers.len(), options.only_consumers)

@@ -14,14 +14,8 @@ use common::domain::RobotName;
 use rustix::process::{Pid, Signal, kill_process_group};
 use supervisor::process::Process;
 
-use crate::chaos::{
-    consumer::Consumer,
-    error::{ChaosError, system},
-    kind::Kind,
-    options::Options,
-    report::Report,
-    terminal,
-};
+use crate::chaos::{consumer::Consumer, kind::Kind, options::Options, report::Report, terminal};
+use crate::error::{BenchError, system};
 
 /// Time to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
@@ -65,7 +59,7 @@ impl Consumers {
         options: &Options,
         directory: PathBuf,
         report: &mut Report,
-    ) -> Result<Self, ChaosError> {
+    ) -> Result<Self, BenchError> {
         if options.consumers.is_empty() {
             return Ok(Self::default());
         }
@@ -107,7 +101,7 @@ impl Consumers {
     }
 
     /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
-    pub(crate) fn maintain(&mut self, report: &mut Report) -> Result<(), ChaosError> {
+    pub(crate) fn maintain(&mut self, report: &mut Report) -> Result<(), BenchError> {
         for running in &mut self.all {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
@@ -139,7 +133,7 @@ impl Consumers {
         pause: Duration,
         supervisor: u32,
         report: &mut Report,
-    ) -> Result<Option<Hit>, ChaosError> {
+    ) -> Result<Option<Hit>, BenchError> {
         let (Some(running), Some(setting)) = (self.all.get_mut(index), &self.setting) else {
             return Ok(None);
         };
@@ -195,7 +189,7 @@ impl Consumers {
 
 impl Running {
     /// Start or restart it, unless it is the run's own recorder.
-    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), ChaosError> {
+    fn start(&mut self, setting: &Setting, report: &mut Report) -> Result<(), BenchError> {
         let Setting { robot, directory } = setting;
         let recording = directory.join(format!("record-{}.mcap", self.starts + 1));
         let Some(mut command) = self.consumer.command(robot, &recording) else {

@@ -12,17 +12,14 @@ use common::{clock::Pace, mission::Mission};
 use serde_json::Value;
 
 use crate::chaos::{
-    attack::Attack,
-    consumers::Consumers,
-    error::{ChaosError, system},
-    options::Options,
-    report::End,
-    series::Series,
+    attack::Attack, consumers::Consumers, options::Options, report::End, series::Series,
 };
+use crate::error::{self, BenchError, system};
 use supervisor::{
     DEATHS,
     process::{Process, firsthand},
     simulator::Simulator,
+    summary::Summary,
 };
 
 /// A mission that takes longer is stopped. In wall-clock time a mission takes half a minute.
@@ -34,7 +31,7 @@ pub(crate) fn command(
     pace: &str,
     out: &Path,
     records: bool,
-) -> Result<Command, ChaosError> {
+) -> Result<Command, BenchError> {
     let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
     command.args(["--robot", &options.robot.to_string()]);
     command.args(["--seed", &seed.to_string(), "--out"]);
@@ -49,7 +46,7 @@ pub(crate) fn command(
 }
 
 /// Resume the run whose supervisor was hit.
-fn resume(directory: &Path, records: bool) -> Result<Command, ChaosError> {
+fn resume(directory: &Path, records: bool) -> Result<Command, BenchError> {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory);
     if !records {
@@ -60,7 +57,7 @@ fn resume(directory: &Path, records: bool) -> Result<Command, ChaosError> {
 
 /// Make `command` a child that ends with this process. Its standard output is piped; its standard error goes to a file
 /// beside the run's directory.
-fn child(mut command: Command, directory: &Path) -> Result<Command, ChaosError> {
+fn child(mut command: Command, directory: &Path) -> Result<Command, BenchError> {
     let stderr = directory.with_extension("stderr");
     let stderr = File::options().create(true).append(true).open(stderr);
     let stderr = stderr.map_err(system("write a mission's standard error"))?;
@@ -69,28 +66,23 @@ fn child(mut command: Command, directory: &Path) -> Result<Command, ChaosError> 
     Ok(command)
 }
 
-fn parse(stdout: &[u8]) -> Result<Value, ChaosError> {
-    let text = String::from_utf8_lossy(stdout);
-    serde_json::from_str(text.trim()).map_err(|_| ChaosError::NoSummary(text.into_owned()))
-}
-
 /// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
-pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Value, ChaosError> {
+pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Summary, BenchError> {
     let directory = options.directory.join("undisturbed");
     let pace = if options.only_consumers { options.pace } else { Pace::Max };
     let output = command(options, seed, &pace.to_string(), &directory, false)?
         .output()
         .map_err(system("start a mission"))?;
     fs::remove_dir_all(directory).map_err(system("remove its directory"))?;
-    parse(&output.stdout)
+    error::summary(&output.stdout, &output.stdout)
 }
 
 /// Attack the mission, and report. Its files stay if something was wrong.
 pub(crate) fn attack(
     series: &mut Series<'_>,
     seed: u64,
-    undisturbed: &Value,
-) -> Result<(), ChaosError> {
+    undisturbed: &Summary,
+) -> Result<(), BenchError> {
     let options = series.options;
     let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
@@ -112,20 +104,20 @@ pub(crate) fn attack(
         let summary = one_supervisor(series, start, robot.as_mut(), &mut attack)?;
         // A supervisor that was hit leaves no summary, unless the run had just ended.
         if !attack.supervisor_is_down() || !summary.is_empty() || began.elapsed() >= PATIENCE {
-            break parse(&summary)?;
+            break error::summary(&summary, &summary)?;
         }
         start = resume(&directory, options.records())?;
     };
     attack.end(series, robot.as_ref())?;
-    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or_default();
+    let undisturbed_error_m = undisturbed.pose_error_m.unwrap_or_default();
     let kills = series.report.kills() - before;
     let mut end = End {
         seed,
-        outcome: summary["outcome"].as_str().unwrap_or("lost").to_owned(),
-        reason: summary["reason"].as_str().unwrap_or_default().to_owned(),
-        collisions: summary["collisions"].as_u64().unwrap_or_default(),
-        pose_excess_m: number(&summary, "pose_error_m") - number(undisturbed, "pose_error_m"),
-        stopping_time_s: number(&summary, "stopping_time_s"),
+        outcome: summary.outcome,
+        reason: summary.reason.clone(),
+        collisions: summary.collisions.unwrap_or_default(),
+        pose_excess_m: summary.pose_error_m.unwrap_or_default() - undisturbed_error_m,
+        stopping_time_s: summary.stopping_time_s.unwrap_or_default(),
         pose_allowance_m: pose_allowance_m(&options.loaded, kills),
         kills,
         healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
@@ -137,7 +129,7 @@ pub(crate) fn attack(
         end.collisions = last.map_or(0, |tick| tick.contacts);
         end.stopping_time_s = last.map_or(0.0, |tick| tick.stopping_time_s);
         let error = attack.pose_error(truth).unwrap_or(f64::INFINITY);
-        end.pose_excess_m = error - number(undisturbed, "pose_error_m");
+        end.pose_excess_m = error - undisturbed_error_m;
     }
     let mut right = series.report.add_mission(&end);
     if options.only_consumers {
@@ -176,7 +168,7 @@ pub(crate) fn robot(
     options: &Options,
     seed: u64,
     directory: &Path,
-) -> Result<Simulator, ChaosError> {
+) -> Result<Simulator, BenchError> {
     fs::create_dir(directory).map_err(system("make a directory"))?;
     let mission = Mission { seed, ..options.loaded.clone() };
     Ok(Simulator::start(directory, &mission, options.pace)?)
@@ -188,7 +180,7 @@ fn one_supervisor(
     start: Command,
     robot: Option<&mut Simulator>,
     attack: &mut Attack,
-) -> Result<Vec<u8>, ChaosError> {
+) -> Result<Vec<u8>, BenchError> {
     let mut child = Process::spawn(start).map_err(system("start a mission"))?;
     let summary = read_stdout(&mut child);
     let attacked = attack.run(series, &mut child, robot, PATIENCE);

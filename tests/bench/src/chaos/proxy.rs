@@ -15,10 +15,10 @@ use std::{
 use common::poll;
 
 use crate::chaos::{
-    error::{ChaosError, system},
     fault_injector::{FaultInjector, Late},
     robot_fault::RobotFault,
 };
+use crate::error::{BenchError, system};
 
 /// Longest wait until the thread sees that the fault begins or the proxy ends.
 const LOOK: Duration = Duration::from_millis(10);
@@ -47,7 +47,7 @@ impl Proxy {
         robot: SocketAddr,
         fault: RobotFault,
         seed: u64,
-    ) -> Result<Self, ChaosError> {
+    ) -> Result<Self, BenchError> {
         let (front, back) = sockets(robot).map_err(system("open the proxy's sockets"))?;
         let address = front.local_addr().map_err(system("name the proxy"))?;
         let shared = Arc::new(Shared::default());

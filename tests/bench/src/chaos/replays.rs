@@ -87,7 +87,7 @@ impl Replays {
             partial.not_begun += 1;
             return;
         };
-        partial.cut += u64::from(*recording.end() != End::Complete);
+        partial.cut += u64::from(recording.end != End::Complete);
         match replay(&recording, &Options::default()) {
             Ok(report) => {
                 partial.not_replayed += report.not_replayed() as u64;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::chaos::{
     kind::Kind, replays::Replays, resources::Resources, tick_latencies::TickLatencies,
 };
-use supervisor::stages::TABLE;
+use supervisor::{outcome::Outcome, stages::TABLE};
 
 /// The name for supervisor and stages together.
 pub(crate) const EVERYTHING: &str = "everything";
@@ -99,7 +99,7 @@ pub(crate) struct Recovery {
 #[derive(Debug)]
 pub struct End {
     pub seed: u64,
-    pub outcome: String,
+    pub outcome: Outcome,
     pub reason: String,
     pub collisions: u64,
     pub pose_excess_m: f64,
@@ -147,12 +147,12 @@ impl Report {
             self.worst_pose_excess_m = end.pose_excess_m;
             self.worst_pose_kills = end.kills;
         }
-        let reached = end.outcome == "reached";
+        let reached = end.outcome == Outcome::Reached;
         self.reached += u64::from(reached);
         let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
         let before = self.wrong.len();
         if !reached {
-            let (outcome, reason) = (&end.outcome, &end.reason);
+            let (outcome, reason) = (end.outcome.as_str(), &end.reason);
             self.wrong.push(format!("seed {seed}: {outcome}: {reason}"));
         }
         if end.collisions > 0 {

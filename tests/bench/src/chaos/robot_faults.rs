@@ -21,16 +21,17 @@ use supervisor::{
     outcome::RIGHT_PLACE_M,
     process::{Process, firsthand},
     simulator::Simulator,
+    summary::Summary,
 };
 
 use crate::chaos::{
-    error::{ChaosError, system},
     mission,
     options::Options,
     proxy::Proxy,
     robot_fault::RobotFault,
     stop_time_table::{Entry, StopTimeTable},
 };
+use crate::error::{BenchError, system};
 
 /// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
@@ -57,7 +58,7 @@ pub struct FaultOptions {
 pub fn run_robot_faults(
     options: &FaultOptions,
     show: &mut dyn FnMut(&StopTimeTable),
-) -> Result<StopTimeTable, ChaosError> {
+) -> Result<StopTimeTable, BenchError> {
     let mut table = StopTimeTable::default();
     for &fault in &options.faults {
         for number in 0..u64::from(options.missions) {
@@ -75,7 +76,7 @@ pub fn run_robot_faults(
     Ok(table)
 }
 
-fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, ChaosError> {
+fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, BenchError> {
     let mut robot = mission::robot(options, seed, &files.join("robot"))?;
     let proxy = Proxy::start(robot.address(), fault, seed)?;
     let mut child = start(options, seed, proxy.address(), &files.join("run"))?;
@@ -94,7 +95,7 @@ fn start(
     seed: u64,
     robot: SocketAddr,
     directory: &Path,
-) -> Result<Process, ChaosError> {
+) -> Result<Process, BenchError> {
     let mut start = mission::command(options, seed, "1", directory, false)?;
     start.args(["--set", &format!("robot.address='udp://{robot}'")]);
     Process::spawn(start).map_err(system("start a mission"))
@@ -127,7 +128,7 @@ impl Observed {
         child: &mut Process,
         robot: &mut Simulator,
         proxy: &Proxy,
-    ) -> Result<(), ChaosError> {
+    ) -> Result<(), BenchError> {
         let began = Instant::now();
         let (least, more) = FAULT_AFTER_S;
         let chance = Pcg64::new(u128::from(seed), 17 + fault as u128).next_u64() >> 11;
@@ -190,7 +191,7 @@ impl Observed {
         self.ticks = truth.len();
     }
 
-    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), ChaosError> {
+    fn hear(&mut self, link: &mut Reader<LinkSample>) -> Result<(), BenchError> {
         while let Some(sample) = link.take()? {
             self.link = Some(sample);
         }
@@ -205,12 +206,11 @@ impl Observed {
         truth: &[GroundTruthTick],
         summary: &[u8],
     ) -> Entry {
-        let summary: serde_json::Value = serde_json::from_slice(summary).unwrap_or_default();
-        let word = |key: &str| summary[key].as_str().unwrap_or_default().to_owned();
         let stopped = self.link.filter(LinkSample::stopped);
         let cause = stopped.map_or("", |link| link.cause().name());
         let (mut outcome, reason) = if self.ended_by_itself {
-            (word("outcome"), word("reason"))
+            let summary: Option<Summary> = serde_json::from_slice(summary).ok();
+            summary.map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
         } else {
             ("goes on".to_owned(), cause.to_owned())
         };
@@ -270,7 +270,7 @@ fn link(options: &Options) -> Option<Reader<LinkSample>> {
 }
 
 /// Start an operator's stop.
-fn operator_stop(options: &Options) -> Result<Process, ChaosError> {
+fn operator_stop(options: &Options) -> Result<Process, BenchError> {
     let mut command = firsthand(&["stop", "--robot", &options.robot.to_string()]);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     Process::spawn(command).map_err(system("stop the robot"))

@@ -1,12 +1,12 @@
 //! The state that the missions of one chaos share.
 
 use crate::chaos::{
-    error::ChaosError,
     options::Options,
     report::Report,
     schedule::Schedule,
     signals::{Row, SignalsFile},
 };
+use crate::error::BenchError;
 
 /// The state that the missions of one chaos share.
 pub(crate) struct Series<'a> {
@@ -18,7 +18,7 @@ pub(crate) struct Series<'a> {
 }
 
 impl<'a> Series<'a> {
-    pub(crate) fn new(options: &'a Options) -> Result<Self, ChaosError> {
+    pub(crate) fn new(options: &'a Options) -> Result<Self, BenchError> {
         let out = options.out.as_deref();
         Ok(Self {
             options,
@@ -29,7 +29,7 @@ impl<'a> Series<'a> {
     }
 
     /// Write the row of a signal.
-    pub(crate) fn keep(&mut self, row: &Row) -> Result<(), ChaosError> {
+    pub(crate) fn keep(&mut self, row: &Row) -> Result<(), BenchError> {
         match &mut self.signals {
             Some(file) => Ok(file.add(row)?),
             None => Ok(()),

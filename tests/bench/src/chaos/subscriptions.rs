@@ -3,17 +3,14 @@
 use std::time::Duration;
 
 use common::{
-    bus::{Bus, Reader, SliceReader},
+    bus::{AnyReader, Bus, BusError, ReadableTopic, Reader},
     domain::Domain,
     roster::Roster,
-    samples::{
-        CommandSample, DeathSample, GridHeader, GuidanceSample, HealthSample, PoseSample,
-        RosterEntry, RosterHeader, WheelSample,
-    },
+    samples::{DeathSample, HealthSample, PoseSample, RosterEntry, RosterHeader, WheelSample},
     topics,
 };
 
-use crate::chaos::{error::ChaosError, options::Options};
+use crate::{chaos::options::Options, error::BenchError};
 
 /// Wait for the bus between checks of the processes.
 pub(crate) const POLL: Duration = Duration::from_millis(50);
@@ -25,28 +22,27 @@ pub(crate) struct Subscriptions {
     pub(crate) health: Reader<HealthSample>,
     pub(crate) wheels: Reader<WheelSample>,
     pub(crate) pose: Reader<PoseSample>,
-    pub(crate) grid: SliceReader<GridHeader, u8>,
-    pub(crate) guidance: Reader<GuidanceSample>,
-    pub(crate) command: Reader<CommandSample>,
+    /// The other outputs of a tick, each with its writer.
+    pub(crate) outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
 }
 
 impl Subscriptions {
     /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
-    pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, ChaosError> {
+    pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, BenchError> {
         let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
         roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
         roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
+        let outputs: [&dyn ReadableTopic; 3] = [&topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
+        let outputs = outputs.iter().map(|it| Ok((it.spec().writer, it.any_reader(&bus)?)));
         let mut subscriptions = Self {
             roster,
             deaths: bus.reader(&topics::DEATHS)?,
             health: bus.reader(&topics::HEALTH)?,
             wheels: bus.reader(&topics::WHEELS)?,
             pose: bus.reader(&topics::POSE)?,
-            grid: bus.slice_reader(&topics::GRID)?,
-            guidance: bus.reader(&topics::GUIDANCE)?,
-            command: bus.reader(&topics::COMMAND)?,
+            outputs: outputs.collect::<Result<_, BusError>>()?,
         };
         let of_supervisor = |header: &RosterHeader, _: &[RosterEntry]| {
             (header.supervisor_pid == supervisor).then_some(())

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use serde_json::Value;
+use supervisor::summary::{Quantiles, Summary};
 
 use crate::quantile;
 
@@ -16,10 +16,10 @@ pub(crate) struct TickLatencies {
 
 impl TickLatencies {
     /// Add the summaries of a mission without consumers and with them.
-    pub(crate) fn add(&mut self, without: &Value, with: &Value) {
-        let of = |summary: &Value| {
-            let latency = |share| summary["tick_latency_us"][share].as_f64();
-            Some([latency("p50")?, latency("p99")?])
+    pub(crate) fn add(&mut self, without: &Summary, with: &Summary) {
+        let of = |summary: &Summary| {
+            let Quantiles { p50, p99, .. } = summary.tick_latency_us;
+            Some([p50?, p99?])
         };
         if let (Some(without), Some(with)) = (of(without), of(with)) {
             self.without_us.push(without);
@@ -55,11 +55,14 @@ mod tests {
     #[test]
     fn medians_are_of_missions_that_ended_with_a_summary_both_times() {
         let mut latencies = TickLatencies::default();
-        let summary = |p50, p99| serde_json::json!({"tick_latency_us": {"p50": p50, "p99": p99}});
+        let summary = |p50, p99| Summary {
+            tick_latency_us: Quantiles { p50: Some(p50), p99: Some(p99), max: None },
+            ..Summary::default()
+        };
         for us in [10.0, 30.0, 20.0] {
             latencies.add(&summary(us, 2.0 * us), &summary(us + 1.0, 3.0 * us));
         }
-        latencies.add(&summary(900.0, 900.0), &serde_json::json!({}));
+        latencies.add(&summary(900.0, 900.0), &Summary::default());
         let said = latencies.to_string();
         assert!(said.contains("3 missions: 21 and 60 us with"), "{said}");
         assert!(said.contains("20 and 40 us without"), "{said}");

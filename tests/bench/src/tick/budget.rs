@@ -11,7 +11,7 @@ use common::latency_budget::{self, Answers, Item, TickTimes};
 use serde::Serialize;
 use supervisor::stages;
 
-use super::error::TickError;
+use crate::error::BenchError;
 
 /// The path of a tick: every stage of the table, then again those with feedback.
 fn way() -> impl Iterator<Item = (&'static str, Answers)> {
@@ -33,7 +33,7 @@ const WAKE: &str = "wake";
 
 impl Budget {
     /// Add the times that the stages of the run in `directory` saved. A killed stage has saved none.
-    pub(super) fn add(&mut self, directory: &Path) -> Result<(), TickError> {
+    pub(super) fn add(&mut self, directory: &Path) -> Result<(), BenchError> {
         let mut published = BTreeMap::new();
         for (row, (stage, answers)) in way().enumerate() {
             let times = load(directory, stage, answers)?;
@@ -81,7 +81,7 @@ fn columns() -> impl Iterator<Item = &'static str> {
 }
 
 /// The times that all generations of `stage` saved.
-fn load(directory: &Path, stage: &str, answers: Answers) -> Result<Vec<TickTimes>, TickError> {
+fn load(directory: &Path, stage: &str, answers: Answers) -> Result<Vec<TickTimes>, BenchError> {
     let mut all = Vec::new();
     for generation in 1.. {
         let file = latency_budget::file(directory, stage, generation);
@@ -89,7 +89,7 @@ fn load(directory: &Path, stage: &str, answers: Answers) -> Result<Vec<TickTimes
             break;
         };
         for line in text.lines() {
-            let times: TickTimes = line.parse().map_err(|problem| TickError::Times {
+            let times: TickTimes = line.parse().map_err(|problem| BenchError::Times {
                 file: file.clone(),
                 problem: format!("{problem}"),
             })?;

@@ -21,7 +21,7 @@ use supervisor::{
     process::{Process, firsthand},
 };
 
-use super::error::{LOST, TickError, system};
+use crate::error::{BenchError, LOST, system};
 
 /// Cells of the smallest map. No forwarder reads it.
 const CELLS: usize = 64;
@@ -38,9 +38,9 @@ pub fn measure(
     robot: &RobotName,
     trips: u64,
     period: Option<Duration>,
-) -> Result<Histogram, TickError> {
+) -> Result<Histogram, BenchError> {
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
-    let bus = lock.bus().ok_or(TickError::Lost)?;
+    let bus = lock.bus().ok_or(BenchError::Lost)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
     let mut end = bus.reader(&topics::COMMAND)?;
     let mut waiter = Waiter::default();
@@ -60,7 +60,7 @@ pub fn measure(
         let mut arrived = false;
         while !arrived {
             if began.elapsed() >= LOST {
-                return Err(TickError::Lost);
+                return Err(BenchError::Lost);
             }
             // During the warm-up a forwarder may be missing; then the sample is sent again.
             if sent_ns == 0 || trip < WARM_UP {
@@ -87,7 +87,7 @@ pub fn measure(
 }
 
 /// Run the forwarder that stands for the stage `place`.
-pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), TickError> {
+pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result<(), BenchError> {
     let mut terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     become_child(place, supervisor)?;
     let domain = Domain::of(robot.clone());
@@ -119,7 +119,7 @@ macro_rules! forward {
     }};
 }
 
-fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, TickError> {
+fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, BenchError> {
     let now = MissionTime::default();
     let (wakes, forward): (&dyn AnyTopic, Forward) = match PLACES
         .iter()
@@ -159,7 +159,7 @@ fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward, Tic
                 |sample, to| { to.publish(sample.stamp.tick, now, CommandSample::default()) }
             ),
         ),
-        None => return Err(TickError::Place(place.to_owned())),
+        None => return Err(BenchError::Place(place.to_owned())),
     };
     waiter.on(bus.wakeup(wakes)?);
     Ok(forward)

@@ -8,15 +8,15 @@ use std::{
 };
 
 use common::latency_budget;
-use supervisor::process;
+use supervisor::{process, summary::Quantiles};
 
 use super::{
     Options,
     budget::Budget,
     consumers,
-    error::{TickError, system},
     process_set::{ProcessSet, Used},
 };
+use crate::error::{self, BenchError, system};
 
 /// One mission's ticks.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 pub(super) fn measure(
     options: &Options<'_>,
     budget: Option<&mut Budget>,
-) -> Result<Ticks, TickError> {
+) -> Result<Ticks, BenchError> {
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
     let directory = directory.map_err(system("make a directory for the mission"))?;
     let pace = options.regime.pace(options.rate_hz).to_string();
@@ -65,7 +65,7 @@ pub(super) fn measure(
         match end.recv_timeout(LOOK_EVERY) {
             Ok(output) => break output.map_err(system("wait for the mission"))?,
             Err(RecvTimeoutError::Timeout) => processes.look(),
-            Err(RecvTimeoutError::Disconnected) => return Err(TickError::Nothing),
+            Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Nothing),
         }
     };
     // The thread has ended, because it has sent its result.
@@ -78,16 +78,12 @@ pub(super) fn measure(
 }
 
 /// The tick latencies of the mission's summary.
-fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, TickError> {
-    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).map_err(|_| {
-        let errors = String::from_utf8_lossy(&output.stderr);
-        TickError::NoSummary(errors.trim().to_owned())
-    })?;
-    let latency = |share| summary["tick_latency_us"][share].as_f64();
-    let (Some(p50_us), Some(p99_us), Some(max_us)) =
-        (latency("p50"), latency("p99"), latency("max"))
+fn ticks(output: &Output, used: Option<Used>) -> Result<Ticks, BenchError> {
+    let summary = error::summary(&output.stdout, &output.stderr)?;
+    let Quantiles { p50: Some(p50_us), p99: Some(p99_us), max: Some(max_us) } =
+        summary.tick_latency_us
     else {
-        return Err(TickError::Nothing);
+        return Err(BenchError::Nothing);
     };
-    Ok(Ticks { count: summary["ticks"].as_u64().unwrap_or_default(), p50_us, p99_us, max_us, used })
+    Ok(Ticks { count: summary.ticks, p50_us, p99_us, max_us, used })
 }

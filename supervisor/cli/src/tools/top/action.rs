@@ -23,15 +23,9 @@ pub(super) enum Action {
 
 impl Action {
     /// The name of the subcommand that does the same.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Kill => "kill",
-            Self::Freeze => "freeze",
-            Self::Thaw => "thaw",
-            Self::Restart => "restart",
-            Self::Stop => "stop",
-            Self::Resume => "resume",
-        }
+    fn name(self) -> &'static str {
+        let row = KEYS.iter().find(|(_, _, key)| *key == Key::Act(self));
+        row.map_or("", |(_, name, _)| name)
     }
 
     /// Whether it concerns a stage rather than the robot.
@@ -66,16 +60,16 @@ pub(super) enum Key {
     Quit,
 }
 
-/// The keys, for the last line of the screen.
-pub(super) const KEYS: [(&str, &str); 8] = [
-    ("↑↓", "choose"),
-    ("k", "kill"),
-    ("f", "freeze"),
-    ("t", "thaw"),
-    ("r", "restart"),
-    ("s", "stop"),
-    ("c", "resume"),
-    ("q", "quit"),
+/// The keys: how the last line of the screen shows each, its effect, and its meaning.
+pub(super) const KEYS: [(&str, &str, Key); 8] = [
+    ("↑↓", "choose", Key::Down),
+    ("k", "kill", Key::Act(Action::Kill)),
+    ("f", "freeze", Key::Act(Action::Freeze)),
+    ("t", "thaw", Key::Act(Action::Thaw)),
+    ("r", "restart", Key::Act(Action::Restart)),
+    ("s", "stop", Key::Act(Action::Stop)),
+    ("c", "resume", Key::Act(Action::Resume)),
+    ("q", "quit", Key::Quit),
 ];
 
 /// Take the keys out of `typed`, the bytes of a terminal in raw mode. The beginning of an incomplete key stays there.
@@ -119,17 +113,9 @@ const CONTROL_C: u8 = 0x03;
 const LONGEST_SEQUENCE: usize = 32;
 
 /// The meaning of a letter; none if it has none.
-const fn meaning(letter: u8) -> Option<Key> {
-    Some(match letter {
-        b'k' => Key::Act(Action::Kill),
-        b'f' => Key::Act(Action::Freeze),
-        b't' => Key::Act(Action::Thaw),
-        b'r' => Key::Act(Action::Restart),
-        b's' => Key::Act(Action::Stop),
-        b'c' => Key::Act(Action::Resume),
-        b'q' | CONTROL_C => Key::Quit,
-        _ => return None,
-    })
+fn meaning(letter: u8) -> Option<Key> {
+    let row = KEYS.iter().find(|(key, ..)| key.as_bytes() == [letter]);
+    if letter == CONTROL_C { Some(Key::Quit) } else { row.map(|(.., key)| *key) }
 }
 
 /// Performs one action at a time in a thread, because a stop takes until the robot rests.

@@ -101,7 +101,7 @@ fn heading(view: &View) -> Line<'static> {
 }
 
 fn keys_line() -> Line<'static> {
-    let spans = KEYS.iter().flat_map(|(key, what)| {
+    let spans = KEYS.iter().flat_map(|(key, what, _)| {
         [Span::styled(*key, TITLE), Span::styled(format!(" {what}  "), DIM)]
     });
     Line::from(spans.collect::<Vec<_>>())

@@ -140,7 +140,7 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
         assert!(lines[7].contains("supervisor") && lines[7].contains("4194303"), "{}", lines[7]);
         let foot = &lines[usize::from(height) - 2..];
         assert_eq!(foot[0], "kill planner: done");
-        for (key, what) in KEYS {
+        for (key, what, _) in KEYS {
             assert!(foot[1].contains(&format!("{key} {what}")), "{}", foot[1]);
         }
         let whole = lines.join("\n");

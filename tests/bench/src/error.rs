@@ -1,0 +1,51 @@
+//! Why a bench ended early.
+
+use std::{io, path::PathBuf, time::Duration};
+
+use common::{bus::BusError, start::StageError};
+use supervisor::{DomainError, simulator::SimulatorError, summary::Summary};
+use thiserror::Error;
+
+use crate::chaos::signals::SignalsError;
+
+/// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
+pub(crate) const LOST: Duration = Duration::from_secs(5);
+
+#[derive(Debug, Error)]
+pub enum BenchError {
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A forwarder or a consumer reports it from its own process.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    #[error(transparent)]
+    Signals(#[from] SignalsError),
+    #[error("cannot {action}: {source}")]
+    System { action: &'static str, source: io::Error },
+    #[error("no sample came back within {LOST:?}; is the machine overloaded?")]
+    Lost,
+    #[error("no forwarder stands for {0:?}")]
+    Place(String),
+    #[error("a mission gave no summary: {0}")]
+    NoSummary(String),
+    #[error("nothing was measured; does the mission drive at all?")]
+    Nothing,
+    /// A file of measured times cannot be read.
+    #[error("{}: {problem}", file.display())]
+    Times { file: PathBuf, problem: String },
+}
+
+/// The system refused to do `action`.
+pub(crate) fn system(action: &'static str) -> impl FnOnce(io::Error) -> BenchError {
+    move |source| BenchError::System { action, source }
+}
+
+/// The summary that `firsthand run --json` printed; `said` is the error otherwise.
+pub(crate) fn summary(stdout: &[u8], said: &[u8]) -> Result<Summary, BenchError> {
+    serde_json::from_slice(stdout)
+        .map_err(|_| BenchError::NoSummary(String::from_utf8_lossy(said).trim().to_owned()))
+}
