@@ -127,7 +127,6 @@ struct Arguments {
     command: Option<Command>,
 }
 
-/// The exit codes of `run`.
 const EXIT_CODES: &str = "Exit codes of run:
   0  target reached, or stopped by Ctrl-C or SIGTERM
   1  could not start, or something failed

@@ -74,7 +74,6 @@ fn start(layers: Vec<AnyLayer>, default: &str) {
 /// Standard error with a priority before each line.
 struct Journal;
 
-/// The writer of one event.
 struct Entry {
     priority: &'static str,
 }

@@ -19,7 +19,6 @@ use std::process::ExitCode;
 
 use console::{failure, output::write_stderr};
 
-/// Run the command line of this process.
 fn main() -> ExitCode {
     #[cfg(feature = "tools")]
     tools::completions::answer_shell(commands::command_line, commands::help::page_names);

@@ -9,19 +9,12 @@ use thiserror::Error;
 
 /// Name of the file of the command that gives its rows.
 const PLAN_FILE: &str = "plan.txt";
-/// Name of the page of results.
 pub const PAGE_FILE: &str = "index.html";
 
-/// Why a directory cannot be used.
 #[derive(Debug, Error)]
 pub enum DirectoryError {
-    /// The directory is of another command.
     #[error("--resume: the command in {} was another: {earlier}", directory.display())]
-    Another {
-        directory: PathBuf,
-        /// The command of the directory.
-        earlier: String,
-    },
+    Another { directory: PathBuf, earlier: String },
     /// It has results, and `resume` is not set.
     #[error("{} contains results; continue them with --resume, or give another --out", directory.display())]
     Taken { directory: PathBuf },

@@ -20,7 +20,6 @@ pub struct Latency {
     pub tick_p50_us: Option<f64>,
     pub tick_p99_us: Option<f64>,
     pub tick_max_us: Option<f64>,
-    /// A full solve of the field.
     pub full_solve_p50_us: Option<f64>,
     pub full_solve_p99_us: Option<f64>,
     pub full_solve_max_us: Option<f64>,

@@ -14,7 +14,6 @@ pub fn styled_head(title: &str, style: &str) -> String {
     )
 }
 
-/// The end of a page.
 pub const END: &str = "</body></html>\n";
 
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#1f2933}\

@@ -13,10 +13,8 @@ const ROWS_FILE: &str = "rows.csv";
 /// Name of the file of latencies. The rows are the same in every run, latencies are not.
 const LATENCIES_FILE: &str = "latencies.csv";
 
-/// The tables of an evaluation.
 #[derive(Debug)]
 pub struct Results {
-    /// The results of missions.
     pub rows: Table<Row>,
     pub latencies: Table<Latency>,
 }

@@ -87,15 +87,11 @@ pub struct Row {
     pub sonar_unavailable_share: Option<f64>,
     /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
     pub wheel_range_rad_s: Option<f64>,
-    /// Times the robot stopped to look.
     pub looks: u64,
     /// Time it looked.
     pub look_s: f64,
-    /// Restarts of the planner after stalls.
     pub replans: u64,
-    /// Resets of the sensed map.
     pub resets: u64,
-    /// Full solves of the field.
     pub full_solves: u64,
 }
 

@@ -23,7 +23,6 @@ use crate::{
 /// Name of a run's picture in its directory.
 const PICTURE: &str = "picture.svg";
 
-/// The missions to run.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub trials: Vec<Trial>,
@@ -31,7 +30,6 @@ pub struct Plan {
     pub settings: Vec<Setting>,
     /// Missions on each world for each setting, with different noise.
     pub repeats: u64,
-    /// The source of their noise seeds.
     pub noise: NoiseSeeds,
     /// Pictures of missions with this noise seed are kept, too, not only of failures.
     pub pictured_seed: Option<u64>,
@@ -71,7 +69,6 @@ const fn mixed(bits: u32) -> u32 {
     bits ^ (bits >> 16)
 }
 
-/// Why an evaluation ended early.
 #[derive(Debug, Error)]
 pub enum RunnerError {
     #[error(transparent)]
@@ -89,7 +86,6 @@ fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> RunnerError {
 pub struct Progress {
     /// Missions that ended, including those of an earlier part.
     pub ended: usize,
-    /// All missions.
     pub all: usize,
     /// Missions that ended in this part.
     pub ended_now: usize,

@@ -20,10 +20,8 @@ const DIAGONAL: u32 = 1414;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShortestPath {
-    /// The length of the path, metres.
     Found(f64),
     None,
-    /// The world is too large for the search.
     TooLarge,
 }
 

@@ -37,7 +37,6 @@ pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     Estimate { value, low: (middle - half).max(-1.0), high: (middle + half).min(1.0) }
 }
 
-/// The median; none without values.
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Some(Spread::of(values)?.median)
 }
@@ -65,7 +64,6 @@ impl Spread {
     }
 }
 
-/// The mean; none without values.
 pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
     (n > 0.0).then_some(sum / n)

@@ -28,7 +28,6 @@ pub struct TableError {
     problem: String,
 }
 
-/// The file and its rows.
 #[derive(Debug)]
 pub struct Table<R> {
     file: PathBuf,
@@ -58,7 +57,6 @@ impl<R: Record> Table<R> {
         self.rows.iter().map(R::key).collect()
     }
 
-    /// Append a row to the file.
     pub fn add(&mut self, row: R) -> Result<(), TableError> {
         let opened = File::options().append(true).open(&self.file);
         let opened = opened.map_err(|error| self.failed("append to")(error.into()))?;

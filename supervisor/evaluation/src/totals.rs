@@ -14,23 +14,18 @@ use crate::{
 pub struct Totals {
     pub setting: String,
     pub count: usize,
-    /// Share that succeeded.
     pub success: f64,
-    /// Share that touched something.
     pub collision: f64,
-    /// Share that ran out of time.
     pub timeout: f64,
     /// Share that reported an arrival in a wrong place.
     pub wrong_place: f64,
     /// Share that gave up although a path exists.
     pub unreachable: f64,
-    /// Share that failed otherwise.
     pub aborted: f64,
     /// Median time of the successes, mission seconds.
     pub median_time_s: Option<f64>,
     /// Median K of the successes.
     pub median_k: Option<f64>,
-    /// Mean SPL of all.
     pub spl: Option<f64>,
     /// Mean BARN score of all; none if it does not apply.
     pub barn_score: Option<f64>,
@@ -86,9 +81,7 @@ pub struct Comparison {
     pub to: String,
     /// Missions that both settings have.
     pub pairs: usize,
-    /// Change of the share of successes.
     pub success: Estimate,
-    /// Change of the share of collisions.
     pub collision: Estimate,
     /// Median ratio of the second's time to the first's, over missions in which both succeeded.
     pub time_ratio: Option<f64>,

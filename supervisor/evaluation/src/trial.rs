@@ -43,7 +43,6 @@ pub struct Scene {
     pub target: DVec2,
 }
 
-/// A mission in a world that is solvable.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The world's name: its kind and number.

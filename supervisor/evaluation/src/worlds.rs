@@ -21,7 +21,6 @@ use crate::trial::{BodySize, Rules, Scene};
 /// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
 
-/// The source of worlds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Worlds {
     /// Rooms, one in three with a door.

@@ -5,7 +5,6 @@ use std::{io, path::PathBuf};
 use common::bus::BusError;
 use thiserror::Error;
 
-/// Errors of recordings.
 #[derive(Debug, Error)]
 pub enum RecordingError {
     #[error("cannot {action} recording {file}: {source}")]
@@ -17,15 +16,9 @@ pub enum RecordingError {
     #[error(
         "{directory} contains several recordings, because the run was resumed; give one of them, up to {last}"
     )]
-    Several {
-        directory: PathBuf,
-        /// The newest of them.
-        last: PathBuf,
-    },
-    /// It is not a recording of `firsthand`.
+    Several { directory: PathBuf, last: PathBuf },
     #[error("{file} is not a recording of firsthand: {problem}; `firsthand record` makes one")]
     Foreign { file: PathBuf, problem: String },
-    /// A message does not match its topic.
     #[error(
         "{file} contains a message on {topic:?} that this version cannot read; use the version that wrote it"
     )]

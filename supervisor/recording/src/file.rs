@@ -26,7 +26,6 @@ const CHUNK_EVERY: Duration = Duration::from_secs(1);
 /// The name of the metadata record about the run.
 pub(crate) const RUN: &str = "run";
 
-/// A recording that is being written.
 pub(crate) struct RecordingFile {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,

@@ -37,7 +37,6 @@ pub(crate) fn schema(name: &str) -> String {
     .to_string()
 }
 
-/// The state of the drawing so far.
 pub(crate) struct Drawn {
     mission: Option<Mission>,
     grid: Replica<u8>,

@@ -11,7 +11,6 @@ use std::{
 /// Most bytes that are read of one log at once.
 const AT_ONCE: usize = 1 << 16;
 
-/// Follows the logs of one run.
 #[derive(Debug)]
 pub(crate) struct LogFiles {
     directory: PathBuf,

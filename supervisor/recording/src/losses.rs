@@ -11,7 +11,6 @@ use common::{
 /// Bytes of the stamp in a message, behind the encoding's header.
 const STAMP: std::ops::Range<usize> = 4..28;
 
-/// The last sample of a writer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Last {
     sequence: u32,
@@ -20,7 +19,6 @@ struct Last {
     bus: u32,
 }
 
-/// Counts missing samples.
 #[derive(Debug, Default)]
 pub(crate) struct Losses {
     /// By topic, stage where every stage writes, and generation.
@@ -66,7 +64,6 @@ impl Losses {
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }
 
-    /// Total losses.
     pub(crate) fn total(&self) -> u64 {
         self.counts.values().sum()
     }

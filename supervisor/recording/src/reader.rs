@@ -27,7 +27,6 @@ const LONGEST_RECORD: usize = 1 << 28;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The file is complete.
     Complete,
     /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
     Cut {
@@ -46,7 +45,6 @@ pub struct Recording {
     pub run_text: String,
     /// The run file: mission, clock, robot.
     pub run: Run,
-    /// The build that recorded it.
     pub build: String,
     pub machine: String,
     pub end: End,
@@ -56,7 +54,6 @@ pub struct Recording {
     pub lost: BTreeMap<String, u64>,
 }
 
-/// A message of any topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     pub topic: Arc<str>,
@@ -82,11 +79,9 @@ pub struct SliceSample<H, T> {
     /// When the recorder took it, nanoseconds since 1970.
     pub log_ns: u64,
     pub header: H,
-    /// The slice.
     pub elements: Vec<T>,
 }
 
-/// Most parts of a run.
 const MOST_PARTS: usize = 1000;
 
 /// The files of a run's recordings, in order: a resumed run begins another.
@@ -272,13 +267,11 @@ impl Iterator for Messages {
     }
 }
 
-/// An item of a file.
 enum Found {
     Metadata(String, BTreeMap<String, String>),
     Message(MessageHeader, Vec<u8>),
 }
 
-/// Why reading stops early.
 enum Stop {
     /// The rest is incomplete or damaged.
     Cut(String),

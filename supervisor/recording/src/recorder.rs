@@ -28,9 +28,7 @@ use crate::{
 
 /// Longest time between two reads of the bus.
 const POLL: Duration = Duration::from_millis(10);
-/// Time between two reads of the logs.
 const LOGS_EVERY: Duration = Duration::from_millis(250);
-/// Most bytes of a run file.
 const LONGEST_RUN_FILE: u64 = 1 << 24;
 /// Niceness of the process: stages that answer the robot go first.
 const NICE: i32 = 5;
@@ -146,7 +144,6 @@ pub fn record(
     }
 }
 
-/// The directory of the current run.
 fn find_run(options: &Options) -> Option<PathBuf> {
     let link = options.domain.run_directory();
     options.run.clone().or_else(|| fs::read_link(link).ok())
@@ -161,7 +158,6 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     out.with_file_name(format!("{stem}-{number}.mcap"))
 }
 
-/// The run that is recorded.
 struct CurrentRun {
     path: PathBuf,
     directory: Option<PathBuf>,
@@ -215,7 +211,6 @@ impl CurrentRun {
         self.directory.as_deref() == run
     }
 
-    /// Record all new samples.
     fn take(&mut self, readers: &mut Readers) -> Result<(), RecordingError> {
         let file = &mut self.file;
         for (topic, reader) in readers {

@@ -13,11 +13,9 @@ pub struct Schema {
     pub text: String,
 }
 
-/// The separator of messages.
 const RULE: &str =
     "================================================================================\n";
 
-/// The schema of the messages of `topic`.
 pub fn of(topic: &dyn AnyTopic) -> Schema {
     let (header, element) = topic.layout();
     let mut parts = Vec::new();

@@ -18,7 +18,6 @@ const FIRST_APART_S: f64 = 2.0;
 /// Cells of a map beyond which it is drawn only at the end, without its field.
 const LARGEST: usize = 1024 * 1024;
 
-/// The robot's map at one moment.
 #[derive(Clone, Debug)]
 pub(crate) struct Belief {
     pub(crate) time_s: f64,

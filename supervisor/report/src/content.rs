@@ -19,7 +19,6 @@ use crate::{
     source::{self, Source},
 };
 
-/// The data that a report takes from the recordings.
 pub(crate) struct Content {
     pub(crate) mission: Mission,
     pub(crate) simulated: bool,
@@ -27,7 +26,6 @@ pub(crate) struct Content {
     pub(crate) about: Vec<(&'static str, String)>,
     /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
-    /// The run's summary, if it is known.
     pub(crate) summary: Map<String, Value>,
     pub(crate) poses: Downsampled<PoseSample>,
     pub(crate) ranges: Downsampled<RangeSample>,
@@ -42,7 +40,6 @@ pub(crate) struct Content {
 }
 
 impl Content {
-    /// Read all parts.
     pub(crate) fn read(source: &Source) -> Result<Self, ReportError> {
         let first = Recording::open(&source.files[0])?;
         let mut content = Self::of(&first);
@@ -159,7 +156,6 @@ impl Content {
         Some(())
     }
 
-    /// A number of the summary.
     pub(crate) fn summed(&self, field: &str) -> Option<f64> {
         self.summary.get(field)?.as_f64()
     }

@@ -8,7 +8,6 @@ use std::{
 use recording::RecordingError;
 use thiserror::Error;
 
-/// Errors of reports.
 #[derive(Debug, Error)]
 pub enum ReportError {
     #[error(transparent)]

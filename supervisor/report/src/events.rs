@@ -23,7 +23,6 @@ pub(crate) const FAILSAFE: &str = "failsafe";
 const MAP: &str = "map";
 const STALLS: &str = "stalls";
 
-/// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Event {
     /// Mission time, seconds.
@@ -35,7 +34,6 @@ pub(crate) struct Event {
     pub(crate) text: String,
 }
 
-/// All events of a run.
 #[derive(Default)]
 pub(crate) struct Events {
     /// In the order of the recording.

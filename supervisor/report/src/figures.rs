@@ -17,11 +17,9 @@ pub(crate) struct Figure {
     /// Name of its file, without ending.
     pub(crate) name: &'static str,
     pub(crate) caption: String,
-    /// The file.
     pub(crate) svg: String,
 }
 
-/// All figures, in the order of the page.
 pub(crate) fn all(content: &Content) -> Vec<Figure> {
     let [first, second] = wheels(content);
     let end = Belief::of(&content.grid_header, &content.grid);

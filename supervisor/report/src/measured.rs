@@ -8,7 +8,6 @@ use common::{
 
 #[derive(Default)]
 pub(crate) struct Measured {
-    /// Poses.
     pub(crate) ticks: u64,
     /// Mission time of the newest pose, seconds.
     pub(crate) time_s: f64,
@@ -105,7 +104,6 @@ impl Measured {
         self.solves.saturating_add(last)
     }
 
-    /// The newest pose.
     pub(crate) const fn last_pose(&self) -> Option<&PoseSample> {
         self.last_pose.as_ref()
     }

@@ -5,7 +5,6 @@ use evaluation::shortest_path::{ShortestPath, shortest_path};
 
 use crate::content::Content;
 
-/// A row of the table.
 pub(crate) struct Metric {
     /// Its name in the literature.
     pub(crate) name: &'static str,

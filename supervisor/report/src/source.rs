@@ -14,7 +14,6 @@ use crate::error::ReportError;
 /// A summary takes 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-/// The recordings of a report.
 pub(crate) struct Source {
     /// Parts of the run, the first one first; never none.
     pub(crate) files: Vec<PathBuf>,

@@ -12,7 +12,7 @@
 //! | `series` | the state that the missions share |
 //! | `attack`, `subscriptions` | the attacker of one mission; its readers on the bus |
 //! | `kind`, `recovery` | how a process is hit; the recovery until its successor works |
-//! | [`Consumer`], `consumers`, `terminal` | consumers that are hit and restarted; a terminal for one that draws |
+//! | `consumer`, `consumers`, `terminal` | consumers that are hit and restarted; a terminal for one that draws |
 //! | `replays` | replays of the missions' recordings |
 //! | `resources`, `leftovers` | resources of a process; files and processes that outlived a mission |
 //! | [`Report`] | the result of all missions |
@@ -44,8 +44,7 @@ mod subscriptions;
 mod terminal;
 mod tick_latencies;
 
-pub use consumer::{Consumer, ConsumerError, GivenConsumer};
-pub use options::Options;
+pub use options::{Arguments, Faults, Options};
 pub use report::Report;
 pub use robot_faults::{FaultOptions, check, run_robot_faults};
 pub use stop_time_table::{Entry, StopTimeTable};
@@ -60,10 +59,10 @@ pub fn run(options: &Options, show: &mut dyn FnMut(&Report)) -> Result<Report, B
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {
-        let seed = options.seed + series.report.missions();
+        let seed = options.asked.seed + series.report.missions();
         let undisturbed = mission::undisturbed(options, seed)?;
         mission::attack(&mut series, seed, &undisturbed)?;
-        let left = leftovers::find(&options.robot, &options.directory);
+        let left = leftovers::find(&options.asked.robot, &options.directory);
         series.report.left_behind(left);
         show(&series.report);
     }

@@ -5,14 +5,12 @@
 //! | [`Options`], [`measure`] | missions and bare hops, in turn |
 //! | [`hops`] | five bare hops between processes |
 //! | `mission` | a mission whose ticks are measured |
-//! | [`consumers`] | processes that read grid and field meanwhile |
 //! | [`Regime`] | how ticks follow each other |
 //! | `budget` | the microseconds of each stage and item |
 //! | `process_set` | resources of a process and its descendants |
 //! | [`Report`] | the result, as it is printed |
 
 mod budget;
-pub mod consumers;
 pub mod hops;
 mod mission;
 mod process_set;
@@ -46,8 +44,6 @@ pub struct Options<'a> {
     pub budget: bool,
     /// Whether the missions are recorded.
     pub record: bool,
-    /// Processes that read grid and field meanwhile.
-    pub consumers: u32,
 }
 
 /// Trips of a round that follow each other without a pause.

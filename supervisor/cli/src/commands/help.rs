@@ -19,7 +19,6 @@ pub(crate) struct Arguments {
     page: Vec<String>,
 }
 
-/// A page of the guide.
 struct Page {
     /// The name of its file in `supervisor/guide/`, without `.md`. In small letters it is the name of the page.
     file: &'static str,
@@ -66,7 +65,6 @@ fn page(name: &str) -> Option<&'static Page> {
     GUIDE.iter().find(|page| page.file.eq_ignore_ascii_case(name))
 }
 
-/// The names of all pages.
 #[cfg(feature = "tools")]
 pub(crate) fn page_names() -> Vec<String> {
     GUIDE.iter().map(Page::name).collect()
@@ -108,7 +106,6 @@ pub(crate) fn main(arguments: &Arguments, mut whole: Command) -> Result<(), Fail
     Ok(())
 }
 
-/// The subcommand of `whole` that `words` name.
 fn subcommand<'a>(whole: &'a mut Command, words: &[String]) -> Option<&'a mut Command> {
     let words = renamed::words(words);
     let mut words = words.iter();

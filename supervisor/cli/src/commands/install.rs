@@ -26,11 +26,8 @@ pub(crate) struct Arguments {
     root: PathBuf,
 }
 
-/// A file to install.
 struct Part {
-    /// The path below the root.
     path: &'static str,
-    /// The text, as packaged.
     text: &'static str,
     /// Whether users may change it; such a file is not overwritten.
     configuration: bool,

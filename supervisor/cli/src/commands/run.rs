@@ -144,7 +144,6 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     }))
 }
 
-/// The run in `directory`, which goes on.
 fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options, Failure> {
     let recovered = RecoveredRun::load(&directory)?;
     let mut mission = recovered.run.mission.clone();
@@ -274,7 +273,6 @@ const RESUMED_WITHIN_S: f64 = 60.0;
 /// The exit code of `--resume-last` if it does not start.
 const CUT_OFF: u8 = 7;
 
-/// The documented exit code.
 fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
     if ending.asked_for && summary.outcome == ending.outcome {
         return ExitCode::SUCCESS;

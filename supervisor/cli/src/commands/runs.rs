@@ -59,7 +59,6 @@ struct List {
     json: bool,
 }
 
-/// A row of the list.
 #[derive(Serialize)]
 struct Listed<'a> {
     run: &'a Path,
@@ -102,7 +101,6 @@ fn list(arguments: &List) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The runs that are asked for.
 fn chosen(arguments: &List) -> Vec<RunDirectory> {
     let mut runs = runs::list(&arguments.runs);
     if let Some(robot) = &arguments.robot {

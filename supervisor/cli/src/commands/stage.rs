@@ -89,7 +89,6 @@ impl StageProcess {
     }
 }
 
-/// The signal of that name.
 fn signal(name: &str) -> Result<Signal, String> {
     Ok(match name.strip_prefix("SIG").unwrap_or(name) {
         "KILL" => Signal::KILL,

@@ -43,7 +43,6 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The object of `status --json`.
 #[derive(Serialize)]
 struct Status<'a> {
     robot: &'a RobotName,
@@ -58,7 +57,6 @@ struct Status<'a> {
     stages: Vec<StageStatus<'a>>,
 }
 
-/// The link to the robot.
 #[derive(Serialize)]
 struct LinkStatus {
     connected: bool,
@@ -83,7 +81,6 @@ struct LinkStatus {
     other_port: u32,
 }
 
-/// The robot's batteries.
 #[derive(Serialize)]
 struct PowerStatus {
     board_v: f64,
@@ -92,7 +89,6 @@ struct PowerStatus {
     low: bool,
 }
 
-/// A stage of the robot.
 #[derive(Serialize)]
 struct StageStatus<'a> {
     name: &'a str,
@@ -114,7 +110,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.all { all::print(arguments.json) } else { print_one(arguments) }
 }
 
-/// Print the status of one robot.
 fn print_one(arguments: &Arguments) -> Result<(), Failure> {
     let bus = Bus::join(&Domain::of(arguments.robot.clone()), "status")?;
     let mut roster = Roster::open(&bus)?;

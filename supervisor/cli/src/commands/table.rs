@@ -60,7 +60,6 @@ pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
     }
 }
 
-/// The topics as a list in Markdown.
 pub(super) fn topics() -> String {
     topics::TABLE.iter().map(|topic| topic_row(*topic)).collect()
 }
@@ -93,7 +92,6 @@ fn topic_row(topic: &dyn AnyTopic) -> String {
     ))
 }
 
-/// The stages as a list in Markdown.
 pub(super) fn stages() -> String {
     let list = |topics: &[Topics]| {
         let topics = topics.iter().copied().flatten();
@@ -126,7 +124,6 @@ pub(super) fn stages() -> String {
     rows + &item(&format!("every stage also reads {reads} and writes {writes}"))
 }
 
-/// The rules of the link's failsafe as a list in Markdown.
 fn failsafe() -> String {
     let row = |rule: &failsafe::Rule| {
         let until = match rule.clears {
@@ -139,7 +136,6 @@ fn failsafe() -> String {
     failsafe::TABLE.iter().map(row).collect()
 }
 
-/// The faults as a list in Markdown.
 fn faults() -> String {
     let row = |fault: &faults::Fault| {
         let stage = fault.stage.unwrap_or("any stage");

@@ -11,11 +11,9 @@ macro_rules! shipped {
     };
 }
 
-/// Name and text of every shipped mission.
 pub(crate) static SHIPPED: [(&str, &str); 5] =
     shipped!("open-room", "obstacle-course", "trap", "passage", "one-drum");
 
-/// Why a mission cannot be loaded.
 #[derive(Debug, Error)]
 pub(crate) enum LookupError {
     #[error("no shipped mission is called {name:?}; shipped are {}", names())]

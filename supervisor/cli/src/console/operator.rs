@@ -75,7 +75,6 @@ pub(crate) fn known(stage: &str) -> Result<&'static str, Failure> {
     Ok(known_stage(stage)?.name)
 }
 
-/// The row of a stage in the table.
 pub(crate) fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }

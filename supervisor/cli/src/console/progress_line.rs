@@ -7,7 +7,6 @@ use std::{
 
 use super::output::write_stderr;
 
-/// A line of progress.
 pub(crate) struct ProgressLine {
     rewrites: bool,
     /// Time between lines that cannot be rewritten.
@@ -21,7 +20,6 @@ impl ProgressLine {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
 
-    /// Whether it is time for a line.
     pub(crate) fn is_due(&self) -> bool {
         self.shown.is_none_or(|shown| self.rewrites || shown.elapsed() >= self.every)
     }

@@ -22,7 +22,6 @@ use super::{
 /// A topic is late after this many of its intervals, because its writer looks at the clock only once in each turn of its loop.
 const LATE: u32 = 2;
 
-/// The samples of one topic, counted.
 #[derive(Debug)]
 pub(crate) struct TopicRates {
     spec: &'static Spec,
@@ -35,14 +34,12 @@ pub(crate) struct TopicRates {
     counts: Counts,
 }
 
-/// The newest sample of a process.
 #[derive(Debug)]
 struct Newest {
     at: Instant,
     stamp: Stamp,
 }
 
-/// Counts since the last report.
 #[derive(Debug, Default)]
 struct Counts {
     samples: u64,
@@ -53,7 +50,6 @@ struct Counts {
     late: bool,
 }
 
-/// The rates of a topic between two reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Report {
     pub(crate) topic: &'static str,
@@ -136,7 +132,6 @@ fn is_late(rate: Rate, gap: Duration) -> bool {
     matches!(rate, Rate::OnChange { again_after, .. } if gap > LATE * again_after)
 }
 
-/// `reports` as a table.
 pub(crate) fn table(reports: &[Report]) -> String {
     let mut table = Table::new([
         ("topic", Left),

@@ -13,7 +13,6 @@ pub(crate) const SUPERVISOR_LOG: &str = "supervisor.log";
 /// Begins the name of each user's directory, before the user's number.
 const USER_DIRECTORY: &str = "firsthand-";
 
-/// A robot of this user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Robot {
     pub(crate) name: RobotName,

@@ -70,7 +70,6 @@ pub(crate) fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     }
 }
 
-/// The runs of `robot` in directories below `runs`.
 fn runs_of(robot: &RobotName, runs: &Path) -> Vec<RunDirectory> {
     let mut runs = runs::list(runs);
     runs.retain(|run| run.robot == *robot);

@@ -18,7 +18,6 @@ pub(crate) const CUT_OFF: &str = "cut-off";
 /// A summary takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-/// A run on the disk.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct RunDirectory {
     pub(crate) began: SystemTime,
@@ -28,13 +27,11 @@ pub(crate) struct RunDirectory {
     pub(crate) mission: Option<String>,
 }
 
-/// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Outcome {
     Running,
     /// The supervisor was killed, or the machine was switched off.
     CutOff,
-    /// The run has a summary.
     Ended {
         /// Its outcome, such as `reached`.
         outcome: String,
@@ -79,7 +76,6 @@ impl RunDirectory {
         self.directory.join(file).exists()
     }
 
-    /// How it ended.
     pub(crate) fn outcome(&self) -> Outcome {
         #[derive(Deserialize)]
         struct Summary {

@@ -38,7 +38,6 @@ impl Stream {
         Ok(Self { signals: Signals::catch(&[SIGINT, SIGTERM, SIGHUP])?, ended: false })
     }
 
-    /// Whether the command must end.
     pub(crate) fn has_ended(&mut self) -> bool {
         self.ended |= self.signals.came() || poll::is_closed(io::stdout()).unwrap_or(true);
         self.ended

@@ -7,7 +7,6 @@ pub(crate) enum Align {
     Right,
 }
 
-/// The rows of a table below its heading.
 pub(crate) struct Table<const N: usize> {
     columns: [Align; N],
     rows: Vec<[String; N]>,

@@ -43,7 +43,6 @@ pub(crate) fn age(seconds: Option<f64>) -> String {
     }
 }
 
-/// A size in the unit that fits.
 pub(crate) fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     match bytes {

@@ -82,7 +82,6 @@ fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompl
     })
 }
 
-/// The completer of one of `names`.
 fn named(names: impl Fn() -> Vec<String> + Send + Sync + 'static) -> ArgValueCompleter {
     ArgValueCompleter::new(move |current: &OsStr| candidates(&current.to_string_lossy(), names()))
 }

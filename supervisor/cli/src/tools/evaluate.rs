@@ -133,7 +133,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// Start and target on a map, if they were given.
     fn ends(&self) -> Option<Ends> {
         let ([x, y, heading_deg], [to_x, to_y]) = (self.start?, self.target?);
         Some(Ends {
@@ -255,7 +254,6 @@ fn body(robot: &str) -> Result<BodySize, Failure> {
     Ok(BodySize { radius_m: mission.body().radius_m, margin_m: MARGIN_M })
 }
 
-/// The object that `--json` ends with.
 fn as_json(report: &Report) -> Result<serde_json::Value, serde_json::Error> {
     let mut totals = report.totals.iter();
     let mut object = match totals.next() {

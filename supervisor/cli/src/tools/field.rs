@@ -12,7 +12,10 @@ use std::{
 
 use clap::Args;
 use common::{process_status::kibibytes, samples::FieldCell};
-use evaluation::maps::{self, Map};
+use evaluation::{
+    maps::{self, Map},
+    statistics::median,
+};
 use harmonic::{Cancellation, Cell, Domain, Field, Phase, Screening, Settings, SolveError, Solver};
 use npyz::WriterBuilder as _;
 use picture::FieldOnMap;
@@ -69,7 +72,6 @@ impl FromStr for TargetCell {
     }
 }
 
-/// What goes wrong once the map is read.
 #[derive(Debug, Error)]
 enum FieldError {
     /// The target is blocked or outside.
@@ -113,7 +115,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(print(&report, arguments.json)?)
 }
 
-/// What is to be solved.
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain, FieldError> {
     let target = arguments.target_cell.0;
     let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
@@ -139,7 +140,6 @@ struct Times {
     verify: Duration,
 }
 
-/// A field from scratch.
 fn solve(domain: &Domain, threads: NonZeroUsize) -> Result<(Field, Times), SolveError> {
     let mut solver = Solver::new(Settings { threads, ..Settings::default() });
     let mut times = Times::default();
@@ -191,17 +191,11 @@ struct Medians {
 
 impl Report {
     fn of(arguments: &Arguments, field: &Field, runs: &[Times]) -> Self {
-        let sorted = |phase: fn(&Times) -> Duration| {
-            let mut all: Vec<f64> = runs.iter().map(|run| phase(run).as_secs_f64() * 1e3).collect();
-            all.sort_by(f64::total_cmp);
-            all
+        let ms = |phase: fn(&Times) -> Duration| {
+            runs.iter().map(move |run| phase(run).as_secs_f64() * 1e3)
         };
-        let phases = [sorted(|run| run.setup), sorted(|run| run.solve), sorted(|run| run.verify)];
-        let [setup_ms, solve_ms, verify_ms] = [0, 1, 2].map(|nth: usize| phases[nth][0]);
-        let median = |nth: usize| {
-            let all = &phases[nth];
-            (all[(all.len() - 1) / 2] + all[all.len() / 2]) / 2.0
-        };
+        let least = |phase| ms(phase).fold(f64::INFINITY, f64::min);
+        let middle = |phase| median(ms(phase)).unwrap_or_default();
         let verification = field.verification();
         Self {
             rows: field.height(),
@@ -212,13 +206,13 @@ impl Report {
             method: verification.method.name(),
             repeats: runs.len(),
             threads: arguments.threads.get(),
-            setup_ms,
-            solve_ms,
-            verify_ms,
+            setup_ms: least(|run| run.setup),
+            solve_ms: least(|run| run.solve),
+            verify_ms: least(|run| run.verify),
             medians: (runs.len() > 1).then(|| Medians {
-                setup_ms_median: median(0),
-                solve_ms_median: median(1),
-                verify_ms_median: median(2),
+                setup_ms_median: middle(|run| run.setup),
+                solve_ms_median: middle(|run| run.solve),
+                verify_ms_median: middle(|run| run.verify),
             }),
             worst_residual: verification.worst_residual,
             log10_u_min: field.log10_u_min(),
@@ -270,7 +264,6 @@ impl fmt::Display for Report {
     }
 }
 
-/// Creates `file` and fills it.
 fn write(
     file: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -314,7 +307,6 @@ fn add_array<T: npyz::AutoSerialize>(
     array.finish()
 }
 
-/// Every cell, row by row.
 fn cells(field: &Field) -> impl Iterator<Item = Cell> {
     let width = field.width();
     (0..field.height()).flat_map(move |row| (0..width).map(move |col| Cell::new(col, row)))
@@ -331,7 +323,6 @@ fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
     direction.unwrap_or_default().map(|component| component as f32)
 }
 
-/// The picture, as SVG.
 fn draw(map: &Map, field: &Field) -> String {
     let drawn: Vec<FieldCell> = cells(field)
         .map(|cell| {

@@ -30,7 +30,6 @@ impl MissionProgress {
         Self { title: title.to_owned(), began: Instant::now(), line: ProgressLine::new(LINE_EVERY) }
     }
 
-    /// Show the progress after a mission.
     pub(super) fn show(&mut self, progress: &Progress) {
         if !self.line.is_due() {
             return;

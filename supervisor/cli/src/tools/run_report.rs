@@ -11,13 +11,11 @@ use supervisor::{Finished, Options, outcome::Outcome, summary::Summary};
 /// The name of a result and its file.
 pub(crate) type Written = Result<(&'static str, PathBuf), String>;
 
-/// Write the report of a recorded run.
 pub(crate) fn report(options: &Options) -> Written {
     let page = report::write(&options.directory, None);
     Ok(("report", page.map_err(|error| format!("no report of this run: {error}"))?))
 }
 
-/// Draw the picture of the run.
 pub(crate) fn picture(options: &Options, finished: &Finished, summary: &Summary) -> Written {
     let picture = options.directory.join("picture.svg");
     let svg = svg(&options.mission, finished, summary);
@@ -29,7 +27,6 @@ pub(crate) fn picture(options: &Options, finished: &Finished, summary: &Summary)
     Ok(("picture", picture))
 }
 
-/// The picture as SVG.
 fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
     let record = &finished.record;
     let believed: Vec<Pose2> = record.poses.iter().map(PoseSample::pose).collect();
@@ -60,7 +57,6 @@ fn svg(mission: &Mission, finished: &Finished, summary: &Summary) -> String {
     })
 }
 
-/// Poses of the ground truth, for the picture.
 fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
     truth
         .iter()

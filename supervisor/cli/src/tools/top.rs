@@ -54,7 +54,6 @@ pub(crate) struct Arguments {
     robot: RobotName,
 }
 
-/// Why the screen ended.
 #[derive(Debug, Error)]
 enum TopError {
     #[error(transparent)]

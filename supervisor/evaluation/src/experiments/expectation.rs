@@ -12,7 +12,6 @@ use crate::{
     statistics::Spread,
 };
 
-/// A claim of the paper.
 #[derive(Debug)]
 struct Claim {
     experiment: &'static str,
@@ -25,10 +24,8 @@ struct Claim {
     to: f64,
 }
 
-/// A figure of one experiment.
 #[derive(Clone, Copy, Debug)]
 enum Figure {
-    /// The share of missions that arrived.
     Arrival,
     Median(fn(&Spreads) -> Option<Spread>),
     /// A median divided by that of another experiment.
@@ -73,7 +70,6 @@ pub struct Expectation {
     /// The claim as a condition.
     pub claim: &'static str,
     pub found: f64,
-    /// Whether the claim holds.
     pub holds: bool,
 }
 

@@ -28,9 +28,7 @@ pub struct Experiment {
     pub reported_time_s: Option<f64>,
     /// Name and text of the shipped mission that it changes.
     mission: (&'static str, &'static str),
-    /// The changes to that mission.
     change: fn(&mut Mission),
-    /// The methods that it is run by.
     methods: &'static [Method],
 }
 
@@ -38,16 +36,12 @@ pub struct Experiment {
 pub enum ExperimentError {
     #[error("no experiment is called {name:?}; give some of {}", names())]
     Unknown { name: String },
-    /// The mission is invalid.
     #[error(transparent)]
     Mission(#[from] MissionError),
     #[error(
         "experiment {name}: the robot cannot get to the target; change the obstacles of its mission"
     )]
-    Unsolvable {
-        /// The experiment.
-        name: &'static str,
-    },
+    Unsolvable { name: &'static str },
 }
 
 fn names() -> String {
@@ -155,7 +149,6 @@ pub static TABLE: [Experiment; 9] = [
 ];
 
 impl Experiment {
-    /// Whether it is run by `method`.
     pub fn is_run_by(&self, method: Method) -> bool {
         self.methods.contains(&method)
     }

@@ -7,7 +7,6 @@ use crate::setting::{HARMONIC, Setting};
 /// Share of the time of radio outage with measured realism. The paper's link fades; the paper gives no number.
 const OUTAGE_SHARE: f64 = 0.2;
 
-/// The methods that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// The paper's method, with its dead reckoning, (21).

@@ -15,7 +15,6 @@ pub struct ExperimentResult {
     pub count: usize,
     /// Missions that arrived, by the ground truth.
     pub arrived: usize,
-    /// Missions that touched something.
     pub touched: usize,
     /// Missions that ended elsewhere, at the target only by dead reckoning.
     pub wrong_place: usize,
@@ -30,11 +29,9 @@ pub struct ExperimentResult {
 pub struct Spreads {
     /// Mission time until the arrival, seconds.
     pub time_s: Option<Spread>,
-    /// Distance driven, metres.
     pub path_m: Option<Spread>,
     /// K: path divided by straight distance.
     pub k: Option<Spread>,
-    /// Least clearance, metres.
     pub clearance_m: Option<Spread>,
     /// Range samples that put a hazard on the map.
     pub safety_events: Option<Spread>,

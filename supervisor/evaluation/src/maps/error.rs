@@ -16,7 +16,6 @@ pub enum MapError {
     /// It is a directory, a pipe or a device.
     #[error("{}: not a regular file; give a map file", file.display())]
     NotAFile { file: PathBuf },
-    /// The name has no known ending.
     #[error(
         "{}: not the name of a map; give a .yaml of the ROS map_server, a .pgm or .png image, or a MovingAI .map",
         file.display()
@@ -25,10 +24,8 @@ pub enum MapError {
     /// The file is longer than any map of its format.
     #[error("{}: {bytes} bytes, a file of this kind has at most {most}; check that it is one", file.display())]
     TooLong { file: PathBuf, bytes: u64, most: u64 },
-    /// The map has no cells, or too many.
     #[error("{}: {cols} x {rows} cells; a map has 1 to {MAX_SIDE} on each side, so crop or scale it", file.display())]
     Size { file: PathBuf, cols: u64, rows: u64 },
-    /// The file is invalid.
     #[error("{}: {problem}", file.display())]
     Malformed {
         file: PathBuf,

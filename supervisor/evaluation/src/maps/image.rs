@@ -43,7 +43,6 @@ impl Lightness {
     }
 }
 
-/// Why an image cannot be decoded.
 type Cause = Box<dyn Error>;
 
 /// Which pixels are free, row by row.

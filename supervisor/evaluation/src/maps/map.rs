@@ -9,7 +9,6 @@ pub struct Map {
     pub blocked: Vec<bool>,
 }
 
-/// A map and its place.
 #[derive(Debug)]
 pub struct PlacedMap {
     pub map: Map,

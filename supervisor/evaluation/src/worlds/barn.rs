@@ -146,7 +146,6 @@ fn open(file: &Path) -> Result<Box<dyn Read>, WorldError> {
     Ok(if zipped { Box::new(flate2::read::GzDecoder::new(opened)) } else { Box::new(opened) })
 }
 
-/// The rows of a CSV file.
 fn rows<T: for<'row> Deserialize<'row>>(file: &Path) -> Result<Vec<T>, WorldError> {
     let mut reader = csv::Reader::from_reader(open(file)?.take(LONGEST));
     reader.deserialize().collect::<Result<_, _>>().map_err(|error: csv::Error| match error.kind() {

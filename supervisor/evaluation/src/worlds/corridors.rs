@@ -8,7 +8,6 @@ use glam::DVec2;
 use super::random::Random;
 use crate::trial::Scene;
 
-/// The kinds of corridor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bends {
     /// Straight, along x, empty.

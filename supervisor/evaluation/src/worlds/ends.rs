@@ -14,7 +14,6 @@ use super::error::WorldError;
 
 /// Most bytes of such a file, which has some twenty short lines.
 const LONGEST: u64 = 64 << 10;
-/// The keys of a test.
 const KEYS: [&str; 5] =
     ["initial_pose_x", "initial_pose_y", "initial_pose_a", "goal_pose_x", "goal_pose_y"];
 

@@ -13,27 +13,15 @@ use thiserror::Error;
 pub enum WorldError {
     #[error("cannot read {}: {source}; give a kind of world, a file or a folder, see `firsthand help evaluation`", file.display())]
     Unreadable { file: PathBuf, source: io::Error },
-    /// The file is invalid.
     #[error("{}: {problem}", file.display())]
-    Malformed {
-        file: PathBuf,
-        /// The problem and the remedy.
-        problem: String,
-    },
+    Malformed { file: PathBuf, problem: String },
     #[error(transparent)]
     Map(#[from] MapError),
-    /// A map is too large.
     #[error("{}: {side_m:.0} m on a side, a world has at most {most_m:.0} m; crop the map", file.display())]
-    TooLarge {
-        file: PathBuf,
-        side_m: f64,
-        /// The limit, metres.
-        most_m: f64,
-    },
+    TooLarge { file: PathBuf, side_m: f64, most_m: f64 },
     /// Start and target were given for worlds that have their own.
     #[error("--start and --target are for ROS maps; give one to --worlds, or leave them out")]
     NoMap,
-    /// The mission is invalid.
     #[error(transparent)]
     Mission(#[from] MissionError),
     /// A body of that size can cross no world of the source.

@@ -25,7 +25,6 @@ const DRAWN_KIND: u64 = 7;
 /// Name of a map's file of tests, as in MRPB.
 const TESTS_FILE: &str = "config.txt";
 
-/// Options for files.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
     /// Number of worlds; without it all, and ten on each map without tests.
@@ -167,7 +166,6 @@ fn map_name(file: &Path) -> String {
     named.to_string_lossy().into_owned()
 }
 
-/// The kind of a file, by its name.
 #[derive(Clone, Copy)]
 enum Kind {
     Mission,

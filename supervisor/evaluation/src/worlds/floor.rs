@@ -12,14 +12,12 @@ use super::{ends::Ends, error::WorldError, random::Random};
 
 /// Longest side of a map, metres: that of the check of solvability.
 const LARGEST_M: f64 = 95.0;
-/// Most boxes of a map.
 const MOST_BOXES: usize = 20_000;
 /// Range of the straight distance to a drawn target, metres.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
 /// Starts that are drawn before the search for a target is given up.
 const MOST_STARTS: usize = 50;
 
-/// The floor of a building.
 #[derive(Debug)]
 pub(super) struct Floor {
     map: PlacedMap,

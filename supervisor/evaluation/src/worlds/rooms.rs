@@ -16,7 +16,6 @@ const KEPT_FREE_M: f64 = 0.5;
 /// Share of rooms with a partition.
 const DOOR_SHARE: f64 = 1.0 / 3.0;
 
-/// The kinds of room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Doors {
     /// One in three has a partition with a door.

@@ -12,12 +12,9 @@ const BOTTOM_M: f64 = 2.4;
 const DRUM_SPACING_M: f64 = 0.36;
 const DRUM_RADIUS_M: f64 = 0.17;
 
-/// The sides of a trap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sides {
-    /// Smooth walls.
     Walls,
-    /// Drums in a row.
     Drums,
 }
 

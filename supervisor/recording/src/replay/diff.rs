@@ -10,7 +10,6 @@ use crate::{
     replay::samples::{COMPARED, First, difference, is_keyframe, tick_of},
 };
 
-/// Where two recordings part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Parting {
     /// Lines of the run file that differ: mission, seed, clock. Address and name of the robot are left out.

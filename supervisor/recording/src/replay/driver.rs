@@ -44,7 +44,6 @@ impl Default for Options {
 /// Topics that the link's process computes outside its step. They are not compared.
 const NOT_COMPUTED: [&str; 1] = ["link"];
 
-/// Replay `recording`.
 pub fn replay(recording: &Recording, options: &Options) -> Result<Report, RecordingError> {
     let counts = &recording.counts;
     let recorded = |topic: &str| counts.contains_key(topic);

@@ -33,11 +33,9 @@ const SHOWN_LENGTH: usize = 600;
 /// The data that all generations of a recording share.
 pub(crate) struct Setting<'a> {
     pub(crate) run: &'a Run,
-    /// Topics that were recorded.
     pub(crate) recorded: &'a dyn Fn(&str) -> bool,
     /// Outputs before this time are computed but not compared.
     pub(crate) from: MissionTime,
-    /// Whether the file was cut off.
     pub(crate) cut: bool,
 }
 
@@ -99,7 +97,6 @@ impl Generation {
         self.worked = true;
     }
 
-    /// Take a piece of its inputs.
     pub(crate) fn piece(&mut self, setting: &Setting<'_>, sequence: u32, piece: &[u8]) {
         self.pieces_came = true;
         if self.is_over() {
@@ -158,7 +155,6 @@ impl Generation {
         }
     }
 
-    /// Take a recorded output.
     pub(crate) fn output(
         &mut self,
         setting: &Setting<'_>,
@@ -243,7 +239,6 @@ impl Generation {
         self.last_inputs.clear();
     }
 
-    /// The recording has ended.
     pub(crate) fn end(
         mut self,
         setting: &Setting<'_>,

@@ -216,7 +216,6 @@ impl Player {
         Ok(true)
     }
 
-    /// Fails if a live stage has ended.
     fn check_stages(&mut self) -> Result<(), LiveError> {
         for live in &mut self.stages {
             let stage = live.stage.name;

@@ -3,7 +3,6 @@
 use common::inputs::LONGEST_ENTRY;
 use thiserror::Error;
 
-/// Puts pieces together.
 #[derive(Debug, Default)]
 pub(crate) struct Pieces {
     next: u32,
@@ -28,7 +27,6 @@ pub(crate) enum Broken {
 }
 
 impl Pieces {
-    /// Add the next piece.
     pub(crate) fn push(&mut self, sequence: u32, piece: &[u8]) -> Result<(), Broken> {
         match (self.next, sequence.checked_sub(self.next)) {
             (_, Some(0)) => {}

@@ -4,7 +4,6 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-/// The result of a replay.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
@@ -14,25 +13,21 @@ pub struct Report {
     pub cut_after_s: Option<f64>,
 }
 
-/// The result of a replay for one stage.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StageReport {
     /// Generations whose outputs are equal to the bit.
     pub equal: u64,
-    /// Generations with a difference.
     pub different: u64,
     /// Generations that ended before their first input.
     pub without_step: u64,
     /// Generations that were not replayed, with reasons.
     pub not_replayed: BTreeMap<u32, String>,
-    /// Inputs of all steps.
     pub inputs: u64,
     pub compared: u64,
     /// Samples that were computed but not recorded.
     pub unrecorded: u64,
 }
 
-/// The first difference of a generation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     pub stage: &'static str,

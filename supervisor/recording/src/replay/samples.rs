@@ -24,13 +24,10 @@ const OWN: [&str; 4] = ["stamp.generation", "stamp.sequence", "full_solve_ns", "
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct First {
     pub tick: u64,
-    /// Its mission time, seconds.
     pub time_s: f64,
     /// The first of the topics of that tick that differs.
     pub topic: &'static str,
-    /// The writer of the topic.
     pub writer: &'static str,
-    /// The first field that differs.
     pub field: String,
     /// Its value in both.
     pub values: [String; 2],

@@ -39,7 +39,6 @@ const NEWEST: u32 = u32::MAX;
 /// it, and chaos has no operator. A second signal may follow in the start-up, and each may be counted late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
 
-/// The attacker's knowledge of a mission.
 #[derive(Default)]
 pub(crate) struct Attack {
     seed: u64,
@@ -299,14 +298,14 @@ impl Attack {
     fn hit(&mut self, series: &mut Series<'_>) -> Result<(), BenchError> {
         let Series { options, schedule, report, .. } = series;
         if let Some((index, kind, pause)) =
-            schedule.consumer(self.consumers.len(), options.only_consumers)
+            schedule.consumer(self.consumers.len(), options.asked.only_consumers)
         {
             let supervisor = self.supervisor;
             let hit = self.consumers.hit(index, kind, pause, supervisor, report)?;
             self.measured.extend(hit.map(|hit| self.row(&hit.name, kind, hit.generation)));
             return Ok(());
         }
-        if options.supervisor && schedule.supervisor() {
+        if options.asked.include_supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind) {
                 report.hit(SUPERVISOR, kind);
@@ -317,7 +316,7 @@ impl Attack {
             }
             return Ok(());
         }
-        if options.freeze_all
+        if options.asked.freeze_all
             && let Some(pause) = schedule.freeze_all()
         {
             self.freeze_all(pause, report);
@@ -346,7 +345,9 @@ impl Attack {
         }
         self.hits.push((stage, Instant::now()));
         let startup_hit = match startup_hit {
-            Some(after) if options.startup && kind != Kind::Freeze => StartupHit::After(after),
+            Some(after) if options.asked.include_startup && kind != Kind::Freeze => {
+                StartupHit::After(after)
+            }
             _ => StartupHit::None,
         };
         let generation = entry.generation;

@@ -17,7 +17,7 @@ use thiserror::Error;
 use crate::chaos::terminal;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Consumer {
+pub(crate) enum Consumer {
     /// The recorder that the run itself starts. It is not restarted within its run.
     RunRecorder,
     /// Another `firsthand record`.
@@ -28,7 +28,6 @@ pub enum Consumer {
     Hz,
     /// `firsthand logs -f`.
     Logs,
-    /// A command of the user.
     Given(GivenConsumer),
 }
 
@@ -88,7 +87,7 @@ impl FromStr for GivenConsumer {
 
 impl Consumer {
     /// The consumers of this executable. Without terminals `hz` replaces `top`.
-    pub fn own() -> Vec<Self> {
+    pub(crate) fn own() -> Vec<Self> {
         let shows = match terminal::open() {
             Ok(_) => Self::Top,
             Err(_) => Self::Hz,
@@ -96,8 +95,7 @@ impl Consumer {
         vec![Self::RunRecorder, Self::Record, shows, Self::Logs]
     }
 
-    /// Its name in results.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         match self {
             Self::RunRecorder => "run's recorder",
             Self::Record => "record",

@@ -37,7 +37,6 @@ struct Setting {
     directory: PathBuf,
 }
 
-/// A running consumer.
 struct Running {
     consumer: Consumer,
     /// None if it ended by itself; of the run's recorder only while that is frozen.
@@ -60,15 +59,16 @@ impl Consumers {
         directory: PathBuf,
         report: &mut Report,
     ) -> Result<Self, BenchError> {
-        if options.consumers.is_empty() {
+        let consumers = options.consumers();
+        if consumers.is_empty() {
             return Ok(Self::default());
         }
         fs::create_dir(&directory).map_err(system("make a directory"))?;
-        let setting = Setting { robot: options.robot.clone(), directory };
+        let setting = Setting { robot: options.asked.robot.clone(), directory };
         let mut all = Vec::new();
-        for (place, consumer) in options.consumers.iter().enumerate() {
+        for (place, consumer) in consumers.into_iter().enumerate() {
             let mut running = Running {
-                consumer: consumer.clone(),
+                consumer,
                 process: None,
                 starts: 0,
                 frozen_until: None,
@@ -212,7 +212,6 @@ impl Running {
         Ok(())
     }
 
-    /// Thaw it, if it is frozen.
     fn thaw(&mut self) {
         if self.frozen_until.take().is_none() {
             return;

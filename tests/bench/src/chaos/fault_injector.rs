@@ -9,11 +9,9 @@ use rand_pcg::{Pcg64, rand_core::Rng};
 
 use crate::chaos::robot_fault::RobotFault;
 
-/// Delay of late frames.
 const LATE: Duration = Duration::from_secs(2);
 /// Age of an old frame that comes again.
 const OLD: Duration = Duration::from_secs(3);
-/// Period of such frames.
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
 /// Period of slow frames: three a second.
 const SLOW: Duration = Duration::from_millis(333);
@@ -78,7 +76,6 @@ impl FaultInjector {
         }
     }
 
-    /// Begin the fault.
     pub(crate) fn begin(&mut self) {
         if !self.faulty {
             self.faulty = true;
@@ -238,7 +235,6 @@ impl FaultInjector {
     }
 }
 
-/// Whether a command turns a wheel.
 fn is_moving(motion: &Motion) -> bool {
     let target = |channel| motion.targets.of(channel).unwrap_or_default();
     motion.quantity == Quantity::Velocity && [0, 1].into_iter().any(|channel| target(channel) != 0)

@@ -3,7 +3,6 @@
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 
-/// How a process is hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Kind {

@@ -32,8 +32,8 @@ pub(crate) fn command(
     out: &Path,
     records: bool,
 ) -> Result<Command, BenchError> {
-    let mut command = firsthand(&["run", &options.mission, "--json", "--pace", pace]);
-    command.args(["--robot", &options.robot.to_string()]);
+    let mut command = firsthand(&["run", &options.asked.mission, "--json", "--pace", pace]);
+    command.args(["--robot", &options.asked.robot.to_string()]);
     command.args(["--seed", &seed.to_string(), "--out"]);
     command.arg(out);
     if !records {
@@ -69,7 +69,7 @@ fn child(mut command: Command, directory: &Path) -> Result<Command, BenchError> 
 /// The summary of the mission without an attack, to compare with. If ticks are compared, it runs at the same pace.
 pub(crate) fn undisturbed(options: &Options, seed: u64) -> Result<Summary, BenchError> {
     let directory = options.directory.join("undisturbed");
-    let pace = if options.only_consumers { options.pace } else { Pace::Max };
+    let pace = if options.asked.only_consumers { options.pace } else { Pace::Max };
     let output = command(options, seed, &pace.to_string(), &directory, false)?
         .output()
         .map_err(system("start a mission"))?;
@@ -88,8 +88,11 @@ pub(crate) fn attack(
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).map_err(system("make a directory"))?;
     let directory = files.join("run");
-    let mut robot =
-        options.supervisor.then(|| robot(options, seed, &files.join("robot"))).transpose()?;
+    let mut robot = options
+        .asked
+        .include_supervisor
+        .then(|| robot(options, seed, &files.join("robot")))
+        .transpose()?;
     let mut start =
         command(options, seed, &options.pace.to_string(), &directory, options.records())?;
     if let Some(robot) = &robot {
@@ -132,10 +135,10 @@ pub(crate) fn attack(
         end.pose_excess_m = error - undisturbed_error_m;
     }
     let mut right = series.report.add_mission(&end);
-    if options.only_consumers {
+    if options.asked.only_consumers {
         series.report.tick_latencies().add(undisturbed, &summary);
     }
-    if options.replay {
+    if options.asked.replay {
         let (hit, others) = attack.hit_recordings();
         right &= series.report.replays().add(seed, &directory, hit, &others);
     }

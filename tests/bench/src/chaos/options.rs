@@ -2,44 +2,112 @@
 
 use std::path::PathBuf;
 
-use crate::chaos::consumer::Consumer;
+use clap::Args;
 use common::{clock::Pace, domain::RobotName, mission::Mission};
+
+use crate::chaos::{
+    consumer::{Consumer, GivenConsumer},
+    robot_fault::{RobotFault, TABLE},
+};
+
+/// Send random signals to random stages at random times, mission after mission, and report.
+#[derive(Clone, Debug, Args)]
+pub struct Arguments {
+    /// A shipped mission or a mission file.
+    #[arg(default_value = "obstacle-course")]
+    pub mission: String,
+    /// Number of signals; after the last one the mission goes on to its end.
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    pub kills: u32,
+    /// Seed of the schedule; the missions' own seeds count up from it.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Hit some successors again within their first 12 ms: about a fifth of all signals.
+    #[arg(long)]
+    pub include_startup: bool,
+    /// Hit the supervisor too, one in twenty signals, and go on with its run each time. The robot is then a process
+    /// of its own, and mission time is wall-clock.
+    #[arg(long, conflicts_with = "pace")]
+    pub include_supervisor: bool,
+    /// Kill and freeze consumers too, one in two signals: the run's own recorder, another one, `top` (without terminals
+    /// `hz`) and `logs -f`.
+    #[arg(long, conflicts_with = "robot_faults")]
+    pub include_consumers: bool,
+    /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
+    pub consumer: Vec<GivenConsumer>,
+    /// Hit consumers only, and compare ticks with those of the same missions without any.
+    #[arg(long, conflicts_with_all = ["include_startup", "include_supervisor", "freeze_all"])]
+    pub only_consumers: bool,
+    /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals, as if the machine stood still.
+    #[arg(long)]
+    pub freeze_all: bool,
+    /// Record the missions, and replay every generation of every stage, which must be equal to the bit.
+    #[arg(long)]
+    pub replay: bool,
+    /// Mission time, R times wall-clock.
+    #[arg(long, default_value = "4")]
+    pub pace: Pace,
+    /// Set a key of the mission, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Write a row for each signal to DIR/signals.csv.
+    #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
+    pub out: Option<PathBuf>,
+    /// Name of the robot, which also names its shared memory.
+    #[arg(long, default_value = "chaos")]
+    pub robot: RobotName,
+    /// Instead of signals, put a fault into the robot's frames from a random moment on, mission after mission: all faults, or
+    /// those named. The stop-time table at the end has the time from each fault to the last moving command and to wheels at rest.
+    #[arg(
+        long, value_name = "FAULT,...", num_args = 0..=1, require_equals = true, default_missing_value = "all",
+        value_parser = parse_faults, conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
+    )]
+    pub robot_faults: Option<Faults>,
+    /// Missions for each fault.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
+    pub missions: u32,
+    /// One line of JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Debug)]
+pub struct Faults(pub Vec<RobotFault>);
+
+fn parse_faults(names: &str) -> Result<Faults, String> {
+    if names == "all" {
+        return Ok(Faults(TABLE.iter().map(|row| row.fault).collect()));
+    }
+    let named = |name: &str| {
+        RobotFault::named(name).ok_or_else(|| {
+            let all: Vec<_> = TABLE.iter().map(|row| row.name).collect();
+            format!("no robot fault {name:?}; give some of {}", all.join(", "))
+        })
+    };
+    names.split(',').map(named).collect::<Result<_, _>>().map(Faults)
+}
 
 /// The mission that is attacked, and the kinds of attack.
 pub struct Options {
-    /// The mission, by name or file, as given to `firsthand run`.
-    pub mission: String,
-    /// The loaded mission, with its overrides.
+    pub asked: Arguments,
     pub loaded: Mission,
-    /// The overrides, `KEY=VALUE`.
+    /// The overrides of the mission, `KEY=VALUE`.
     pub set: Vec<String>,
-    pub robot: RobotName,
     /// The missions' pace, on the wall clock.
     pub pace: Pace,
-    /// Total number of signals.
-    pub kills: u32,
-    /// Seed of the schedule; the missions' seeds count up from it.
-    pub seed: u64,
-    /// Whether some signals hit a successor in its first milliseconds.
-    pub startup: bool,
-    /// Whether the supervisor is hit too; its run is resumed then. The robot is then a process of its own, like a real one.
-    pub supervisor: bool,
-    /// Whether some hits freeze supervisor and stages together, as if the machine stood still for a moment.
-    pub freeze_all: bool,
-    /// Whether missions are recorded, and every generation of every stage replayed.
-    pub replay: bool,
-    /// Consumers that are hit too.
-    pub consumers: Vec<Consumer>,
-    /// Whether nothing else is hit.
-    pub only_consumers: bool,
-    /// Directory of the table of signals.
-    pub out: Option<PathBuf>,
     /// Parent of the run directories. It is emptied after each mission.
     pub directory: PathBuf,
 }
 
 impl Options {
     pub(crate) fn records(&self) -> bool {
-        self.replay || self.consumers.contains(&Consumer::RunRecorder)
+        self.asked.replay || self.asked.include_consumers
+    }
+
+    pub(crate) fn consumers(&self) -> Vec<Consumer> {
+        let own = if self.asked.include_consumers { Consumer::own() } else { Vec::new() };
+        let given = self.asked.consumer.iter().cloned().map(Consumer::Given);
+        own.into_iter().chain(given).collect()
     }
 }

@@ -33,7 +33,6 @@ struct Shared {
     last_moving: Mutex<Option<Instant>>,
 }
 
-/// A running proxy. It ends when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Proxy {
     address: SocketAddr,
@@ -73,7 +72,6 @@ impl Proxy {
         self.address
     }
 
-    /// Begin the fault.
     pub(crate) fn begin_fault(&self) {
         self.shared.faulty.store(true, Ordering::Relaxed);
     }
@@ -104,7 +102,6 @@ fn sockets(robot: SocketAddr) -> io::Result<(UdpSocket, UdpSocket)> {
     Ok((front, back))
 }
 
-/// The state of the thread.
 struct Wire {
     front: UdpSocket,
     back: UdpSocket,

@@ -10,13 +10,11 @@ use crate::chaos::{
     signals::{Row, ms_since},
 };
 
-/// The recovery of a stage that was hit, until its successor works.
 pub(crate) struct PendingRecovery {
     pub(crate) stage: &'static str,
     pub(crate) generation: u32,
     pub(crate) at: Instant,
     startup_hit: StartupHit,
-    /// The measurements so far.
     pub(crate) row: Row,
 }
 

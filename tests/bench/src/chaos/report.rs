@@ -54,14 +54,11 @@ pub struct Report {
     pub(crate) took_s: f64,
 }
 
-/// Counts of a consumer in all missions.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct ConsumerCounts {
-    /// Times it was killed.
     pub killed: u32,
     /// Times it was frozen for a moment.
     pub frozen: u32,
-    /// Times it was started by chaos.
     pub started: u32,
     /// Times it ended without a signal of chaos.
     pub ended_by_itself: u32,
@@ -95,7 +92,6 @@ pub(crate) struct Recovery {
     pub output: Histogram,
 }
 
-/// The end of one mission.
 #[derive(Debug)]
 pub struct End {
     pub seed: u64,
@@ -174,7 +170,6 @@ impl Report {
         self.replays.get_or_insert_default()
     }
 
-    /// Ticks with and without consumers.
     pub(crate) fn tick_latencies(&mut self) -> &mut TickLatencies {
         self.tick_latencies.get_or_insert_default()
     }

@@ -5,7 +5,6 @@ use std::fs;
 use common::process_status;
 use serde::Serialize;
 
-/// Resources of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Resources {
     pub descriptors: i64,

@@ -51,18 +51,16 @@ pub struct FaultOptions {
     /// The mission, the robot and the first seed; the rest is not used.
     pub base: Options,
     pub faults: Vec<RobotFault>,
-    pub missions: u32,
 }
 
-/// Run the missions, one after the other. `show` is called after each.
 pub fn run_robot_faults(
     options: &FaultOptions,
     show: &mut dyn FnMut(&StopTimeTable),
 ) -> Result<StopTimeTable, BenchError> {
     let mut table = StopTimeTable::default();
     for &fault in &options.faults {
-        for number in 0..u64::from(options.missions) {
-            let seed = options.base.seed + number;
+        for number in 0..u64::from(options.base.asked.missions) {
+            let seed = options.base.asked.seed + number;
             let files = options.base.directory.join(format!("{}-{seed}", fault.row().name));
             fs::create_dir(&files).map_err(system("make a directory"))?;
             let entry = one(&options.base, fault, seed, &files)?;
@@ -101,7 +99,6 @@ fn start(
     Process::spawn(start).map_err(system("start a mission"))
 }
 
-/// The observations of a mission.
 #[derive(Debug, Default)]
 struct Observed {
     /// When the fault began, and the newest tick of the ground truth then.
@@ -265,13 +262,13 @@ fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
 
 /// A reader of the link's samples, once the bus exists.
 fn link(options: &Options) -> Option<Reader<LinkSample>> {
-    let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos").ok()?;
+    let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos").ok()?;
     bus.reader(&topics::LINK).ok()
 }
 
 /// Start an operator's stop.
 fn operator_stop(options: &Options) -> Result<Process, BenchError> {
-    let mut command = firsthand(&["stop", "--robot", &options.robot.to_string()]);
+    let mut command = firsthand(&["stop", "--robot", &options.asked.robot.to_string()]);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     Process::spawn(command).map_err(system("stop the robot"))
 }

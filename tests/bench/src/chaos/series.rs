@@ -8,7 +8,6 @@ use crate::chaos::{
 };
 use crate::error::BenchError;
 
-/// The state that the missions of one chaos share.
 pub(crate) struct Series<'a> {
     pub(crate) options: &'a Options,
     pub(crate) schedule: Schedule,
@@ -19,10 +18,10 @@ pub(crate) struct Series<'a> {
 
 impl<'a> Series<'a> {
     pub(crate) fn new(options: &'a Options) -> Result<Self, BenchError> {
-        let out = options.out.as_deref();
+        let out = options.asked.out.as_deref();
         Ok(Self {
             options,
-            schedule: Schedule::new(options.seed),
+            schedule: Schedule::new(options.asked.seed),
             report: Report::default(),
             signals: out.map(SignalsFile::create).transpose()?,
         })
@@ -37,6 +36,6 @@ impl<'a> Series<'a> {
     }
 
     pub(crate) fn is_over(&self) -> bool {
-        self.report.signals() >= self.options.kills
+        self.report.signals() >= self.options.asked.kills
     }
 }

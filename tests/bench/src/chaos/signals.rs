@@ -81,7 +81,6 @@ pub struct SignalsError {
     problem: String,
 }
 
-/// The file, while signals are sent.
 #[derive(Debug)]
 pub(crate) struct SignalsFile {
     path: PathBuf,

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use crate::chaos::robot_fault::{Promise, REST_LATER_S, REST_WITHIN_S, RobotFault};
 
-/// One mission of a robot with a fault.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
     pub fault: RobotFault,

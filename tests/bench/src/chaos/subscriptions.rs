@@ -29,7 +29,7 @@ pub(crate) struct Subscriptions {
 impl Subscriptions {
     /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
     pub(crate) fn join(options: &Options, supervisor: u32) -> Result<Option<Self>, BenchError> {
-        let bus = Bus::join(&Domain::of(options.robot.clone()), "chaos")?;
+        let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
         roster.waiter.on(bus.wakeup(&topics::HEALTH)?);

@@ -21,7 +21,6 @@ fn way() -> impl Iterator<Item = (&'static str, Answers)> {
     first.chain(again.map(|stage| (stage.name, Answers::Feedback)))
 }
 
-/// The times of all rounds.
 #[derive(Debug, Default)]
 pub(super) struct Budget {
     /// Nanoseconds of each row of [`way`], by column.

@@ -13,12 +13,10 @@ use supervisor::{process, summary::Quantiles};
 use super::{
     Options,
     budget::Budget,
-    consumers,
     process_set::{ProcessSet, Used},
 };
 use crate::error::{self, BenchError, system};
 
-/// One mission's ticks.
 #[derive(Debug)]
 pub(super) struct Ticks {
     pub(super) count: u64,
@@ -51,8 +49,6 @@ pub(super) fn measure(
     if budget.is_some() {
         command.env(latency_budget::ASKED_FOR, "1");
     }
-    // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
-    let _consumers = consumers::start(options.robot, options.consumers)?;
     let run = command
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

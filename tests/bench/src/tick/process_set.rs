@@ -8,7 +8,6 @@ use std::{
 
 use common::process_status;
 
-/// Resources of a set of processes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Used {
     /// Voluntary context switches of all threads in a second: each wait ends with a wakeup.
@@ -28,7 +27,6 @@ pub(super) struct ProcessSet {
     pss_kib: u64,
 }
 
-/// The counts at a moment.
 #[derive(Clone, Debug)]
 struct Counts {
     at: Instant,

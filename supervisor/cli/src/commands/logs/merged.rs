@@ -6,7 +6,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The extension of a log.
 const LOG: &str = "log";
 /// A longer line is cut, because a process may write lines of any length.
 const LONGEST_LINE: u64 = 64 << 10;
@@ -22,7 +21,6 @@ pub(crate) struct Logs {
     logs: Vec<Log>,
 }
 
-/// The log of one process.
 #[derive(Debug)]
 struct Log {
     process: String,
@@ -32,20 +30,17 @@ struct Log {
     position: u64,
     /// The beginning of a line whose end is not written yet.
     unfinished: Vec<u8>,
-    /// The next line.
     head: Option<Line>,
     /// The time of the last line that began with one.
     time: String,
 }
 
-/// A line of a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Line {
     /// The time in UTC as the process wrote it. A line without a time has the time of the line before.
     pub(crate) time: String,
     /// The process: a stage, `supervisor`, `x80-sim`.
     pub(crate) process: String,
-    /// The rest of the line.
     pub(crate) text: String,
 }
 
@@ -124,7 +119,6 @@ impl Log {
         }
     }
 
-    /// Read the next line, unless there is one.
     fn advance(&mut self) -> io::Result<()> {
         if self.head.is_some() {
             return Ok(());

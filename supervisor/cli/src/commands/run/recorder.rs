@@ -13,7 +13,6 @@ const ATTACHED_WITHIN: Duration = Duration::from_secs(2);
 /// The recorder takes some milliseconds to write its last chunk.
 const ENDED_WITHIN: Duration = Duration::from_secs(5);
 
-/// The recorder of one run.
 pub(crate) struct RunRecorder {
     process: Process,
 }

@@ -19,7 +19,6 @@ const UNFINISHED: &str = "summary.json.unfinished";
 /// A summary takes 2 kB.
 const ROOM: u64 = 16 << 10;
 
-/// The file before the end of the run.
 pub(crate) struct SummaryFile {
     file: File,
     directory: PathBuf,
@@ -44,7 +43,6 @@ impl SummaryFile {
         Ok(Self { file, directory: directory.to_path_buf() })
     }
 
-    /// Write the summary.
     pub(crate) fn write(mut self, text: &str) -> Result<(), String> {
         let (from, to) = (self.directory.join(UNFINISHED), self.directory.join(SUMMARY));
         let written = self.file.write_all(text.as_bytes());

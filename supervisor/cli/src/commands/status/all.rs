@@ -24,7 +24,6 @@ use crate::console::{
 /// The roster is published five times a second.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// A row of the list.
 #[derive(Serialize)]
 struct Listed {
     robot: String,

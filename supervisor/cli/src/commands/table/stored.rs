@@ -48,7 +48,6 @@ pub(crate) fn markdown(name: &str, section: Option<&str>) -> Option<String> {
     })
 }
 
-/// All results, section by section.
 pub(crate) fn results() -> String {
     let of_results = FILES.iter().filter(|(name, _)| *name != "capabilities");
     let printed =

@@ -69,7 +69,6 @@ pub(super) fn main(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The topic of that name.
 pub(super) fn readable(name: &str) -> Result<&'static dyn ReadableTopic, Failure> {
     let mut all = topics::READABLE.iter();
     all.find(|topic| topic.spec().name == name).copied().ok_or_else(|| {

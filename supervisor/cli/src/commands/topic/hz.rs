@@ -35,7 +35,6 @@ pub(super) struct Arguments {
     number: Option<u64>,
 }
 
-/// Each report covers this long.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
 /// The readers of a bus, and the rates of what they read.

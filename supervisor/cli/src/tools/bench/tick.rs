@@ -1,6 +1,6 @@
 //! `firsthand bench tick`: the time of a tick, and of the bus alone.
 
-use bench::tick::{self, Options, Regime, consumers, hops, parse_hz};
+use bench::tick::{self, Options, Regime, hops, parse_hz};
 use clap::Args;
 use common::{clock::Pace, domain::RobotName};
 
@@ -30,9 +30,6 @@ pub(crate) struct Arguments {
     /// Record the missions meanwhile, as `run` does.
     #[arg(long)]
     record: bool,
-    /// Number of processes that read grid and field of the missions meanwhile.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
-    consumers: u32,
     /// One line of JSON.
     #[arg(long)]
     json: bool,
@@ -42,9 +39,6 @@ pub(crate) struct Arguments {
     /// Be the forwarder that stands for this stage.
     #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
     forwarder: Option<String>,
-    /// Be a consumer of this robot.
-    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
-    consumer: bool,
     /// The parent process: this one stops when it ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
@@ -55,9 +49,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         Some(robot) => robot.clone(),
         None => format!("latency{}", std::process::id()).parse()?,
     };
-    if let (true, Some(supervisor)) = (arguments.consumer, arguments.supervisor) {
-        return Ok(consumers::run(&robot, supervisor)?);
-    }
     if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
         return Ok(hops::run_forwarder(&robot, place, supervisor)?);
     }
@@ -71,7 +62,6 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         rounds: arguments.rounds,
         budget: arguments.budget,
         record: arguments.record,
-        consumers: arguments.consumers,
     })?;
     Ok(print(&report, arguments.json)?)
 }

@@ -10,7 +10,6 @@ use rustix::process::Signal;
 
 use crate::console::operator;
 
-/// What an operator does to a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Action {
     Kill,
@@ -33,7 +32,6 @@ impl Action {
         !matches!(self, Self::Stop | Self::Resume)
     }
 
-    /// Do it to `robot`, or to its `stage`.
     fn perform(self, robot: &RobotName, stage: &str) -> Result<(), String> {
         let done = match self {
             Self::Kill => operator::send(robot, stage, Signal::KILL),
@@ -47,16 +45,11 @@ impl Action {
     }
 }
 
-/// The meaning of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
-    /// Choose the stage above.
     Up,
-    /// Choose the stage below.
     Down,
-    /// Do something.
     Act(Action),
-    /// End.
     Quit,
 }
 

@@ -19,7 +19,6 @@ use crate::console::rates::TopicRates;
 /// Rates are counted over this time.
 const COUNT_FOR: Duration = Duration::from_secs(1);
 
-/// Readers on the bus of a run.
 pub(super) struct Feed {
     roster: SliceReader<RosterHeader, RosterEntry>,
     pose: Reader<PoseSample>,
@@ -122,7 +121,6 @@ impl Feed {
         view.supervisor_usage = usages.next().unwrap_or_default();
     }
 
-    /// Count the outputs of the stages.
     fn count(&mut self, view: &mut View) -> Result<(), BusError> {
         let now = Instant::now();
         let due = now.saturating_duration_since(self.counted) >= COUNT_FOR;

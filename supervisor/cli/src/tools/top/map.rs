@@ -15,14 +15,11 @@ use super::view::View;
 /// Directions from east on, counter-clockwise, 45 degrees each.
 const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
 const ROBOT: [char; 8] = ['▶', '◥', '▲', '◤', '◀', '◣', '▼', '◢'];
-/// The letter at the target.
 pub(super) const TARGET: char = 'X';
-/// The letter on the way of the robot.
 pub(super) const WAY: char = '·';
 /// The field is drawn at one letter of this many to the right, and of this many down.
 const FIELD_EVERY: (usize, usize) = (4, 2);
 
-/// The colour of scanned cells.
 const SCANNED: Color = Color::Indexed(236);
 pub(super) const FIELD_STYLE: Style = Style::new().fg(Color::Indexed(67));
 pub(super) const WAY_STYLE: Style = Style::new().fg(Color::Magenta);

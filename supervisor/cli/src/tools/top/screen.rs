@@ -31,7 +31,6 @@ const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
 const DIM: Style = Style::new().fg(Color::DarkGray);
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 
-/// Draw `view` on all of `frame`.
 pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
     let [title, body, message, keys] = Layout::vertical([
         Constraint::Length(1),
@@ -154,7 +153,6 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     frame.render_stateful_widget(table, area, &mut state);
 }
 
-/// A row of the table.
 struct Cells {
     texts: [String; 9],
     style: Style,
@@ -215,7 +213,6 @@ fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     frame.render_widget(Paragraph::new(legend), foot);
 }
 
-/// The numbers of robot, guidance and link.
 fn numbers(view: &View) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
     let mut line = |name: &str, text: String, style: Style| {

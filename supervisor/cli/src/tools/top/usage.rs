@@ -7,7 +7,6 @@ use std::{
 
 use common::process_status::{kibibytes, processor_time};
 
-/// Processor and memory of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Usage {
     /// Share of one processor since the last look, from 0 to 1; none at the first look.

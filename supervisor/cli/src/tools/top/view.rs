@@ -18,10 +18,8 @@ use super::usage::Usage;
 const MOST_POINTS: usize = 4000;
 /// The distance between two points of the way, metres.
 const POINT_EVERY_M: f64 = 0.05;
-/// The longest list of events.
 const MOST_EVENTS: usize = 50;
 
-/// The data of the screen.
 #[derive(Debug)]
 pub(super) struct View {
     pub(super) robot: RobotName,
@@ -38,9 +36,7 @@ pub(super) struct View {
     pub(super) command: Option<CommandSample>,
     pub(super) link: Option<LinkSample>,
     pub(super) power: Option<PowerSample>,
-    /// The believed map.
     pub(super) grid: Replica<u8>,
-    /// The harmonic field's direction.
     pub(super) field: Replica<FieldCell>,
     /// The target, metres in the mission frame.
     pub(super) target: Option<DVec2>,
@@ -52,7 +48,6 @@ pub(super) struct View {
     pub(super) message: String,
 }
 
-/// A row of the table.
 #[derive(Clone, Debug)]
 pub(super) struct Stage {
     pub(super) entry: RosterEntry,

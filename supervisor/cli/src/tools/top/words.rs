@@ -17,7 +17,6 @@ pub(super) const fn guidance(status: u8) -> &'static str {
     }
 }
 
-/// The end of a stage's process.
 pub(super) fn death(death: &DeathSample) -> String {
     let (stage, generation) = (name_str(&death.stage), death.generation);
     let how = ExitCause::from(death);
@@ -26,7 +25,6 @@ pub(super) fn death(death: &DeathSample) -> String {
     format!("{at:.1} s {stage} {generation}: {hung}{how}")
 }
 
-/// The cause of a stall, and what is done about it.
 pub(super) fn stall(stall: &StallSample) -> String {
     let cause = match stall.cause() {
         StallCause::Still => "stands still",

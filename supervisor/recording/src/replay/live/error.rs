@@ -9,7 +9,6 @@ use thiserror::Error;
 use crate::RecordingError;
 
 pub(super) const NEVER_LIVE: &str = "x80-link";
-/// Errors of playing a recording.
 #[derive(Debug, Error)]
 pub enum LiveError {
     #[error(transparent)]

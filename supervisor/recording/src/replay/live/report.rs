@@ -12,11 +12,9 @@ pub struct LiveReport {
     pub stages: BTreeMap<&'static str, LiveStageReport>,
     /// The first difference between a live sample and the recorded one.
     pub first: Option<First>,
-    /// Samples that were played.
     pub played: u64,
 }
 
-/// The comparison for one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LiveStageReport {
     /// Ticks that both it and the recorded stage answered.
