@@ -11,7 +11,7 @@
 //! | [`words`] | states, ages and sizes in words |
 //! | [`missions`] | missions that ship and mission files, with assignments |
 //! | [`robots`] | the robots of this machine |
-//! | [`runs`], [`run_directories`] | the directories of runs |
+//! | [`runs`] | the directories of runs |
 //! | [`operator`] | requests and signals to the processes of a robot |
 //! | [`rates`] | how often topics are published, against the table |
 
@@ -22,7 +22,6 @@ pub(crate) mod output;
 pub(crate) mod progress_line;
 pub(crate) mod rates;
 pub(crate) mod robots;
-pub(crate) mod run_directories;
 pub(crate) mod runs;
 pub(crate) mod stream;
 pub(crate) mod table;

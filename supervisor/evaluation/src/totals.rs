@@ -122,9 +122,14 @@ impl Comparison {
 }
 
 impl fmt::Display for Estimate {
-    /// For example `.620 [.564, .673]`.
+    /// For example `.620 [.564, .673]`, or with signs as `{:+}`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.3} [{:.3}, {:.3}]", self.value, self.low, self.high)
+        let Self { value, low, high } = self;
+        if f.sign_plus() {
+            write!(f, "{value:+.3} [{low:+.3}, {high:+.3}]")
+        } else {
+            write!(f, "{value:.3} [{low:.3}, {high:.3}]")
+        }
     }
 }
 
@@ -133,25 +138,11 @@ impl fmt::Display for Comparison {
         write!(
             f,
             "{} against {}, {} pairs: success {:+}, collision {:+}",
-            self.to,
-            self.from,
-            self.pairs,
-            Signed(self.success),
-            Signed(self.collision)
+            self.to, self.from, self.pairs, self.success, self.collision
         )?;
         match self.time_ratio {
             Some(ratio) => write!(f, ", time x {ratio:.2}"),
             None => Ok(()),
         }
-    }
-}
-
-/// A difference, with its sign.
-struct Signed(Estimate);
-
-impl fmt::Display for Signed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Estimate { value, low, high } = self.0;
-        write!(f, "{value:+.3} [{low:+.3}, {high:+.3}]")
     }
 }

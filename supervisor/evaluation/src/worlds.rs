@@ -21,49 +21,50 @@ use crate::trial::{BodySize, Rules, Scene};
 /// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum Worlds {
-    /// Rooms, one in three with a door.
-    Rooms,
-    /// Rooms, all with a door.
-    Doors,
-    /// U traps of walls and of drums.
-    Traps,
-    /// Corridors with bends.
-    Corridors,
-    /// Straight empty corridors from 0.8 m.
-    StraightCorridors,
-    /// Rooms with tables, chairs, low and soft things.
-    Furnished,
+    Drawn(&'static Kind),
     /// A file or a folder: a mission, a ROS map, a BARN `.world` or table of cylinders.
     Path(PathBuf),
 }
 
-/// Kinds that are drawn, by their names.
-const DRAWN: [(&str, Worlds); 6] = [
-    ("rooms", Worlds::Rooms),
-    ("doors", Worlds::Doors),
-    ("traps", Worlds::Traps),
-    ("corridors", Worlds::Corridors),
-    ("straight-corridors", Worlds::StraightCorridors),
-    ("furnished", Worlds::Furnished),
+/// A kind of world that is drawn.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its stream of random numbers.
+    stream: u64,
+    name: &'static str,
+    draw: fn(&mut Random, usize) -> Scene,
+}
+
+const fn kind(stream: u64, name: &'static str, draw: fn(&mut Random, usize) -> Scene) -> Kind {
+    Kind { stream, name, draw }
+}
+
+static KINDS: [Kind; 6] = [
+    kind(1, "rooms", |random, number| rooms::draw(random, number, Doors::Some)),
+    kind(2, "doors", |random, number| rooms::draw(random, number, Doors::All)),
+    kind(3, "traps", traps::draw),
+    kind(4, "corridors", |random, _| corridors::draw(random, Bends::Oblique)),
+    kind(5, "straight-corridors", |random, _| corridors::draw(random, Bends::None)),
+    kind(6, "furnished", furnished::draw),
 ];
 
 impl FromStr for Worlds {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        let drawn = DRAWN.into_iter().find(|(name, _)| *name == text);
-        Ok(drawn.map_or_else(|| Self::Path(text.into()), |(_, worlds)| worlds))
+        let drawn = KINDS.iter().find(|kind| kind.name == text);
+        Ok(drawn.map_or_else(|| Self::Path(text.into()), Self::Drawn))
     }
 }
 
 /// The name that [`FromStr`] reads.
 impl fmt::Display for Worlds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self, DRAWN.iter().find(|(_, worlds)| worlds == self)) {
-            (Self::Path(path), _) => path.display().fmt(f),
-            (_, found) => f.write_str(found.map_or("", |(name, _)| name)),
+        match self {
+            Self::Drawn(kind) => f.write_str(kind.name),
+            Self::Path(path) => path.display().fmt(f),
         }
     }
 }
@@ -79,24 +80,8 @@ pub fn find(
     if ends.is_some() && !matches!(worlds, Worlds::Path(_)) {
         return Err(WorldError::NoMap);
     }
-    let drawn = |kind: u64, name: &str, draw: &dyn Fn(&mut Random, usize) -> Scene| {
-        draw_until(count.unwrap_or(100), seed, kind, name, body, draw)
-    };
     let found = match worlds {
-        Worlds::Rooms => {
-            drawn(1, "rooms", &|random, number| rooms::draw(random, number, Doors::Some))?
-        }
-        Worlds::Doors => {
-            drawn(2, "doors", &|random, number| rooms::draw(random, number, Doors::All))?
-        }
-        Worlds::Traps => drawn(3, "traps", &traps::draw)?,
-        Worlds::Corridors => {
-            drawn(4, "corridors", &|random, _| corridors::draw(random, Bends::Oblique))?
-        }
-        Worlds::StraightCorridors => {
-            drawn(5, "straight-corridors", &|random, _| corridors::draw(random, Bends::None))?
-        }
-        Worlds::Furnished => drawn(6, "furnished", &furnished::draw)?,
+        Worlds::Drawn(kind) => draw_until(count.unwrap_or(100), seed, kind, body)?,
         Worlds::Path(path) => files::read(path, Asked { count, seed, ends }, body)?,
     };
     if found.trials.is_empty() {
@@ -106,19 +91,13 @@ pub fn find(
 }
 
 /// Draw worlds until `count` of them are solvable.
-fn draw_until(
-    count: usize,
-    seed: u64,
-    kind: u64,
-    name: &str,
-    body: &BodySize,
-    draw: &dyn Fn(&mut Random, usize) -> Scene,
-) -> Result<Found, WorldError> {
+fn draw_until(count: usize, seed: u64, kind: &Kind, body: &BodySize) -> Result<Found, WorldError> {
+    let Kind { stream, name, draw } = kind;
     let mut found = Found::default();
     let mut drawn = 0;
     while found.trials.len() < count && drawn < MOST_FAILURES + count as u64 {
         let number = found.trials.len();
-        let scene = draw(&mut Random::new(seed, kind, drawn), number);
+        let scene = draw(&mut Random::new(seed, *stream, drawn), number);
         drawn += 1;
         let world = format!("{name}-{seed}-{number:04}");
         found.add(world, &scene, Rules::default(), body)?;
@@ -136,14 +115,7 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_worlds_and_another_others() {
-        for worlds in [
-            Worlds::Rooms,
-            Worlds::Doors,
-            Worlds::Traps,
-            Worlds::Corridors,
-            Worlds::StraightCorridors,
-            Worlds::Furnished,
-        ] {
+        for worlds in KINDS.iter().map(Worlds::Drawn) {
             let missions = |seed| -> Vec<Mission> {
                 let found = find(&worlds, Some(6), seed, None, &BODY).unwrap();
                 found.trials.into_iter().map(|trial| trial.mission).collect()
@@ -155,9 +127,7 @@ mod tests {
 
     #[test]
     fn every_world_can_be_crossed_and_nothing_stands_in_the_robot() {
-        for worlds in
-            [Worlds::Rooms, Worlds::Doors, Worlds::Traps, Worlds::Corridors, Worlds::Furnished]
-        {
+        for worlds in KINDS.iter().map(Worlds::Drawn) {
             for trial in find(&worlds, Some(20), 3, None, &BODY).unwrap().trials {
                 let mission = &trial.mission;
                 let name = &trial.world;
@@ -174,7 +144,7 @@ mod tests {
     #[test]
     fn the_guide_has_every_kind_of_world() {
         let page = include_str!("../../guide/evaluation.md");
-        for (name, _) in DRAWN {
+        for Kind { name, .. } in &KINDS {
             assert!(page.contains(&format!("\n| `{name}` | ")), "{name}");
         }
     }

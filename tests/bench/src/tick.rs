@@ -2,7 +2,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`Options`], [`measure`] | missions and bare hops, in turn |
+//! | [`Arguments`], [`measure`] | missions and bare hops, in turn |
 //! | [`hops`] | five bare hops between processes |
 //! | `mission` | a mission whose ticks are measured |
 //! | [`Regime`] | how ticks follow each other |
@@ -17,33 +17,51 @@ mod process_set;
 mod regime;
 mod report;
 
-use common::{domain::RobotName, latency::Histogram};
+use clap::Args;
+use common::{clock::Pace, domain::RobotName, latency::Histogram};
 
-pub use regime::{Regime, parse_hz};
 pub use report::Report;
 
 use crate::error::BenchError;
 use budget::Budget;
+use regime::{Regime, parse_hz};
 
-/// The mission that is measured, and how.
-#[derive(Debug)]
-pub struct Options<'a> {
-    /// A shipped mission or a mission file.
-    pub mission: &'a str,
-    /// `KEY=VALUE` over it.
-    pub set: &'a [String],
-    /// Ticks of the mission in a second of mission time.
-    pub rate_hz: f64,
-    /// The robot, which also names the shared memory.
-    pub robot: &'a RobotName,
-    /// How ticks and hops follow each other.
-    pub regime: Regime,
-    /// How often missions and hops are measured, in turn: a shared machine has good and bad moments.
+/// Measure a tick, datagram in to datagram out, and five bare hops between processes.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The mission whose ticks are measured.
+    #[arg(default_value = "open-room")]
+    pub mission: String,
+    /// The pace of the mission, at which the bare hops follow each other too.
+    #[arg(long, default_value = "max")]
+    pub pace: Pace,
+    /// Ticks a second instead of the pace; a robot has 7.
+    #[arg(long, value_name = "HZ", value_parser = parse_hz, conflicts_with = "pace")]
+    pub rate: Option<f64>,
+    /// Number of rounds, each of which measures both, because a shared machine has good and bad moments.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub rounds: u32,
-    /// Whether each stage's part of a tick is measured too.
+    /// Measure also the parts of a tick, in microseconds by stage and item.
+    #[arg(long)]
     pub budget: bool,
-    /// Whether the missions are recorded.
+    /// Set a key of the mission, as often as needed.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Record the missions meanwhile, as `run` does.
+    #[arg(long)]
     pub record: bool,
+    /// One line of JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Name of the robot, which also names its shared memory.
+    #[arg(long)]
+    pub robot: Option<RobotName>,
+    /// Be the forwarder that stands for this stage.
+    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
+    pub forwarder: Option<String>,
+    /// The parent process: this one stops when it ends.
+    #[arg(long, hide = true)]
+    pub supervisor: Option<u32>,
 }
 
 /// Trips of a round that follow each other without a pause.
@@ -51,23 +69,27 @@ const TRIPS: u64 = 2000;
 /// Trips of a round with the pause of a tick between them.
 const PACED_TRIPS: u64 = 50;
 
-/// Measure missions and bare hops.
-pub fn measure(options: &Options<'_>) -> Result<Report, BenchError> {
-    let trips = match options.regime {
+/// Measure missions of `robot` and bare hops, in turn. The mission has `rate_hz` ticks in a mission second.
+pub fn measure(
+    arguments: &Arguments,
+    robot: &RobotName,
+    rate_hz: f64,
+) -> Result<Report, BenchError> {
+    let regime = Regime::new(arguments.rate, arguments.pace, rate_hz);
+    let trips = match regime {
         Regime::BackToBack => TRIPS,
         Regime::Rate { .. } => PACED_TRIPS,
     };
-    let mut budget = options.budget.then(Budget::default);
+    let mut budget = arguments.budget.then(Budget::default);
     let mut hops = Histogram::default();
     let mut rounds = Vec::new();
-    for _ in 0..options.rounds {
-        let round = hops::measure(options.robot, trips, options.regime.period())?;
+    for _ in 0..arguments.rounds {
+        let round = hops::measure(robot, trips, regime.period())?;
         hops.add(round.counts(), round.max_ns());
-        rounds.push(mission::measure(options, budget.as_mut())?);
+        rounds.push(mission::measure(arguments, robot, regime.pace(rate_hz), budget.as_mut())?);
     }
-    let trips = u64::from(options.rounds) * trips;
-    let mut report =
-        Report::new(options.regime, &hops, trips, &rounds).ok_or(BenchError::Nothing)?;
+    let trips = u64::from(arguments.rounds) * trips;
+    let mut report = Report::new(regime, &hops, trips, &rounds).ok_or(BenchError::Nothing)?;
     report.budget = budget.map(Budget::rows);
     Ok(report)
 }

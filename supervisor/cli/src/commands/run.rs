@@ -25,7 +25,7 @@ use crate::{
         output::{print_text, write_stderr},
         progress_line::ProgressLine,
         robots::SUPERVISOR_LOG,
-        run_directories as directories,
+        runs,
     },
     logging,
 };
@@ -111,12 +111,12 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
         return resumed(arguments, found).map(Some);
     }
     if arguments.resume_last
-        && let Some(cut) = directories::cut_off(&arguments.runs, &arguments.robot)?
+        && let Some(cut) = runs::cut_off(&arguments.runs, &arguments.robot)?
     {
         if recovery::age_s(&cut)?.is_some_and(|age| age <= RESUMED_WITHIN_S) {
             return resumed(arguments, cut).map(Some);
         }
-        directories::mark_cut_off(&cut)
+        runs::mark_cut_off(&cut)
             .map_err(|error| format!("cannot mark {} as cut off: {error}", cut.display()))?;
         let cut = cut.display();
         write_stderr(&format!(
@@ -126,12 +126,12 @@ fn options(arguments: &Arguments) -> Result<Option<Options>, Failure> {
     }
     let mission = mission(arguments)?;
     let directory = match &arguments.out {
-        Some(directory) => directories::own(directory)?,
+        Some(directory) => runs::own(directory)?,
         None => {
             if let Some(keep) = arguments.keep {
-                directories::prune(&arguments.runs, &arguments.robot, keep);
+                runs::prune(&arguments.runs, &arguments.robot, keep);
             }
-            directories::numbered(&arguments.runs, &mission.name)?
+            runs::numbered(&arguments.runs, &mission.name)?
         }
     };
     Ok(Some(Options {

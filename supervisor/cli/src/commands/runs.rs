@@ -14,7 +14,6 @@ use serde::Serialize;
 use crate::console::{
     failure::Failure,
     output::{json_lines, print_text},
-    run_directories,
     runs::{self, Outcome, RunDirectory},
     table::{
         Align::{Left, Right},
@@ -90,7 +89,7 @@ fn list(arguments: &List) -> Result<ExitCode, Failure> {
     if let Some(keep) = arguments.prune {
         let robots: BTreeSet<_> = chosen(arguments).into_iter().map(|run| run.robot).collect();
         for robot in robots {
-            run_directories::prune(runs, &robot, keep);
+            runs::prune(runs, &robot, keep);
         }
     }
     let mut chosen = chosen(arguments);

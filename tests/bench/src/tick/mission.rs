@@ -7,11 +7,11 @@ use std::{
     time::Duration,
 };
 
-use common::latency_budget;
+use common::{clock::Pace, domain::RobotName, latency_budget};
 use supervisor::{process, summary::Quantiles};
 
 use super::{
-    Options,
+    Arguments,
     budget::Budget,
     process_set::{ProcessSet, Used},
 };
@@ -32,18 +32,21 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// Run the mission. Its stages measure their items only for a `budget`, because measuring takes time.
 pub(super) fn measure(
-    options: &Options<'_>,
+    arguments: &Arguments,
+    robot: &RobotName,
+    pace: Pace,
     budget: Option<&mut Budget>,
 ) -> Result<Ticks, BenchError> {
     let directory = tempfile::Builder::new().prefix("firsthand-latency-").tempdir();
     let directory = directory.map_err(system("make a directory for the mission"))?;
-    let pace = options.regime.pace(options.rate_hz).to_string();
-    let mut command = process::firsthand(&["run", options.mission, "--json", "--pace", &pace]);
-    command.args(["--robot", &options.robot.to_string(), "--out"]).arg(directory.path());
-    if !options.record {
+    let mut command = process::firsthand(&["run", &arguments.mission, "--json"]);
+    command
+        .args(["--pace", &pace.to_string(), "--robot", &robot.to_string(), "--out"])
+        .arg(directory.path());
+    if !arguments.record {
         command.arg("--no-record");
     }
-    for setting in options.set {
+    for setting in &arguments.set {
         command.args(["--set", setting]);
     }
     if budget.is_some() {

@@ -6,7 +6,7 @@ use common::clock::Pace;
 
 /// How ticks follow each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Regime {
+pub(crate) enum Regime {
     BackToBack,
     Rate {
         /// Ticks a second.
@@ -16,7 +16,7 @@ pub enum Regime {
 
 impl Regime {
     /// The regime of a mission with `rate_hz` ticks in a mission second at `pace`; or with `asked_hz` ticks a second.
-    pub fn new(asked_hz: Option<f64>, pace: Pace, rate_hz: f64) -> Self {
+    pub(crate) fn new(asked_hz: Option<f64>, pace: Pace, rate_hz: f64) -> Self {
         match (asked_hz, pace) {
             (Some(hz), _) => Self::Rate { hz },
             (None, Pace::Max) => Self::BackToBack,
@@ -25,7 +25,7 @@ impl Regime {
     }
 
     /// The pace that gives a mission with `rate_hz` ticks in a mission second this regime.
-    pub fn pace(self, rate_hz: f64) -> Pace {
+    pub(crate) fn pace(self, rate_hz: f64) -> Pace {
         match self {
             Self::BackToBack => Pace::Max,
             Self::Rate { hz } => Pace::Rate(hz / rate_hz),
@@ -33,7 +33,7 @@ impl Regime {
     }
 
     /// Time from tick to tick; none if they follow at once.
-    pub fn period(self) -> Option<Duration> {
+    pub(crate) fn period(self) -> Option<Duration> {
         match self {
             Self::BackToBack => None,
             Self::Rate { hz } => Some(Duration::from_secs_f64(1.0 / hz)),
@@ -51,7 +51,7 @@ impl fmt::Display for Regime {
 }
 
 /// Ticks a second, as the command line gives them.
-pub fn parse_hz(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_hz(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(hz),
         _ => Err(format!("{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}")),
