@@ -11,8 +11,8 @@ use common::{clock::Pace, domain::RobotName, latency_budget};
 use supervisor::{process, summary::Quantiles};
 
 use super::{
-    Arguments,
     budget::Budget,
+    options::Arguments,
     process_set::{ProcessSet, Used},
 };
 use crate::error::{self, BenchError, system};
