@@ -11,6 +11,8 @@ use common::{
 };
 use serde_json::{Value, json};
 
+use crate::downsampled::Downsampled;
+
 /// Channels and their schemas.
 pub(crate) const CHANNELS: &[(&str, &str)] = &[
     ("foxglove/pose", "foxglove.PoseInFrame"),
@@ -43,10 +45,7 @@ pub(crate) struct Drawn {
     grid_ns: Option<u64>,
     scene_ns: Option<u64>,
     pose: Pose2,
-    trajectory: Vec<[f64; 2]>,
-    /// Every `stride`-th pose is stored.
-    stride: usize,
-    poses: usize,
+    trajectory: Downsampled<[f64; 2], TRAJECTORY>,
 }
 
 /// A message: channel, mission time, content.
@@ -60,9 +59,7 @@ impl Drawn {
             grid_ns: None,
             scene_ns: None,
             pose: Pose2::default(),
-            trajectory: Vec::new(),
-            stride: 1,
-            poses: 0,
+            trajectory: Downsampled::default(),
         }
     }
 
@@ -83,18 +80,7 @@ impl Drawn {
 
     fn pose(&mut self, sample: &PoseSample, began_ns: u64) -> Drawing {
         self.pose = sample.pose();
-        if self.poses.is_multiple_of(self.stride) {
-            self.trajectory.push([sample.x_m, sample.y_m]);
-        }
-        self.poses += 1;
-        if self.trajectory.len() >= TRAJECTORY {
-            let mut index = 0;
-            self.trajectory.retain(|_| {
-                index += 1;
-                index % 2 == 1
-            });
-            self.stride *= 2;
-        }
+        self.trajectory.push([sample.x_m, sample.y_m]);
         let stamp_ns = sample.stamp.stamp_ns;
         let pose = json!({
             "timestamp": time(began_ns + stamp_ns),
@@ -153,7 +139,8 @@ impl Drawn {
                 }],
             })
         };
-        let mut entities = vec![entity("trajectory", self.trajectory.clone(), [0.0, 0.3, 0.8])];
+        let mut entities =
+            vec![entity("trajectory", self.trajectory.items().to_vec(), [0.0, 0.3, 0.8])];
         if let Some(mission) = &self.mission {
             let cone = cone(mission, self.pose, range);
             entities.push(entity("sonar", cone, [0.9, 0.5, 0.0]));
@@ -247,18 +234,6 @@ mod tests {
         assert_eq!(of("fo"), "Zm8=");
         assert_eq!(of("foo"), "Zm9v");
         assert_eq!(of("foobar"), "Zm9vYmFy");
-    }
-
-    #[test]
-    fn a_long_trajectory_is_thinned_and_stays_bounded() {
-        let mut drawn = Drawn::new(None);
-        for tick in 0..10_000_u64 {
-            let sample = PoseSample { x_m: tick as f64, ..PoseSample::default() };
-            drawn.pose(&sample, 0);
-            assert!(drawn.trajectory.len() < TRAJECTORY);
-        }
-        assert!(drawn.trajectory.len() > TRAJECTORY / 4);
-        assert!(drawn.trajectory.last().unwrap()[0] > 9_900.0);
     }
 
     #[test]

@@ -42,6 +42,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`schema`] | the schema of a topic, made from its layout |
+//! | [`downsampled`] | a bounded number of samples |
 //! | `file` | writing the file |
 //! | `foxglove` | messages for viewers |
 //! | `log_files` | lines that the processes of a run append to their logs |
@@ -51,6 +52,7 @@
 //! | [`replay`] | recordings replayed to the bit (feature `replay`) |
 //! | `error` | errors |
 
+pub mod downsampled;
 mod error;
 mod file;
 mod foxglove;

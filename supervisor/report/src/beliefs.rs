@@ -9,7 +9,7 @@ use common::{
 };
 use planner::step::{Input, Planner};
 
-use crate::downsampled::drop_every_second;
+use recording::downsampled::drop_every_second;
 
 /// Most maps. When there are more, every second one is dropped, and from then on half as many are taken.
 const MOST: usize = 8;

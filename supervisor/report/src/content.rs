@@ -7,17 +7,19 @@ use common::{
     samples::{CommandSample, GridHeader, PoseSample, RangeSample, WheelSample},
     topics::{self, AnyTopic},
 };
-use recording::{End, Message, Recording};
+use recording::{End, Message, Recording, downsampled::Downsampled};
 use serde_json::{Map, Value};
 
 use crate::{
     beliefs::Beliefs,
-    downsampled::Downsampled,
     error::ReportError,
     events::Events,
     measured::Measured,
     source::{self, Source},
 };
+
+/// Most samples of a topic that are drawn.
+const MOST: usize = 20_000;
 
 pub(crate) struct Content {
     pub(crate) mission: Mission,
@@ -27,10 +29,10 @@ pub(crate) struct Content {
     /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
-    pub(crate) poses: Downsampled<PoseSample>,
-    pub(crate) ranges: Downsampled<RangeSample>,
-    pub(crate) commands: Downsampled<CommandSample>,
-    pub(crate) wheels: Downsampled<WheelSample>,
+    pub(crate) poses: Downsampled<PoseSample, MOST>,
+    pub(crate) ranges: Downsampled<RangeSample, MOST>,
+    pub(crate) commands: Downsampled<CommandSample, MOST>,
+    pub(crate) wheels: Downsampled<WheelSample, MOST>,
     pub(crate) grid: Replica<u8>,
     /// The header of the newest grid.
     pub(crate) grid_header: GridHeader,

@@ -12,7 +12,6 @@
 //! | module | holds |
 //! |---|---|
 //! | `source` | the recordings of the run, and its summary |
-//! | `downsampled` | a bounded number of samples |
 //! | `content` | the data that a report takes from the recordings |
 //! | `events` | deaths, recoveries and other events |
 //! | `measured` | metrics of the recording itself |
@@ -24,7 +23,6 @@
 
 mod beliefs;
 mod content;
-mod downsampled;
 mod error;
 mod events;
 mod figures;

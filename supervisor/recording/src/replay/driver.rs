@@ -20,7 +20,7 @@ use crate::{
     replay::{
         generation::{Generation, Setting},
         report::Report,
-        samples::time_of,
+        samples::{stamp_of, time_of},
     },
 };
 
@@ -140,9 +140,7 @@ impl Generations {
         } else {
             let writer = topics::TABLE.iter().find(|known| known.spec().name == topic);
             let writer = writer.map_or("", |topic| topic.spec().writer);
-            let number = message.data.get(20..).and_then(|rest| rest.first_chunk());
-            let number = number.map_or(0, |bytes| u32::from_le_bytes(*bytes));
-            if let Some(generation) = self.of(writer, number) {
+            if let Some(generation) = self.of(writer, stamp_of(&message.data).generation) {
                 let Message { topic, sequence, data, .. } = message;
                 generation.output(setting, &topic, sequence, data);
             }

@@ -1,6 +1,7 @@
 //! Recorded samples of a tick: their tick and time, and where two of them differ.
 
 use common::{
+    bus::{Layout as _, Stamp, cdr::Decoder},
     clock::MissionTime,
     topics::{self, AnyTopic},
 };
@@ -33,17 +34,18 @@ pub struct First {
     pub values: [String; 2],
 }
 
+/// The stamp that a message begins with.
+pub(crate) fn stamp_of(message: &[u8]) -> Stamp {
+    let stamp = Decoder::new(message).and_then(|mut from| Stamp::decode(&mut from));
+    stamp.unwrap_or_default()
+}
+
 pub(crate) fn tick_of(message: &[u8]) -> u64 {
-    number(message, 4)
+    stamp_of(message).tick
 }
 
 pub(crate) fn time_of(message: &[u8]) -> MissionTime {
-    MissionTime(number(message, 12))
-}
-
-fn number(message: &[u8], at: usize) -> u64 {
-    let bytes = message.get(at..).and_then(|rest| rest.first_chunk());
-    bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes))
+    stamp_of(message).time()
 }
 
 /// Place of a grid's `keyframe`: behind stamp, version and five numbers.

@@ -11,6 +11,7 @@ use common::{
     },
 };
 use glam::DVec2;
+use recording::downsampled::drop_every_second;
 
 use super::usage::Usage;
 
@@ -97,11 +98,7 @@ impl View {
         let last = self.way.last();
         if last.is_none_or(|last| last.distance(position) >= POINT_EVERY_M) {
             if self.way.len() == MOST_POINTS {
-                let mut nth = 0;
-                self.way.retain(|_| {
-                    nth += 1;
-                    nth % 2 == 1
-                });
+                drop_every_second(&mut self.way);
             }
             self.way.push(position);
         }

@@ -43,11 +43,17 @@ impl<I: Iterator<Item = Result<Message, RecordingError>>> Iterator for ByTick<I>
 
 #[cfg(test)]
 mod tests {
+    use common::{
+        bus::{Stamp, encode_sample},
+        samples::PoseSample,
+    };
+
     use super::*;
 
     fn message(topic: &str, tick: u64) -> Message {
-        let mut data = vec![0; 4];
-        data.extend_from_slice(&tick.to_le_bytes());
+        let mut data = Vec::new();
+        let stamp = Stamp { tick, ..Stamp::default() };
+        encode_sample(&PoseSample { stamp, ..PoseSample::default() }, &mut data);
         Message { topic: topic.into(), log_ns: 0, sequence: 0, data }
     }
 

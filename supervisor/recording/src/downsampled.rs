@@ -1,10 +1,7 @@
 //! A bounded number of samples of a longer sequence.
 
-/// Most samples of a kind.
-const MOST: usize = 20_000;
-
 /// Drop every second sample, from the second one on.
-pub(crate) fn drop_every_second<T>(items: &mut Vec<T>) {
+pub fn drop_every_second<T>(items: &mut Vec<T>) {
     let mut nth = 0;
     items.retain(|_| {
         nth += 1;
@@ -12,22 +9,22 @@ pub(crate) fn drop_every_second<T>(items: &mut Vec<T>) {
     });
 }
 
-/// Samples in order. When there are too many, every second one is dropped, and from then on only every second one is taken.
+/// Samples in order. When there are more than `MOST`, every second one is dropped, and from then on only every second one is taken.
 #[derive(Clone, Debug)]
-pub(crate) struct Downsampled<T> {
+pub struct Downsampled<T, const MOST: usize> {
     items: Vec<T>,
     seen: usize,
     stride: usize,
 }
 
-impl<T> Default for Downsampled<T> {
+impl<T, const MOST: usize> Default for Downsampled<T, MOST> {
     fn default() -> Self {
         Self { items: Vec::new(), seen: 0, stride: 1 }
     }
 }
 
-impl<T> Downsampled<T> {
-    pub(crate) fn push(&mut self, item: T) {
+impl<T, const MOST: usize> Downsampled<T, MOST> {
+    pub fn push(&mut self, item: T) {
         if self.items.len() == MOST {
             drop_every_second(&mut self.items);
             self.stride = self.stride.saturating_mul(2);
@@ -38,12 +35,12 @@ impl<T> Downsampled<T> {
         self.seen = self.seen.saturating_add(1);
     }
 
-    pub(crate) fn items(&self) -> &[T] {
+    pub fn items(&self) -> &[T] {
         &self.items
     }
 
     /// Samples of the sequence for each stored one.
-    pub(crate) const fn stride(&self) -> usize {
+    pub const fn stride(&self) -> usize {
         self.stride
     }
 }
@@ -54,7 +51,8 @@ mod tests {
 
     #[test]
     fn of_very_many_samples_a_bounded_number_is_kept_at_equal_steps() {
-        let mut kept = Downsampled::default();
+        const MOST: usize = 1000;
+        let mut kept = Downsampled::<_, MOST>::default();
         (0..1_000_000).for_each(|nth| kept.push(nth));
         assert!((MOST / 2..=MOST).contains(&kept.items().len()));
         let step = kept.stride();
