@@ -47,7 +47,11 @@ impl Process for Shell {
     fn open(context: &mut Context) -> Result<Self, StageError> {
         let no_thread = |error| StageError::Other(format!("cannot start a thread: {error}"));
         let background = BackgroundSolver::start().map_err(no_thread)?;
-        context.waiter.on_readable(&background)?;
+        // In lockstep a result is waited for when it is due.
+        let lockstep = matches!(context.run.clock, MissionClock::Ticks { .. });
+        if !lockstep {
+            context.waiter.on_readable(&background)?;
+        }
         let field = FieldPublisher::start().map_err(no_thread)?;
         context.waiter.on_readable(&field)?;
         let cells = context.run.mission.grid_frame().area();
@@ -57,7 +61,7 @@ impl Process for Shell {
             pose: context.reader(&POSE)?,
             background,
             field,
-            lockstep: matches!(context.run.clock, MissionClock::Ticks { .. }),
+            lockstep,
             job: None,
             latest_pose: None,
             answered: None,
