@@ -129,7 +129,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
 
     /// Join the robot's bus, if there is one. Returns whether it was joined.
     fn look(&mut self) -> Result<bool, BusError> {
-        let Ok(making) = BusInstance::current(&self.domain) else {
+        let Ok(instance) = BusInstance::current(&self.domain) else {
             return Ok(false);
         };
         if !self.domain.is_supervised() {
@@ -143,10 +143,10 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             }
             Err(error) => {
                 let since = match self.refused.take() {
-                    Some((refused, since)) if refused == making => since,
+                    Some((refused, since)) if refused == instance => since,
                     _ => Instant::now(),
                 };
-                self.refused = Some((making, since));
+                self.refused = Some((instance, since));
                 if since.elapsed() >= REFUSED_FOR {
                     return Err(error);
                 }

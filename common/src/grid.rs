@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`mission::grid`] | the state of a cell, windows of cells, cells and metres |
 //! | `part.rs` | which part of which version of a map a sample carries |
-//! | `replica.rs` | a follower's copy of a map, kept up to date from such parts |
+//! | `replica.rs` | a follower's copy of a map, updated from such parts |
 
 mod part;
 mod replica;

@@ -298,7 +298,7 @@ mod tests {
             let said = bad.parse::<TickTimes>();
             assert!(said.is_err(), "{bad}: {said:?}");
         }
-        // Nobody asked.
+        // Without the request nothing is written.
         let unasked = directory.path().join("none");
         LatencyBudget::default().save(&unasked).unwrap();
         assert!(!unasked.exists());
