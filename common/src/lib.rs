@@ -30,6 +30,7 @@
 pub mod checkpoint;
 pub mod external;
 pub mod faults;
+pub mod file;
 pub mod follower;
 pub mod grid;
 pub mod ground_truth;

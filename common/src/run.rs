@@ -10,7 +10,9 @@ use std::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{address::Address, clock::MissionClock, domain::RobotName, mission::Mission};
+use crate::{
+    address::Address, clock::MissionClock, domain::RobotName, file::replace, mission::Mission,
+};
 
 /// The file's name in the run directory.
 pub const FILE_NAME: &str = "run.toml";
@@ -85,14 +87,6 @@ pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
 /// Where a process of the run in `directory` saves the state that its successor restores.
 pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
     directory.join(format!("{process}.checkpoint"))
-}
-
-/// Replace `file`. A kill leaves its old content or the new one.
-pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
-    let mut new = file.as_os_str().to_owned();
-    new.push(".new");
-    fs::write(&new, content)?;
-    fs::rename(&new, file)
 }
 
 #[cfg(test)]

@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
-use crate::{
-    latency::Latency,
-    row::Row,
-    table::{Table, TableError},
-};
+use common::file::FileError;
+
+use crate::{latency::Latency, row::Row, table::Table};
 
 /// Name of the file of rows.
 const ROWS_FILE: &str = "rows.csv";
@@ -21,14 +19,14 @@ pub struct Results {
 
 impl Results {
     /// The tables in `directory`, or empty ones.
-    pub fn open(directory: &Path) -> Result<Self, TableError> {
+    pub fn open(directory: &Path) -> Result<Self, FileError> {
         Ok(Self {
             rows: Table::open(&directory.join(ROWS_FILE))?,
             latencies: Table::open(&directory.join(LATENCIES_FILE))?,
         })
     }
 
-    pub fn sort(&mut self) -> Result<(), TableError> {
+    pub fn sort(&mut self) -> Result<(), FileError> {
         self.rows.sort()?;
         self.latencies.sort()
     }

@@ -8,6 +8,7 @@ use std::{
     thread,
 };
 
+use common::file::FileError;
 use supervisor::{process::firsthand, summary::Summary};
 use thiserror::Error;
 
@@ -16,7 +17,6 @@ use crate::{
     results::Results,
     row::{Outcome, Row},
     setting::Setting,
-    table::TableError,
     trial::Trial,
 };
 
@@ -72,14 +72,9 @@ const fn mixed(bits: u32) -> u32 {
 #[derive(Debug, Error)]
 pub enum RunnerError {
     #[error(transparent)]
-    Table(#[from] TableError),
-    #[error("cannot {action}: {source}")]
-    System { action: String, source: io::Error },
-}
-
-fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> RunnerError {
-    let action = action.into();
-    move |source| RunnerError::System { action, source }
+    File(#[from] FileError),
+    #[error("cannot start a mission: {0}")]
+    Start(io::Error),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -145,13 +140,12 @@ pub fn run(
     let pictures = plan.pictured_seed.map(|_| "pictures");
     for folder in ["worlds", "failures"].into_iter().chain(pictures) {
         let folder = plan.directory.join(folder);
-        fs::create_dir_all(&folder).map_err(system(format!("make {}", folder.display())))?;
+        fs::create_dir_all(&folder).map_err(FileError::of("make", &folder))?;
     }
     for trial in &plan.trials {
         let text = toml::to_string(&trial.mission).map_err(io::Error::other);
         let file = plan.mission_file(trial);
-        text.and_then(|text| fs::write(&file, text))
-            .map_err(system(format!("write {}", file.display())))?;
+        text.and_then(|text| fs::write(&file, text)).map_err(FileError::of("write", &file))?;
     }
     let done = results.rows.keys();
     let all = plan.jobs().count();
@@ -213,7 +207,7 @@ fn mission(
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .output()
-        .map_err(system("start a mission"))?;
+        .map_err(RunnerError::Start)?;
     let (row, latency) = match serde_json::from_slice::<Summary>(&output.stdout) {
         Ok(summary) => {
             let row = Row::new(trial, *seed, setting, &summary);

@@ -3,13 +3,11 @@
 use std::{
     collections::BTreeSet,
     fs::File,
-    io,
     path::{Path, PathBuf},
 };
 
-use common::run::replace;
+use common::file::{FileError, replace};
 use serde::{Serialize, de::DeserializeOwned};
-use thiserror::Error;
 
 /// World, noise seed and setting, which identify a mission.
 pub type Key = (String, u64, String);
@@ -20,14 +18,6 @@ pub trait Record: Serialize + DeserializeOwned {
     fn key(&self) -> Key;
 }
 
-#[derive(Debug, Error)]
-#[error("cannot {action} {}: {problem}", file.display())]
-pub struct TableError {
-    action: &'static str,
-    file: PathBuf,
-    problem: String,
-}
-
 #[derive(Debug)]
 pub struct Table<R> {
     file: PathBuf,
@@ -36,10 +26,10 @@ pub struct Table<R> {
 
 impl<R: Record> Table<R> {
     /// The table in `file`: with its rows, or empty.
-    pub fn open(file: &Path) -> Result<Self, TableError> {
+    pub fn open(file: &Path) -> Result<Self, FileError> {
         let mut table = Self { file: file.to_path_buf(), rows: Vec::new() };
         if file.exists() {
-            let mut reader = csv::Reader::from_path(file).map_err(table.failed("read"))?;
+            let mut reader = csv::Reader::from_path(file).map_err(FileError::of("read", file))?;
             let whole = reader.deserialize().map_while(Result::ok);
             // A mission whose row was cut off is run again.
             table.rows = whole.collect();
@@ -57,19 +47,19 @@ impl<R: Record> Table<R> {
         self.rows.iter().map(R::key).collect()
     }
 
-    pub fn add(&mut self, row: R) -> Result<(), TableError> {
+    pub fn add(&mut self, row: R) -> Result<(), FileError> {
         let opened = File::options().append(true).open(&self.file);
-        let opened = opened.map_err(|error| self.failed("append to")(error.into()))?;
+        let opened = opened.map_err(FileError::of("append to", &self.file))?;
         let mut writer =
             csv::WriterBuilder::new().has_headers(self.rows.is_empty()).from_writer(opened);
         let written = writer.serialize(&row).and_then(|()| Ok(writer.flush()?));
-        written.map_err(self.failed("append to"))?;
+        written.map_err(FileError::of("append to", &self.file))?;
         self.rows.push(row);
         Ok(())
     }
 
     /// Sort the rows by world, seed and setting, and rewrite the file. If a mission has two rows, the later one stays.
-    pub fn sort(&mut self) -> Result<(), TableError> {
+    pub fn sort(&mut self) -> Result<(), FileError> {
         self.rows.reverse();
         self.rows.sort_by_key(R::key);
         self.rows.dedup_by_key(|row| row.key());
@@ -77,27 +67,13 @@ impl<R: Record> Table<R> {
     }
 
     /// Replace the file by one with all rows.
-    fn save(&self) -> Result<(), TableError> {
+    fn save(&self) -> Result<(), FileError> {
         let write = || -> Result<(), csv::Error> {
             let mut writer = csv::Writer::from_writer(Vec::new());
             self.rows.iter().try_for_each(|row| writer.serialize(row))?;
             let rows = writer.into_inner().map_err(csv::IntoInnerError::into_error)?;
             Ok(replace(&self.file, rows)?)
         };
-        write().map_err(self.failed("write"))
-    }
-
-    fn failed(&self, action: &'static str) -> impl Fn(csv::Error) -> TableError {
-        let file = self.file.clone();
-        move |error| TableError {
-            action,
-            file: file.clone(),
-            problem: match error.kind() {
-                csv::ErrorKind::Io(source) if source.kind() == io::ErrorKind::NotFound => {
-                    "its directory is missing".to_owned()
-                }
-                _ => error.to_string(),
-            },
-        }
+        write().map_err(FileError::of("write", &self.file))
     }
 }

@@ -1,14 +1,14 @@
 //! Errors of recordings.
 
-use std::{io, path::PathBuf};
+use std::path::PathBuf;
 
-use common::bus::BusError;
+use common::{bus::BusError, file::FileError};
 use thiserror::Error;
 
 #[derive(Debug, Error)]
 pub enum RecordingError {
-    #[error("cannot {action} recording {file}: {source}")]
-    File { action: &'static str, file: PathBuf, source: io::Error },
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error("cannot write recording {file}: {problem}; is the disk full?")]
     Write { file: PathBuf, problem: String },
     #[error("{0} holds no recording.mcap; give a recorded run or a recording")]

@@ -10,6 +10,7 @@ use std::{
 
 use common::{
     bus::Stamp,
+    file::FileError,
     topics::{EncodedTopic, Spec},
 };
 use mcap::{
@@ -49,10 +50,9 @@ impl RecordingFile {
         topics: &[&'static dyn EncodedTopic],
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
-        let named =
-            |source| RecordingError::File { action: "make", file: path.to_path_buf(), source };
+        let named = |error: io::Error| FileError::of("make recording", path)(error);
         if path.exists() {
-            return Err(named(io::ErrorKind::AlreadyExists.into()));
+            return Err(named(io::ErrorKind::AlreadyExists.into()).into());
         }
         let mut unfinished = path.as_os_str().to_owned();
         unfinished.push(".new");

@@ -11,6 +11,7 @@ use std::{
 
 use common::{
     bus::{Layout, Payload, SliceTopic, Stamped, Topic, decode_sample, decode_slice},
+    file::FileError,
     run::Run,
     topics::AnyTopic,
 };
@@ -294,11 +295,7 @@ impl std::fmt::Debug for Records {
 
 impl Records {
     fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::File {
-            action: "read",
-            file: path.to_path_buf(),
-            source,
-        })?;
+        let file = File::open(path).map_err(FileError::of("read recording", path))?;
         // A chunk is checked as a whole before its content is used.
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
@@ -332,13 +329,8 @@ impl Records {
                             read => break read,
                         }
                     };
-                    let read = read.map_err(|source| {
-                        Stop::Error(RecordingError::File {
-                            action: "read",
-                            file: self.path.clone(),
-                            source,
-                        })
-                    })?;
+                    let read = read.map_err(FileError::of("read recording", &self.path));
+                    let read = read.map_err(|error| Stop::Error(error.into()))?;
                     self.reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {

@@ -1,10 +1,6 @@
 //! Errors of reports.
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
-
+use common::file::FileError;
 use recording::RecordingError;
 use thiserror::Error;
 
@@ -12,11 +8,6 @@ use thiserror::Error;
 pub enum ReportError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    #[error("cannot {action} {file}: {source}")]
-    File { action: &'static str, file: PathBuf, source: io::Error },
-}
-
-pub(crate) fn failed(action: &'static str, file: &Path) -> impl FnOnce(io::Error) -> ReportError {
-    let file = file.to_path_buf();
-    move |source| ReportError::File { action, file, source }
+    #[error(transparent)]
+    File(#[from] FileError),
 }

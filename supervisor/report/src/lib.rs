@@ -40,7 +40,9 @@ use std::{
 
 pub use error::ReportError;
 
-use self::{content::Content, error::failed, source::Source};
+use common::file::FileError;
+
+use self::{content::Content, source::Source};
 
 /// The page's name in the directory of a report.
 pub const PAGE: &str = "report.html";
@@ -51,7 +53,7 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
     let source = Source::find(run)?;
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);
     let content = Content::read(&source)?;
-    fs::create_dir_all(&out).map_err(failed("make", &out))?;
+    fs::create_dir_all(&out).map_err(FileError::of("make", &out))?;
     let figures = figures::all(&content);
     for figure in &figures {
         save(&out.join(format!("{}.svg", figure.name)), &figure.svg)?;
@@ -62,9 +64,9 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
 }
 
 /// An incomplete file is removed.
-fn save(file: &Path, text: &str) -> Result<(), ReportError> {
+fn save(file: &Path, text: &str) -> Result<(), FileError> {
     fs::write(file, text).map_err(|error| {
         let _ = fs::remove_file(file);
-        failed("write", file)(error)
+        FileError::of("write", file)(error)
     })
 }

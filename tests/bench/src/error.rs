@@ -2,11 +2,9 @@
 
 use std::{io, path::PathBuf, time::Duration};
 
-use common::{bus::BusError, start::StageError};
+use common::{bus::BusError, file::FileError, start::StageError};
 use supervisor::{DomainError, simulator::SimulatorError, summary::Summary};
 use thiserror::Error;
-
-use crate::chaos::signals::SignalsError;
 
 /// A trip takes microseconds, the forwarders' start some milliseconds; a sample that takes longer is lost.
 pub(crate) const LOST: Duration = Duration::from_secs(5);
@@ -23,7 +21,7 @@ pub enum BenchError {
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
     #[error(transparent)]
-    Signals(#[from] SignalsError),
+    File(#[from] FileError),
     #[error("cannot {action}: {source}")]
     System { action: &'static str, source: io::Error },
     #[error("no sample came back within {LOST:?}; is the machine overloaded?")]

@@ -7,7 +7,10 @@ use std::{
 };
 
 use clap::Args;
-use common::mission::{Mission, Model};
+use common::{
+    file::FileError,
+    mission::{Mission, Model},
+};
 use evaluation::{
     directory::{self, PAGE_FILE},
     report::{self, Report},
@@ -122,7 +125,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     console.end();
     results.sort()?;
     let page = plan.directory.join(PAGE_FILE);
-    fs::write(&page, report::html(&plan, &results, &described))?;
+    fs::write(&page, report::html(&plan, &results, &described))
+        .map_err(FileError::of("write", &page))?;
     let report = Report::new(&plan, results.rows.rows());
     let text = if arguments.json {
         format!("{}\n", as_json(&report)?)

@@ -3,7 +3,7 @@
 use std::{fmt::Write as _, fs, num::NonZero, path::PathBuf};
 
 use clap::Args;
-use common::mission::Realism;
+use common::{file::FileError, mission::Realism};
 use evaluation::{
     directory::{self, PAGE_FILE},
     experiments::{
@@ -80,8 +80,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     results.sort()?;
     let report = Report::new(&chosen, results.rows.rows());
     let page = directory.join(PAGE_FILE);
-    fs::write(&page, report.html(&described, FIRST_SEED))
-        .map_err(|error| format!("cannot write {}: {error}", page.display()))?;
+    fs::write(&page, report.html(&described, FIRST_SEED)).map_err(FileError::of("write", &page))?;
     let mut text = String::new();
     if arguments.json {
         for object in report.objects() {

@@ -3,12 +3,13 @@
 
 use std::{
     fs::{self, File},
+    io,
     path::{Path, PathBuf},
     time::Instant,
 };
 
+use common::file::FileError;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::chaos::kind::Kind;
 
@@ -72,15 +73,6 @@ pub(crate) fn ms_since(at: Instant) -> f64 {
     (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
-/// The table of signals cannot be written or read.
-#[derive(Debug, Error)]
-#[error("cannot {action} {}: {problem}", file.display())]
-pub struct SignalsError {
-    action: &'static str,
-    file: PathBuf,
-    problem: String,
-}
-
 #[derive(Debug)]
 pub(crate) struct SignalsFile {
     path: PathBuf,
@@ -89,29 +81,26 @@ pub(crate) struct SignalsFile {
 
 impl SignalsFile {
     /// Make `directory` and the file in it.
-    pub(crate) fn create(directory: &Path) -> Result<Self, SignalsError> {
+    pub(crate) fn create(directory: &Path) -> Result<Self, FileError> {
         let path = directory.join(FILE_NAME);
-        fs::create_dir_all(directory).map_err(failed("make the directory of", &path))?;
+        fs::create_dir_all(directory).map_err(FileError::of("make the directory of", &path))?;
         let file = File::create_new(&path).map_err(|error| {
-            let remedy = match error.kind() {
-                std::io::ErrorKind::AlreadyExists => "; give another directory",
-                _ => "",
+            let error = match error.kind() {
+                io::ErrorKind::AlreadyExists => {
+                    io::Error::other(format!("{error}; give another directory"))
+                }
+                _ => error,
             };
-            failed("make", &path)(format!("{error}{remedy}"))
+            FileError::of("make", &path)(error)
         })?;
         Ok(Self { path, writer: csv::Writer::from_writer(file) })
     }
 
-    pub(crate) fn add(&mut self, row: &Row) -> Result<(), SignalsError> {
+    pub(crate) fn add(&mut self, row: &Row) -> Result<(), FileError> {
         let written = self.writer.serialize(row);
-        written.map_err(failed("write", &self.path))?;
-        self.writer.flush().map_err(failed("write", &self.path))
+        written.map_err(FileError::of("write", &self.path))?;
+        self.writer.flush().map_err(FileError::of("write", &self.path))
     }
-}
-
-fn failed<E: ToString>(action: &'static str, file: &Path) -> impl FnOnce(E) -> SignalsError {
-    let file = file.to_path_buf();
-    move |problem| SignalsError { action, file, problem: problem.to_string() }
 }
 
 #[cfg(test)]

@@ -1,0 +1,35 @@
+//! The error of a file that cannot be used, and the replacement of a file.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+#[derive(Debug, Error)]
+#[error("cannot {action} {}: {source}", file.display())]
+pub struct FileError {
+    pub action: &'static str,
+    pub file: PathBuf,
+    pub source: io::Error,
+}
+
+impl FileError {
+    /// Makes the error of doing `action` to `file` from its cause.
+    pub fn of<E: Into<io::Error>>(
+        action: &'static str,
+        file: &Path,
+    ) -> impl FnOnce(E) -> Self + use<E> {
+        let file = file.to_path_buf();
+        move |cause| Self { action, file, source: cause.into() }
+    }
+}
+
+/// Replace `file`. A kill leaves its old content or the new one.
+pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+    let mut new = file.as_os_str().to_owned();
+    new.push(".new");
+    fs::write(&new, content)?;
+    fs::rename(&new, file)
+}
