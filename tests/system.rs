@@ -32,6 +32,7 @@ mod robot_faults;
 mod screen;
 mod services;
 mod structure;
+mod stopping;
 mod telemetry;
 mod transports;
 mod wire_faults;

@@ -22,6 +22,7 @@
 //! | [`external`] | how a stage that the supervisor did not start takes its place |
 //! | [`stage_command`] | the command line of a stage's process |
 //! | [`wiring`] | what a stage's process opens and persists, declared |
+//! | [`stop_socket`] | the operator's stop without middleware |
 //! | [`shell`] | the process shell every stage runs in |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
@@ -51,6 +52,7 @@ pub mod stage;
 pub mod stage_command;
 pub mod start;
 pub mod step;
+pub mod stop_socket;
 pub mod topics;
 pub mod wiring;
 

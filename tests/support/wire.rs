@@ -10,7 +10,7 @@ use std::{
         mpsc::{Receiver, channel},
     },
     thread::JoinHandle,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use serde_json::Value;
@@ -64,6 +64,25 @@ impl Robot {
         }
     }
 
+    /// Wait for the next record of its ground truth. Returns whether both wheels rest.
+    pub fn wait_for_a_tick(&mut self) -> bool {
+        rests(&self.truth.recv_timeout(PATIENCE).unwrap())
+    }
+
+    /// Wait until both wheels rest.
+    pub fn wait_until_at_rest(&mut self) {
+        let began = Instant::now();
+        while !self.wait_for_a_tick() {
+            assert!(began.elapsed() < PATIENCE, "the robot moves");
+        }
+    }
+
+    /// Whether both wheels rest by the newest record.
+    pub fn is_at_rest(&mut self) -> bool {
+        let newest = self.truth.try_iter().last();
+        newest.map_or_else(|| self.wait_for_a_tick(), |truth| rests(&truth))
+    }
+
     /// Kill the robot. Returns its distance from its start by then.
     pub fn kill(mut self) -> f64 {
         self.process.kill().unwrap();
@@ -71,6 +90,11 @@ impl Robot {
         let last = self.truth.iter().last();
         last.map_or(self.went, |truth| from_start(&truth))
     }
+}
+
+fn rests(truth: &Value) -> bool {
+    let speed = |key: &str| truth[key].as_f64().unwrap().abs();
+    speed("v") < 0.01 && speed("omega") < 0.05
 }
 
 fn from_start(truth: &Value) -> f64 {

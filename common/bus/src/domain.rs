@@ -157,6 +157,12 @@ impl Domain {
         self.directory.join("run-directory")
     }
 
+    /// The socket of the link that an operator's stop needs no middleware for.
+    #[must_use]
+    pub fn stop_socket(&self) -> PathBuf {
+        self.directory.join("stop")
+    }
+
     /// A link to the middleware's configuration of the current [`BusInstance`](crate::bus_instance::BusInstance). A consumer in any
     /// language loads it first.
     #[must_use]

@@ -18,6 +18,7 @@
 //! | `make` | creating and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files that killed processes leave |
 //! | `ownership` | checks of the owner and the permissions of a bus's files |
+//! | `close_on_exec` | descriptors that a child must not inherit |
 //! | `write`, `read` | writers; readers and wakeups |
 //! | `any` | readers of any topic |
 //! | `open` | writers of any topic, and the processes that have it open |
@@ -36,6 +37,7 @@ mod any;
 pub mod bus_instance;
 pub mod cdr;
 pub mod clock;
+mod close_on_exec;
 pub mod domain;
 mod encoded;
 mod error;
@@ -56,6 +58,7 @@ mod write;
 
 pub use self::{
     any::{AnyReader, AnySample, ReadableTopic},
+    close_on_exec::close_all_on_exec,
     encoded::{EncodedReader, EncodedTopic, EncodedWriter},
     error::BusError,
     layout::{

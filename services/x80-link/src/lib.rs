@@ -12,6 +12,7 @@
 //! | `writers` | the processes whose commands and orders the link accepts |
 //! | [`stage`] | the link as a stage: the entries of a recording, and the samples that it publishes |
 //! | [`shell`] | the process of the link: the wire and the topics that it reads |
+//! | [`stop_guard`] | the process that stops a moving robot when the link's process ended |
 
 pub mod backoff;
 pub mod drive;
@@ -20,6 +21,7 @@ mod rangers;
 pub mod shell;
 pub mod stage;
 pub mod step;
+pub mod stop_guard;
 pub mod telemetry;
 pub mod transport;
 mod writers;

@@ -1,11 +1,12 @@
 //! The process of the link. It reads the wire, `command`, `directive`, `tick_limit` and `roster`, and writes the wire, `range`,
 //! `wheels`, `link` and telemetry.
 
-use std::time::Duration;
+use std::{io, time::Duration};
 
 use common::{
     bus::Reader,
     clock::{MissionClock, monotonic_ns},
+    domain::Domain,
     latency::Histogram,
     latency_budget::{Answers, LatencyBudget},
     samples::{
@@ -14,6 +15,7 @@ use common::{
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
     step::Step as _,
+    stop_socket::{Request, StopMark, StopSocket},
     topics::{self, AnyTopic as _},
     wiring::Wiring,
 };
@@ -25,6 +27,7 @@ use crate::{
     },
     stage::{Entry, LinkStage, Taken, WIRE_PIECE},
     step::{Effect, Event},
+    stop_guard::StopGuard,
     transport::{Transport, TransportError},
     writers::Writers,
 };
@@ -40,6 +43,13 @@ pub struct Shell {
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
     runner: Runner<LinkStage>,
+    /// None where it could not be made, which the log says.
+    stop_socket: Option<StopSocket>,
+    stop_mark: StopMark,
+    /// Whether the mark is set, as far as this link knows.
+    marked: bool,
+    /// None in lockstep, where a robot waits for commands, and where it could not be started, which the log says.
+    guard: Option<StopGuard>,
     /// Whether the topics of telemetry are open.
     has_telemetry: bool,
     clock: MissionClock,
@@ -67,28 +77,51 @@ impl Process for Shell {
     };
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
+        // The socket is there before the guard, which knows this link by it.
+        let domain = Domain::of(context.run.robot.clone());
+        let stop_socket = StopSocket::bind(&domain)
+            .inspect_err(without("operators' stops without middleware"))
+            .ok();
+        let directory = &context.generation.directory;
+        let in_ticks = matches!(context.run.clock, MissionClock::Ticks { .. });
+        let guard = (!in_ticks)
+            .then(|| StopGuard::start(directory).inspect_err(without("stop guard")).ok())
+            .flatten();
+        let stop_mark = StopMark::of(directory);
         let transport = Transport::open(&context.run.address).map_err(wire_broke)?;
         context.waiter.on_readable(&transport)?;
+        if let Some(socket) = &stop_socket {
+            context.waiter.on_readable(socket)?;
+        }
         let runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
         let mut command = context.reader(&topics::COMMAND)?;
         let writers = Writers::open(context, &mut command)?;
-        Ok(Self {
+        let mut shell = Self {
             transport,
             command,
             writers,
             directive: context.reader(&topics::DIRECTIVE)?,
             tick_limit: context.reader(&topics::TICK_LIMIT)?,
             runner,
+            stop_socket,
+            marked: stop_mark.is_set(),
+            stop_mark,
+            guard,
             has_telemetry: false,
             clock: context.run.clock,
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
             budget: context.budget.clone(),
-        })
+        };
+        if shell.marked {
+            shell.take(Event::Operator(Request::Stop), monotonic_ns())?;
+        }
+        Ok(shell)
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
+        self.take_operators_requests()?;
         self.maintain()?;
         if let Some(directive) = self.directive.newest()? {
             let order = Order::from_byte(directive.order);
@@ -117,6 +150,7 @@ impl Process for Shell {
         }
         self.maintain()?;
         self.take(Event::Quiet, monotonic_ns())?;
+        self.answer_operators();
         if monotonic_ns() - self.stated_ns >= topics::LINK.restated_every().as_nanos() as u64 {
             self.state()?;
         }
@@ -150,12 +184,23 @@ impl Process for Shell {
         self.carry_out(effects)?;
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
+        let link = &self.runner.stage.link;
+        if (link.is_at_rest() || !link.was_heard())
+            && let Some(guard) = self.guard.take()
+        {
+            guard.release();
+        }
         Ok(())
     }
 }
 
+/// Log that the link goes on without `what`.
+fn without(what: &'static str) -> impl Fn(&io::Error) {
+    move |error| tracing::error!(%error, "the link goes on without its {what}")
+}
+
 #[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
-fn wire_broke(error: TransportError) -> StageError {
+pub(crate) fn wire_broke(error: TransportError) -> StageError {
     StageError::Other(error.to_string())
 }
 
@@ -186,6 +231,32 @@ fn log_decision(before: Decision, now: Decision) {
 }
 
 impl Shell {
+    fn take_operators_requests(&mut self) -> Result<(), StageError> {
+        while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
+            tracing::warn!(?request, "an operator asks the link itself");
+            self.take(Event::Operator(request), monotonic_ns())?;
+        }
+        Ok(())
+    }
+
+    /// Tell operators that the robot rests, and leave the mark of a stop for the next link.
+    fn answer_operators(&mut self) {
+        let link = &self.runner.stage.link;
+        if link.decision().stops()
+            && link.is_at_rest()
+            && let Some(socket) = &mut self.stop_socket
+        {
+            socket.tell_at_rest();
+        }
+        let stopped = link.is_stopped_by_operator();
+        if stopped != self.marked {
+            self.marked = stopped;
+            if let Err(error) = self.stop_mark.set(stopped) {
+                tracing::error!(%error, "cannot mark the operator's stop: a link that is started again will not know of it");
+            }
+        }
+    }
+
     /// Reopen a closed wire, and tell the link when the wire opens or closes.
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();

@@ -14,6 +14,7 @@ use common::{
     stage::Stage,
     start::StageError,
     step::{ForeignState, Step as _},
+    stop_socket::Request,
     topics::{INFRARED, POWER, RANGE, SURROUNDINGS, WHEELS, WIRE},
 };
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,8 @@ pub enum Taken<'a> {
     TickLimit(u64),
     /// [`Event::Quiet`].
     Quiet,
+    /// As [`Event::Operator`]: whether to stop.
+    Operator(bool),
 }
 
 impl<'a> Taken<'a> {
@@ -61,6 +64,7 @@ impl<'a> Taken<'a> {
             Event::Order(order, reason) => Self::Order(order.into(), reason.into()),
             Event::TickLimit(last) => Self::TickLimit(last),
             Event::Quiet => Self::Quiet,
+            Event::Operator(request) => Self::Operator(request == Request::Stop),
         }
     }
 
@@ -74,6 +78,8 @@ impl<'a> Taken<'a> {
             }
             Self::TickLimit(last) => Event::TickLimit(*last),
             Self::Quiet => Event::Quiet,
+            Self::Operator(true) => Event::Operator(Request::Stop),
+            Self::Operator(false) => Event::Operator(Request::Resume),
         }
     }
 }

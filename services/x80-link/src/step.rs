@@ -17,6 +17,7 @@ use common::{
         Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, WheelSample,
     },
     step::{ForeignState, Step},
+    stop_socket::Request,
     wire::{Decoder, DecoderTally, MotorSensors},
 };
 
@@ -123,7 +124,6 @@ impl Step for Link {
             last_tick: None,
             newest_command: None,
             repeat: None,
-            // The robot has not moved yet, so no stop needs to be sent.
             decision: Decision { action: Action::Stop, cause: Cause::NotOrdered },
             stop_sent_ns: None,
             due: 0,
@@ -153,6 +153,8 @@ impl Step for Link {
             Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
             Event::Command(command) => self.take_command(command, now_ns, &mut effects),
             Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
+            Event::Operator(Request::Stop) => self.observe(Observation::Stopped, now_ns),
+            Event::Operator(Request::Resume) => self.observe(Observation::Resumed, now_ns),
             Event::TickLimit(last_tick) => self.last_tick = Some(last_tick),
             Event::Quiet => {}
         }
@@ -215,6 +217,16 @@ impl Link {
     /// The number of times that the robot was lost.
     pub fn losses(&self) -> u64 {
         self.monitors().presence.losses()
+    }
+
+    /// Whether the robot has ever answered.
+    pub fn was_heard(&self) -> bool {
+        self.connected() || self.losses() > 0
+    }
+
+    /// Whether an operator stopped the robot at its link.
+    pub const fn is_stopped_by_operator(&self) -> bool {
+        self.monitors().orders.stopped_here()
     }
 
     /// The stops that are sent when the stage ends.

@@ -136,7 +136,8 @@ const EXIT_CODES: &str = "Exit codes of run:
   5  collision (simulated robot)
   6  aborted by a fault
   7  an earlier run was cut off (--resume-last)
-  9  in the wrong place by the ground truth (simulated robot)
+  9  in the wrong place: by the ground truth (simulated robot), or where it came to rest
+ 10  could not be stopped: told to stand by every method, it moves
  78  invalid mission file; do not retry
 
 An error message ends with a code in brackets, which scripts can match.";

@@ -51,6 +51,7 @@ impl DomainLock {
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         let lock = lock(&domain)?;
+        remove_run(&domain)?;
         let mut acquired =
             Self { domain, bus: None, stages_lock: None, joining_lock: None, cells, _lock: lock };
         acquired.recreate_bus()?;
@@ -90,6 +91,7 @@ impl Drop for DomainLock {
         // The lock is removed last, with its directory; a process that waits for it then makes its own.
         let _ = self.clear();
         let domain = &self.domain;
+        let _ = remove_run(domain);
         for file in [domain.stages_lock_file(), domain.joining_lock_file(), domain.lock_file()] {
             let _ = fs::remove_file(file);
         }
@@ -164,13 +166,17 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
     }
 }
 
+/// Remove what names a run and its link.
+fn remove_run(domain: &Domain) -> Result<(), DomainError> {
+    let files = [domain.run_link(), domain.run_directory(), domain.stop_socket()];
+    files.iter().try_for_each(|file| remove_file(file))
+}
+
 /// Remove all files of the middleware in this domain. Files of another user in shared memory are left: a new bus has
 /// random names, so nobody can have taken them.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     // A process cannot join a bus without a configuration.
     remove_file(&domain.middleware_config())?;
-    remove_file(&domain.run_link())?;
-    remove_file(&domain.run_directory())?;
     let directory = domain.directory();
     let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
     for entry in configs.flatten() {

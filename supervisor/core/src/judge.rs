@@ -1,6 +1,6 @@
 //! Whether the mission is over, and how it ended. Pure.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::{
     address::Address,
@@ -12,18 +12,22 @@ use x80_link::failsafe;
 
 use crate::{
     outcome::{Ending, Outcome},
+    policy::Now,
     records,
 };
 
-/// A pipeline without a tick for so long, although nothing holds it, is stuck. This is wall-clock time: in lockstep mission
-/// time does not advance meanwhile, so the mission's own timeout would not end it.
+/// A pipeline without a tick for so long, although nothing holds it, is stuck. This is time in which the supervisor ran: in
+/// lockstep mission time does not advance meanwhile, so the mission's own timeout would not end it.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
+
+/// A robot that was told to stand and does not rest by then could not be stopped: the link has used each method of the
+/// protocol twice by then.
+pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 
 /// The input of the judgement.
 #[derive(Clone, Debug)]
 pub(crate) struct Snapshot<'a> {
-    /// Distance from the target at which the controller reported its arrival, metres.
-    pub arrived_m: Option<f64>,
+    pub arrival: Option<Arrival>,
     pub link: Option<&'a LinkSample>,
     pub simulated: bool,
     pub simulator_ended: bool,
@@ -34,7 +38,7 @@ pub(crate) struct Snapshot<'a> {
     /// Mission time advances with ticks, not with the wall clock.
     pub in_ticks: bool,
     /// The time when the newest tick was first seen or the order last changed, whichever is later.
-    pub progress: Instant,
+    pub progress: Now,
     /// The robot was once ready to drive.
     pub was_ready: bool,
     pub reason: HoldReason,
@@ -45,10 +49,19 @@ pub(crate) struct Snapshot<'a> {
     pub address: &'a Address,
 }
 
+/// An arrival that the controller reported.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
+    /// Distance of the newest pose from the target, metres.
+    pub distance_m: f64,
+    /// When it was first seen.
+    pub since: Now,
+}
+
 /// The end of the mission at `now`, if it has come. The first rule that applies decides.
-pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
+pub(crate) fn judge(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
     simulator_ended(snapshot)
-        .or_else(|| arrived(snapshot))
+        .or_else(|| arrived(snapshot, now))
         .or_else(|| ended_by_failsafe(snapshot))
         .or_else(|| collided(snapshot))
         .or_else(|| overran(snapshot))
@@ -97,8 +110,16 @@ fn simulator_ended(snapshot: &Snapshot<'_>) -> Option<Ending> {
     (snapshot.simulator_ended).then(|| Ending::failed(Outcome::Aborted, reason))
 }
 
-fn arrived(snapshot: &Snapshot<'_>) -> Option<Ending> {
-    snapshot.arrived_m.map(reached)
+/// An arrival counts when the encoders say that the robot rests. In lockstep it does when no command follows.
+fn arrived(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
+    let Arrival { distance_m, since } = snapshot.arrival?;
+    let at_rest = snapshot.link.is_some_and(|link| link.at_rest == 1);
+    if snapshot.in_ticks || at_rest {
+        return Some(reached(distance_m));
+    }
+    let arrived = format!("arrived {distance_m:.2} m from the target");
+    (now.saturating_sub(since) >= RESTS_WITHIN)
+        .then(|| Ending::failed(Outcome::Aborted, format!("{arrived}, and was not seen at rest")))
 }
 
 fn ended_by_failsafe(snapshot: &Snapshot<'_>) -> Option<Ending> {
@@ -118,7 +139,7 @@ fn overran(snapshot: &Snapshot<'_>) -> Option<Ending> {
     late.then(|| snapshot.deadline.timed_out())
 }
 
-fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
+fn stuck(snapshot: &Snapshot<'_>, now: Now) -> Option<Ending> {
     let may_wait = match snapshot.reason {
         // A real robot may be out of reach for any time.
         HoldReason::None => !snapshot.simulated,
@@ -127,7 +148,7 @@ fn stuck(snapshot: &Snapshot<'_>, now: Instant) -> Option<Ending> {
         HoldReason::StageHeld => !snapshot.in_ticks,
         HoldReason::Starting | HoldReason::Ending => false,
     };
-    if may_wait || now.duration_since(snapshot.progress) < NO_PROGRESS {
+    if may_wait || now.saturating_sub(snapshot.progress) < NO_PROGRESS {
         return None;
     }
     let robot_answers = snapshot.link.is_some_and(|link| link.connected == 1);
@@ -170,16 +191,16 @@ impl StopClock {
 #[derive(Debug)]
 pub(crate) struct TickProgress {
     tick: Option<u64>,
-    since: Instant,
+    since: Now,
 }
 
 impl TickProgress {
-    pub(crate) const fn new(now: Instant) -> Self {
+    pub(crate) const fn new(now: Now) -> Self {
         Self { tick: None, since: now }
     }
 
     /// Record the newest `tick` at `now`. Returns when it was first seen.
-    pub(crate) fn update(&mut self, tick: Option<u64>, now: Instant) -> Instant {
+    pub(crate) fn update(&mut self, tick: Option<u64>, now: Now) -> Now {
         if tick != self.tick {
             (self.tick, self.since) = (tick, now);
         }

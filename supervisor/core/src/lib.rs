@@ -37,7 +37,7 @@
 //! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
 //! | [`planner_executable`] | the executable that a mission names for the planner, checked |
 //! | [`process`] | a process that is watched, signalled, reaped |
-//! | `descriptors` | what a child must not inherit |
+//! | `descriptors` | the limit of this process's descriptors |
 //! | `stage_process`, `stage_processes` | one stage with its policy and process; all of them |
 //! | `bus_endpoints`, [`observer`], [`totals`] | what the supervisor reads from and writes to the bus; totals of it |
 //! | `observed_time` | time that the supervisor was there to see: what deadlines count |
@@ -96,6 +96,7 @@ pub use domain_error::DomainError;
 pub use error::SupervisorError;
 pub use progress::Progress;
 pub use records::DEATHS;
-pub use run::{Finished, run};
+pub use run::{Finished, StillMoving, run};
 pub use stage_processes::Starter;
 pub use supervisor::Options;
+pub use x80_link::stop_guard;

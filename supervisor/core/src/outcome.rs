@@ -3,6 +3,8 @@
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use serde::{Deserialize, Serialize};
 
+use crate::shutdown::Wheels;
+
 /// A simulated robot that reports its arrival and by the ground truth stands farther from its target than this is in the wrong
 /// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
@@ -22,6 +24,8 @@ pub enum Outcome {
     /// Stopped by hand, or something failed.
     #[default]
     Aborted,
+    /// The robot was told to stand by every method of its protocol, and its encoders say that it moves.
+    CouldNotBeStopped,
 }
 
 impl Outcome {
@@ -33,6 +37,7 @@ impl Outcome {
             Self::Timeout => "timeout",
             Self::Collision => "collision",
             Self::Aborted => "aborted",
+            Self::CouldNotBeStopped => "could_not_be_stopped",
         }
     }
 }
@@ -53,19 +58,44 @@ impl Ending {
         Self { outcome, reason: reason.into(), cause: None, asked_for: false }
     }
 
-    /// This ending; or the wrong place, if the ground truth `ended` shows that a robot did not reach its target.
-    pub(crate) fn checked(self, mission: &Mission, ended: Option<&GroundTruthTick>) -> Self {
-        let distance_m = ended
-            .map_or(0.0, |ended| (ended.x - mission.target.x).hypot(ended.y - mission.target.y));
+    /// This ending; or the wrong place, if the robot did not reach its target by the ground truth `ended`, or came to rest
+    /// `at_rest_m` from it by its own pose, metres.
+    pub(crate) fn checked(
+        self,
+        mission: &Mission,
+        ended: Option<&GroundTruthTick>,
+        at_rest_m: Option<f64>,
+    ) -> Self {
         let allowed_m = RIGHT_PLACE_M.max(mission.arrival_tolerance_m);
-        if self.outcome != Outcome::Reached || distance_m <= allowed_m {
+        let by_truth_m =
+            ended.map(|ended| (ended.x - mission.target.x).hypot(ended.y - mission.target.y));
+        let too_far = |distance_m: &f64| *distance_m > allowed_m;
+        let said = &self.reason;
+        let contradicted = if let Some(distance_m) = by_truth_m.filter(too_far) {
+            format!("{said} by its own pose, {distance_m:.2} m by the ground truth")
+        } else if let Some(distance_m) = at_rest_m.filter(too_far) {
+            format!("{said}, and came to rest {distance_m:.2} m from it")
+        } else {
+            return self;
+        };
+        if self.outcome != Outcome::Reached {
             return self;
         }
-        let said = self.reason;
-        let reason = format!(
-            "{said} by its own pose, {distance_m:.2} m by the ground truth: more than {allowed_m} m"
-        );
-        Self::failed(Outcome::WrongPlace, reason)
+        Self::failed(Outcome::WrongPlace, format!("{contradicted}: more than {allowed_m} m"))
+    }
+
+    /// This ending, with what the encoders said when the stages were stopped.
+    pub(crate) fn with(self, wheels: Wheels) -> Self {
+        match wheels {
+            Wheels::AtRest => self,
+            Wheels::Unknown => {
+                Self { reason: format!("{}; nobody saw it at rest", self.reason), ..self }
+            }
+            Wheels::Turning => {
+                let reason = format!("{}; told to stand by every method, it moves", self.reason);
+                Self { cause: self.cause, ..Self::failed(Outcome::CouldNotBeStopped, reason) }
+            }
+        }
     }
 
     /// An end that the user asked for.
@@ -91,7 +121,7 @@ mod tests {
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
             let ended = ended.map(at);
             let ending = Ending::asked_for(said, "0.08 m from the target");
-            let checked = ending.checked(&mission, ended.as_ref());
+            let checked = ending.checked(&mission, ended.as_ref(), None);
             assert_eq!(checked.asked_for, checked.outcome != WrongPlace);
             checked.outcome
         };

@@ -14,6 +14,7 @@ use std::{
 };
 
 use common::{
+    bus::close_all_on_exec,
     poll,
     samples::{DeathCause, DeathSample},
     stage_command,
@@ -22,7 +23,7 @@ use common::{
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
-use crate::{descriptors, planner_executable};
+use crate::planner_executable;
 
 /// The kernel ends a killed process within this, unless it hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
@@ -129,7 +130,7 @@ impl fmt::Display for ExitCause {
 impl Process {
     /// Start `command`. It inherits no descriptor but the standard ones.
     pub fn spawn(mut command: Command) -> io::Result<Self> {
-        descriptors::close_all_on_exec()?;
+        close_all_on_exec()?;
         let mut child = command.spawn()?;
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
             Ok(pidfd) => Ok(Self { id: child.id(), child: Some(child), pidfd }),

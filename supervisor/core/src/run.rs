@@ -16,7 +16,7 @@ use crate::{
     observer::Record,
     outcome::Ending,
     progress::Progress,
-    shutdown,
+    shutdown::{self, Wheels},
     supervisor::{Options, Supervisor},
 };
 
@@ -45,13 +45,39 @@ pub struct Finished {
     pub resets: u64,
 }
 
+/// A robot that could not be stopped. Its link goes on telling it to stand, by each method of the protocol in turn.
+pub struct StillMoving<'a> {
+    supervisor: Supervisor<'a>,
+    signals: Signals,
+    _lock: DomainLock,
+}
+
+impl StillMoving<'_> {
+    /// Wait until the robot rests or a signal tells this process to leave it. Returns whether the robot rests.
+    pub fn watch(mut self) -> Result<bool, SupervisorError> {
+        let supervisor = &mut self.supervisor;
+        let at_rest = loop {
+            shutdown::turn(supervisor)?;
+            if shutdown::wheels(supervisor) == Wheels::AtRest {
+                break true;
+            }
+            if self.signals.came() {
+                break false;
+            }
+            supervisor.wait()?;
+        };
+        shutdown::finish(supervisor)?;
+        Ok(at_rest)
+    }
+}
+
 /// Carry out a run. `attach` is called once, when the robot's bus exists and no stage has started: consumers that start
 /// there miss no sample. `show` is called a few times a second.
-pub fn run(
-    options: &Options,
+pub fn run<'a>(
+    options: &'a Options,
     attach: &mut dyn FnMut(),
     show: &mut dyn FnMut(&Progress<'_>),
-) -> Result<Finished, SupervisorError> {
+) -> Result<(Finished, Option<StillMoving<'a>>), SupervisorError> {
     let mut signals =
         Signals::catch(&[SIGINT, SIGTERM, SIGHUP]).map_err(system("catch signals"))?;
     let turns = Turns::default();
@@ -71,12 +97,12 @@ pub fn run(
     let stopped = shutdown::stop(&mut supervisor);
     turns.end();
     let ending = ending?;
-    stopped?;
+    let wheels = stopped?;
     let end_by_stall = supervisor.end_by_stall();
     let deadline = supervisor.deadline();
-    let simulator = supervisor.robot.simulator;
+    let simulator = supervisor.robot.simulator.as_ref();
     let mut truth = simulator.map_or_else(Vec::new, |simulator| simulator.truth().to_vec());
-    let record = supervisor.bus.observer.record;
+    let record = std::mem::take(&mut supervisor.bus.observer.record);
     let decided = decisive::first(
         ending,
         &record,
@@ -86,9 +112,11 @@ pub fn run(
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
-    Ok(Finished {
+    let at_rest_m = record.pose.as_ref().map(|pose| supervisor.to_target_m(pose));
+    let ending = decided.ending.checked(&options.mission, truth.last(), at_rest_m);
+    let finished = Finished {
         duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
-        ending: decided.ending.checked(&options.mission, truth.last()),
+        ending: ending.with(wheels),
         last_tick: decided.last_tick,
         record,
         truth,
@@ -97,5 +125,8 @@ pub fn run(
         resumes: supervisor.state_file.state.resumes,
         replans,
         resets,
-    })
+    };
+    let still_moving =
+        (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals, _lock: lock });
+    Ok((finished, still_moving))
 }

@@ -1,22 +1,54 @@
-//! Bringing the robot to rest and stopping the stages in order: at the end, or to recreate the bus.
+//! Bringing the robot to rest and stopping the stages: at the end, or to recreate the bus.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use common::{
+    samples::Action,
+    topics::{self, AnyTopic as _},
+};
 
 use crate::{
-    domain::DomainLock, error::SupervisorError, judge::TickProgress, order::Decision,
+    domain::DomainLock,
+    error::SupervisorError,
+    judge::{RESTS_WITHIN, TickProgress},
+    order::Decision,
+    policy::Now,
     supervisor::Supervisor,
 };
 
 /// Time for the link to confirm that the robot was ordered to stand, before the link is stopped.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
+/// A robot whose encoders nobody reads is waited for so long: its link may be starting.
+const HEARD_WITHIN: Duration = Duration::from_secs(1);
 
-/// Bring the robot to rest; stop the stages in reverse order, the link last; then stop the simulated robot.
-pub(crate) fn stop(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
+/// What the encoders say at the end of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wheels {
+    AtRest,
+    /// The robot or its link does not answer.
+    Unknown,
+    Turning,
+}
+
+/// Bring the robot to rest and stop the stages; the link, which stops the robot, comes last, and not while wheels turn:
+/// [`finish`] ends it then.
+pub(crate) fn stop(supervisor: &mut Supervisor<'_>) -> Result<Wheels, SupervisorError> {
     supervisor.service.stopping();
     supervisor.decision = Decision::ENDING;
-    stand(supervisor)?;
+    let wheels = come_to_rest(supervisor)?;
+    if wheels == Wheels::Turning {
+        stop_stages(supervisor, 1)?;
+    } else {
+        finish(supervisor)?;
+    }
+    Ok(wheels)
+}
+
+/// Stop what still runs: the stages, then the simulated robot.
+pub(crate) fn finish(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
     supervisor.stages.start_no_more();
-    stop_stages(supervisor)?;
+    stop_stages(supervisor, 1)?;
+    stop_stages(supervisor, 0)?;
     if let Some(simulator) = &mut supervisor.robot.simulator {
         simulator.stop()?;
     }
@@ -36,38 +68,81 @@ pub(crate) fn recreate_bus<'a>(
     stand(&mut supervisor)?;
     // A stage that dies meanwhile is not started again on the old bus.
     supervisor.stages.start_no_more();
-    stop_stages(&mut supervisor)?;
+    stop_stages(&mut supervisor, 0)?;
     let mut supervisor = supervisor.with_new_bus(lock)?;
     supervisor.publish_state()?;
     supervisor.stages.start_all(supervisor.first_tick());
-    supervisor.tick_progress = TickProgress::new(Instant::now());
+    supervisor.tick_progress = TickProgress::new(supervisor.stages.now());
     Ok(supervisor)
 }
 
 /// Order the robot to stand, and wait a moment for the link to confirm it.
 fn stand(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
     supervisor.publish_state()?;
-    let began = Instant::now();
+    let began = supervisor.stages.now();
     loop {
-        let bus = &mut supervisor.bus;
-        bus.observer.take(&mut supervisor.stages)?;
-        let confirmed = bus.observer.record.link.is_none_or(|link| link.stopped());
-        if confirmed || began.elapsed() >= STAND_CONFIRMED {
+        turn(supervisor)?;
+        let confirmed = supervisor.bus.observer.record.link.is_none_or(|link| link.stopped());
+        if confirmed || waited(supervisor, began) >= STAND_CONFIRMED {
             return Ok(());
         }
-        bus.waiter.wait(STAND_CONFIRMED)?;
+        supervisor.wait()?;
     }
 }
 
-/// Stop one stage after the other, in reverse order.
-fn stop_stages(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
-    while supervisor.stages.stop_last() {
-        supervisor.service.feed();
+/// Order the end of the mission, and wait until the encoders say that the robot rests. The link uses each method of the
+/// protocol in turn meanwhile.
+fn come_to_rest(supervisor: &mut Supervisor<'_>) -> Result<Wheels, SupervisorError> {
+    supervisor.publish_state()?;
+    let began = supervisor.stages.now();
+    loop {
+        turn(supervisor)?;
+        let (wheels, patience) = match wheels(supervisor) {
+            Wheels::AtRest => return Ok(Wheels::AtRest),
+            Wheels::Turning => (Wheels::Turning, RESTS_WITHIN),
+            Wheels::Unknown if supervisor.drove => (Wheels::Unknown, HEARD_WITHIN),
+            Wheels::Unknown => (Wheels::Unknown, Duration::ZERO),
+        };
+        if waited(supervisor, began) >= patience {
+            return Ok(wheels);
+        }
         supervisor.wait()?;
-        supervisor.bus.observer.take(&mut supervisor.stages)?;
-        supervisor.poll_processes(0)?;
-        // The simulated robot's pipe must not fill: the robot could not answer the link.
-        supervisor.robot.poll()?;
+    }
+}
+
+/// What the link says of the robot since it was told that the mission ends.
+pub(crate) fn wheels(supervisor: &Supervisor<'_>) -> Wheels {
+    let link = supervisor.bus.observer.record.link;
+    match link.filter(|_| supervisor.stages.runs(topics::LINK.spec().writer)) {
+        Some(link) if link.connected == 0 => Wheels::Unknown,
+        Some(link) if link.action() == Action::End && link.at_rest == 1 => Wheels::AtRest,
+        Some(_) => Wheels::Turning,
+        None => Wheels::Unknown,
+    }
+}
+
+fn waited(supervisor: &Supervisor<'_>, since: Now) -> Duration {
+    supervisor.stages.now().saturating_sub(since)
+}
+
+/// A turn of the loop of a supervisor that only waits for the end.
+pub(crate) fn turn(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
+    supervisor.service.feed();
+    supervisor.bus.observer.take(&mut supervisor.stages)?;
+    supervisor.poll_processes(supervisor.first_tick())?;
+    // The simulated robot's pipe must not fill: the robot could not answer the link.
+    supervisor.robot.poll()?;
+    if supervisor.bus.is_due(topics::RESTATE) {
+        supervisor.publish_state()?;
+    }
+    Ok(())
+}
+
+/// Stop the stages from the `first` of the start order on, all at once.
+fn stop_stages(supervisor: &mut Supervisor<'_>, first: usize) -> Result<(), SupervisorError> {
+    while supervisor.stages.stop_from(first) {
+        supervisor.wait()?;
+        turn(supervisor)?;
     }
     Ok(())
 }

@@ -62,7 +62,8 @@ impl StageProcesses {
         }
     }
 
-    fn now(&self) -> Now {
+    /// Time in which the supervisor ran.
+    pub fn now(&self) -> Now {
         self.clock.at(Instant::now())
     }
 
@@ -189,17 +190,24 @@ impl StageProcesses {
         }
     }
 
-    /// Stop the last stage, in start order, that has a process or waits for one. Returns whether there was one.
-    pub fn stop_last(&mut self) -> bool {
-        let last = self.stages.iter().rposition(|stage| {
-            stage.process().is_some() || !matches!(stage.phase(), Phase::Down | Phase::Held)
-        });
-        if let Some(index) = last
-            && !matches!(self.stages[index].phase(), Phase::Stopping { .. })
-        {
-            self.apply(index, Event::Stop, self.now(), 0);
+    /// Stop all stages from the `first` of the start order on. Returns whether one of them has a process or waits for one.
+    pub fn stop_from(&mut self, first: usize) -> bool {
+        let mut any = false;
+        for index in first..self.stages.len() {
+            let stage = &self.stages[index];
+            match stage.phase() {
+                Phase::Down | Phase::Held if stage.process().is_none() => continue,
+                Phase::Stopping { .. } => {}
+                _ => _ = self.apply(index, Event::Stop, self.now(), 0),
+            }
+            any = true;
         }
-        last.is_some()
+        any
+    }
+
+    /// Whether `stage` beats as ready.
+    pub fn runs(&self, stage: &str) -> bool {
+        self.position(stage).is_some_and(|index| self.stages[index].is_running())
     }
 
     /// Give `event` to the stage's policy, and carry out its action.

@@ -1,6 +1,6 @@
 //! The loop of one robot's supervisor: it reads events, asks the pure functions for decisions, and carries them out.
 
-use std::{os::unix::fs::symlink, path::PathBuf, time::Instant};
+use std::{os::unix::fs::symlink, path::PathBuf};
 
 use common::{
     address::Address,
@@ -9,7 +9,8 @@ use common::{
     mission::Mission,
     run::Run,
     samples::{
-        DirectiveSample, HoldReason, Order, RequestKind, RosterHeader, TickLimitSample, name_str,
+        DirectiveSample, HoldReason, Order, PoseSample, RequestKind, RosterHeader, TickLimitSample,
+        name_str,
     },
     signals::Signals,
     topics,
@@ -21,11 +22,12 @@ use crate::{
     decisive,
     domain::DomainLock,
     error::{SupervisorError, system},
-    judge::{self, Deadline, StopClock, TickProgress},
+    judge::{self, Arrival, Deadline, StopClock, TickProgress},
     last_resort::Turns,
     lockstep::Lockstep,
     order::{self, Decision},
     outcome::{Ending, Outcome},
+    policy::Now,
     progress::Progress,
     records,
     recovery::{RecoveredRun, StateFile},
@@ -86,6 +88,8 @@ pub(crate) struct Supervisor<'a> {
     /// Whether the robot was ever ordered to drive.
     pub drove: bool,
     pub tick_progress: TickProgress,
+    /// When the arrival was first seen.
+    arrived: Option<Now>,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
     pub lockstep: Lockstep,
@@ -133,7 +137,8 @@ impl<'a> Supervisor<'a> {
             clock,
             decision: Decision::STARTING,
             drove: false,
-            tick_progress: TickProgress::new(Instant::now()),
+            tick_progress: TickProgress::new(Now::ZERO),
+            arrived: None,
             stop_clock: StopClock::default(),
             stall_watch: StallWatch::new(mission),
             lockstep,
@@ -262,7 +267,7 @@ impl<'a> Supervisor<'a> {
         let changed = decision.reason != self.decision.reason;
         if changed {
             tracing::info!(reason = ?decision.reason, "order");
-            self.tick_progress = TickProgress::new(Instant::now());
+            self.tick_progress = TickProgress::new(self.stages.now());
         }
         self.drove |= decision.order() == Order::Drive;
         self.decision = decision;
@@ -275,8 +280,13 @@ impl<'a> Supervisor<'a> {
     }
 
     fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
-        let now = Instant::now();
+        let now = self.stages.now();
         let record = &self.bus.observer.record;
+        let newest_m = record.pose.as_ref().map(|pose| self.to_target_m(pose));
+        let arrival = record.arrival.map(|command| Arrival {
+            distance_m: newest_m.unwrap_or(command.distance_m),
+            since: *self.arrived.get_or_insert(now),
+        });
         let simulator = self.robot.simulator.as_ref();
         let truth = simulator.map_or(&[][..], Simulator::truth);
         let collision = decisive::first_contact(truth);
@@ -285,7 +295,7 @@ impl<'a> Supervisor<'a> {
         self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
         judge::judge(
             &judge::Snapshot {
-                arrived_m: record.arrival.map(|command| command.distance_m),
+                arrival,
                 link: record.link.as_ref(),
                 simulated: simulator.is_some(),
                 simulator_ended,
@@ -303,6 +313,11 @@ impl<'a> Supervisor<'a> {
             },
             now,
         )
+    }
+
+    /// Distance of `pose` from the target, metres.
+    pub(crate) fn to_target_m(&self, pose: &PoseSample) -> f64 {
+        self.options.mission.target.distance(pose.pose().position)
     }
 
     pub(crate) const fn deadline(&self) -> Deadline {

@@ -1,4 +1,4 @@
-//! The monitor of the supervisor's directives: whether the robot is ordered to drive.
+//! The monitor of the supervisor's directives and of an operator's stop at the link: whether the robot may drive.
 
 use std::time::Duration;
 
@@ -21,10 +21,11 @@ struct Directive {
     heard_ns: u64,
 }
 
-/// The supervisor's directives.
+/// The supervisor's directives, and an operator's stop that did not come from it.
 #[derive(Clone, Debug)]
 pub struct Orders {
     newest: Option<Directive>,
+    stopped_here: bool,
 }
 
 impl Orders {
@@ -33,9 +34,15 @@ impl Orders {
         self.is(Order::Drive)
     }
 
-    /// Whether the newest directive holds the robot because of an operator's stop.
+    /// Whether an operator stops the robot.
     pub fn by_operator(&self) -> bool {
-        self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
+        self.stopped_here
+            || self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
+    }
+
+    /// Whether an operator stopped the robot at its link.
+    pub const fn stopped_here(&self) -> bool {
+        self.stopped_here
     }
 
     fn is(&self, order: Order) -> bool {
@@ -50,12 +57,17 @@ impl Orders {
 
 impl Monitor for Orders {
     fn new(_: &Mission) -> Self {
-        Self { newest: None }
+        Self { newest: None, stopped_here: false }
     }
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
-        if let Observation::Directive(order, reason) = *what {
-            self.newest = Some(Directive { order, reason, heard_ns: now.machine_ns });
+        match *what {
+            Observation::Directive(order, reason) => {
+                self.newest = Some(Directive { order, reason, heard_ns: now.machine_ns });
+            }
+            Observation::Stopped => self.stopped_here = true,
+            Observation::Resumed => self.stopped_here = false,
+            _ => {}
         }
     }
 
@@ -63,7 +75,7 @@ impl Monitor for Orders {
         let age = |directive: Directive| now.machine_ns.saturating_sub(directive.heard_ns);
         let holds = match (cause, self.held()) {
             (Cause::MissionOver, _) => self.is(Order::Stop),
-            (Cause::OperatorStop, held) => held == Some(HoldReason::Operator),
+            (Cause::OperatorStop, held) => self.stopped_here || held == Some(HoldReason::Operator),
             (Cause::StageHeld, held) => held == Some(HoldReason::StageHeld),
             (Cause::SupervisorSilent, _) => self
                 .newest

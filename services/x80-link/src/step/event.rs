@@ -6,6 +6,7 @@ use common::{
         CommandSample, HoldReason, InfraredSample, Order, PowerSample, RangeSample,
         SurroundingsSample, WheelSample,
     },
+    stop_socket::Request,
 };
 
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,8 @@ pub enum Event<'a> {
     Command(&'a CommandSample),
     /// The supervisor's directive: an order, and the reason for not driving.
     Order(Order, HoldReason),
+    /// An operator's request at the link.
+    Operator(Request),
     /// The supervisor's limit in lockstep: the last tick that may begin.
     TickLimit(u64),
     /// Time passed without input.

@@ -21,7 +21,9 @@ impl Link {
         if now.stops() {
             self.repeat = None;
             if !self.in_ticks() {
-                self.send_stop(!before.stops(), now_ns, effects);
+                // The robot may be driving still by a command of an earlier link.
+                let new = !before.stops() || self.stop_sent_ns.is_none();
+                self.send_stop(new, now_ns, effects);
             }
         }
         if now != before {
@@ -55,7 +57,7 @@ impl Link {
         } else if let Some(method) = self.next_stop_method() {
             effects.push(Effect::Send(self.drive.stop_by(method)));
             effects.push(Effect::StopBy(method));
-        } else if self.decision.cause == Cause::RobotDoesNotStop {
+        } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
             // The method that was used last needs time to have an effect.
             return;
         } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {

@@ -15,6 +15,8 @@ impl Link {
         self.failsafe.monitors.presence.wire(open);
         // The rest of a frame does not follow in the next connection.
         self.decoder.reset();
+        // What was sent while the wire was closed is lost.
+        self.stop_sent_ns = None;
         if !open {
             self.lose(now_ns, effects);
         }

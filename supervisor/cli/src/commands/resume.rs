@@ -1,7 +1,7 @@
 //! `firsthand resume`.
 
 use clap::Args;
-use common::{domain::RobotName, samples::RequestKind};
+use common::domain::RobotName;
 
 use crate::console::{failure::Failure, operator};
 
@@ -14,5 +14,5 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    operator::ask(&arguments.robot, RequestKind::Resume, "")
+    operator::resume(&arguments.robot)
 }

@@ -206,8 +206,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(recorder) = recorder {
         recorder.end();
     }
-    let finished = match ran {
-        Ok(finished) => finished,
+    let (finished, still_moving) = match ran {
+        Ok(ran) => ran,
         Err(error) => {
             made_for_nothing();
             return Err(error.into());
@@ -218,10 +218,20 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let json = serde_json::to_string(&summary)?;
     let text = if arguments.json { format!("{json}\n") } else { summary.to_string() };
     complain(print_text(&text).map_err(|error| format!("cannot print the summary: {error}")));
-    if may_be_removed(arguments, &options, &finished) {
+    let may_be_removed = may_be_removed(arguments, &options, &finished);
+    if !may_be_removed {
+        complain(summary_file.write(&format!("{json}\n")));
+    }
+    if let Some(robot) = still_moving {
+        write_stderr(
+            "firsthand: THE ROBOT MOVES although it was told to stand by every method; its link goes on telling it; Ctrl-C leaves it\n",
+        );
+        let now = if robot.watch()? { "rests" } else { "was left while it moved" };
+        write_stderr(&format!("firsthand: the robot {now}\n"));
+    }
+    if may_be_removed {
         let _ = fs::remove_dir_all(directory);
     } else {
-        complain(summary_file.write(&format!("{json}\n")));
         // Picture and report come last and have no effect on the result.
         #[cfg(feature = "tools")]
         {
@@ -284,6 +294,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
         Outcome::Collision => 5,
         Outcome::Aborted => 6,
         Outcome::WrongPlace => 9,
+        Outcome::CouldNotBeStopped => 10,
     })
 }
 

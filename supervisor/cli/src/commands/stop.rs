@@ -1,7 +1,7 @@
 //! `firsthand stop`.
 
 use clap::Args;
-use common::domain::RobotName;
+use common::{domain::RobotName, samples::RequestKind};
 
 use crate::console::{failure::Failure, operator};
 
@@ -11,8 +11,14 @@ pub(crate) struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
+    /// Only tell the supervisor, and do not wait for rest.
+    #[arg(long, hide = true)]
+    through_supervisor: bool,
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.through_supervisor {
+        return operator::ask(&arguments.robot, RequestKind::Stop, "");
+    }
     operator::stand(&arguments.robot)
 }

@@ -2,6 +2,8 @@
 
 use std::{
     fs::File,
+    io::Read as _,
+    process::{Child, Stdio},
     time::{Duration, Instant},
 };
 
@@ -9,30 +11,122 @@ use common::{
     bus::Bus,
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
-    lock_holders,
+    lock_holders, poll,
     roster::Roster,
+    run::Run,
     samples::{
         Action, Cause, LinkSample, RequestKind, RequestSample, RosterEntry, RosterHeader, name,
         name_str,
     },
+    stop_socket::{self, Answer, Request},
     topics::{self, AnyTopic as _},
     waiter::Waiter,
 };
 use rustix::process::Signal;
-use supervisor::stages::{self, Stage};
+use supervisor::{
+    process,
+    stages::{self, Stage},
+    stop_guard,
+};
 
-use super::failure::{Failure, Refused};
+use super::{
+    failure::{Failure, Refused},
+    output::write_stderr,
+};
 
 /// The roster is published five times a second; a frozen supervisor publishes none.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
 
+/// A process that tells the supervisor has started by then, too.
+const TOLD_WITHIN: Duration = Duration::from_secs(4);
+
 /// A robot that obeys rests within a second. The link repeats a stop five times a second, and uses the next method after a second.
 const REST_PATIENCE: Duration = Duration::from_secs(5);
 
-/// Let the robot stand, and wait until it rests.
+/// A link that is scheduled answers within milliseconds.
+const LINK_ANSWERS: Duration = Duration::from_millis(200);
+
+/// Let the robot stand, and wait until it rests. The link is asked directly, without the middleware. The supervisor is told as
+/// well: mission time stops, and the stop holds for its successors. Where no link answers, the robot itself is told to stand.
 pub(crate) fn stand(robot: &RobotName) -> Result<(), Failure> {
-    ask(robot, RequestKind::Stop, "")?;
-    await_rest(robot)
+    let domain = Domain::of(robot.clone());
+    let link = stop_socket::Operator::connect(&domain)
+        .map_err(|error| format!("cannot open a socket to the link: {error}"))?
+        .filter(|link| {
+            let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
+            matches!(answer, Ok(Some(_)))
+        });
+    let run = Run::load(&domain.run_directory());
+    if link.is_none() && run.is_err() {
+        ask(robot, RequestKind::Stop, "")?;
+        return await_rest(robot);
+    }
+    let supervisor = tell_supervisor(robot)?;
+    let rests = match (link, run) {
+        (Some(link), _) => rests_by(&link),
+        // A link that answers nobody sends nothing either.
+        (None, Ok(run)) => stop_guard::stand(&run, || false)?,
+        (None, Err(_)) => false,
+    };
+    let told = told(supervisor);
+    match told {
+        Err(why) if rests => {
+            write_stderr(&format!(
+                "firsthand: the robot rests; its supervisor was not told: {why}\n"
+            ));
+            Ok(())
+        }
+        Err(why) => Err(why.into()),
+        Ok(()) if rests => Ok(()),
+        Ok(()) => await_rest(robot),
+    }
+}
+
+/// Whether `link` says that the robot rests, in time.
+fn rests_by(link: &stop_socket::Operator) -> bool {
+    let began = Instant::now();
+    loop {
+        match link.answer(REST_PATIENCE.saturating_sub(began.elapsed())) {
+            Ok(Some(Answer::AtRest)) => return true,
+            Ok(Some(Answer::Heard)) => {}
+            Ok(None) | Err(_) => return false,
+        }
+    }
+}
+
+/// Ask the supervisor for a stop, in a process of its own: the files of a damaged bus can end the process that opens them.
+fn tell_supervisor(robot: &RobotName) -> Result<Child, Failure> {
+    let child =
+        process::firsthand(&["stop", "--through-supervisor", "--robot", &robot.to_string()])
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn();
+    Ok(child
+        .map_err(|error| format!("cannot start a process that tells the supervisor: {error}"))?)
+}
+
+/// Whether the process that tells the supervisor did.
+fn told(mut teller: Child) -> Result<(), Refused> {
+    let mut why = String::new();
+    let mut said = teller.stderr.take();
+    // Its end closes the pipe.
+    let ended =
+        said.as_ref().is_none_or(|said| poll::is_readable(said, TOLD_WITHIN).unwrap_or(true));
+    if !ended {
+        let _ = teller.kill();
+    }
+    if let Some(said) = &mut said {
+        let _ = said.take(4096).read_to_string(&mut why);
+    }
+    match teller.wait() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) if why.is_empty() => {
+            Err(Refused::new("no-answer", format!("it ended with {status}")))
+        }
+        _ => {
+            Err(Refused::new("no-answer", why.trim().trim_start_matches("firsthand: ").to_owned()))
+        }
+    }
 }
 
 /// Wait until the link says that it stopped the robot, and the robot's encoders that it rests.
@@ -68,6 +162,15 @@ fn await_rest(robot: &RobotName) -> Result<(), Failure> {
 fn rests(link: &LinkSample) -> bool {
     let stopped = link.cause() == Cause::OperatorStop || link.action() == Action::End;
     stopped && link.at_rest == 1
+}
+
+/// Let a stopped robot go on.
+pub(crate) fn resume(robot: &RobotName) -> Result<(), Failure> {
+    // A stop of which the supervisor was not told is the link's alone.
+    if let Ok(Some(link)) = stop_socket::Operator::connect(&Domain::of(robot.clone())) {
+        let _ = link.send(Request::Resume);
+    }
+    ask(robot, RequestKind::Resume, "")
 }
 
 /// The name of a stage of the table.

@@ -21,7 +21,7 @@ fn the_time_of_an_operators_stop_is_counted_from_its_first_sight_to_its_last() {
 
 #[test]
 fn every_rule_of_the_judgement_decides_its_row() {
-    let start = Instant::now();
+    let start = Duration::from_secs(100);
     let go = link(Action::Go, Cause::None);
     let stop = link(Action::Stop, Cause::BatteryLow);
     let end = link(Action::End, Cause::BatteryEmpty);
@@ -29,9 +29,14 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let robot = "x80".parse().unwrap();
     let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap();
     let address = address.resolve().unwrap();
+    let moving = LinkSample { at_rest: 0, ..go };
+    let resting = LinkSample { at_rest: 1, ..go };
+    let arrival = |distance_m, seconds| {
+        Some(Arrival { distance_m, since: start + Duration::from_secs(seconds) })
+    };
     // A simulated robot that drives; its last tick was made at the start.
     let driving = || Snapshot {
-        arrived_m: None,
+        arrival: None,
         link: Some(&go),
         simulated: true,
         simulator_ended: false,
@@ -50,14 +55,23 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let starting = || Snapshot { was_ready: false, reason: HoldReason::Starting, ..driving() };
     let held = || Snapshot { reason: HoldReason::StageHeld, held: vec!["mapper"], ..driving() };
     // These are times after the last tick.
-    let (early, late) = (NO_PROGRESS - Duration::from_millis(1), NO_PROGRESS);
+    const MS: Duration = Duration::from_millis(1);
+    let (early, late) = (NO_PROGRESS - MS, NO_PROGRESS);
     #[rustfmt::skip]
     let rows = [
         ("a driving robot goes on", driving(), early, None),
-        ("a simulator that ended", Snapshot { simulator_ended: true, arrived_m: Some(0.1), ..driving() }, early,
+        ("a simulator that ended", Snapshot { simulator_ended: true, arrival: arrival(0.1, 0), ..driving() }, early,
          Some((Outcome::Aborted, "x80-sim.log"))),
-        ("an arrival", Snapshot { arrived_m: Some(0.123), collision_m: Some([1.0, 2.0]), ..driving() }, early,
+        ("an arrival", Snapshot { arrival: arrival(0.123, 0), collision_m: Some([1.0, 2.0]), ..driving() }, early,
          Some((Outcome::Reached, "0.12 m from the target"))),
+        ("an arrival on the wall clock waits for rest",
+         Snapshot { arrival: arrival(0.1, 0), link: Some(&moving), in_ticks: false, ..driving() }, RESTS_WITHIN - MS, None),
+        ("an arrival at rest",
+         Snapshot { arrival: arrival(0.1, 0), link: Some(&resting), in_ticks: false, ..driving() }, early,
+         Some((Outcome::Reached, "0.10 m from the target"))),
+        ("an arrival that nobody sees at rest",
+         Snapshot { arrival: arrival(0.1, 1), link: None, in_ticks: false, ..driving() }, RESTS_WITHIN + 1000 * MS,
+         Some((Outcome::Aborted, "not seen at rest"))),
         ("an end by the link's failsafe",
          Snapshot { link: Some(&end), collision_m: Some([1.0, 2.0]), ..driving() },
          early, Some((Outcome::Aborted, "battery"))),
@@ -98,7 +112,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
 
 #[test]
 fn progress_is_when_a_tick_was_first_seen() {
-    let start = Instant::now();
+    let start = Duration::ZERO;
     let at = |seconds| start + Duration::from_secs(seconds);
     let mut progress = TickProgress::new(start);
     assert_eq!(progress.update(None, at(1)), start);

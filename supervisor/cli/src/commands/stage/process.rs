@@ -14,7 +14,7 @@ use common::{
 use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
 #[cfg(feature = "baselines")]
 use supervisor::stages::PLANNER;
-use supervisor::{planner_executable, stages::Stage};
+use supervisor::{planner_executable, stages::Stage, stop_guard};
 
 use crate::console::{failure::Failure, operator};
 
@@ -22,6 +22,10 @@ use crate::console::{failure::Failure, operator};
 pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
+    if name == stop_guard::NAME {
+        let directory = options.first().ok_or("name the directory of a run")?;
+        return Ok(stop_guard::run(Path::new(directory))?);
+    }
     #[cfg(feature = "baselines")]
     if let Some(run) = baseline(&name) {
         let start = stage_command::start_with(PLANNER, options.iter().cloned())?;

@@ -39,7 +39,7 @@ impl Action {
             Self::Thaw => operator::send(robot, stage, Signal::CONT),
             Self::Restart => operator::ask(robot, RequestKind::Restart, stage),
             Self::Stop => operator::stand(robot),
-            Self::Resume => operator::ask(robot, RequestKind::Resume, ""),
+            Self::Resume => operator::resume(robot),
         };
         done.map_err(|error| error.to_string())
     }

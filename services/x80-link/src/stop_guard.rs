@@ -1,0 +1,140 @@
+//! The stop guard: a process that stops the robot when its link ended and nobody saw the robot at rest.
+//!
+//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link, however that ends. The guard
+//! is in a session of its own: what is sent to the link, to the supervisor or to their process groups does not reach it. It
+//! speaks to the robot itself, by the same [`Link`] as the link's process, and leaves when the robot rests or another link runs.
+
+use std::{
+    io,
+    io::{Read as _, Write as _},
+    os::{fd::AsFd as _, unix::process::CommandExt as _},
+    path::Path,
+    process::{Command, Stdio},
+    time::Duration,
+};
+
+use common::{
+    bus::close_all_on_exec,
+    clock::{MissionClock, Pace, monotonic_ns},
+    domain::Domain,
+    poll,
+    run::Run,
+    samples::{HoldReason, Order},
+    shell::StageError,
+    step::Step as _,
+    stop_socket::Identity,
+};
+use rustix::process::setsid;
+
+use crate::{
+    shell::wire_broke,
+    step::{Effect, Event, Input, Link, State},
+    transport::Transport,
+};
+
+/// The word of its command line after `firsthand stage`.
+pub const NAME: &str = "stop-guard";
+
+/// The guard looks at the clock so often.
+const LOOKS_AGAIN: Duration = Duration::from_millis(20);
+/// A robot that has said nothing for so long is out of reach.
+const SILENT: Duration = Duration::from_secs(10);
+/// A simulated robot ends with its supervisor.
+const SIMULATED_SILENT: Duration = Duration::from_secs(1);
+
+/// The link's end.
+#[derive(Debug)]
+pub(crate) struct StopGuard {
+    pipe: io::PipeWriter,
+}
+
+impl StopGuard {
+    /// Start the guard of the run in `directory`.
+    pub(crate) fn start(directory: &Path) -> io::Result<Self> {
+        close_all_on_exec()?;
+        let (ended, pipe) = io::pipe()?;
+        Command::new("/proc/self/exe")
+            .arg0("firsthand")
+            .args(["stage", NAME])
+            .arg(directory)
+            .stdin(ended)
+            .stdout(Stdio::null())
+            .spawn()?;
+        Ok(Self { pipe })
+    }
+
+    /// The robot rests: the guard is not needed.
+    pub(crate) fn release(mut self) {
+        // A guard that was killed needs no release.
+        let _ = self.pipe.write_all(b"r");
+    }
+}
+
+/// Be the guard of the run in `directory`. Standard input ends with the link.
+pub fn run(directory: &Path) -> Result<(), StageError> {
+    // The link's session may be that of a terminal, or end with it.
+    let _ = setsid();
+    let run = Run::load(directory)?;
+    let domain = Domain::of(run.robot.clone());
+    let link = Identity::now(&domain);
+    let released = io::stdin().lock().read(&mut [0]).is_ok_and(|read| read > 0);
+    if released || Identity::is_succeeded(link, &domain) {
+        return Ok(());
+    }
+    tracing::warn!("the link ended, and nobody saw the robot at rest: it is told to stand");
+    let at_rest = stand(&run, || Identity::is_succeeded(link, &domain))?;
+    tracing::warn!(at_rest, "the stop guard leaves");
+    Ok(())
+}
+
+/// Tell the robot of `run` to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns
+/// whether they do; not if it is out of reach, or `leave` says so.
+pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
+    let MissionClock::Wall { rate, .. } = run.clock else {
+        // In lockstep a robot waits for commands.
+        return Ok(true);
+    };
+    let silent = match run.mission.robot.address {
+        Some(_) => SILENT,
+        None => SIMULATED_SILENT,
+    };
+    let mut transport = Transport::open(&run.address).map_err(wire_broke)?;
+    let mut link = Link::new(&run.mission);
+    // A pace is no foreign state.
+    let _ = link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
+    let mut heard_ns = monotonic_ns();
+    loop {
+        let now_ns = monotonic_ns();
+        let mut effects = Vec::new();
+        let mut take = |event: Event<'_>| {
+            let input = Input { event, machine_ns: now_ns };
+            effects.extend(link.step(input, run.clock.at(0, now_ns)));
+        };
+        take(Event::Order(Order::Stop, HoldReason::Ending));
+        if let Some(open) = transport.maintain(now_ns).map_err(wire_broke)? {
+            take(Event::Wire(open));
+        }
+        while let Some(bytes) = transport.receive(now_ns).map_err(wire_broke)? {
+            heard_ns = now_ns;
+            take(Event::Datagram(bytes));
+        }
+        for effect in effects {
+            match effect {
+                Effect::Send(bytes) => transport.send(&bytes).map_err(wire_broke)?,
+                Effect::StopBy(method) => {
+                    tracing::warn!(by = method.as_str(), "the robot does not stand; told again");
+                }
+                _ => {}
+            }
+        }
+        if link.is_at_rest() {
+            return Ok(true);
+        }
+        let out_of_reach = now_ns.saturating_sub(heard_ns) >= silent.as_nanos() as u64;
+        if out_of_reach || leave() {
+            return Ok(false);
+        }
+        poll::readable(&[transport.as_fd()], Some(LOOKS_AGAIN))
+            .map_err(|error| StageError::Other(format!("cannot wait for the robot: {error}")))?;
+    }
+}
