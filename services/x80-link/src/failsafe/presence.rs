@@ -67,6 +67,11 @@ pub struct Presence {
 }
 
 impl Presence {
+    /// Whether the wire is open.
+    pub const fn is_wire_open(&self) -> bool {
+        self.wire_open
+    }
+
     /// Whether the robot answers.
     pub const fn connected(&self) -> bool {
         self.connected

@@ -22,7 +22,8 @@ impl Link {
             self.repeat = None;
             if !self.in_ticks() {
                 // The robot may be driving still by a command of an earlier link.
-                let new = !before.stops() || self.stop_sent_ns.is_none();
+                let new = !before.stops()
+                    || self.stop_sent_ns.is_none() && self.monitors().presence.is_wire_open();
                 self.send_stop(new, now_ns, effects);
             }
         }

@@ -122,14 +122,14 @@ fn ticks(effects: &[Effect]) -> Vec<(u64, RangeSample, WheelSample)> {
 fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     let mut link = on_the_wall();
     let ping = Command::System(SystemSignal::Ping);
-    assert_eq!(sent(&link.at(Event::Quiet, 0)), [ping]);
+    let first = sent(&link.at(Event::Quiet, 0));
+    assert_eq!((first.len(), &first[0]), (1 + STOPS as usize, &ping), "{first:?}");
     assert_eq!(sent(&link.at(Event::Quiet, 100 * MS)), []);
     assert_eq!(sent(&link.at(Event::Quiet, 200 * MS)), [ping]);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     let setup = sent(&effects);
-    let zero = 1;
-    assert_eq!(setup.len(), 9 + zero, "{setup:?}");
+    assert_eq!(setup.len(), 9 + STOPS as usize, "{setup:?}");
     let later = sent(&link.at(Event::Quiet, 400 * MS));
     assert!(!later.contains(&ping), "{later:?}");
 }
@@ -143,7 +143,8 @@ fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() 
     assert!(effects.contains(&Effect::Connected(false)));
     assert_eq!(link.at(Event::Quiet, 1000 * MS), []);
     let effects = link.at(Event::Wire(true), 1001 * MS);
-    assert_eq!(sent(&effects), [Command::System(SystemSignal::Ping)]);
+    assert_eq!(sent(&effects)[0], Command::System(SystemSignal::Ping));
+    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; STOPS as usize]);
     let effects = link.at(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(ticks(&effects)[0].1.raw_cm, 80, "{effects:?}");
@@ -292,7 +293,7 @@ fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
     // The link before this one was killed, and the robot ignores the time limit of its last command.
     let mut link = on_the_wall();
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
+    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; STOPS as usize]);
     assert!(velocities(&link.at(Event::Order(Order::Drive, HoldReason::None), MS)).is_empty());
     let effects = link.at(Event::Quiet, 201 * MS);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
