@@ -117,6 +117,7 @@ fn a_wrongly_written_mission_has_an_exit_code_that_the_units_do_not_try_again() 
         let setting = |key: &str| unit.lines().find_map(|line| line.strip_prefix(key));
         let never = setting("RestartPreventExitStatus=").unwrap();
         assert!(never.split(' ').any(|code| code == "78"), "{file}: {never}");
+        assert!(setting("ExecStopPost=").unwrap().contains(" stop --robot "), "{file}");
         assert!(setting("ExecStart=").unwrap().contains(" --keep "), "{file}");
         assert_eq!(setting("LimitCORE="), None, "{file}");
     }

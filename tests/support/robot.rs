@@ -112,6 +112,10 @@ pub fn assert_nothing_left(robot: &str) {
     assert!(shared.is_empty(), "left in shared memory: {shared:?}");
     let directory = domain.directory();
     assert!(!directory.exists(), "{} is left", directory.display());
+    // A stop guard ends after its link, when its robot rests or is gone.
+    wait_until("no stop guard is left", || {
+        !processes_of(robot).iter().any(|line| line.contains("stop-guard"))
+    });
     assert_eq!(processes_of(robot), Vec::<String>::new());
 }
 

@@ -28,7 +28,7 @@ use crate::{
     stage::{Entry, LinkStage, Taken, WIRE_PIECE},
     step::{Effect, Event},
     stop_guard::StopGuard,
-    transport::{Transport, TransportError},
+    transport::Transport,
     writers::Writers,
 };
 
@@ -88,7 +88,7 @@ impl Process for Shell {
             .then(|| StopGuard::start(directory).inspect_err(without("stop guard")).ok())
             .flatten();
         let stop_mark = StopMark::of(directory);
-        let transport = Transport::open(&context.run.address).map_err(wire_broke)?;
+        let transport = Transport::open(&context.run.address)?;
         context.waiter.on_readable(&transport)?;
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
@@ -140,7 +140,7 @@ impl Process for Shell {
             // A tick begins with its datagram.
             self.budget.awake();
             let now_ns = monotonic_ns();
-            let Some(bytes) = self.transport.receive(now_ns).map_err(wire_broke)? else {
+            let Some(bytes) = self.transport.receive(now_ns)? else {
                 break;
             };
             let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
@@ -199,11 +199,6 @@ fn without(what: &'static str) -> impl Fn(&io::Error) {
     move |error| tracing::error!(%error, "the link goes on without its {what}")
 }
 
-#[allow(clippy::needless_pass_by_value, reason = "the shape map_err wants")]
-pub(crate) fn wire_broke(error: TransportError) -> StageError {
-    StageError::Other(error.to_string())
-}
-
 fn log_battery(change: &BatteryChange) {
     let BatteryChange { pack, volts, charge } = *change;
     let volts = format!("{volts:.1}");
@@ -260,7 +255,7 @@ impl Shell {
     /// Reopen a closed wire, and tell the link when the wire opens or closes.
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
-        if let Some(open) = self.transport.maintain(now_ns).map_err(wire_broke)? {
+        if let Some(open) = self.transport.maintain(now_ns)? {
             self.take(Event::Wire(open), now_ns)?;
         }
         Ok(())
@@ -278,7 +273,7 @@ impl Shell {
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
         for effect in effects {
             match effect {
-                Effect::Send(bytes) => self.transport.send(&bytes).map_err(wire_broke)?,
+                Effect::Send(bytes) => self.transport.send(&bytes)?,
                 Effect::Answered { began_ns } => {
                     let tick = self.runner.out.at.tick;
                     self.budget.published(tick, Answers::Feedback);

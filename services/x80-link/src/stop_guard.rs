@@ -7,6 +7,7 @@
 use std::{
     io,
     io::{Read as _, Write as _},
+    net::UdpSocket,
     os::{fd::AsFd as _, unix::process::CommandExt as _},
     path::Path,
     process::{Command, Stdio},
@@ -14,6 +15,7 @@ use std::{
 };
 
 use common::{
+    address::Address,
     bus::close_all_on_exec,
     clock::{MissionClock, Pace, monotonic_ns},
     domain::Domain,
@@ -27,7 +29,6 @@ use common::{
 use rustix::process::setsid;
 
 use crate::{
-    shell::wire_broke,
     step::{Effect, Event, Input, Link, State},
     transport::Transport,
 };
@@ -39,8 +40,8 @@ pub const NAME: &str = "stop-guard";
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 /// A robot that has said nothing for so long is out of reach.
 const SILENT: Duration = Duration::from_secs(10);
-/// A simulated robot ends with its supervisor.
-const SIMULATED_SILENT: Duration = Duration::from_secs(1);
+/// A robot that says for so long that it moves, whatever it is told, may have encoders that are not to be believed.
+const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
 
 /// The link's end.
 #[derive(Debug)]
@@ -88,21 +89,20 @@ pub fn run(directory: &Path) -> Result<(), StageError> {
 }
 
 /// Tell the robot of `run` to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns
-/// whether they do; not if it is out of reach, or `leave` says so.
+/// whether they do; not if it is out of reach or told in vain, or `leave` says so.
 pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
     let MissionClock::Wall { rate, .. } = run.clock else {
         // In lockstep a robot waits for commands.
         return Ok(true);
     };
-    let silent = match run.mission.robot.address {
-        Some(_) => SILENT,
-        None => SIMULATED_SILENT,
-    };
-    let mut transport = Transport::open(&run.address).map_err(wire_broke)?;
+    // A simulated robot ends with its supervisor.
+    let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
+    let mut transport = Transport::open(&run.address)?;
     let mut link = Link::new(&run.mission);
     // A pace is no foreign state.
     let _ = link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
-    let mut heard_ns = monotonic_ns();
+    let began_ns = monotonic_ns();
+    let mut heard_ns = began_ns;
     loop {
         let now_ns = monotonic_ns();
         let mut effects = Vec::new();
@@ -111,16 +111,16 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
             effects.extend(link.step(input, run.clock.at(0, now_ns)));
         };
         take(Event::Order(Order::Stop, HoldReason::Ending));
-        if let Some(open) = transport.maintain(now_ns).map_err(wire_broke)? {
+        if let Some(open) = transport.maintain(now_ns)? {
             take(Event::Wire(open));
         }
-        while let Some(bytes) = transport.receive(now_ns).map_err(wire_broke)? {
+        while let Some(bytes) = transport.receive(now_ns)? {
             heard_ns = now_ns;
             take(Event::Datagram(bytes));
         }
         for effect in effects {
             match effect {
-                Effect::Send(bytes) => transport.send(&bytes).map_err(wire_broke)?,
+                Effect::Send(bytes) => transport.send(&bytes)?,
                 Effect::StopBy(method) => {
                     tracing::warn!(by = method.as_str(), "the robot does not stand; told again");
                 }
@@ -130,11 +130,19 @@ pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageEr
         if link.is_at_rest() {
             return Ok(true);
         }
-        let out_of_reach = now_ns.saturating_sub(heard_ns) >= silent.as_nanos() as u64;
-        if out_of_reach || leave() {
+        let since = |then_ns: u64| Duration::from_nanos(now_ns.saturating_sub(then_ns));
+        if since(heard_ns) >= SILENT || is_gone() || since(began_ns) >= TOLD_IN_VAIN || leave() {
             return Ok(false);
         }
         poll::readable(&[transport.as_fd()], Some(LOOKS_AGAIN))
             .map_err(|error| StageError::Other(format!("cannot wait for the robot: {error}")))?;
+    }
+}
+
+/// Whether a process of this machine receives datagrams at `address`.
+fn is_taken(address: &Address) -> bool {
+    match address {
+        Address::Udp(address) => UdpSocket::bind(address).is_err(),
+        Address::Tcp(_) | Address::Serial(_) => true,
     }
 }

@@ -20,7 +20,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use common::address::Address;
+use common::{address::Address, start::StageError};
 use thiserror::Error;
 
 pub use self::counts::{Attempts, Tally};
@@ -36,6 +36,12 @@ pub struct TransportError {
     pub address: Address,
     /// The system's error.
     pub source: io::Error,
+}
+
+impl From<TransportError> for StageError {
+    fn from(error: TransportError) -> Self {
+        Self::Other(error.to_string())
+    }
 }
 
 /// A wire to one robot.

@@ -3,8 +3,6 @@
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use serde::{Deserialize, Serialize};
 
-use crate::shutdown::Wheels;
-
 /// A simulated robot that reports its arrival and by the ground truth stands farther from its target than this is in the wrong
 /// place, metres. Other benchmarks use the same limit. A wider tolerance of the mission takes its place.
 pub const RIGHT_PLACE_M: f64 = 0.5;
@@ -40,6 +38,15 @@ impl Outcome {
             Self::CouldNotBeStopped => "could_not_be_stopped",
         }
     }
+}
+
+/// The encoders' answer at the end of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wheels {
+    AtRest,
+    /// The robot or its link does not answer.
+    Unknown,
+    Turning,
 }
 
 /// The outcome of a run, and its reason.

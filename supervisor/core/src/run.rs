@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use common::{
     domain::Domain,
     ground_truth::GroundTruthTick,
+    samples::Cause,
     signals::{SIGHUP, SIGINT, SIGTERM, Signals},
 };
 
@@ -14,9 +15,9 @@ use crate::{
     error::{SupervisorError, system},
     last_resort::{self, Turns},
     observer::Record,
-    outcome::Ending,
+    outcome::{Ending, Wheels},
     progress::Progress,
-    shutdown::{self, Wheels},
+    shutdown,
     supervisor::{Options, Supervisor},
 };
 
@@ -94,7 +95,9 @@ pub fn run<'a>(
         }
     };
     // After an error too, the robot is stopped first, and then the stages in order.
-    let stopped = shutdown::stop(&mut supervisor);
+    let given_up = Some(Cause::OdometryGivenUp.name());
+    let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
+    let stopped = shutdown::stop(&mut supervisor, trusts_encoders);
     turns.end();
     let ending = ending?;
     let wheels = stopped?;

@@ -12,6 +12,7 @@ use crate::{
     error::SupervisorError,
     judge::{RESTS_WITHIN, TickProgress},
     order::Decision,
+    outcome::Wheels,
     policy::Now,
     supervisor::Supervisor,
 };
@@ -21,21 +22,18 @@ const STAND_CONFIRMED: Duration = Duration::from_millis(100);
 /// A robot whose encoders nobody reads is waited for so long: its link may be starting.
 const HEARD_WITHIN: Duration = Duration::from_secs(1);
 
-/// What the encoders say at the end of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wheels {
-    AtRest,
-    /// The robot or its link does not answer.
-    Unknown,
-    Turning,
-}
-
 /// Bring the robot to rest and stop the stages; the link, which stops the robot, comes last, and not while wheels turn:
-/// [`finish`] ends it then.
-pub(crate) fn stop(supervisor: &mut Supervisor<'_>) -> Result<Wheels, SupervisorError> {
+/// [`finish`] ends it then. Where `trusts_encoders` is false, nobody knows of wheels that they turn.
+pub(crate) fn stop(
+    supervisor: &mut Supervisor<'_>,
+    trusts_encoders: bool,
+) -> Result<Wheels, SupervisorError> {
     supervisor.service.stopping();
     supervisor.decision = Decision::ENDING;
-    let wheels = come_to_rest(supervisor)?;
+    let wheels = match come_to_rest(supervisor)? {
+        Wheels::Turning if !trusts_encoders => Wheels::Unknown,
+        wheels => wheels,
+    };
     if wheels == Wheels::Turning {
         stop_stages(supervisor, 1)?;
     } else {

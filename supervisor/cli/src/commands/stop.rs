@@ -1,22 +1,34 @@
 //! `firsthand stop`.
 
 use clap::Args;
-use common::{domain::RobotName, samples::RequestKind};
+use common::{
+    domain::{Domain, RobotName},
+    samples::RequestKind,
+};
 
 use crate::console::{failure::Failure, operator};
 
 /// Let the robot stand until `firsthand resume`; the mission goes on then. Fails unless the encoders confirm that it rests.
+///
+/// The link obeys directly, whatever is wrong with the supervisor or with shared memory. Where no link is left, this command
+/// tells the robot of the last run to stand.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
+    /// Do nothing where no run was cut off. This is for services of systemd.
+    #[arg(long)]
+    cut_off: bool,
     /// Only tell the supervisor, and do not wait for rest.
     #[arg(long, hide = true)]
     through_supervisor: bool,
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.cut_off && !Domain::of(arguments.robot.clone()).run_directory().exists() {
+        return Ok(());
+    }
     if arguments.through_supervisor {
         return operator::ask(&arguments.robot, RequestKind::Stop, "");
     }
