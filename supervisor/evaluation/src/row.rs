@@ -164,7 +164,7 @@ fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
         Reported::Collision => Outcome::Collision,
         Reported::Timeout => Outcome::Timeout,
         Reported::Unreachable => Outcome::Unreachable,
-        Reported::Aborted => Outcome::Aborted,
+        Reported::Aborted | Reported::CouldNotBeStopped => Outcome::Aborted,
     }
 }
 
