@@ -192,7 +192,7 @@ fn what_a_stage_killed_in_its_start_left_on_the_bus_is_removed() {
     let bus = bus_instance("block-cut-off");
     let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
     let id: u128 = node.file_name().unwrap().to_str().unwrap().parse().unwrap();
-    // A generation that was killed between making its node's directory and registering the node.
+    // The generation was killed after it created its node's directory and before it registered the node.
     let cut_off = bus.root().join("nodes").join((id + (1 << 96)).to_string());
     fs::create_dir(&cut_off).unwrap();
     let details = format!("{}node.details", bus.shared_memory_prefix());

@@ -1,4 +1,4 @@
-//! Errors of locking a robot's domain and making its bus.
+//! Errors of locking a robot's domain and creating its bus.
 
 use std::{
     io,

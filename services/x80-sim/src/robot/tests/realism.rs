@@ -167,7 +167,7 @@ fn a_resumed_robot_has_the_wheels_and_the_silences_it_had() {
     let saved = first.saved_state();
     let mut resumed = Robot::restored(&mission(text), &saved);
     assert!((curvature(&mut resumed) - had).abs() < 1e-3);
-    // A run of a minute does not end within a few readings; drawn anew, half of the six would differ.
+    // A run of a minute does not end within a few readings. If the states were drawn again, half of the six would differ.
     let silent = resumed.saved_state().silent;
     let kept = silent.iter().zip(saved.silent).filter(|(now, then)| **now == *then);
     assert!(kept.count() >= 5, "{silent:?} {:?}", saved.silent);
