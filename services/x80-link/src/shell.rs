@@ -185,7 +185,8 @@ impl Process for Shell {
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
         let link = &self.runner.stage.link;
-        if (link.is_at_rest() || !link.was_heard())
+        // A guard has only the encoders, too.
+        if (link.is_at_rest() || !link.was_heard() || link.distrusts_encoders())
             && let Some(guard) = self.guard.take()
         {
             guard.release();

@@ -224,6 +224,12 @@ impl Link {
         self.connected() || self.losses() > 0
     }
 
+    /// Whether the encoders are implausible.
+    pub fn distrusts_encoders(&self) -> bool {
+        let causes = [Cause::OdometryImplausible, Cause::OdometryGivenUp];
+        causes.into_iter().any(|cause| self.failsafe.applied(cause))
+    }
+
     /// Whether an operator stopped the robot at its link.
     pub const fn is_stopped_by_operator(&self) -> bool {
         self.monitors().orders.stopped_here()

@@ -11,6 +11,7 @@
 //! | [`Report`] | the result, as it is printed |
 
 mod budget;
+pub mod consumers;
 pub mod hops;
 mod mission;
 mod options;

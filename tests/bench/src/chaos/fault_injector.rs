@@ -144,7 +144,7 @@ impl FaultInjector {
     }
 
     fn keeps_speed(&self) -> bool {
-        self.faulty && self.fault == RobotFault::DoesNotStop
+        self.faulty && matches!(self.fault, RobotFault::DoesNotStop | RobotFault::IgnoresZero)
     }
 
     fn keep(&mut self, frame: &Frame<'_>, now: Duration) {

@@ -91,7 +91,7 @@ pub(crate) fn attack(
     let mut robot = options
         .asked
         .include_supervisor
-        .then(|| robot(options, seed, &files.join("robot")))
+        .then(|| robot(options, seed, &files.join("robot"), false))
         .transpose()?;
     let mut start =
         command(options, seed, &options.pace.to_string(), &directory, options.records())?;
@@ -171,9 +171,11 @@ pub(crate) fn robot(
     options: &Options,
     seed: u64,
     directory: &Path,
+    ignores_time: bool,
 ) -> Result<Simulator, BenchError> {
     fs::create_dir(directory).map_err(system("make a directory"))?;
-    let mission = Mission { seed, ..options.loaded.clone() };
+    let mut mission = Mission { seed, ..options.loaded.clone() };
+    mission.simulation.ignores_time |= ignores_time;
     Ok(Simulator::start(directory, &mission, options.pace)?)
 }
 

@@ -9,14 +9,22 @@ pub const REST_WITHIN_S: f64 = 2.0;
 /// show in turns; a rate needs nine slow frames. Each command lasts for 0.25 s meanwhile.
 pub const REST_LATER_S: f64 = 4.0;
 
+/// Longest time from a kill to wheels at rest, seconds: the stop guard speaks within milliseconds, the rest is the lag of the
+/// wheels.
+pub const REST_AT_ONCE_S: f64 = 0.5;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
+    /// The robot is at rest within [`REST_AT_ONCE_S`] and stays so, and touches nothing.
+    RestsAtOnce,
     /// The robot is at rest within [`REST_WITHIN_S`] and stays so, with a reason, and touches nothing.
     Rests,
     /// The robot is at rest within [`REST_LATER_S`] and stays so, with a reason, and touches nothing.
     RestsLater,
     /// It touches nothing, and does not report its arrival in a wrong place: its data are poor, but not false.
     Unharmed,
+    /// As [`Promise::Unharmed`], and it rests when its mission ends.
+    EndsAtRest,
 }
 
 /// A fault of a robot's data. [`TABLE`] says what each does.
@@ -39,6 +47,10 @@ pub enum RobotFault {
     StreamsStop,
     DoesNotStop,
     FramesSlow,
+    IgnoresZero,
+    LinkKilled,
+    SupervisorKilled,
+    AllKilled,
 }
 
 #[derive(Debug)]
@@ -73,20 +85,30 @@ pub static TABLE: &[Row] = &[
     row(RobotFault::StreamsStop, "streams-stop", Promise::Rests, "no sensor frame comes, acknowledgements do"),
     row(RobotFault::DoesNotStop, "does-not-stop", Promise::Rests, "after `firsthand stop`: given speed 0 the robot keeps its speed"),
     row(RobotFault::FramesSlow, "frames-slow", Promise::RestsLater, "sensor frames come three times a second"),
+    row(RobotFault::IgnoresZero, "ignores-zero", Promise::EndsAtRest, "given speed 0 the robot keeps its speed, to the end of its mission"),
+    row(RobotFault::LinkKilled, "link-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the link under a frozen supervisor"),
+    row(RobotFault::SupervisorKilled, "supervisor-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the supervisor"),
+    row(RobotFault::AllKilled, "all-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of all processes, then `firsthand stop`"),
 ];
 
 impl Promise {
     /// Time from the fault to rest, seconds; none if the robot may go on.
     pub const fn rest_within_s(self) -> Option<f64> {
         match self {
+            Self::RestsAtOnce => Some(REST_AT_ONCE_S),
             Self::Rests => Some(REST_WITHIN_S),
             Self::RestsLater => Some(REST_LATER_S),
-            Self::Unharmed => None,
+            Self::Unharmed | Self::EndsAtRest => None,
         }
     }
 }
 
 impl RobotFault {
+    /// Whether processes are killed, while a robot that ignores time limits is under way.
+    pub const fn is_kill(self) -> bool {
+        matches!(self, Self::LinkKilled | Self::SupervisorKilled | Self::AllKilled)
+    }
+
     pub fn row(self) -> &'static Row {
         // A test ensures that every fault has a row.
         TABLE.iter().find(|row| row.fault == self).unwrap_or(&TABLE[0])
@@ -115,7 +137,7 @@ mod tests {
             assert_eq!(RobotFault::named(row.name), Some(row.fault));
             assert_eq!(row.fault.row().name, row.name);
         }
-        assert_eq!(RobotFault::FramesSlow as usize + 1, TABLE.len());
+        assert_eq!(RobotFault::AllKilled as usize + 1, TABLE.len());
         assert_eq!(RobotFault::named("none"), None);
     }
 
@@ -123,9 +145,10 @@ mod tests {
     fn the_guides_table_is_this_one() {
         let guide = include_str!("../../../../supervisor/guide/break-it.md");
         for row in TABLE {
-            let promise = match row.promise.rest_within_s() {
-                Some(within_s) => format!("rests within {within_s} s"),
-                None => "unharmed".to_owned(),
+            let promise = match (row.promise.rest_within_s(), row.promise) {
+                (Some(within_s), _) => format!("rests within {within_s} s"),
+                (None, Promise::EndsAtRest) => "ends at rest".to_owned(),
+                (None, _) => "unharmed".to_owned(),
             };
             let what = row.what;
             let line = format!("| `{}` | {what} | {promise} |\n", row.name);

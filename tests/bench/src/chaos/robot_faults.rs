@@ -17,6 +17,7 @@ use common::{
     topics,
 };
 use rand_pcg::{Pcg64, rand_core::Rng};
+use rustix::process::{Pid, Signal, kill_process};
 use supervisor::{
     outcome::RIGHT_PLACE_M,
     process::{Process, firsthand},
@@ -31,7 +32,11 @@ use crate::chaos::{
     robot_fault::RobotFault,
     stop_time_table::{Entry, StopTimeTable},
 };
-use crate::error::{BenchError, system};
+use crate::{
+    command_line,
+    error::{BenchError, system},
+    processes,
+};
 
 /// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
@@ -75,12 +80,15 @@ pub fn run_robot_faults(
 }
 
 fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, BenchError> {
-    let mut robot = mission::robot(options, seed, &files.join("robot"))?;
+    let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
     let proxy = Proxy::start(robot.address(), fault, seed)?;
-    let mut child = start(options, seed, proxy.address(), &files.join("run"))?;
+    let run = files.join("run");
+    let mut child = start(options, seed, proxy.address(), &run)?;
     let summary = mission::read_stdout(&mut child);
     let mut observed = Observed::default();
-    let watched = observed.watch(options, fault, seed, &mut child, &mut robot, &proxy);
+    let watched = observed.watch(options, fault, seed, &mut child, &run, &mut robot, &proxy);
+    // A frozen supervisor does not end in order.
+    child.signal(Signal::CONT);
     child.end(END_GRACE);
     let summary = summary.join().unwrap_or_default();
     robot.stop()?;
@@ -123,6 +131,7 @@ impl Observed {
         fault: RobotFault,
         seed: u64,
         child: &mut Process,
+        run: &Path,
         robot: &mut Simulator,
         proxy: &Proxy,
     ) -> Result<(), BenchError> {
@@ -142,7 +151,8 @@ impl Observed {
                 // The bus does not exist yet.
                 link = None;
             }
-            self.ended_by_itself = child.try_reap().map_err(system("reap"))?.is_some();
+            self.ended_by_itself =
+                child.try_reap().map_err(system("reap"))?.is_some() && !fault.is_kill();
             let watched = match fault.row().promise.rest_within_s() {
                 Some(_) => WATCHED,
                 None => WATCHED_ON_ITS_WAY,
@@ -162,7 +172,10 @@ impl Observed {
             if self.fault_began.is_none() && newest.is_some_and(due) {
                 proxy.begin_fault();
                 self.fault_began = Some((Instant::now(), self.ticks));
-                if fault == RobotFault::DoesNotStop {
+                if fault.is_kill() {
+                    kill(fault, child, run);
+                }
+                if matches!(fault, RobotFault::DoesNotStop | RobotFault::AllKilled) {
                     stop = Some(operator_stop(options)?);
                 }
             }
@@ -205,12 +218,15 @@ impl Observed {
     ) -> Entry {
         let stopped = self.link.filter(LinkSample::stopped);
         let cause = stopped.map_or("", |link| link.cause().name());
-        let (mut outcome, reason) = if self.ended_by_itself {
+        let (mut outcome, mut reason) = if self.ended_by_itself {
             let summary: Option<Summary> = serde_json::from_slice(summary).ok();
             summary.map(|it| (it.outcome.as_str().to_owned(), it.reason)).unwrap_or_default()
         } else {
             ("goes on".to_owned(), cause.to_owned())
         };
+        if fault.is_kill() {
+            (outcome, reason) = ("killed".to_owned(), fault.row().name.to_owned());
+        }
         let last = truth.last();
         let target = options.loaded.target;
         let wrong =
@@ -264,6 +280,31 @@ fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
 fn link(options: &Options) -> Option<Reader<LinkSample>> {
     let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos").ok()?;
     bus.reader(&topics::LINK).ok()
+}
+
+/// Kill what `fault` says of the mission with its files in `run`.
+fn kill(fault: RobotFault, supervisor: &Process, run: &Path) {
+    let run = run.to_string_lossy();
+    let lines =
+        processes().map(|pid| (pid, String::from_utf8_lossy(&command_line(pid)).into_owned()));
+    let others = lines.filter(|(pid, line)| *pid != std::process::id() && line.contains(&*run));
+    let others: Vec<_> = others.collect();
+    if fault == RobotFault::LinkKilled {
+        // It starts no other link.
+        supervisor.signal(Signal::STOP);
+    } else {
+        supervisor.signal(Signal::KILL);
+    }
+    for (pid, line) in others {
+        let is_hit = match fault {
+            RobotFault::LinkKilled => line.contains("x80-link"),
+            fault => fault == RobotFault::AllKilled,
+        };
+        if let Some(pid) = Pid::from_raw(pid as i32).filter(|_| is_hit) {
+            // A process that has ended needs no signal.
+            let _ = kill_process(pid, Signal::KILL);
+        }
+    }
 }
 
 /// Start an operator's stop.

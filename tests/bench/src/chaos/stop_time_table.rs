@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-use crate::chaos::robot_fault::{Promise, REST_LATER_S, REST_WITHIN_S, RobotFault};
+use crate::chaos::robot_fault::{Promise, REST_AT_ONCE_S, REST_LATER_S, REST_WITHIN_S, RobotFault};
+
+/// A mission that ends at rest ends at least so long after the last tick in which a wheel turned, seconds.
+const AT_REST_BEFORE_S: f64 = 0.15;
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
@@ -30,8 +33,11 @@ impl Entry {
     /// Whether the robot did as promised.
     pub fn is_kept(&self) -> bool {
         let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
-        let Some(limit_s) = self.fault.row().promise.rest_within_s() else {
-            return unharmed;
+        let promise = self.fault.row().promise;
+        let Some(limit_s) = promise.rest_within_s() else {
+            let rests =
+                self.rest_s.is_some_and(|rest_s| rest_s + AT_REST_BEFORE_S <= self.watched_s);
+            return unharmed && (rests || promise != Promise::EndsAtRest);
         };
         let within = |seconds: Option<f64>| seconds.is_some_and(|seconds| seconds <= limit_s);
         unharmed && within(self.last_moving_s) && within(self.rest_s) && !self.reason.is_empty()
@@ -82,10 +88,12 @@ impl fmt::Display for StopTimeTable {
         }
         writeln!(
             to,
-            "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, or {REST_LATER_S} s: {}; except where \
-             the robot may go on unharmed: {}.",
+            "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
+             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}.",
             names(Promise::RestsLater),
-            names(Promise::Unharmed)
+            names(Promise::RestsAtOnce),
+            names(Promise::Unharmed),
+            names(Promise::EndsAtRest)
         )
     }
 }

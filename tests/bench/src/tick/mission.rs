@@ -12,6 +12,7 @@ use supervisor::{process, summary::Quantiles};
 
 use super::{
     budget::Budget,
+    consumers,
     options::Arguments,
     process_set::{ProcessSet, Used},
 };
@@ -52,6 +53,8 @@ pub(super) fn measure(
     if budget.is_some() {
         command.env(latency_budget::ASKED_FOR, "1");
     }
+    // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
+    let _consumers = consumers::start(robot, arguments.consumers)?;
     let run = command
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

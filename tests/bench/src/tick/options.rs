@@ -29,6 +29,12 @@ pub struct Arguments {
     /// Record the missions meanwhile, as `run` does.
     #[arg(long)]
     pub record: bool,
+    /// Number of processes that read grid and field of the missions meanwhile.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
+    pub consumers: u32,
+    /// Be a consumer of this robot.
+    #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
+    pub consumer: bool,
     /// One line of JSON.
     #[arg(long)]
     pub json: bool,

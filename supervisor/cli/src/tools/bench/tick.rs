@@ -1,7 +1,7 @@
 //! `firsthand bench tick`: the time of a tick, and of the bus alone.
 
 pub(crate) use bench::tick::Arguments;
-use bench::tick::{self, hops};
+use bench::tick::{self, consumers, hops};
 
 use crate::console::{failure::Failure, missions, output::print};
 
@@ -12,6 +12,9 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     };
     if let (Some(place), Some(supervisor)) = (&arguments.forwarder, arguments.supervisor) {
         return Ok(hops::run_forwarder(&robot, place, supervisor)?);
+    }
+    if let (true, Some(supervisor)) = (arguments.consumer, arguments.supervisor) {
+        return Ok(consumers::run(&robot, supervisor)?);
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
     let report = tick::measure(arguments, &robot, rate_hz)?;
