@@ -152,20 +152,23 @@ impl Operator {
     }
 }
 
-/// Which link's socket lies in a robot's directory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Identity([i64; 3]);
+/// Tells the socket of one link from that of its successor: inode and time of its creation. Empty for a link without one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity(pub String);
 
 impl Identity {
-    /// That of the socket that lies there now.
-    pub fn now(domain: &Domain) -> Option<Self> {
-        let found = fs::symlink_metadata(domain.stop_socket()).ok()?;
-        Some(Self([found.ino() as i64, found.ctime(), found.ctime_nsec()]))
+    /// The identity of the socket in the robot's directory now.
+    pub fn now(domain: &Domain) -> Self {
+        let found = fs::symlink_metadata(domain.stop_socket());
+        Self(found.map_or_else(
+            |_| String::new(),
+            |found| format!("{}-{}-{}", found.ino(), found.ctime(), found.ctime_nsec()),
+        ))
     }
 
     /// Whether a link runs whose socket is not this one.
-    pub fn is_succeeded(this: Option<Self>, domain: &Domain) -> bool {
-        Self::now(domain) != this && matches!(Operator::connect(domain), Ok(Some(_)))
+    pub fn is_succeeded(&self, domain: &Domain) -> bool {
+        Self::now(domain) != *self && matches!(Operator::connect(domain), Ok(Some(_)))
     }
 }
 

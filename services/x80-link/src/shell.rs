@@ -15,7 +15,7 @@ use common::{
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
     step::Step as _,
-    stop_socket::{Request, StopMark, StopSocket},
+    stop_socket::{Identity, Request, StopMark, StopSocket},
     topics::{self, AnyTopic as _},
     wiring::Wiring,
 };
@@ -85,7 +85,11 @@ impl Process for Shell {
         let directory = &context.generation.directory;
         let in_ticks = matches!(context.run.clock, MissionClock::Ticks { .. });
         let guard = (!in_ticks)
-            .then(|| StopGuard::start(directory).inspect_err(without("stop guard")).ok())
+            .then(|| {
+                StopGuard::start(directory, &Identity::now(&domain))
+                    .inspect_err(without("stop guard"))
+                    .ok()
+            })
             .flatten();
         let stop_mark = StopMark::of(directory);
         let transport = Transport::open(&context.run.address)?;

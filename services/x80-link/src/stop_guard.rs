@@ -50,14 +50,15 @@ pub(crate) struct StopGuard {
 }
 
 impl StopGuard {
-    /// Start the guard of the run in `directory`.
-    pub(crate) fn start(directory: &Path) -> io::Result<Self> {
+    /// Start the guard of the link with this socket, in the run in `directory`.
+    pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
         close_all_on_exec()?;
         let (ended, pipe) = io::pipe()?;
         Command::new("/proc/self/exe")
             .arg0("firsthand")
             .args(["stage", NAME])
             .arg(directory)
+            .arg(&link.0)
             .stdin(ended)
             .stdout(Stdio::null())
             .spawn()?;
@@ -71,19 +72,18 @@ impl StopGuard {
     }
 }
 
-/// Be the guard of the run in `directory`. Standard input ends with the link.
-pub fn run(directory: &Path) -> Result<(), StageError> {
+/// Be the guard of the link with this socket, in the run in `directory`. Standard input ends with the link.
+pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     // The link's session may be that of a terminal, or end with it.
     let _ = setsid();
     let run = Run::load(directory)?;
     let domain = Domain::of(run.robot.clone());
-    let link = Identity::now(&domain);
     let released = io::stdin().lock().read(&mut [0]).is_ok_and(|read| read > 0);
-    if released || Identity::is_succeeded(link, &domain) {
+    if released || link.is_succeeded(&domain) {
         return Ok(());
     }
     tracing::warn!("the link ended, and nobody saw the robot at rest: it is told to stand");
-    let at_rest = stand(&run, || Identity::is_succeeded(link, &domain))?;
+    let at_rest = stand(&run, || link.is_succeeded(&domain))?;
     tracing::warn!(at_rest, "the stop guard leaves");
     Ok(())
 }

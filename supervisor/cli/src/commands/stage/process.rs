@@ -9,6 +9,7 @@ use common::{
     mission::Mission,
     stage_command::{self, SUBCOMMAND},
     start::Start,
+    stop_socket::Identity,
 };
 #[cfg(feature = "baselines")]
 use evaluation::baselines::{bug::Bug, shell::Shell, wavefront::Wavefront};
@@ -23,8 +24,11 @@ pub(super) fn run(words: &[OsString]) -> Result<(), Failure> {
     let (name, options) = words.split_first().ok_or("name a stage")?;
     let name = name.to_string_lossy();
     if name == stop_guard::NAME {
-        let directory = options.first().ok_or("name the directory of a run")?;
-        return Ok(stop_guard::run(Path::new(directory))?);
+        let [directory, link] = options else {
+            return Err("name the directory of a run and the socket of its link".into());
+        };
+        let link = Identity(link.to_string_lossy().into_owned());
+        return Ok(stop_guard::run(Path::new(directory), &link)?);
     }
     #[cfg(feature = "baselines")]
     if let Some(run) = baseline(&name) {
