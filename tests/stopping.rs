@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use crate::support::{
     PATIENCE, Run, find, output, pid, signal_process,
-    wire::{Proxy, Robot},
+    wire::{Pass, Proxy, Robot},
 };
 
 /// A mission of a robot that ignores the time limit of commands, with its target at `target_m` ahead.
@@ -101,7 +101,7 @@ fn a_robot_on_a_serial_line_stands_after_kills_of_its_link_its_supervisor_or_all
 }
 
 /// Passes on what the host sends, without the commands that `ignored` names.
-fn without(ignored: fn(&Command) -> bool) -> Box<dyn FnMut(&[u8]) -> Vec<u8> + Send> {
+fn without(ignored: fn(&Command) -> bool) -> Box<Pass> {
     let mut decoder = Decoder::default();
     Box::new(move |bytes| {
         decoder.push(bytes);

@@ -118,7 +118,7 @@ pub struct Proxy {
 }
 
 /// Turns the bytes that arrive into the bytes that are passed on.
-type Pass = dyn FnMut(&[u8]) -> Vec<u8> + Send;
+pub type Pass = dyn FnMut(&[u8]) -> Vec<u8> + Send;
 
 impl Proxy {
     pub fn before(robot: &Robot, mut to_robot: Box<Pass>, mut to_link: Box<Pass>) -> Self {

@@ -198,7 +198,7 @@ impl StageProcesses {
             match stage.phase() {
                 Phase::Down | Phase::Held if stage.process().is_none() => continue,
                 Phase::Stopping { .. } => {}
-                _ => _ = self.apply(index, Event::Stop, self.now(), 0),
+                _ => self.apply(index, Event::Stop, self.now(), 0),
             }
             any = true;
         }

@@ -3,7 +3,7 @@
 use std::{
     fs,
     net::SocketAddr,
-    path::Path,
+    path::{Path, PathBuf},
     process::Stdio,
     time::{Duration, Instant},
 };
@@ -66,7 +66,7 @@ pub fn run_robot_faults(
     for &fault in &options.faults {
         for number in 0..u64::from(options.base.asked.missions) {
             let seed = options.base.asked.seed + number;
-            let files = options.base.directory.join(format!("{}-{seed}", fault.row().name));
+            let files = directory(&options.base, fault, seed);
             fs::create_dir(&files).map_err(system("make a directory"))?;
             let entry = one(&options.base, fault, seed, &files)?;
             if entry.is_kept() {
@@ -82,11 +82,10 @@ pub fn run_robot_faults(
 fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<Entry, BenchError> {
     let mut robot = mission::robot(options, seed, &files.join("robot"), fault.is_kill())?;
     let proxy = Proxy::start(robot.address(), fault, seed)?;
-    let run = files.join("run");
-    let mut child = start(options, seed, proxy.address(), &run)?;
+    let mut child = start(options, seed, proxy.address(), &files.join("run"))?;
     let summary = mission::read_stdout(&mut child);
     let mut observed = Observed::default();
-    let watched = observed.watch(options, fault, seed, &mut child, &run, &mut robot, &proxy);
+    let watched = observed.watch(options, fault, seed, &mut child, &mut robot, &proxy);
     // A frozen supervisor does not end in order.
     child.signal(Signal::CONT);
     child.end(END_GRACE);
@@ -131,7 +130,6 @@ impl Observed {
         fault: RobotFault,
         seed: u64,
         child: &mut Process,
-        run: &Path,
         robot: &mut Simulator,
         proxy: &Proxy,
     ) -> Result<(), BenchError> {
@@ -173,7 +171,7 @@ impl Observed {
                 proxy.begin_fault();
                 self.fault_began = Some((Instant::now(), self.ticks));
                 if fault.is_kill() {
-                    kill(fault, child, run);
+                    kill(fault, child, &directory(options, fault, seed));
                 }
                 if matches!(fault, RobotFault::DoesNotStop | RobotFault::AllKilled) {
                     stop = Some(operator_stop(options)?);
@@ -282,8 +280,14 @@ fn link(options: &Options) -> Option<Reader<LinkSample>> {
     bus.reader(&topics::LINK).ok()
 }
 
-/// Kill what `fault` says of the mission with its files in `run`.
-fn kill(fault: RobotFault, supervisor: &Process, run: &Path) {
+/// The directory of a mission's files.
+fn directory(options: &Options, fault: RobotFault, seed: u64) -> PathBuf {
+    options.directory.join(format!("{}-{seed}", fault.row().name))
+}
+
+/// Kill what `fault` says of the mission with its files in `directory`.
+fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
+    let run = directory.join("run");
     let run = run.to_string_lossy();
     let lines =
         processes().map(|pid| (pid, String::from_utf8_lossy(&command_line(pid)).into_owned()));
