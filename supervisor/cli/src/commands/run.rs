@@ -203,12 +203,15 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let ran = supervisor::run(&options, &mut attach, &mut |progress| {
         console.show(progress);
     });
-    if let Some(recorder) = recorder {
-        recorder.end();
-    }
+    let end_recorder = || {
+        if let Some(recorder) = recorder {
+            recorder.end();
+        }
+    };
     let (finished, still_moving) = match ran {
         Ok(ran) => ran,
         Err(error) => {
+            end_recorder();
             made_for_nothing();
             return Err(error.into());
         }
@@ -229,6 +232,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let now = if robot.watch()? { "rests" } else { "was left while it moved" };
         write_stderr(&format!("firsthand: the robot {now}\n"));
     }
+    // On a busy machine the recorder may need seconds for its last chunks.
+    end_recorder();
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
     } else {
