@@ -108,7 +108,7 @@ fn come_to_rest(supervisor: &mut Supervisor<'_>) -> Result<Wheels, SupervisorErr
     }
 }
 
-/// What the link says of the robot since it was told that the mission ends.
+/// The link's answer since it was told that the mission ends.
 pub(crate) fn wheels(supervisor: &Supervisor<'_>) -> Wheels {
     let link = supervisor.bus.observer.record.link;
     match link.filter(|_| supervisor.stages.runs(topics::LINK.spec().writer)) {

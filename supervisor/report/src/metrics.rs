@@ -119,7 +119,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
     ]
 }
 
-/// Of a car only one of the two is a wheel speed; the other is a steering angle.
+/// A car has only one wheel speed; the other value is a steering angle.
 fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;

@@ -48,7 +48,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
     })?)
 }
 
-/// What a page of the guide shows behind `<!-- table NAME SECTION -->`; none of an unknown name.
+/// The text that a page of the guide shows behind `<!-- table NAME SECTION -->`; none of an unknown name.
 #[cfg(all(test, feature = "tools"))]
 pub(crate) fn shown(name: &str, section: Option<&str>) -> Option<String> {
     match name {

@@ -177,7 +177,7 @@ struct Report {
     medians: Option<Medians>,
     worst_residual: f64,
     log10_u_min: f64,
-    /// Of the process when the field stood: map, solver and field, not the files made of it.
+    /// Memory of the process when the field was solved: map, solver and field, not the files made of it.
     peak_memory_bytes: Option<u64>,
 }
 

@@ -1,4 +1,4 @@
-//! What the page adds to `common`: the payload, and the row of the table of topics.
+//! The additions of the page to `common`: the payload, and the row of the table of topics.
 //!
 //! Why `unsafe` is allowed here: as in `common::samples`, deriving `ZeroCopySend` writes an `unsafe impl` for a
 //! `repr(C)` struct of plain numbers.

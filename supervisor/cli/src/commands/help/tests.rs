@@ -1,4 +1,4 @@
-//! What README and guide say of commands, files and tests.
+//! Tests of README and guide: their commands, files and tests exist.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
@@ -118,7 +118,7 @@ fn filled_in(word: &str) -> String {
     value(last).map_or(word.to_owned(), |value| format!("{key}{value}"))
 }
 
-/// What `firsthand` is given, if this command runs it.
+/// The arguments of `firsthand`, if this command runs it.
 fn arguments(command: &[String]) -> Option<&[String]> {
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
     let at = match words.as_slice() {

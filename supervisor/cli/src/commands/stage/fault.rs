@@ -25,7 +25,7 @@ use crate::console::{
 pub(super) struct Arguments {
     /// The stage (`firsthand stage list`).
     stage: String,
-    /// What to break in it; see below.
+    /// The fault; see below.
     fault: String,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]

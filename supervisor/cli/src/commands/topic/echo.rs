@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     /// One JSON object a line, with all elements of arrays; a number that is not finite is null.
     #[arg(long)]
     json: bool,
-    /// As text, show all elements of arrays, and not the first 16 only.
+    /// Show all elements of arrays in text, not only the first 16.
     #[arg(long)]
     whole: bool,
     /// End after N samples.

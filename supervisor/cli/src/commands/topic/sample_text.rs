@@ -11,7 +11,7 @@ use serde::{
 
 /// The name of a slice's elements, beside the fields of their header.
 const ELEMENTS: &str = "elements";
-/// As text, an array is cut after this many elements unless all are asked for.
+/// Text shows this many elements of an array unless all are asked for.
 const SHOWN: usize = 16;
 
 /// `sample` as text, one field a line. The fields of a struct stand below its name. Arrays of more than 16 elements are cut,

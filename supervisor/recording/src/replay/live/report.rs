@@ -19,7 +19,7 @@ pub struct LiveReport {
 pub struct LiveStageReport {
     /// Ticks that both it and the recorded stage answered.
     pub answered: u64,
-    /// Of these, ticks with equal values.
+    /// The ticks of these that have equal values.
     pub equal: u64,
     /// Ticks that only the recorded stage answered in time.
     pub unanswered: u64,

@@ -38,7 +38,7 @@ fn test_functions() -> BTreeSet<String> {
     functions
 }
 
-/// What is wrong with a row of the capabilities.
+/// The error in a row of the capabilities.
 fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
     let [text, verdict, tests] = row;
     let mut tests = tests.split_whitespace();
