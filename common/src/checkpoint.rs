@@ -264,6 +264,38 @@ mod tests {
     }
 
     #[test]
+    fn the_newest_state_comes_back_of_processes_that_each_save_a_few_times() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("pose");
+        let mut newest = None;
+        for process in 0..6_u32 {
+            let (mut checkpoint, restored) = open(&path);
+            assert_eq!(restored, newest, "process {process}");
+            for save in 0..=process % 3 {
+                newest = Some(vec![process, save]);
+                checkpoint.save(&vec![process, save]).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn a_state_with_any_bit_changed_after_its_version_is_not_restored() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("pose");
+        let (mut checkpoint, _) = open(&path);
+        checkpoint.save(&vec![7_u32; 4]).unwrap();
+        checkpoint.save(&vec![9_u32; 4]).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        // The second save went into the first slot, which is as long as its state.
+        for bit in 8 * 4..8 * (HEADER + 5) {
+            let mut changed = whole.clone();
+            changed[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(&path, &changed).unwrap();
+            assert_eq!(open(&path).1, Some(vec![7; 4]), "bit {bit}");
+        }
+    }
+
+    #[test]
     fn a_file_of_noise_is_no_state() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("pose");

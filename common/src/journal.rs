@@ -248,6 +248,24 @@ mod tests {
     }
 
     #[test]
+    fn an_entry_with_any_bit_changed_is_not_folded() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        let file = path.with_extension("journal");
+        let (mut journal, _) = open(&path);
+        journal.append(&100_u64).unwrap();
+        let last = std::fs::read(&file).unwrap().len() - END.len();
+        journal.append(&200_u64).unwrap();
+        let whole = std::fs::read(&file).unwrap();
+        for bit in 8 * last..8 * (whole.len() - END.len()) {
+            let mut changed = whole.clone();
+            changed[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(&file, &changed).unwrap();
+            assert_eq!(folded(&path), 100, "bit {}", bit - 8 * last);
+        }
+    }
+
+    #[test]
     fn entries_the_snapshot_holds_are_not_folded_twice() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("map.checkpoint");

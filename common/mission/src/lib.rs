@@ -97,7 +97,7 @@ pub struct Mission {
     /// The values of the controller, which turns guidance into wheel speeds.
     #[serde(default)]
     pub controller: Controller,
-    /// The shapes that the robot knows beforehand.
+    /// The hazards that the map holds before the robot starts.
     #[serde(default, skip_serializing_if = "Shapes::is_empty")]
     pub known: Shapes,
     /// The shapes that really exist. Only the simulator reads them.

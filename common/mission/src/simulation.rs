@@ -158,7 +158,7 @@ macro_rules! section {
 section! {
     /// The ultrasonic rangers' physics (the DUR5200 of the X80, 40 kHz).
     SonarPhysics, written as SonarKeys in "simulation.sonar" {
-        /// Half angle of the cone that answers at full range, degrees.
+        /// Half of the beam angle within which the sonar hears an echo at its full range, degrees.
         cone_deg in 0.0..=60.0 => 15.0, 15.0;
         /// Half angle at which the last answer fades, degrees; no wider than the cone is no lobe.
         lobe_deg in 0.0..=60.0 => 15.0, 25.0;

@@ -45,7 +45,7 @@ pub struct Decoder {
 enum Candidate {
     /// A frame with LEN data bytes and a right CRC; `end` is the offset after the CRC.
     Sound { end: usize, ending: Ending },
-    /// An incomplete frame; `len` is the number of data bytes that it announces, as far as it came.
+    /// The beginning of a frame whose rest has not come. Its header announces `len` bytes of data.
     Half { len: usize },
     /// The CRC is wrong.
     Broken,

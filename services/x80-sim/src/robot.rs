@@ -78,7 +78,7 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// The robot of `mission`, booted and standing at the start; tick 0 is measured.
+    /// The robot of `mission`, booted and standing at the start. Its sensors hold their readings of tick 0.
     pub fn new(mission: &Mission) -> Self {
         Self::with_noise(mission, mission.seed)
     }

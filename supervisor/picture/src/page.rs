@@ -11,7 +11,7 @@ pub(super) const WIDTH: f64 = 1150.0;
 pub(super) const PLOT_LEFT: f64 = 62.0;
 /// Top edge of the plot.
 pub(super) const PLOT_TOP: f64 = 92.0;
-/// Side of the plot: a square, as the perimeter is.
+/// Side of the plot, pixels. The plot is a square, because the perimeter of a mission is one.
 pub(super) const PLOT_SIDE: f64 = 800.0;
 
 /// Lines are cut at this distance outside the plot, and not only hidden, so that a far pose gives no far coordinates.

@@ -104,7 +104,7 @@ impl Matrix {
 fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
     let mut start = 0;
     while start < ends.len() {
-        // A panel has as many pivots as are left, rounded down to a power of two.
+        // A block of columns that is eliminated at once has a power of two of them, the largest that is left up to the limit.
         start += match ends.len() - start {
             8.. => panel::<8>(entries, stride, start, ends),
             4.. => panel::<4>(entries, stride, start, ends),
