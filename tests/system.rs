@@ -17,6 +17,7 @@ mod failsafe;
 mod faults;
 mod field;
 mod foreign_payload;
+mod held_wheels;
 mod kills_and_freezes;
 mod live_replay;
 mod machine;

@@ -67,6 +67,10 @@ topics! {
     WHEELS: Topic<WheelSample> {
         name: "wheels", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
     }
+    /// Wheels are held although they were told to turn: where something touches the body.
+    CONTACT: Topic<ContactSample> {
+        name: "contact", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
     /// Where the robot believes it is.
     POSE: Topic<PoseSample> {
         name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,

@@ -34,9 +34,13 @@ impl Robot {
     }
 
     pub fn start(mission: &str, transport: &str, listen: &str) -> Self {
-        let arguments = ["sim", mission, "--ground-truth", "--transport", transport];
-        let mut process = firsthand(&arguments)
-            .args(["--listen", listen])
+        Self::start_with(mission, &["--transport", transport, "--listen", listen])
+    }
+
+    /// Start a simulated robot with further arguments of `firsthand sim`.
+    pub fn start_with(mission: &str, arguments: &[&str]) -> Self {
+        let mut process = firsthand(&["sim", mission, "--ground-truth"])
+            .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

@@ -33,8 +33,8 @@ use serde::{Deserialize, Serialize};
 pub use error::MissionError;
 pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig, Steering};
 pub use simulation::{
-    BatteryPhysics, Heights, InfraredPhysics, Move, Physics, Radio, Ranger, Realism, Simulation,
-    SonarPhysics, Thing, WheelPhysics,
+    BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, Move, Physics, Radio, Ranger,
+    Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
 };
 
 use crate::{

@@ -75,6 +75,9 @@ pub struct RobotConfig {
     pub command_limit_s: f64,
     /// Below what a battery is low.
     pub low_battery_v: BatteryLimits,
+    /// The motor current of a wheel that something holds, AD counts: a wheel that does not turn as told and draws less is taken for a
+    /// wheel whose encoder is dead; 0 takes each for that. The default is that of the simulated robot, because no X80 was measured.
+    pub held_current_ad: u16,
 }
 
 /// The voltages below which the batteries are low, volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells,
@@ -116,6 +119,7 @@ impl Default for RobotConfig {
             right: Channel { channel: 1, reversed: false },
             command_limit_s: 0.25,
             low_battery_v: BatteryLimits::default(),
+            held_current_ad: 1000,
         }
     }
 }

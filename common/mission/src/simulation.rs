@@ -37,6 +37,9 @@ pub struct Simulation {
     /// Things that appear, vanish or move.
     #[serde(rename = "thing", skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<Thing>,
+    /// Wheels that are blocked for a while.
+    #[serde(rename = "block", skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<Block>,
 }
 
 /// The preset of the simulated robot's errors.
@@ -77,6 +80,32 @@ pub struct Thing {
     /// Its positions in order of time. It moves in a straight line between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<Move>,
+}
+
+/// Something that lets wheels not turn for a while, for example a cable around an axle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Block {
+    /// The wheels.
+    pub wheels: BlockedWheels,
+    /// The time when it begins, seconds.
+    #[serde(default)]
+    pub from_s: f64,
+    /// The time when it ends, seconds; by default never.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_s: Option<f64>,
+}
+
+/// The wheels that a [`Block`] blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BlockedWheels {
+    /// The left one.
+    Left,
+    /// The right one.
+    Right,
+    /// Both.
+    Both,
 }
 
 /// The position of a moving shape at a time.

@@ -57,6 +57,21 @@ payloads! {
     }
 }
 
+payloads! {
+    /// Topic `contact`: wheels that were told to turn are held. They stand by their encoders, and their motors draw a high current.
+    #[derive(Serialize, Deserialize)]
+    "firsthand.Contact" ContactSample {
+        /// The direction from the body's centre in which something touches the body, radians counter-clockwise from the robot's axis.
+        bearing_rad: f64,
+        /// Half the angle in which that may be, radians; 0 if it is not known where, because the robot was told to turn on the spot.
+        half_width_rad: f64,
+        /// 1: the left wheel is held, or the driven wheels of a car.
+        left: u8,
+        /// 1: the right wheel is held.
+        right: u8,
+    }
+}
+
 wire_enum! {
     /// The action of the link's failsafe, the least severe first.
     #[derive(PartialOrd, Ord)]
@@ -113,6 +128,8 @@ wire_enum! {
         RangeSilent = 17 "front sonar silent",
         /// The robot's frames are old.
         RobotLate = 18 "robot late",
+        /// Something holds a wheel that was told to turn.
+        WheelsHeld = 19 "wheels held",
     }
 }
 

@@ -284,6 +284,8 @@ wire_enum! {
         InsideHazard = 2,
         /// It stands where the belief has no way to the target, u = 0.
         CutOff = 3,
+        /// Something holds its wheels.
+        Held = 4,
     }
 }
 

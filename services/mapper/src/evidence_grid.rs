@@ -11,6 +11,8 @@
 //!
 //! The ray of an infrared ranger is as thin as a cell and ends at a surface of any angle. The cells that it passed are free,
 //! the cell where it ends is occupied, and the absence of an echo is no evidence against that.
+//!
+//! Where the body touched something, no ranger is evidence against it: all of them may look over it.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     infrared_model::{SCANNED_ASIDE_M, Seen},
-    reading::{Ray, Reading},
+    reading::{Ray, Reading, Touch},
     sonar_model::SonarModel,
 };
 
@@ -32,8 +34,10 @@ const SCANNED: u8 = u8::MAX;
 
 /// Flag of a cell: an obstacle stands in it.
 const OCCUPIED: u8 = 1;
-/// Flag of a cell: an infrared ranger saw the obstacle.
+/// Flag of a cell: an infrared ranger saw the obstacle, which the sonar may not hear.
 const SEEN: u8 = 2;
+/// Flag of a cell: the body touched the obstacle, which no ranger may see.
+const TOUCHED: u8 = 4;
 
 /// Distance that the wheels roll until scanned ground is one step less certain, metres.
 pub(crate) fn step_m(sonar: &SonarModel) -> f64 {
@@ -62,7 +66,7 @@ pub(crate) struct EvidenceGrid {
     /// the sonar was pointed at the cell without a result.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
-    /// The flags [`OCCUPIED`] and [`SEEN`].
+    /// The flags [`OCCUPIED`], [`SEEN`] and [`TOUCHED`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
 }
@@ -203,7 +207,7 @@ impl EvidenceGrid {
                     if off <= sonar.against.max(slack) { sonar.pass } else { sonar.pass_at_edge };
                 let weight = self.weight_of(index);
                 let same = apart(self.side[index], came_from) <= sonar.same_side;
-                if weight <= 0 || same && self.occupied[index] & SEEN == 0 {
+                if weight <= 0 || same && self.occupied[index] & (SEEN | TOUCHED) == 0 {
                     self.set(sonar, lattice, cell, weight.saturating_sub(pass), flips);
                     window = window.including(cell);
                 }
@@ -283,7 +287,7 @@ impl EvidenceGrid {
                 self.set(sonar, lattice, cell, weight, flips);
             } else if along <= clear_m {
                 self.looks[index] = SCANNED;
-                if on_ray {
+                if on_ray && self.occupied[index] & TOUCHED == 0 {
                     let weight = weight.saturating_sub(sonar.pass);
                     self.set(sonar, lattice, cell, weight, flips);
                 }
@@ -291,6 +295,31 @@ impl EvidenceGrid {
                 continue;
             }
             window = window.including(cell);
+        }
+        window
+    }
+
+    /// Note that something touches a body of `radius` metres: an obstacle stands in every cell at its rim in the arc of `touch`.
+    pub(crate) fn touch(
+        &mut self,
+        sonar: &SonarModel,
+        lattice: &GridFrame,
+        touch: &Touch,
+        radius: f64,
+        flips: &mut Vec<Flip>,
+    ) -> Window {
+        let mut window = Window::default();
+        let rim = radius - sonar.rim_m..=radius + lattice.resolution_m;
+        for cell in around(lattice, touch.robot, radius + lattice.resolution_m) {
+            let offset = lattice.centre_of(cell) - touch.robot;
+            let (across, along) = (touch.axis.perp_dot(offset), touch.axis.dot(offset));
+            if rim.contains(&offset.length()) && across.atan2(along).abs() <= touch.half_width {
+                let index = lattice.index(cell);
+                self.side[index] = side_of(touch.axis);
+                self.set(sonar, lattice, cell, sonar.most, flips);
+                self.occupied[index] |= TOUCHED;
+                window = window.including(cell);
+            }
         }
         window
     }
@@ -337,7 +366,7 @@ impl EvidenceGrid {
             flips.push(Flip { cell, occupied });
         }
         if !occupied {
-            self.occupied[index] &= !SEEN;
+            self.occupied[index] &= !(SEEN | TOUCHED);
         }
     }
 }

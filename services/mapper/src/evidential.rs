@@ -12,7 +12,7 @@ use crate::{
     clear_beams::ClearBeams,
     evidence_grid::{EvidenceGrid, Flip, lattice, step_m},
     inflation::{Geometry, Inflation},
-    reading::{Ray, Reading},
+    reading::{Ray, Reading, Touch},
     sonar_model::SonarModel,
 };
 
@@ -128,6 +128,18 @@ impl Evidential {
             window = window.union(map.inflation.follow(&self.geometry, *flip));
         }
         Observed { window, safety_event: flips.iter().any(|flip| flip.occupied) }
+    }
+
+    /// Note that something touches the body. Returns the window of the grid that may look different now.
+    pub(crate) fn touch(&self, map: &mut EvidenceMap, touch: &Touch) -> Window {
+        let mut flips = Vec::new();
+        let lattice = &self.geometry.lattice;
+        let touched = map.evidence.touch(&self.sonar, lattice, touch, self.radius, &mut flips);
+        let mut window = self.on_grid(touched);
+        for flip in &flips {
+            window = window.union(map.inflation.follow(&self.geometry, *flip));
+        }
+        window
     }
 
     /// Let scanned ground grow stale as the wheels roll from `before` to `now`, metres since the start. Returns the window of

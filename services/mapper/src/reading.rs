@@ -1,6 +1,13 @@
 //! Readings of the rangers in the mission's frame.
 
-use common::{infrared, kinematics::Pose2, mission::Sensors, samples::RangeSample};
+use std::f64::consts::PI;
+
+use common::{
+    infrared,
+    kinematics::Pose2,
+    mission::Sensors,
+    samples::{ContactSample, RangeSample},
+};
 use glam::DVec2;
 
 use crate::infrared_model::{self, Seen};
@@ -46,5 +53,30 @@ impl Ray {
             })
         };
         rangers.zip(range.infrared_ad).filter_map(ray).collect()
+    }
+}
+
+/// Something that touches the body, in the mission's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Touch {
+    /// Position of the body's centre, metres.
+    pub(crate) robot: DVec2,
+    /// Direction of the middle of the arc in which the body is touched, a unit vector.
+    pub(crate) axis: DVec2,
+    /// Half the angle of the arc, radians.
+    pub(crate) half_width: f64,
+}
+
+impl Touch {
+    /// The contact of a robot at `pose`; none if it is not known where the body is touched. The sample comes from shared memory and
+    /// may hold anything.
+    pub(crate) fn of(pose: Pose2, contact: &ContactSample) -> Option<Self> {
+        let &ContactSample { bearing_rad, half_width_rad, .. } = contact;
+        let usable = bearing_rad.is_finite() && half_width_rad > 0.0 && half_width_rad <= PI;
+        usable.then(|| Self {
+            robot: pose.position,
+            axis: DVec2::from_angle(pose.heading + bearing_rad),
+            half_width: half_width_rad,
+        })
     }
 }

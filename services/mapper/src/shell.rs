@@ -6,12 +6,12 @@ use std::time::Duration;
 use common::{
     bus::Reader,
     clock::MissionTime,
-    samples::{DirectiveSample, FaultKind, PoseSample, RangeSample},
+    samples::{ContactSample, DirectiveSample, FaultKind, PoseSample, RangeSample},
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     step::Step as _,
-    topics::{DIRECTIVE, GRID, HEALTH, POSE, RANGE},
+    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGE},
     wiring::{Persists, Wiring},
 };
 
@@ -27,15 +27,17 @@ const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
 pub struct Shell {
     pose: Reader<PoseSample>,
     range: Reader<RangeSample>,
+    contact: Reader<ContactSample>,
     directive: Reader<DirectiveSample>,
     runner: Runner<Mapper>,
     latest_range: Option<RangeSample>,
+    latest_contact: Option<ContactSample>,
     last_keyframe: Option<MissionTime>,
 }
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&RANGE, &POSE, &DIRECTIVE],
+        inputs: &[&RANGE, &CONTACT, &POSE, &DIRECTIVE],
         // A planner that becomes ready is a new reader of the grid.
         wakes: &[&POSE, &DIRECTIVE, &HEALTH],
         outputs: &[&GRID],
@@ -52,9 +54,11 @@ impl Process for Shell {
         Ok(Self {
             pose: context.reader(&POSE)?,
             range: context.reader(&RANGE)?,
+            contact: context.reader(&CONTACT)?,
             directive: context.reader(&DIRECTIVE)?,
             runner,
             latest_range: None,
+            latest_contact: None,
             last_keyframe: None,
         })
     }
@@ -63,7 +67,11 @@ impl Process for Shell {
         while let Some(pose) = self.pose.take()? {
             let range = self.range_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
-            self.step(Input::Tick { pose, range })?;
+            let input = match self.contact_of(pose.stamp.tick)? {
+                Some(contact) => Input::Contact { pose, range, contact },
+                None => Input::Tick { pose, range },
+            };
+            self.step(input)?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
             && self.step(Input::Reset { epoch })?
@@ -121,6 +129,17 @@ impl Shell {
             }
         }
         Ok(self.latest_range.filter(|range| range.stamp.tick == tick))
+    }
+
+    /// The contact of `tick`, likewise; most ticks have none.
+    fn contact_of(&mut self, tick: u64) -> Result<Option<ContactSample>, StageError> {
+        while self.latest_contact.is_none_or(|contact| contact.stamp.tick < tick) {
+            match self.contact.take()? {
+                Some(contact) => self.latest_contact = Some(contact),
+                None => break,
+            }
+        }
+        Ok(self.latest_contact.filter(|contact| contact.stamp.tick == tick))
     }
 
     fn is_keyframe_due(&self) -> bool {

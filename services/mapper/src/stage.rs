@@ -24,6 +24,7 @@ pub struct Start {
 }
 
 /// An action of the mapper, and its tick.
+#[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
     /// The step takes this; what changed is published.

@@ -7,7 +7,7 @@ use common::{
     clock::MissionTime,
     grid::{Cell, CellState, GridFrame, Part, Window},
     mission::{Method, Mission, Sensors},
-    samples::{FaultKind, GridHeader, PoseSample, RangeSample, RangeStatus},
+    samples::{ContactSample, FaultKind, GridHeader, PoseSample, RangeSample, RangeStatus},
     sonar::Mount,
     step::{ForeignState, Step},
 };
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     evidential::{EvidenceMap, Evidential},
     fault,
-    reading::{Ray, Reading},
+    reading::{Ray, Reading, Touch},
 };
 
 /// The range at which the reading "4 cm or nearer" is mapped, metres.
@@ -39,6 +39,8 @@ pub enum Input {
     },
     /// A fault that an operator injects into the belief; it acts from the next tick on.
     Fault(FaultKind),
+    /// As [`Input::Tick`], for a tick at which something holds the wheels.
+    Contact { pose: PoseSample, range: Option<RangeSample>, contact: ContactSample },
 }
 
 /// The part of the map that an input changed and that is published.
@@ -182,7 +184,10 @@ impl Step for Mapper {
 
     fn step(&mut self, input: Input, _: MissionTime) -> Change {
         match input {
-            Input::Tick { pose, range } => Change::Window(self.map(&pose, range.as_ref())),
+            Input::Tick { pose, range } => Change::Window(self.map(&pose, range.as_ref(), None)),
+            Input::Contact { pose, range, contact } => {
+                Change::Window(self.map(&pose, range.as_ref(), Some(&contact)))
+            }
             Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
             Input::Reset { .. } => Change::None,
             Input::Fault(fault) => {
@@ -248,9 +253,14 @@ impl Mapper {
         }
     }
 
-    /// Map one reading taken at `pose`. Returns the window that changed, empty for none. A tick given
+    /// Map one reading taken at `pose`, and the contact of that tick. Returns the window that changed, empty for none. A tick given
     /// twice is mapped once.
-    fn map(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
+    fn map(
+        &mut self,
+        pose: &PoseSample,
+        range: Option<&RangeSample>,
+        contact: Option<&ContactSample>,
+    ) -> Window {
         if self.belief.tick == Some(pose.stamp.tick) {
             return Window::default();
         }
@@ -265,7 +275,9 @@ impl Mapper {
             Sensed::Hits => self.mark_hit(pose, range),
             Sensed::Evidence(_) => self.weigh(pose, range, rolled),
         };
-        let changed = changed.union(self.falsify());
+        let contact = contact.and_then(|contact| Touch::of(now, contact));
+        let felt = contact.map_or_else(Window::default, |touch| self.mark_touch(&touch));
+        let changed = changed.union(felt).union(self.falsify());
         self.belief.version += u64::from(changed.area() > 0);
         changed
     }
@@ -303,6 +315,19 @@ impl Mapper {
         let news = self.evidential.take(map, robot.position, reading, &rays, self.belief.rolled);
         let changed = self.redraw(stale.union(news.window));
         self.belief.safety_events += u64::from(news.safety_event);
+        changed
+    }
+
+    /// Mark hazard where something touches the body.
+    fn mark_touch(&mut self, touch: &Touch) -> Window {
+        let changed = match &mut self.belief.sensed {
+            Sensed::Hits => self.mark(touch.robot + self.footprint * touch.axis, touch.robot),
+            Sensed::Evidence(map) => {
+                let touched = self.evidential.touch(map, touch);
+                self.redraw(touched)
+            }
+        };
+        self.belief.safety_events += u64::from(changed.area() > 0);
         changed
     }
 

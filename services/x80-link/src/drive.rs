@@ -83,6 +83,12 @@ impl Drive {
         }
     }
 
+    /// The motor currents of the left and the right wheel, AD counts.
+    pub fn currents(&self, sensors: &MotorSensors) -> [u16; 2] {
+        let channels = [self.robot.left, self.robot.right];
+        channels.map(|wheel| sensors.currents[usize::from(wheel.channel.min(1))])
+    }
+
     /// A channel's encoder, turned so that it grows forward.
     fn wheel(&self, sensors: &MotorSensors, channel: Channel) -> Encoder {
         let encoder = sensors.encoders[usize::from(channel.channel.min(1))];

@@ -4,6 +4,7 @@
 //! A new cause needs a variant of [`Cause`], a row, and a monitor, which is a file in `failsafe/` and a line in `monitors!`.
 
 pub mod battery;
+mod contact;
 pub mod latency_monitor;
 pub mod monitor;
 pub mod odometry;
@@ -164,6 +165,13 @@ pub const TABLE: &[Rule] = &[
         when: "0.55 s of commanded motion with less than a quarter of it in the encoders, until the robot restarts, or 3 jumps within 2 s; `x80-link.log` says which",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(odometry::CALM) },
+        monitor: |all| &all.odometry,
+    },
+    Rule {
+        cause: Cause::WheelsHeld,
+        when: "0.4 s of commanded motion with less than a quarter of it in the encoders, and a motor current of `robot.held_current_ad` or more; the robot stands for 0.5 s, `contact` says where it is touched, and the supervisor takes it for a stall",
+        action: Action::Stop,
+        clears: Clears::WithCondition,
         monitor: |all| &all.odometry,
     },
     Rule {

@@ -65,6 +65,7 @@ impl Process for Shell {
         feedback: &[&topics::COMMAND],
         wakes: &[&topics::COMMAND, &topics::DIRECTIVE, &topics::TICK_LIMIT],
         outputs: &[
+            &topics::CONTACT,
             &topics::RANGE,
             &topics::WHEELS,
             &topics::LINK,

@@ -15,7 +15,7 @@ use common::{
     start::StageError,
     step::{ForeignState, Step as _},
     stop_socket::Request,
-    topics::{INFRARED, POWER, RANGE, SURROUNDINGS, WHEELS, WIRE},
+    topics::{CONTACT, INFRARED, POWER, RANGE, SURROUNDINGS, WHEELS, WIRE},
 };
 use serde::{Deserialize, Serialize};
 
@@ -115,8 +115,11 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, range, wheels } => {
+            Effect::Tick { tick, time, range, wheels, contact } => {
                 out.at = Progress { tick, time };
+                if let Some(contact) = contact {
+                    out.publish(&CONTACT, contact)?;
+                }
                 out.publish(&RANGE, range)?;
                 out.publish(&WHEELS, wheels)?;
             }

@@ -14,7 +14,8 @@ use common::{
     clock::{MissionTime, Pace},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeSample, WheelSample,
+        Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeSample,
+        WheelSample,
     },
     step::{ForeignState, Step},
     stop_socket::Request,
@@ -55,6 +56,7 @@ const STOP_AGAIN: Duration = Duration::from_millis(200);
 struct OpenTick {
     range: RangeSample,
     wheels: WheelSample,
+    contact: Option<ContactSample>,
     began_ns: u64,
     /// The time when the tick was published; `None` while it waits for the supervisor's limit.
     given_ns: Option<u64>,
@@ -293,6 +295,7 @@ impl Link {
         self.open = Some(OpenTick {
             range: self.rangers.for_tick(),
             wheels,
+            contact: self.failsafe.monitors.odometry.take_contact(),
             began_ns: now_ns,
             given_ns: None,
         });
@@ -300,7 +303,8 @@ impl Link {
     }
 
     fn tick_effect(&self, tick: u64, open: &OpenTick) -> Effect {
-        Effect::Tick { tick, time: self.time, range: open.range, wheels: open.wheels }
+        let OpenTick { range, wheels, contact, .. } = *open;
+        Effect::Tick { tick, time: self.time, range, wheels, contact }
     }
 
     /// The number of the open tick.

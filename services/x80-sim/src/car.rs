@@ -116,8 +116,9 @@ impl Car {
         let grip = grip(held_at.is_some(), physics);
         let went = held_at.unwrap_or(ground) / self.wheel_radius_m * self.counts_per_radian * sign;
         let motor = &mut motors[channel];
-        motor.turn(went * grip + asked * (1.0 - grip));
-        if grip > 0.0 {
+        let share = grip.unwrap_or(0.0);
+        motor.turn(went * share + asked * (1.0 - share));
+        if let Some(grip) = grip {
             motor.hold(went / dt, grip);
         }
     }

@@ -13,10 +13,10 @@ pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) ->
     metres * (1.0 - physics.slip_share) + lost
 }
 
-/// The share by which wheels go with the ground. A wheel that slips turns all the same; one whose body is `held` turns as
-/// far as it slips at the contact.
-pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> f64 {
-    if held { 1.0 - physics.contact_slip } else { 0.0 }
+/// The share by which wheels go with the ground while their body is `held`: the rest slips at the contact. A wheel that nothing
+/// holds turns as it is asked, however it slips.
+pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
+    held.then_some(1.0 - physics.contact_slip)
 }
 
 /// The wheels of the robot and their motors.
@@ -66,29 +66,30 @@ impl Drivetrain {
         Wheels { left: metres.left * self.diameter.left, right: metres.right * self.diameter.right }
     }
 
-    /// The wheels have turned in `dt` seconds: by the share `grip` with the ground, which went by `went` metres, and by the rest
-    /// as they were `asked`.
+    /// The wheels have turned in `dt` seconds: a wheel that is held by the share `grip` with the ground, which went by `went` metres,
+    /// and by the rest as it was `asked`.
     pub(crate) fn turn(
         &self,
         motors: &mut [Motor; 6],
         asked: Wheels<f64>,
         went: Wheels<f64>,
-        grip: f64,
+        grip: Wheels<Option<f64>>,
         dt: f64,
     ) {
-        let mut turn = |channel: usize, sign: f64, asked: f64, went: f64| {
+        let mut turn = |channel: usize, sign: f64, asked: f64, went: f64, grip: Option<f64>| {
             let Some(motor) = motors.get_mut(channel) else {
                 return;
             };
             let counts = |metres: f64| sign * metres / self.metres_per_count;
-            motor.turn(counts(went * grip + asked * (1.0 - grip)));
-            if grip > 0.0 {
+            let share = grip.unwrap_or(0.0);
+            motor.turn(counts(went * share + asked * (1.0 - share)));
+            if let Some(grip) = grip {
                 motor.hold(counts(went) / dt, grip);
             }
         };
         let Wheels { left, right } = self.diameter;
-        turn(self.channel.left, self.sign.left, asked.left, went.left / left);
-        turn(self.channel.right, self.sign.right, asked.right, went.right / right);
+        turn(self.channel.left, self.sign.left, asked.left, went.left / left, grip.left);
+        turn(self.channel.right, self.sign.right, asked.right, went.right / right, grip.right);
     }
 
     /// Speeds of the rims, m/s, forward positive.

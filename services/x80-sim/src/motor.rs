@@ -21,6 +21,9 @@ const POSITION_REACHED: f64 = 0.5;
 /// Below this speed friction holds a wheel that is ordered to stand, counts per second (2 mm/s); the dead band of
 /// starting is friction too, where it is wider.
 const STANDSTILL: f64 = 5.0;
+/// The share of the stall torque at which a tyre slips: half the robot's weight of 34 N with a friction of 0.6, over the 26 N of a
+/// stalled motor at the rim.
+const SLIPS_AT: f64 = 0.4;
 /// The greatest number of delayed changes of the target. At a change every 5 ms this is more than the longest delay needs. A host that
 /// sends faster overwrites the newest one.
 const MOST_PENDING: usize = 1024;
@@ -65,6 +68,7 @@ pub struct Motor {
     target: f64,
     speed: f64,
     turned: f64,
+    load: f64,
 }
 
 /// A motion command that still holds.
@@ -92,6 +96,7 @@ impl Motor {
             target: 0.0,
             speed: 0.0,
             turned: 0.0,
+            load: 0.0,
         }
     }
 
@@ -124,6 +129,11 @@ impl Motor {
     /// Counts since boot.
     pub fn turned(&self) -> f64 {
         self.turned
+    }
+
+    /// The share of its stall torque that it gives against something that holds its wheel or the body.
+    pub fn load(&self) -> f64 {
+        self.load
     }
 
     /// Restore the counts of an earlier process; the wheel stands.
@@ -179,6 +189,7 @@ impl Motor {
     /// Follow the order from mission time `now` for `dt` seconds. Returns the counts the loop asks of the
     /// wheel.
     pub fn step(&mut self, now: f64, dt: f64, noise: &mut Noise) -> f64 {
+        self.load = 0.0;
         if self.ends_at().is_some_and(|end| now >= end) {
             // The time limit of a position is the duration of the motion; the wheel goes on to its last count.
             self.order = self
@@ -222,9 +233,13 @@ impl Motor {
     }
 
     /// The ground under it lets the wheel go at `speed` counts per second only; `grip` is the share of its own speed that it
-    /// loses by that, 0 where it slips freely. A push gives it none.
+    /// loses by that, 0 where it slips freely. A push gives it none. Its loop raises the torque until the wheel stalls or slips.
     pub fn hold(&mut self, speed: f64, grip: f64) {
         let held = speed.clamp(self.speed.min(0.0), self.speed.max(0.0));
+        if self.target != 0.0 {
+            let lost = (1.0 - held / self.target).clamp(0.0, 1.0);
+            self.load = lost * (grip + (1.0 - grip) * SLIPS_AT);
+        }
         self.speed = held * grip + self.speed * (1.0 - grip);
     }
 

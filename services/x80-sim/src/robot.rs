@@ -3,7 +3,7 @@
 use common::{
     ground_truth::GroundTruthTick,
     kinematics::Twist,
-    mission::{Mission, Physics},
+    mission::{Block, BlockedWheels, Mission, Physics},
     wire::{
         Addressing, Command, CustomSensors, Frame, Motion, MotorSensors, Report, StandardSensors,
         SystemSignal,
@@ -49,6 +49,7 @@ pub enum Heard {
 pub struct Robot {
     physics: Physics,
     ignores_time: bool,
+    blocks: Vec<Block>,
     stops_when_silent: Option<f64>,
     rate_hz: f64,
     drivetrain: Drivetrain,
@@ -99,6 +100,7 @@ impl Robot {
         let mut robot = Self {
             physics,
             ignores_time: mission.simulation.ignores_time,
+            blocks: mission.simulation.blocks.clone(),
             stops_when_silent: mission.simulation.stops_when_silent_s,
             rate_hz: mission.robot.rate_hz,
             drivetrain: Drivetrain::new(mission, wheel_errors.diameter),
@@ -310,10 +312,19 @@ impl Robot {
             car.step(&mut self.motors, &mut self.body, world, &wheels, (now, dt), noise);
         } else {
             let asked = drivetrain.step(&mut self.motors, now, dt, noise);
-            let ground =
+            let mut ground =
                 drivetrain.rims(asked).map(|metres| drivetrain::slipped(metres, &wheels, noise));
+            let blocked = self.blocked_wheels();
+            if blocked.left {
+                ground.left = 0.0;
+            }
+            if blocked.right {
+                ground.right = 0.0;
+            }
             let went = self.body.roll(ground, &self.world);
-            let grip = drivetrain::grip(went != ground, &wheels);
+            let at_contact = drivetrain::grip(went != ground, &wheels);
+            // What blocks a wheel lets it not slip.
+            let grip = blocked.map(|blocked| if blocked { Some(1.0) } else { at_contact });
             drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         }
         self.least_clearance = self.least_clearance.min(self.body.clearance());
@@ -321,6 +332,19 @@ impl Robot {
         if rims.left.abs().max(rims.right.abs()) > GroundTruthTick::AT_REST_M_S {
             self.stopping_time = self.stopping_time.max(now + dt - self.ordered_at);
         }
+    }
+
+    /// For each wheel, whether something in it or around it lets it not turn now.
+    fn blocked_wheels(&self) -> Wheels<bool> {
+        let blocks = |wheel: &Block| {
+            self.time >= wheel.from_s && wheel.until_s.is_none_or(|until| self.time < until)
+        };
+        let mut now = Wheels::default();
+        for block in self.blocks.iter().filter(|block| blocks(block)) {
+            now.left |= block.wheels != BlockedWheels::Right;
+            now.right |= block.wheels != BlockedWheels::Left;
+        }
+        now
     }
 
     /// Speeds of the rims, m/s, forward positive.

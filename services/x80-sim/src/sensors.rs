@@ -23,8 +23,10 @@ const SIDE_FORWARD_M: f64 = 0.194;
 pub const MIDDLE: u16 = 2048;
 /// Supply of the AD converters, AD counts: drivers convert with it.
 const REFERENCE: u16 = 2048;
-/// Motor current of a standing motor, and for each count per second, AD counts.
+/// Motor current of a standing motor, and for each count per second, AD counts; nominal.
 const CURRENT: (f64, f64) = (20.0, 0.2);
+/// Motor current that a stalled motor draws besides, AD counts; nominal. A stalled motor draws several times what it draws as it rolls.
+const STALL_CURRENT: f64 = 1500.0;
 
 /// The ultrasonic and infrared rangers and the rest of the multimedia board.
 #[derive(Clone, Debug)]
@@ -180,6 +182,7 @@ pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
             return 0;
         }
         let (standing, per_speed) = CURRENT;
-        (standing + per_speed * motor.speed().abs()).min(4095.0) as u16
+        let current = standing + per_speed * motor.speed().abs() + STALL_CURRENT * motor.load();
+        current.min(4095.0) as u16
     })
 }

@@ -7,8 +7,8 @@ use common::{
     grid::{Applied, Replica},
     latency::Histogram,
     samples::{
-        CommandSample, CommandState, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        HealthSample, LinkSample, PoseSample, RosterEntry, name_str,
+        CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
+        GuidanceSample, HealthSample, LinkSample, PoseSample, RosterEntry, name_str,
     },
     topics::{self, AnyTopic},
     waiter::Waiter,
@@ -22,6 +22,8 @@ use crate::{
 
 /// Guidance samples recorded: that of the arrival tick must still be there when its command is read.
 const MOST_GUIDANCE: usize = 1024;
+/// Contacts recorded: more than come between two checks for stalls.
+const MOST_CONTACTS: usize = 64;
 /// The greatest number of recorded poses, three hours at 7 Hz. Whenever the record is full, every second pose is dropped.
 const MOST_POSES: usize = 80_000;
 
@@ -29,6 +31,7 @@ pub struct Observer {
     health: Reader<HealthSample>,
     link: Reader<LinkSample>,
     pose: Reader<PoseSample>,
+    contact: Reader<ContactSample>,
     grid: SliceReader<GridHeader, u8>,
     guidance: Reader<GuidanceSample>,
     field: SliceReader<FieldHeader, FieldCell>,
@@ -52,6 +55,8 @@ pub struct Record {
     /// The epoch of the newest grid, and whether the grid changed when it began.
     grid_epoch: u64,
     grid_changed: bool,
+    /// The newest ticks at which something held the wheels, oldest first.
+    contacts: VecDeque<u64>,
     /// The first command that said arrived.
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
@@ -78,6 +83,7 @@ impl Observer {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,
             pose: bus.reader(&topics::POSE)?,
+            contact: bus.reader(&topics::CONTACT)?,
             grid: bus.slice_reader(&topics::GRID)?,
             guidance: bus.reader(&topics::GUIDANCE)?,
             field: bus.slice_reader(&topics::FIELD)?,
@@ -94,6 +100,9 @@ impl Observer {
             let writes = |topic: &dyn AnyTopic| topic.spec().writer == stage;
             if writes(&topics::LINK) {
                 self.link.follow(author);
+            }
+            if writes(&topics::CONTACT) {
+                self.contact.follow(author);
             }
             if writes(&topics::POSE) {
                 self.pose.follow(author);
@@ -165,6 +174,12 @@ impl Observer {
             record.poses.push(pose);
         }
         // Poses are computed from the link's samples, so these are read last.
+        while let Some(contact) = self.contact.take()? {
+            if record.contacts.len() == MOST_CONTACTS {
+                record.contacts.pop_front();
+            }
+            record.contacts.push_back(contact.stamp.tick);
+        }
         while let Some(link) = self.link.take()? {
             stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
             record.latencies.insert(link.stamp.generation, link);
@@ -192,6 +207,12 @@ impl Record {
     /// The newest guidance at or before `tick`.
     pub fn guidance_at(&self, tick: u64) -> Option<&GuidanceSample> {
         self.guidance.iter().rev().find(|guidance| guidance.stamp.tick <= tick)
+    }
+
+    /// Whether something held the wheels after the tick `last`, up to `tick`: a slow planner may answer no tick with a contact.
+    pub(crate) fn has_contact(&self, last: Option<u64>, tick: u64) -> bool {
+        let is_new = |contact: &u64| *contact <= tick && last.is_none_or(|last| *contact > last);
+        self.contacts.iter().any(is_new)
     }
 
     /// The pose and the guidance of every tick after `last` that has both, oldest first.

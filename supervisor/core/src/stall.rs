@@ -8,6 +8,7 @@
 //! | still | it neither drives nor turns | replan |
 //! | pinned | it drives or turns, and stays at its place | replan |
 //! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
+//! | held | something holds its wheels: its motors push and its encoders stand | replan |
 //! | cut off | no way leads from its place to the target, and it has looked around | reset |
 
 use std::{f64::consts::TAU, time::Duration};
@@ -42,6 +43,8 @@ const TURNED_RAD: f64 = 0.1;
 const SHARE: f64 = 0.05;
 /// Distance that leads out of any margin, even of several overlapping ones, metres.
 const WAY_OUT_M: f64 = 1.0;
+/// Contacts within this distance are at the same place, metres: a robot that turns about a blocked wheel stays within it.
+const HELD_WITHIN_M: f64 = 0.5;
 /// Replans before the map is reset.
 const MOST_REPLANS: u32 = 2;
 /// Resets of the map before the target is unreachable.
@@ -51,6 +54,7 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
     let cause = match cause {
         StallCause::Still => "the robot neither drives nor turns, whatever is planned",
         StallCause::Pinned => "the robot moves and does not get away, whatever is planned",
+        StallCause::Held => "the wheels are held fast, whatever is planned",
         StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
         StallCause::CutOff => "the belief isolates the robot from the target, again and again",
     };
@@ -96,6 +100,8 @@ pub(crate) struct StallWatch {
     /// Replans at this place, since the last reset.
     replans_here: u32,
     replans: u32,
+    /// Where the wheels were held, and the replans there since the last reset.
+    held_at: Option<(DVec2, u32)>,
     epoch: u64,
     /// The last tick that was checked.
     tick: Option<u64>,
@@ -153,6 +159,7 @@ impl StallWatch {
             inside_hazard_since: None,
             replans_here: 0,
             replans: 0,
+            held_at: None,
             epoch: 0,
             tick: None,
             stalls: Vec::new(),
@@ -189,12 +196,13 @@ impl StallWatch {
     }
 
     /// Check a tick of a robot that is ordered to drive; each tick once. `held` says that something else holds the robot: the
-    /// link's failsafe, or a stage that is down.
+    /// link's failsafe, or a stage that is down. `contact` says that something holds its wheels.
     pub(crate) fn step(
         &mut self,
         pose: &PoseSample,
         guidance: &GuidanceSample,
         held: bool,
+        contact: bool,
     ) -> Option<StallSample> {
         if self.tick.replace(pose.stamp.tick) == Some(pose.stamp.tick) {
             return None;
@@ -205,24 +213,24 @@ impl StallWatch {
             self.hold(pose.stamp.tick);
             return None;
         }
-        if self.waits_for_field(pose, guidance) {
+        let cause = if contact {
+            StallCause::Held
+        } else if self.waits_for_field(pose, guidance) {
             (self.anchor, self.place) = (None, None);
             return None;
-        }
-        let cause =
-            self.without_policy(pose, guidance).or_else(|| self.without_motion(pose, guidance))?;
-        let recovery = match cause {
-            StallCause::Still | StallCause::Pinned if self.replans_here < MOST_REPLANS => {
-                self.replans_here += 1;
-                self.replans += 1;
-                RecoveryStep::Replan
-            }
-            _ if self.epoch < MOST_RESETS => {
-                self.epoch += 1;
-                self.replans_here = 0;
-                RecoveryStep::Reset
-            }
-            _ => RecoveryStep::GiveUp,
+        } else {
+            self.without_policy(pose, guidance).or_else(|| self.without_motion(pose, guidance))?
+        };
+        let recovery = if self.may_replan(cause, pose.pose().position) {
+            self.replans += 1;
+            RecoveryStep::Replan
+        } else if self.epoch < MOST_RESETS {
+            self.epoch += 1;
+            self.replans_here = 0;
+            self.held_at = None;
+            RecoveryStep::Reset
+        } else {
+            RecoveryStep::GiveUp
         };
         // The recovery step gets as much time as the robot had.
         let now = pose.stamp.time();
@@ -243,6 +251,22 @@ impl StallWatch {
         };
         self.stalls.push(stall);
         Some(stall)
+    }
+
+    /// Whether a fresh planner is the next step against `cause`, which is counted.
+    fn may_replan(&mut self, cause: StallCause, here: DVec2) -> bool {
+        let replans = match cause {
+            StallCause::Still | StallCause::Pinned => &mut self.replans_here,
+            StallCause::Held => {
+                let elsewhere = |(at, _): &mut (DVec2, u32)| at.distance(here) > HELD_WITHIN_M;
+                self.held_at.take_if(elsewhere);
+                &mut self.held_at.get_or_insert((here, 0)).1
+            }
+            StallCause::InsideHazard | StallCause::CutOff => return false,
+        };
+        let may = *replans < MOST_REPLANS;
+        *replans += u32::from(may);
+        may
     }
 
     /// The robot was not ordered to drive until `tick`, so nothing by then is a stall.

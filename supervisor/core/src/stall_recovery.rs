@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use common::samples::{Order, RecoveryStep, StallSample};
+use common::samples::{Cause, Order, RecoveryStep, StallSample};
 
 use crate::{
     error::SupervisorError,
@@ -58,7 +58,9 @@ impl Supervisor<'_> {
     fn next_stall(&mut self) -> Option<StallSample> {
         let record = &self.bus.observer.record;
         let in_ticks = self.clock.in_ticks();
-        let stopped = record.link.is_none_or(|link| link.stopped());
+        // The link stops a robot whose wheels are held, and only the supervisor can free it.
+        let stopped =
+            record.link.is_none_or(|link| link.stopped() && link.cause() != Cause::WheelsHeld);
         // In lockstep mission time stands still while something holds the robot.
         let held = !in_ticks && (stopped || !self.stages.all_running());
         // A tick without its command may be incomplete here.
@@ -69,7 +71,8 @@ impl Supervisor<'_> {
             if newest.is_some_and(|newest| pose.stamp.tick > newest) {
                 break;
             }
-            if let Some(stall) = self.stall_watch.step(pose, guidance, held) {
+            let contact = record.has_contact(self.stall_watch.tick(), pose.stamp.tick);
+            if let Some(stall) = self.stall_watch.step(pose, guidance, held, contact) {
                 found = Some((*pose, stall));
                 break;
             }

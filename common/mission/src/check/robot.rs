@@ -30,6 +30,7 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     for limit in [limits.board, limits.motor, limits.servo] {
         within("robot.low_battery_v", limit, 0.0..=MOTOR_SCALE_V, "V")?;
     }
+    within("robot.held_current_ad", f64::from(robot.held_current_ad), 0.0..=4095.0, "AD counts")?;
     if robot.command_limit_s * robot.rate_hz <= 1.0 {
         return Err(objection(
             "robot.command_limit_s",
@@ -88,6 +89,13 @@ fn steering(mission: &Mission) -> Result<(), Objection> {
             ))
         });
     };
+    if !mission.simulation.blocks.is_empty() {
+        return Err(objection(
+            "simulation.block",
+            "wheels of a car are not blocked",
+            "remove it, or choose another robot.model",
+        ));
+    }
     within("robot.wheelbase_m", steering.wheelbase_m, 0.01..=5.0, "m")?;
     within("robot.steering_limit_deg", steering.limit_rad.to_degrees(), 1.0..=80.0, "degrees")?;
     within(

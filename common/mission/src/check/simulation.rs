@@ -1,10 +1,12 @@
 //! The simulation's part of a mission.
 
 use super::{Checker, MAX_TIMEOUT_S, Objection, objection, within};
-use crate::simulation::{OutOfRange, Ranger, Simulation, Thing};
+use crate::simulation::{Block, OutOfRange, Ranger, Simulation, Thing};
 
 /// More things that come and go than this are a mistake.
 const MAX_THINGS: usize = 1000;
+/// More blocks of wheels than this are too.
+const MAX_BLOCKS: usize = 100;
 /// More stations on one thing's way than this are too.
 const MAX_MOVES: usize = 1000;
 
@@ -33,7 +35,11 @@ impl Checker {
         for thing in &simulation.things {
             self.thing(thing)?;
         }
-        Ok(())
+        if simulation.blocks.len() > MAX_BLOCKS {
+            let problem = format!("more than {MAX_BLOCKS} blocks of wheels");
+            return Err(objection("simulation.block", problem, "give fewer"));
+        }
+        simulation.blocks.iter().try_for_each(block)
     }
 
     fn thing(&mut self, thing: &Thing) -> Result<(), Objection> {
@@ -58,6 +64,14 @@ impl Checker {
         }
         Ok(())
     }
+}
+
+fn block(block: &Block) -> Result<(), Objection> {
+    const KEY: &str = "simulation.block";
+    within(KEY, block.from_s, 0.0..=MAX_TIMEOUT_S, "s")?;
+    block
+        .until_s
+        .map_or(Ok(()), |until| within(KEY, until, block.from_s..=MAX_TIMEOUT_S, "s of until_s"))
 }
 
 fn ranger(ranger: &Ranger) -> Result<(), Objection> {
@@ -120,6 +134,10 @@ mod tests {
             (
                 "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 1, bottom_m = 0.3, top_m = 0.2 }]",
                 "m.toml:2: simulation.thing: top_m = 0.2 is not above bottom_m = 0.3",
+            ),
+            (
+                "[[simulation.block]]\nwheels = 'left'\nfrom_s = 3\nuntil_s = 2",
+                "m.toml:2: simulation.block: 2 s of until_s is out of range",
             ),
             (
                 "[[world.wall]]\npoints = [[2, 0], [2, 1]]\necho = 2",

@@ -15,6 +15,14 @@ impl Mapper {
         }
     }
 
+    fn touch(&mut self, pose: &PoseSample, bearing_rad: f64) {
+        let half_width_rad = 0.8;
+        let contact = ContactSample { bearing_rad, half_width_rad, ..ContactSample::default() };
+        let input = Input::Contact { pose: *pose, range: None, contact };
+        let changed = self.step(input, pose.stamp.time());
+        assert!(matches!(changed, Change::Window(window) if window.area() > 0));
+    }
+
     fn reset(&mut self, epoch: u64) -> bool {
         self.step(Input::Reset { epoch }, MissionTime(0)) == Change::Whole
     }
@@ -199,4 +207,16 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
         assert_eq!(mapper.state().cells(), before, "{method}");
         assert_eq!(mapper.state().safety_events(), 0, "{method}");
     }
+}
+
+#[test]
+fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
+    let mut mapper = mapper("");
+    mapper.touch(&PoseSample::default(), FRAC_PI_2);
+    let state = |x: f64, y: f64| {
+        let cell = mapper.frame().cell_at(DVec2::new(x, y)).unwrap();
+        CellState::from_byte(mapper.state().cells()[mapper.frame().index(cell)])
+    };
+    assert!(state(0.0, 0.3).is_hazard());
+    assert!(!state(0.0, -0.3).is_hazard() && !state(0.0, 0.0).is_hazard());
 }

@@ -39,6 +39,8 @@ pub enum Observation<'a> {
     Sent,
     /// The robot acknowledged something.
     Acknowledged,
+    /// The motor currents of the wheels in the motor frame that follows, AD counts.
+    Currents([u16; 2]),
     /// A motor frame came, with these counts of the wheels, growing forward.
     Motor([u16; 2], Counts),
     /// A standard frame came.

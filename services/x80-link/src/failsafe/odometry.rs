@@ -12,6 +12,8 @@
 //! - At [`SUSPECTED_AFTER`] the robot must stand. At 7 Hz that is 0.86 s after a motion began, and the robot is at rest 0.2 s later.
 //! - A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
 //!   direction too often for the other evidence.
+//! - A wheel that does not turn while its motor draws the current of a held one is held, and its encoder is not suspected
+//!   ([`super::contact`]).
 //! - Intervals longer than two periods are no evidence, because commands may have been lost too.
 //!
 //! Single implausible counts, which lie farther off than wheels turn, are dropped ([`super::restart`]). [`MOST_JUMPS`] of them
@@ -22,11 +24,14 @@ use std::{collections::VecDeque, time::Duration};
 use common::{
     clock::MissionTime,
     mission::Mission,
-    samples::{Cause, Order},
+    samples::{Cause, ContactSample, Order},
     wire::counts_between,
 };
 
-use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
+use super::{
+    contact::{Contacts, HELD_AFTER},
+    monitor::{Condition, Counts, Moment, Monitor, Observation},
+};
 
 /// The counts are evidence once a command's direction has held for so long.
 const SETTLE: Duration = Duration::from_millis(250);
@@ -41,6 +46,8 @@ const LEAST_TURN_M_S: f64 = 0.1;
 const LEAST_TURN_SHARE: f64 = 0.25;
 /// A plausible wheel turns at least this share of its commanded speed.
 const LEAST_SHARE: f64 = 0.25;
+/// A wheel that turns this share of its commanded speed rolls as told.
+const ROLLS_SHARE: f64 = 0.5;
 /// The amount of evidence that leads to a suspicion. A radio that delivers frames does not lose commands for so long.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
 /// A commanded wheel may count nothing for so long, because commands may be lost.
@@ -97,6 +104,8 @@ struct Evidence {
     against_s: f64,
     /// The time for which the wheel has counted nothing although it was commanded to turn.
     still_s: f64,
+    /// The time for which the wheel did not turn as commanded while its motor drew a high current.
+    held_s: f64,
 }
 
 impl Evidence {
@@ -108,24 +117,35 @@ impl Evidence {
         self.asked = [before, counts_s];
     }
 
-    /// Add the evidence that the wheel rolled `counts` in the `gap_s` seconds until `now`. Commands below `least` counts/s give none.
-    fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, now: MissionTime) {
+    /// Add the evidence that the wheel rolled `counts` in the `gap_s` seconds until `now`, while its motor drew the current of a held
+    /// wheel if `high`. Commands below `least` counts/s give none. Returns whether the wheel rolled as told.
+    fn weigh(&mut self, counts: f64, gap_s: f64, least: f64, high: bool, now: MissionTime) -> bool {
         let [before, newest] = self.asked;
         let asked = before.abs().min(newest.abs());
         let told_s = now.since(self.since).as_secs_f64() - gap_s;
         if asked < least || gap_s <= 0.0 {
-            return;
+            return false;
         }
-        self.still_s = if counts.abs() <= 1.0 { self.still_s + gap_s } else { 0.0 };
         let share = counts * newest.signum() / (gap_s * asked);
+        if high && share < LEAST_SHARE {
+            // The motor pushes in vain. A body that turns about what it touches may even push its wheel back.
+            self.still_s = 0.0;
+            if told_s >= SETTLE.as_secs_f64() {
+                self.held_s += gap_s;
+            }
+            return false;
+        }
+        self.held_s = 0.0;
+        self.still_s = if counts.abs() <= 1.0 { self.still_s + gap_s } else { 0.0 };
         let opposite = share <= -LEAST_SHARE;
         let settled = if opposite { TURNS_AFTER } else { SETTLE };
         if told_s < settled.as_secs_f64() {
-            return;
+            return false;
         }
         let most = if opposite { 2.0 } else { 1.0 };
         let against = (1.0 - share / LEAST_SHARE).clamp(-2.0, most);
         self.against_s = (self.against_s + gap_s * against).max(0.0);
+        share >= ROLLS_SHARE
     }
 }
 
@@ -143,6 +163,7 @@ pub struct Odometry {
     left: Evidence,
     right: Evidence,
     turn: Evidence,
+    contacts: Contacts,
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
@@ -179,6 +200,12 @@ impl Odometry {
             self.suspicion = None;
             self.restart_evidence(now);
         }
+        if let Some(wheel) = self.contacts.repeats(now)
+            && [&self.left, &self.right].iter().all(|evidence| evidence.asked == [0.0; 2])
+        {
+            let suspicion = [Suspicion::Left, Suspicion::Right][wheel];
+            self.suspicion.get_or_insert((suspicion, now));
+        }
         let Some((before, then)) = self.frame.replace((counts, now)) else {
             return;
         };
@@ -193,10 +220,18 @@ impl Odometry {
             [0, 1].map(|wheel| f64::from(counts_between(before[wheel], counts[wheel])));
         let gap_s = gap.as_secs_f64();
         let least = LEAST_M_S * self.counts_per_m;
-        self.left.weigh(left, gap_s, least, now);
-        self.right.weigh(right, gap_s, least, now);
-        let least = LEAST_TURN_M_S * self.counts_per_m;
-        self.turn.weigh(right - left, gap_s, least, now);
+        let high = self.contacts.high();
+        let wheels = [(&mut self.left, left), (&mut self.right, right)];
+        for (wheel, (evidence, counts)) in wheels.into_iter().enumerate() {
+            if evidence.weigh(counts, gap_s, least, high[wheel], now) && high[wheel] {
+                self.contacts.rolled(wheel, gap_s);
+            }
+        }
+        if high == [false; 2] {
+            let least = LEAST_TURN_M_S * self.counts_per_m;
+            self.turn.weigh(right - left, gap_s, least, false, now);
+        }
+        self.look_for_contact(now);
         let suspected = |evidence: &Evidence| {
             evidence.against_s >= SUSPECTED_AFTER.as_secs_f64()
                 || evidence.still_s >= STILL_AFTER.as_secs_f64()
@@ -209,6 +244,23 @@ impl Odometry {
         if let Some((_, suspicion)) = all.into_iter().find(|(evidence, _)| suspected(evidence)) {
             self.suspicion.get_or_insert((suspicion, now));
         }
+    }
+
+    fn look_for_contact(&mut self, now: MissionTime) {
+        let [left, right] = [&self.left, &self.right].map(|evidence| evidence.held_s);
+        if left.max(right) < HELD_AFTER.as_secs_f64() {
+            return;
+        }
+        let held = if self.steers { [true; 2] } else { [left > 0.0, right > 0.0] };
+        let asked = [&self.left, &self.right].map(|evidence| evidence.asked[1]);
+        if self.contacts.begin(held, asked, now) {
+            (self.left.held_s, self.right.held_s) = (0.0, 0.0);
+        }
+    }
+
+    /// The contact that the newest frame shows, once.
+    pub(crate) const fn take_contact(&mut self) -> Option<ContactSample> {
+        self.contacts.take()
     }
 
     fn implausible(&mut self, now: MissionTime) {
@@ -229,6 +281,7 @@ impl Odometry {
         self.left = Evidence::default();
         self.right = Evidence::default();
         self.turn = Evidence::default();
+        self.contacts.reset();
         self.jumps.clear();
         self.recoveries = 0;
         self.suspicion = None;
@@ -237,7 +290,7 @@ impl Odometry {
     fn restart_evidence(&mut self, now: MissionTime) {
         for evidence in [&mut self.left, &mut self.right, &mut self.turn] {
             evidence.since = now;
-            evidence.still_s = 0.0;
+            (evidence.still_s, evidence.held_s) = (0.0, 0.0);
         }
     }
 }
@@ -255,6 +308,7 @@ impl Monitor for Odometry {
             left: Evidence::default(),
             right: Evidence::default(),
             turn: Evidence::default(),
+            contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
             recoveries: 0,
             suspicion: None,
@@ -267,6 +321,7 @@ impl Monitor for Odometry {
             Observation::Directive(order, _) => self.ordered_to_drive = order == Order::Drive,
             Observation::Resumed => self.reset(),
             Observation::Commanded(counts) => self.commanded(counts, now.time),
+            Observation::Currents(currents) => self.contacts.take_currents(currents),
             Observation::Motor(counts, Counts::Follow) => self.plausible(counts, now.time),
             Observation::Motor(_, Counts::Restarted { was_away: true }) => self.reset(),
             Observation::Motor(_, Counts::Implausible) => self.implausible(now.time),
@@ -280,6 +335,7 @@ impl Monitor for Odometry {
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
         match (cause, self.suspicion, self.jumps.back()) {
+            (Cause::WheelsHeld, ..) => self.contacts.condition(now.time),
             // A mission does not end while its robot is ordered not to drive.
             (Cause::OdometryGivenUp, Some((_, since)), _) => {
                 (self.ordered_to_drive && now.time.since(since) >= GIVEN_UP_AFTER).into()
@@ -291,7 +347,10 @@ impl Monitor for Odometry {
         }
     }
 
-    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
+    fn explain(&self, cause: Cause, _: Moment) -> Option<String> {
+        if cause == Cause::WheelsHeld {
+            return self.contacts.explain();
+        }
         let (suspicion, _) = self.suspicion?;
         Some(suspicion.words().to_owned())
     }

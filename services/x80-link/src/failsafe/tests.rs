@@ -94,6 +94,16 @@ fn does_not_stop(failsafe: &mut Failsafe) {
     frames(failsafe, (1..=30).map(|frame| 50 * frame), 4000);
 }
 
+fn wheels_are_held(failsafe: &mut Failsafe) {
+    for frame in (0..=10).rev() {
+        let when = ago(100 * frame * MS);
+        let odometry = &mut failsafe.monitors.odometry;
+        odometry.observe(&Observation::Currents([1500; 2]), when);
+        odometry.observe(&Observation::Motor([0; 2], Counts::Follow), when);
+        odometry.observe(&Observation::Commanded([1200; 2]), when);
+    }
+}
+
 /// For each cause, a change that alone leads to it, and its action.
 const CASES: &[(Break, Action, Cause)] = &[
     (|it| directive(it, Order::Stop, HoldReason::Ending), Action::End, Cause::MissionOver),
@@ -149,6 +159,7 @@ const CASES: &[(Break, Action, Cause)] = &[
         Cause::FramesSlow,
     ),
     (|it| jumps(it, now()), Action::Stop, Cause::OdometryImplausible),
+    (wheels_are_held, Action::Stop, Cause::WheelsHeld),
     (
         |it| {
             let reading = standard(255, 7.2);
@@ -323,5 +334,7 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
     says(Cause::OdometryImplausible, &jumps);
     let does_not_stop = seconds(stop_monitor::DOES_NOT_STOP_AFTER);
     says(Cause::RobotDoesNotStop, &does_not_stop);
+    says(Cause::WheelsHeld, &seconds(contact::HELD_AFTER));
+    says(Cause::WheelsHeld, &format!("stands for {}", seconds(contact::STANDS_FOR)));
     assert!((SLOW_SHARE - 0.5).abs() < 1e-9 && Action::Slow.effect().contains("half"));
 }

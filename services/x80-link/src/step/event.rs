@@ -3,7 +3,7 @@
 use common::{
     clock::{MissionTime, Pace},
     samples::{
-        CommandSample, HoldReason, InfraredSample, Order, PowerSample, RangeSample,
+        CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeSample,
         SurroundingsSample, WheelSample,
     },
     stop_socket::Request,
@@ -73,6 +73,8 @@ pub enum Effect {
         range: RangeSample,
         /// The encoders.
         wheels: WheelSample,
+        /// The contact that these encoders show.
+        contact: Option<ContactSample>,
     },
     /// The command of a tick was sent.
     Answered {

@@ -7,7 +7,7 @@ use common::wire::{
 use super::{Effect, Link, PING_EVERY, passed};
 use crate::{
     drive::encoded,
-    failsafe::monitor::{Counts, Observation},
+    failsafe::monitor::{Counts, Monitor as _, Observation},
 };
 
 impl Link {
@@ -84,15 +84,21 @@ impl Link {
         }
     }
 
-    /// Classify the counts of a frame. In lockstep all counts are plausible: the robot is a simulated one that does not restart, and no
-    /// time passes by which to judge.
+    /// Classify the counts of a frame. In lockstep all counts are plausible, because the robot is a simulated one that does not restart.
+    /// Only its contacts are noticed then.
     pub(super) fn judge_counts(&mut self, sensors: &MotorSensors, now_ns: u64) -> Counts {
-        if self.in_ticks() {
-            return Counts::Follow;
-        }
         let wheels = self.drive.wheels(sensors);
         let counts = [wheels.left_counts, wheels.right_counts];
         let counts = counts.map(|count| count % COUNT_CYCLE);
+        let currents = Observation::Currents(self.drive.currents(sensors));
+        if self.in_ticks() {
+            let now = self.moment(now_ns);
+            let odometry = &mut self.failsafe.monitors.odometry;
+            odometry.observe(&currents, now);
+            odometry.observe(&Observation::Motor(counts, Counts::Follow), now);
+            return Counts::Follow;
+        }
+        self.observe(currents, now_ns);
         let was_away = !self.connected();
         let are = self.restart.step(counts, was_away, self.now);
         self.observe(Observation::Motor(counts, are), now_ns);

@@ -32,7 +32,7 @@ fn a_robot_that_moves_is_left_alone() {
     let mut watch = watch();
     for tick in (0..100).map(f64::from) {
         let driving = PoseSample { x_m: tick * 0.05, ..pose(tick, tick * 0.05) };
-        assert_eq!(watch.step(&driving, &guidance(GuidanceStatus::Along, 0), false), None);
+        assert_eq!(watch.step(&driving, &guidance(GuidanceStatus::Along, 0), false, false), None);
     }
 }
 
@@ -41,7 +41,7 @@ fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
     let mut watch = watch();
     let along = guidance(GuidanceStatus::Along, 0);
     let stalls: Vec<_> = (0..=10)
-        .filter_map(|second| watch.step(&pose(f64::from(second), 0.0), &along, false))
+        .filter_map(|second| watch.step(&pose(f64::from(second), 0.0), &along, false, false))
         .map(|stall| parts(&stall))
         .collect();
     let cause = StallCause::Still;
@@ -58,7 +58,7 @@ fn a_robot_held_by_something_else_is_not_stalled() {
     let mut watch = watch();
     let along = guidance(GuidanceStatus::Along, 0);
     for second in 0..20 {
-        assert_eq!(watch.step(&pose(f64::from(second), 0.0), &along, true), None);
+        assert_eq!(watch.step(&pose(f64::from(second), 0.0), &along, true, false), None);
     }
 }
 
@@ -68,13 +68,13 @@ fn a_robot_that_waits_for_a_field_is_not_stalled_until_that_takes_too_long() {
     let waiting = guidance(GuidanceStatus::Waiting, 0);
     let first = (0..300).find(|&second| {
         let pose = pose(f64::from(second), 0.0);
-        watch.step(&pose, &waiting, false).is_some()
+        watch.step(&pose, &waiting, false, false).is_some()
     });
     let least = FIELD_WITHIN.as_secs() as i32;
     assert_eq!(first, Some(least + STALLED_AFTER.as_secs() as i32));
     // The next one is asked for after as long again.
     let second = pose(f64::from(least) + 10.0, 0.0);
-    assert_eq!(watch.step(&second, &waiting, false), None);
+    assert_eq!(watch.step(&second, &waiting, false, false), None);
 }
 
 #[test]
@@ -82,13 +82,13 @@ fn what_a_robot_did_while_it_was_not_to_drive_is_no_stall() {
     let mut watch = watch();
     let along = guidance(GuidanceStatus::Along, 0);
     let cut_off = guidance(GuidanceStatus::Unreachable, 0);
-    assert_eq!(watch.step(&pose(0.0, 0.0), &along, false), None);
-    assert_eq!(watch.step(&pose(0.5, 0.0), &cut_off, false), None);
+    assert_eq!(watch.step(&pose(0.0, 0.0), &along, false, false), None);
+    assert_eq!(watch.step(&pose(0.5, 0.0), &cut_off, false, false), None);
     let resumed = pose(20.0, 0.0);
     watch.hold(resumed.stamp.tick);
     assert_eq!(watch.tick(), Some(resumed.stamp.tick));
-    assert_eq!(watch.step(&pose(20.2, 0.0), &cut_off, false), None);
-    assert_eq!(watch.step(&pose(20.4, 0.0), &along, false), None);
+    assert_eq!(watch.step(&pose(20.2, 0.0), &cut_off, false, false), None);
+    assert_eq!(watch.step(&pose(20.4, 0.0), &along, false, false), None);
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn a_robot_cut_off_forgets_three_times_and_gives_up() {
     for tick in 0..100 {
         let cut_off = guidance(GuidanceStatus::Unreachable, watch.epoch());
         let pose = pose(f64::from(tick) * 0.5, f64::from(tick));
-        stalls.extend(watch.step(&pose, &cut_off, false).map(|stall| parts(&stall)));
+        stalls.extend(watch.step(&pose, &cut_off, false, false).map(|stall| parts(&stall)));
         if matches!(stalls.last(), Some((_, RecoveryStep::GiveUp, _))) {
             break;
         }
@@ -123,7 +123,7 @@ fn a_robot_cut_off_by_the_evidential_method_looks_around_before_its_belief_is_bl
     let turn = TAU / mission.controller.look_rad_s;
     let first = (0..100)
         .map(f64::from)
-        .find(|&second| watch.step(&turning(second), &cut_off, false).is_some());
+        .find(|&second| watch.step(&turning(second), &cut_off, false, false).is_some());
     assert!(first > Some(turn) && first < Some(5.0 * turn), "{first:?}");
 }
 
@@ -134,7 +134,7 @@ fn a_scan_is_no_stall() {
     for tick in 0..75 {
         let seconds = f64::from(tick) * 0.2;
         let scanning = PoseSample { heading_rad: seconds.sin(), ..pose(seconds, 0.0) };
-        assert_eq!(watch.step(&scanning, &look, false), None);
+        assert_eq!(watch.step(&scanning, &look, false, false), None);
     }
 }
 
@@ -142,11 +142,11 @@ fn a_scan_is_no_stall() {
 fn an_answer_from_before_the_reset_does_not_reset_again() {
     let mut watch = watch();
     let old = guidance(GuidanceStatus::Unreachable, 0);
-    watch.step(&pose(0.0, 0.0), &old, false);
-    let reset = watch.step(&pose(1.0, 0.0), &old, false);
+    watch.step(&pose(0.0, 0.0), &old, false, false);
+    let reset = watch.step(&pose(1.0, 0.0), &old, false, false);
     let want = (StallCause::CutOff, RecoveryStep::Reset, 1);
     assert_eq!(reset.map(|stall| parts(&stall)), Some(want));
-    assert_eq!(watch.step(&pose(2.5, 0.1), &old, false), None);
+    assert_eq!(watch.step(&pose(2.5, 0.1), &old, false, false), None);
 }
 
 /// Moves to and fro at one place for `seconds`.
@@ -159,7 +159,7 @@ fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<StallSampl
             heading_rad: seconds,
             ..pose(seconds, 0.05 * seconds)
         };
-        watch.step(&rocking, &along, false)
+        watch.step(&rocking, &along, false, false)
     });
     rocking.collect()
 }
@@ -196,8 +196,8 @@ fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to
         let crawl = PoseSample { x_m: 0.01 * second, ..pose(second, 0.01 * second) };
         let near = |distance_m| GuidanceSample { distance_m, ..guidance(GuidanceStatus::Along, 0) };
         let stalls = [
-            circling.step(&circle, &near(3.0 - circle.x_m), false),
-            crawling.step(&crawl, &near(0.5 - crawl.x_m), false),
+            circling.step(&circle, &near(3.0 - circle.x_m), false, false),
+            crawling.step(&crawl, &near(0.5 - crawl.x_m), false, false),
         ];
         for (first, stall) in seen.iter_mut().zip(stalls) {
             *first = first.or(stall.map(|stall| stall.cause()));
@@ -211,7 +211,7 @@ fn a_place_that_was_left_does_not_count() {
     let mut watch = watch();
     assert_eq!(rock(&mut watch, 0..40).len(), 2);
     let elsewhere = PoseSample { x_m: 1.0, ..pose(40.0, 3.0) };
-    watch.step(&elsewhere, &guidance(GuidanceStatus::Along, 0), false);
+    watch.step(&elsewhere, &guidance(GuidanceStatus::Along, 0), false, false);
     let recoveries: Vec<_> = rock(&mut watch, 41..85).iter().map(StallSample::recovery).collect();
     assert_eq!(recoveries, [RecoveryStep::Replan, RecoveryStep::Replan]);
     assert_eq!(watch.recoveries(None).0, 4);
@@ -225,7 +225,7 @@ fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
             x_m: f64::from(tenths) * 0.1,
             ..pose(f64::from(tenths), f64::from(tenths) * 0.1)
         });
-        let stall = driving.find_map(|pose| watch.step(&pose, &way_out, false));
+        let stall = driving.find_map(|pose| watch.step(&pose, &way_out, false, false));
         stall.map(|stall| parts(&stall))
     };
     let want = (StallCause::InsideHazard, RecoveryStep::Reset, 1);
@@ -233,7 +233,7 @@ fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
     let mut watch = watch();
     assert_eq!(drive(&mut watch, 0..8), None);
     let out = PoseSample { x_m: 0.8, ..pose(8.0, 0.8) };
-    watch.step(&out, &guidance(GuidanceStatus::Along, 0), false);
+    watch.step(&out, &guidance(GuidanceStatus::Along, 0), false, false);
     assert_eq!(drive(&mut watch, 9..17), None);
 }
 
@@ -253,7 +253,7 @@ fn a_car_that_circles_on_its_tightest_circle_is_pinned_and_the_reason_names_the_
             heading_rad: turned,
             ..pose(seconds, travelled)
         };
-        watch.step(&circling, &along, false)
+        watch.step(&circling, &along, false, false)
     });
     let cause = stall.map(|stall| stall.cause());
     assert_eq!(cause, Some(StallCause::Pinned));
@@ -261,4 +261,30 @@ fn a_car_that_circles_on_its_tightest_circle_is_pinned_and_the_reason_names_the_
     assert!(reason.contains("turns in no less than 0.31 m"), "{reason}");
     let x80 = Mission::parse("target = [3, 0]", path).unwrap();
     assert!(!words(StallCause::Pinned, &x80.body()).contains("turns in no less"));
+}
+
+#[test]
+fn held_wheels_get_a_fresh_planner_at_once_and_again_elsewhere_and_are_held_fast_at_last() {
+    use RecoveryStep::{GiveUp, Replan, Reset};
+    let mut watch = watch();
+    let held = |watch: &mut StallWatch, second: u32, x_m: f64| {
+        let pose = PoseSample { x_m, ..pose(f64::from(second), x_m) };
+        // The planner has no field yet.
+        let stall = watch.step(&pose, &guidance(GuidanceStatus::Waiting, 0), false, true);
+        parts(&stall.unwrap())
+    };
+    for second in 0..4 {
+        let here = held(&mut watch, second, f64::from(second));
+        assert_eq!(here, (StallCause::Held, Replan, 0));
+    }
+    let mut steps = Vec::new();
+    while steps.last() != Some(&GiveUp) {
+        let second = 10 + steps.len() as u32;
+        // A robot that turns about a blocked wheel.
+        steps.push(held(&mut watch, second, 10.0 + 0.2 * f64::from(second % 2)).1);
+    }
+    let round = [Replan, Replan, Reset];
+    assert_eq!(steps, [&round[..], &round, &round, &[Replan, Replan, GiveUp]].concat());
+    let body = Mission::parse("target = [3, 0]", std::path::Path::new("m.toml")).unwrap().body();
+    assert!(words(watch.gave_up().unwrap().cause(), &body).contains("held fast"));
 }

@@ -260,3 +260,27 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     mapper.reset(1);
     assert!(beams(&mapper).is_empty());
 }
+
+#[test]
+fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_it() {
+    let mut mapper = mapper(INFRARED);
+    mapper.touch(&PoseSample::default(), 0.0);
+    let touched = |mapper: &Mapper| {
+        assert!(!state(mapper, -0.4, 0.0).is_hazard(), "behind it is free");
+        state(mapper, 0.2, 0.0).is_hazard() && state(mapper, 0.4, 0.0).is_hazard()
+    };
+    assert!(touched(&mapper));
+    // The robot has backed off and looks over it.
+    let far = [infrared_ad(0.8); 7];
+    for tick in 1..40 {
+        let stamp = Stamp { tick, ..Stamp::default() };
+        let pose = PoseSample { stamp, x_m: -0.3, ..PoseSample::default() };
+        let status = RangeStatus::Nothing.into();
+        let range = RangeSample { stamp, status, infrared_ad: far, ..RangeSample::default() };
+        mapper.hear(&pose, Some(&range));
+    }
+    assert!(touched(&mapper));
+    // Where the body is, nothing stands.
+    hear(&mut mapper, 40, 0.2, 0.0, None);
+    assert!(!state(&mapper, 0.2, 0.0).is_hazard());
+}

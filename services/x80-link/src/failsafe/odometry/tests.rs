@@ -256,3 +256,112 @@ fn an_old_frame_now_and_then_is_not_suspected() {
         assert_eq!(suspicion(&odometry), None);
     }
 }
+
+/// A suspicion, and its time in seconds.
+type Suspected = Option<(f64, Suspicion)>;
+/// The current of a wheel that rolls, and of one that is held, AD counts.
+const ROLLS_AD: u16 = 260;
+const HELD_AD: u16 = 1520;
+
+/// Drive a robot whose wheels are held from the start and draw `current(told to stand)`. Returns the contacts, and the suspicion
+/// with its time in seconds. The robot is told to stand while its wheels are known to be held.
+fn held(current: impl Fn(bool) -> [u16; 2]) -> (Vec<(f64, ContactSample)>, Suspected) {
+    let mut odometry = odometry();
+    let (mut contacts, mut told_to_stand) = (Vec::new(), true);
+    for tick in 0..40 {
+        let time = f64::from(tick) * PERIOD;
+        let now = MissionTime::from_seconds(time);
+        odometry.contacts.take_currents(current(told_to_stand));
+        odometry.plausible([7, 7], now);
+        contacts.extend(odometry.take_contact().map(|contact| (time, contact)));
+        if let Some(suspicion) = suspicion(&odometry) {
+            return (contacts, Some((time, suspicion)));
+        }
+        let moment = Moment { time: now, machine_ns: 0 };
+        told_to_stand = odometry.condition(Cause::WheelsHeld, moment) == Condition::Holds;
+        odometry.commanded(if told_to_stand { [0, 0] } else { [TURN, TURN] }, now);
+    }
+    (contacts, None)
+}
+
+#[test]
+fn wheels_that_draw_the_current_of_held_ones_are_a_contact_ahead_and_no_suspicion() {
+    let (contacts, suspicion) = held(|stands| [if stands { 20 } else { HELD_AD }; 2]);
+    assert_eq!(suspicion, None);
+    let (first_s, first) = contacts[0];
+    assert!(first_s < 1.0, "{first_s}");
+    assert_eq!((first.left, first.right, first.bearing_rad), (1, 1, 0.0));
+    assert!(first.half_width_rad > 0.0);
+    assert!(contacts.len() > 2, "a robot that stays held is noticed again");
+}
+
+#[test]
+fn a_dead_encoder_is_suspected_in_time_by_a_current_that_is_no_sign() {
+    let repeated = |_: bool| [HELD_AD; 2];
+    let beyond_the_range = |_: bool| [u16::MAX; 2];
+    let rolls = |_: bool| [ROLLS_AD; 2];
+    for current in [&repeated as &dyn Fn(bool) -> [u16; 2], &beyond_the_range, &rolls] {
+        let (_, suspicion) = held(current);
+        in_time(suspicion, Suspicion::Left);
+    }
+}
+
+#[test]
+fn a_current_that_is_high_on_rolling_wheels_is_no_sign_of_held_ones() {
+    let mut odometry = odometry();
+    let mut wheels = Wheels::default();
+    let mut suspected = None;
+    for tick in 0..60 {
+        let time = f64::from(tick) * PERIOD;
+        wheels.roll_to(time);
+        let now = MissionTime::from_seconds(time);
+        odometry.contacts.take_currents([HELD_AD; 2]);
+        // The encoders die after five seconds.
+        if tick <= 35 {
+            odometry.plausible(wheels.counts(), now);
+        } else {
+            odometry.plausible([0; 2], now);
+        }
+        assert_eq!(odometry.take_contact().map(|contact| contact.left), None);
+        if suspicion(&odometry).is_some() {
+            suspected.get_or_insert(time);
+        }
+        odometry.commanded([TURN, TURN], now);
+        wheels.tell([TURN, TURN]);
+    }
+    assert!(suspected.unwrap() < 6.2, "{suspected:?}");
+}
+
+#[test]
+fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    let at = |held: [bool; 2], told: [i16; 2]| {
+        let mut odometry = odometry();
+        let mut turned = [0_u16; 2];
+        for tick in 0..12 {
+            let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
+            let current = held.map(|held| if held { HELD_AD } else { ROLLS_AD });
+            odometry.contacts.take_currents(current);
+            odometry.plausible(turned, now);
+            if let Some(contact) = odometry.take_contact() {
+                return contact;
+            }
+            odometry.commanded(told, now);
+            for wheel in [0, 1] {
+                let counts = f64::from(told[wheel]) * PERIOD;
+                let rolled = if held[wheel] { 0.0 } else { counts };
+                turned[wheel] =
+                    (f64::from(turned[wheel]) + rolled).rem_euclid(f64::from(COUNTS)) as u16;
+            }
+        }
+        panic!("no contact");
+    };
+    let left = at([true, false], [TURN, TURN]);
+    assert!(left.bearing_rad > 0.0 && left.bearing_rad < FRAC_PI_2, "{left:?}");
+    let right = at([false, true], [TURN, TURN]);
+    assert_eq!((right.left, right.right, right.bearing_rad), (0, 1, -left.bearing_rad));
+    let behind = at([true, true], [-TURN, -TURN]);
+    assert!((behind.bearing_rad - PI).abs() < 1e-9, "{behind:?}");
+    // A robot that turns on the spot may be touched anywhere.
+    assert_eq!(at([true, true], [-TURN, TURN]).half_width_rad, 0.0);
+}

@@ -1,7 +1,7 @@
 //! Tests of the errors of a robot, each set by its own key.
 
-use super::{Robot, forward, mission, robot, send};
-use common::wire::Command;
+use super::{Robot, forward, mission, motor, robot, send};
+use common::wire::{Command, counts_between};
 
 /// The robot of `text` after `ticks` under `command`.
 fn driven(text: &str, command: Command, ticks: u32) -> Robot {
@@ -80,6 +80,34 @@ fn wheels_count_on_at_a_contact_where_they_slip_and_not_where_they_stall() {
     // Four seconds at 0.25 m/s, less what the speed loop lags.
     assert!((slipping.0 - 0.985).abs() < 0.02, "{slipping:?}");
     assert!(stalled.1 < 0.01 && slipping.1 > 0.24, "{stalled:?} {slipping:?}");
+}
+
+#[test]
+fn a_held_motor_draws_several_times_the_current_of_a_rolling_one_and_a_standing_one_the_least() {
+    let currents = |text: &str, counts: i16| {
+        let mut robot = driven(text, forward(counts, None), 14);
+        let [left, right, ..] = motor(&mut robot).currents;
+        [left, right]
+    };
+    let [rolls, _] = currents("", 1200);
+    let wall = "world.wall = [{ points = [[0.5, -1], [0.5, 1]] }]";
+    let [held, _] = currents(wall, 1200);
+    let [slips, _] = currents(&format!("simulation.wheels.contact_slip = 1\n{wall}"), 1200);
+    assert!(held > 4 * rolls && slips > rolls && slips < held, "{held} {slips} {rolls}");
+    let block = "simulation.block = [{ wheels = 'right', from_s = 1 }]";
+    let [free, blocked] = currents(block, 1200);
+    assert!((free, blocked) == (rolls, held), "{free} {blocked}");
+    assert!(currents(wall, 0)[0] < rolls);
+}
+
+#[test]
+fn a_blocked_wheel_stands_while_the_block_lasts_and_its_robot_turns_about_it() {
+    let block = "simulation.block = [{ wheels = 'left', from_s = 1, until_s = 3 }]";
+    let driven_for = |ticks| driven(block, forward(562, None), ticks).ground_truth();
+    let (before, during, after) = (driven_for(7), driven_for(20), driven_for(28));
+    assert!(before.heading.abs() < 1e-6 && during.heading > 1.5, "{before:?} {during:?}");
+    assert_eq!(driven_for(14).left_counts, during.left_counts);
+    assert!(counts_between(during.left_counts, after.left_counts) > 300, "{after:?}");
 }
 
 #[test]

@@ -31,6 +31,7 @@ pub(super) fn stall(stall: &StallSample) -> String {
         StallCause::Pinned => "stays where it is",
         StallCause::InsideHazard => "is inside a hazard",
         StallCause::CutOff => "is cut off",
+        StallCause::Held => "is held by its wheels",
     };
     let recovery = match stall.recovery() {
         RecoveryStep::Replan => "new planner",

@@ -1,0 +1,73 @@
+//! Robots whose wheels are held: by a thing that no sensor notices, or by something in the wheels.
+
+use serde_json::Value;
+
+use crate::support::{
+    Run, assert_ended, assert_nothing_left, find, generation, records, wire::Robot,
+};
+
+/// On the wall clock, in which the link judges the robot's frames.
+const ON_THE_WALL: [&str; 2] = ["--pace", "2"];
+
+/// The causes and recovery steps of the stalls.
+fn stalls(directory: &std::path::Path) -> Vec<(String, String)> {
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let stalls = records(&directory.join("run").join("stalls.jsonl"));
+    stalls.iter().map(|stall| (text(&stall["cause"]), text(&stall["recovery"]))).collect()
+}
+
+/// Drive the open room with these blocked wheels. Returns code, summary and stalls.
+fn blocked(
+    robot: &str,
+    blocks: &str,
+    pace: &[&str],
+) -> (Option<i32>, Value, Vec<(String, String)>) {
+    let set = format!("simulation.block=[{blocks}]");
+    let run = Run::start(robot, "open-room", &[&["--set", &set], pace].concat());
+    let (code, summary, directory) = run.finish_in();
+    assert_nothing_left(robot);
+    (code, summary, stalls(directory.path()))
+}
+
+#[test]
+fn a_robot_with_a_wheel_blocked_for_5_s_gets_a_fresh_planner_and_arrives_at_any_pace() {
+    for (robot, pace) in [("blocked", &ON_THE_WALL[..]), ("blocked-max", &[])] {
+        let block = "{wheels='left',from_s=7,until_s=12}";
+        let (code, summary, stalls) = blocked(robot, block, pace);
+        assert_ended(code, &summary, 0, "reached");
+        assert_eq!(stalls[0], ("held".to_owned(), "replan".to_owned()), "{stalls:?}");
+    }
+}
+
+#[test]
+fn a_robot_whose_wheels_are_held_for_ever_is_unreachable_and_its_odometry_is_not_blamed() {
+    let (code, summary, stalls) = blocked("held", "{wheels='both',from_s=7}", &ON_THE_WALL);
+    assert_ended(code, &summary, 3, "unreachable");
+    assert!(summary["reason"].as_str().unwrap().contains("held fast"), "{summary}");
+    assert!(stalls.iter().all(|(cause, _)| cause == "held"), "{stalls:?}");
+    assert!(summary["replans"].as_u64() > Some(1), "{summary}");
+}
+
+#[test]
+fn a_robot_that_is_held_by_a_thing_that_no_sensor_notices_maps_it_and_goes_another_way() {
+    // A box that stands there, and one that appears before the robot.
+    let shape = "[{at=[2,0],size_m=[0.3,0.8],top_m=0.1,echo=0}]";
+    let things = [
+        ("unheard", format!("world.box={shape}")),
+        ("appears", format!("simulation.thing=[{{from_s=3,shape={{box={shape}}}}}]")),
+    ];
+    for (name, thing) in things {
+        let set = ["--set", &thing, "--set", "simulation.wheels.contact_slip=0"];
+        let robot = Robot::start_with("open-room", &set);
+        let address = format!("robot.address=\"udp://{}\"", robot.listening);
+        let mut run = Run::start(name, "open-room", &["--pace", "1", "--set", &address]);
+        run.wait_until("the planner is restarted", |status| {
+            generation(status, "planner") > 1 && find(status, "planner")["state"] == "running"
+        });
+        let (code, summary, directory) = run.finish_in();
+        assert_ended(code, &summary, 0, "reached");
+        let stalls = stalls(directory.path());
+        assert_eq!(stalls[0], ("held".to_owned(), "replan".to_owned()), "{stalls:?}");
+        assert_nothing_left(name);
+    }
+}
