@@ -27,7 +27,7 @@ payloads! {
         /// Length of the way so far, metres.
         travelled_m: f64,
         /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. It covers
-        /// the errors of the wheels, as `[dead_reckoning]` of the mission states them.
+        /// the errors of the wheels, as `[dead_reckoning]` of the mission states them, and motions lost with their counts.
         covariance: [f64; 6],
         /// The encoder counts it was computed at.
         left_counts: u16,
@@ -46,6 +46,18 @@ impl PoseSample {
     pub fn position_rms_m(&self) -> f64 {
         let [xx, _, _, yy, ..] = self.covariance;
         (xx + yy).max(0.0).sqrt()
+    }
+
+    /// Circular error probable: the distance from this pose within which the robot is with a probability of a half, metres. F. E.
+    /// Grubbs, Operations Research 12(1), 1964, by the moments of the squared distance; within 2 %.
+    pub fn position_cep_m(&self) -> f64 {
+        let [xx, xy, _, yy, ..] = self.covariance;
+        let mean = xx + yy;
+        if mean <= 0.0 {
+            return 0.0;
+        }
+        let v = 2.0 * (xx * xx + 2.0 * xy * xy + yy * yy) / (mean * mean);
+        mean.sqrt() * (1.0 - v / 9.0).max(0.0).powf(1.5)
     }
 
     /// Speeds over the last tick.

@@ -87,6 +87,18 @@ impl ErrorModel {
         let noise: SMatrix<f64, 5, 5> = slips.iter().map(|slip| slip * slip.transpose()).sum();
         Covariance(carried * before.0 * carried.transpose() + noise)
     }
+
+    /// The covariance after a motion that nobody measured: each wheel rolled any way up to `farthest` metres, forward or
+    /// back. The robot may have gone as far aside as ahead, because it may have turned first.
+    pub(crate) fn after_lost(&self, before: &Covariance, farthest: f64) -> Covariance {
+        // Evenly distributed, for each wheel. A car turns less than two wheels that roll freely, so this holds for it too.
+        let wheel = farthest * farthest / 3.0;
+        let place = wheel / 2.0;
+        let heading = 2.0 * wheel / (self.track_m * self.track_m);
+        Covariance(
+            before.0 + SMatrix::from_diagonal(&Error::from([place, place, heading, 0.0, 0.0])),
+        )
+    }
 }
 
 impl Covariance {

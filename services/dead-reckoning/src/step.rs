@@ -20,6 +20,12 @@ const PLAUSIBLE: f64 = 2.0;
 /// Counts never rejected, whatever the time between: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
 
+/// A speed is an average over at least this share of a tick: frames that come bunched give no speed of their own.
+const LEAST_SHARE_OF_A_TICK: f64 = 0.5;
+
+/// A wheel still turns for so long after the time of its last command is over, seconds: delay and lag of its speed loop.
+const COASTS_S: f64 = 0.2;
+
 /// No robot is switched off and on again and answers sooner, seconds; a link that was killed is back in a tenth.
 const BOOTS_IN_S: f64 = 2.0;
 
@@ -58,7 +64,8 @@ struct Last {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reckoned {
     pub pose: PoseSample,
-    /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays.
+    /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays, and its covariance grows
+    /// by how far the robot can have gone.
     pub rejected: bool,
 }
 
@@ -69,6 +76,10 @@ pub struct DeadReckoning {
     body: Body,
     integration: Integration,
     errors: ErrorModel,
+    /// The period of the ticks, seconds.
+    period_s: f64,
+    /// The longest that wheels turn after a tick that no further one follows, seconds.
+    turns_on_s: f64,
     state: State,
 }
 
@@ -81,11 +92,14 @@ impl Step for DeadReckoning {
         let body = mission.body();
         let start = mission.start_pose();
         let errors = ErrorModel::new(&mission.dead_reckoning, &body);
+        let period_s = 1.0 / mission.robot.rate_hz;
         Self {
             drive: body.drive(),
             body,
             integration: mission.dead_reckoning.integration,
             errors,
+            period_s,
+            turns_on_s: period_s + mission.robot.command_limit_s + COASTS_S,
             state: State {
                 position: start.position,
                 heading: start.heading,
@@ -124,12 +138,15 @@ impl Step for DeadReckoning {
                 Integration::Euler => pose.along_euler(motion.v, motion.omega),
             };
             self.state.covariance = self.errors.after(&self.state.covariance, pose, motion);
+            if rejected {
+                // A robot without ticks gets no commands, so its wheels soon rest.
+                let lost_m = self.body.top_speed_m_s * elapsed.min(self.turns_on_s);
+                self.state.covariance = self.errors.after_lost(&self.state.covariance, lost_m);
+            }
             self.state.position = moved.position;
             self.state.heading = moved.heading;
             self.state.travelled += motion.v.abs();
-            if elapsed > 0.0 {
-                (v, omega) = (motion.v / elapsed, motion.omega / elapsed);
-            }
+            (v, omega) = self.speeds(motion, elapsed);
         }
         self.state.last = Some(Last {
             tick: wheels.stamp.tick,
@@ -171,6 +188,18 @@ impl DeadReckoning {
                 drive.twist(SteeredWheel { wheel, steering: angle.unwrap_or_default() })
             }
         })
+    }
+
+    /// Speed and turn rate of a motion, m/s and rad/s: no faster than the body can go, along the same curve.
+    fn speeds(&self, moved: Twist, elapsed: f64) -> (f64, f64) {
+        let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
+        let (v, omega) = (moved.v / time, moved.omega / time);
+        let wheel = match self.body.steering {
+            Some(_) => v.abs(),
+            None => v.abs() + omega.abs() * self.body.track_m / 2.0,
+        };
+        let share = (self.body.top_speed_m_s / wheel).min(1.0);
+        (v * share, omega * share)
     }
 
     fn sample(&self) -> PoseSample {

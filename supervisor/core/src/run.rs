@@ -115,8 +115,7 @@ pub fn run<'a>(
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
-    let at_rest_m = record.pose.as_ref().map(|pose| supervisor.to_target_m(pose));
-    let ending = decided.ending.checked(&options.mission, truth.last(), at_rest_m);
+    let ending = decided.ending.checked(&options.mission, truth.last(), record.pose.as_ref());
     let finished = Finished {
         duration_s: supervisor.clock.duration_s(decided.last_tick, &record, &truth),
         ending: ending.with(wheels),

@@ -159,8 +159,13 @@ impl Record for Row {
 fn outcome(summary: &Summary, success_within_m: f64) -> Outcome {
     let there = summary.true_distance_m.is_some_and(|distance| distance <= success_within_m);
     match summary.outcome {
-        Reported::Reached | Reported::WrongPlace if there => Outcome::Success,
-        Reported::Reached | Reported::WrongPlace => Outcome::WrongPlace,
+        Reported::Reached | Reported::ReachedUnsure | Reported::WrongPlace => {
+            if there {
+                Outcome::Success
+            } else {
+                Outcome::WrongPlace
+            }
+        }
         Reported::Collision => Outcome::Collision,
         Reported::Timeout => Outcome::Timeout,
         Reported::Unreachable => Outcome::Unreachable,
@@ -220,6 +225,8 @@ mod tests {
         };
         assert_eq!(outcome(Reported::Reached, 0.4), Outcome::Success);
         assert_eq!(outcome(Reported::Reached, 0.6), Outcome::WrongPlace);
+        assert_eq!(outcome(Reported::ReachedUnsure, 0.4), Outcome::Success);
+        assert_eq!(outcome(Reported::ReachedUnsure, 0.6), Outcome::WrongPlace);
         assert_eq!(outcome(Reported::Collision, 0.1), Outcome::Collision);
         assert_eq!(outcome(Reported::Timeout, 0.1), Outcome::Timeout);
     }

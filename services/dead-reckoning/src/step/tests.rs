@@ -113,6 +113,49 @@ fn a_restored_state_goes_on_as_if_nothing_had_happened() {
 }
 
 #[test]
+fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
+    // 1 m/s at most at the rim, so 5 rad/s on the spot.
+    let mut reckoning = reckoning("");
+    reckoning.take(&wheels(0, 0, 0));
+    let at = |tick, stamp_ns, left, right| {
+        let stamp = Stamp { tick, stamp_ns, ..Stamp::default() };
+        WheelSample { stamp, ..wheels(tick, left, right) }
+    };
+    for (tick, after_ns) in [(1, 0), (2, 1), (3, 100_000), (4, 20_000_000)] {
+        let now_ns = tick * 1_000_000_000 + after_ns;
+        let before = at(2 * tick, now_ns - after_ns, 0, 0);
+        reckoning.take(&before);
+        let straight = reckoning.take(&at(2 * tick + 1, now_ns, 400, 400));
+        close(straight.v_m_s, 1.0);
+        reckoning.take(&at(100 + 2 * tick, now_ns + 400_000_000, 400, 400));
+        let turned = at(101 + 2 * tick, now_ns + 400_000_000 + after_ns, 0, 800);
+        close(reckoning.take(&turned).omega_rad_s, 5.0);
+        reckoning.take(&at(102 + 2 * tick, now_ns + 900_000_000, 0, 0));
+    }
+    // Two ticks of 7 Hz that come at once are no rush.
+    reckoning.take(&at(200, 9_000_000_000, 0, 0));
+    let bunched = reckoning.take(&at(201, 9_001_000_000, 50, 50));
+    close(bunched.v_m_s, 50.0 * 2e-4 * PI / (0.5 / 7.0));
+}
+
+#[test]
+fn a_motion_that_nobody_measured_is_in_the_covariance() {
+    let mut reckoning = reckoning("");
+    reckoning.take(&wheels(0, 600, 700));
+    let before = reckoning.take(&wheels(1, 600, 700));
+    let after = reckoning.take(&WheelSample { restarts: 1, ..wheels(2, 0, 1) });
+    // In 0.5 s each wheel rolls up to 0.5 m at the top speed; evenly distributed: 0.25 / 3.
+    let wheel = 0.25 / 3.0;
+    for (entry, more) in [(0, wheel / 2.0), (3, wheel / 2.0), (5, 2.0 * wheel / 0.16)] {
+        close(after.covariance[entry] - before.covariance[entry], more);
+    }
+    // However long it was away, the wheels stood when its last command was over: after 1 / 7 + 0.25 + 0.2 s.
+    let much_later = reckoning.take(&WheelSample { restarts: 2, ..wheels(200, 5, 6) });
+    let lost = (1.0 / 7.0 + 0.45_f64).powi(2) / 3.0;
+    close(much_later.covariance[5] - after.covariance[5], 2.0 * lost / 0.16);
+}
+
+#[test]
 fn counters_that_restart_do_not_move_the_robot() {
     let mut reckoning = reckoning("");
     reckoning.take(&wheels(0, 16_000, 16_000));

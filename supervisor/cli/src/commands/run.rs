@@ -300,6 +300,7 @@ fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
         Outcome::Aborted => 6,
         Outcome::WrongPlace => 9,
         Outcome::CouldNotBeStopped => 10,
+        Outcome::ReachedUnsure => 11,
     })
 }
 
