@@ -29,6 +29,8 @@ enum Fault {
     Reversed,
     /// Other counts in every frame.
     Random,
+    /// The counts of both wheels go on elsewhere.
+    Elsewhere,
     /// The encoders roll on by 560 counts/s.
     RollsOn,
     /// The front sonar says 0.
@@ -168,6 +170,10 @@ impl Shared {
                     encoder.position = (32_768 - encoder.position) % 32_768;
                 }
             }
+            Fault::Elsewhere => {
+                left.position = (left.position + 9000) % 32_768;
+                right.position = (right.position + 5000) % 32_768;
+            }
             Fault::Random => {
                 left.position = frames.wrapping_mul(9973) % 32_768;
                 right.position = frames.wrapping_mul(20_011) % 32_768;
@@ -214,6 +220,21 @@ fn a_robot_whose_encoders_cannot_be_true_drives_for_1_5_s_at_most_and_its_missio
         assert_eq!(summary["cause"], "odometry implausible for long", "{summary}");
         assert_nothing_left("fi-encoders");
     }
+}
+
+#[test]
+fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
+    let body = Robot::start("open-room", "udp", "127.0.0.1:0");
+    let faults = FaultInjector::before(&body, Fault::None);
+    let mut run = Run::start("fi-jump", "open-room", &["--set", &faults.proxy.as_robot()]);
+    run.wait_until_under_way(0.5);
+    faults.set(Fault::Elsewhere);
+    run.wait_until("it stands", cause_is("odometry implausible"));
+    run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
+    let (code, summary) = run.finish();
+    assert_ended(code, &summary, 11, "reached_unsure");
+    let expected_m = summary["pose_error_expected_m"].as_f64().unwrap();
+    assert!(expected_m > 0.5, "{summary}");
 }
 
 #[test]

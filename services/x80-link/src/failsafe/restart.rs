@@ -3,6 +3,9 @@
 //! A robot that was switched off and on, or got another battery, restarts its counts, and the step in the counts is no motion. Other
 //! counts that lie farther off than wheels turn are implausible. The next counts are then compared with the last plausible ones, so
 //! a single outdated frame has no effect.
+//!
+//! While the robot is driven, a wheel turns no farther than it was commanded to, than it turned before, or than the robot reports
+//! as its speed. Without this rule, counts that restart within half a metre of the start would pass for a motion.
 
 use common::{
     clock::MissionTime,
@@ -14,6 +17,10 @@ use super::monitor::Counts;
 
 /// Counts are implausible from so many times the distance that wheels roll at their top speed.
 const IMPLAUSIBLE: f64 = 1.5;
+/// Beyond the known speeds of a wheel, a difference of so many metres is plausible: in a tick a wheel hardly accelerates more.
+const SLACK_M: f64 = 0.06;
+/// The known speeds bound the motion for so many periods after a command.
+const PERIODS: f64 = 6.0;
 /// Implausible counts are accepted after so many frames in which each can follow the one before.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
@@ -21,6 +28,11 @@ const FOLLOW_EACH_OTHER: u32 = 3;
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<([u16; 2], MissionTime)>,
+    /// The known speeds of the wheels at the last plausible counts: those that the robot reported and those by the counts, counts/s.
+    turned: [[f64; 2]; 2],
+    /// The speeds of the two newest commands, counts/s, and the time of the newest that was to move a wheel.
+    commanded: [[f64; 2]; 2],
+    driven: Option<MissionTime>,
     /// The newest implausible counts, their time, and the number of frames in which each can follow the one before.
     suspected: Option<([u16; 2], MissionTime, u32)>,
     away: bool,
@@ -29,6 +41,8 @@ pub struct RestartWatch {
     top_counts: f64,
     /// The jitter of the frames, seconds.
     jitter_s: f64,
+    /// [`SLACK_M`] in counts.
+    slack: f64,
 }
 
 impl RestartWatch {
@@ -37,11 +51,23 @@ impl RestartWatch {
         let body = mission.body();
         Self {
             last: None,
+            turned: [[0.0; 2]; 2],
+            commanded: [[0.0; 2]; 2],
+            driven: None,
             suspected: None,
             away: false,
             restarts: 0,
             top_counts: body.top_speed_m_s / body.metres_per_count(),
             jitter_s: 1.0 / mission.robot.rate_hz,
+            slack: SLACK_M / body.metres_per_count(),
+        }
+    }
+
+    /// Note that the wheels were commanded to turn at these speeds, counts/s.
+    pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
+        self.commanded = [self.commanded[1], counts.map(f64::from)];
+        if counts != [0, 0] {
+            self.driven = Some(now);
         }
     }
 
@@ -50,21 +76,33 @@ impl RestartWatch {
         self.away = true;
     }
 
-    /// Classify the counts of channels 0 and 1; `was_away` says whether the robot did not answer until this frame. After an absence,
+    /// Classify the counts of the wheels; `speeds` are those that the robot reports with them, counts/s. `was_away` says whether the robot did not answer until this frame. After an absence,
     /// counts near the value at which robots start mean a restart. Otherwise they must also be farther off than wheels turn.
-    pub fn step(&mut self, counts: [u16; 2], was_away: bool, now: MissionTime) -> Counts {
+    pub fn step(
+        &mut self,
+        counts: [u16; 2],
+        speeds: [i32; 2],
+        was_away: bool,
+        now: MissionTime,
+    ) -> Counts {
+        let speeds = speeds.map(f64::from);
         let away = std::mem::take(&mut self.away);
         let Some((before, then)) = self.last else {
             self.last = Some((counts, now));
             return Counts::Follow;
         };
-        let share = self.share_of_reach(before, then, counts, now);
+        let share = self
+            .share_of_reach(before, then, counts, now)
+            .max(self.share_of_driven(before, then, counts, speeds, now));
         if counts_restarted(before, counts) && (away || share > 1.0) {
             self.begin_at(counts, now);
             return Counts::Restarted { was_away };
         }
         if share <= IMPLAUSIBLE {
             (self.last, self.suspected) = (Some((counts, now)), None);
+            let gap_s = now.since(then).as_secs_f64().max(self.jitter_s);
+            let turned = |wheel: usize| f64::from(counts_between(before[wheel], counts[wheel]));
+            self.turned = [speeds, [0, 1].map(|wheel| turned(wheel) / gap_s)];
             return Counts::Follow;
         }
         let following = self.suspected.map_or(1, |(suspected, at, following)| {
@@ -98,6 +136,32 @@ impl RestartWatch {
         f64::from(farthest.unwrap_or_default()) / reach
     }
 
+    /// The ratio of the difference of the counts to [`IMPLAUSIBLE`] of the most that wheels turn by all that is known of their speeds; 0 if
+    /// the robot is not driven.
+    fn share_of_driven(
+        &self,
+        before: [u16; 2],
+        then: MissionTime,
+        counts: [u16; 2],
+        speeds: [f64; 2],
+        now: MissionTime,
+    ) -> f64 {
+        let recent = |at: MissionTime| now.since(at).as_secs_f64() <= PERIODS * self.jitter_s;
+        if !recent(then) || !self.driven.is_some_and(recent) {
+            return 0.0;
+        }
+        let time = now.since(then).as_secs_f64() + self.jitter_s;
+        let share = |wheel: usize| {
+            let counts = f64::from(counts_between(before[wheel], counts[wheel]));
+            let known =
+                [self.commanded[0], self.commanded[1], self.turned[0], self.turned[1], speeds];
+            let along = known.map(|speeds| speeds[wheel] * counts.signum());
+            let reach = along.into_iter().fold(0.0, f64::max) * time + self.slack / IMPLAUSIBLE;
+            counts.abs() / reach
+        };
+        share(0).max(share(1))
+    }
+
     /// The number of times that the counts restarted or continued elsewhere.
     pub const fn restarts(&self) -> u32 {
         self.restarts
@@ -121,34 +185,45 @@ mod tests {
     #[test]
     fn counts_that_begin_anew_after_an_absence_are_a_restart() {
         let mut watch = watch();
-        assert_eq!(watch.step([32_168, 600], false, at(0.0)), Counts::Follow, "the first frame");
+        assert_eq!(
+            watch.step([32_168, 600], [0; 2], false, at(0.0)),
+            Counts::Follow,
+            "the first frame"
+        );
         watch.lost();
-        assert_eq!(watch.step([0, 1], false, at(3.0)), Counts::Restarted { was_away: false });
-        assert_eq!(watch.step([32_700, 68], false, at(3.1)), Counts::Follow, "it drives on");
+        assert_eq!(
+            watch.step([0, 1], [0; 2], false, at(3.0)),
+            Counts::Restarted { was_away: false }
+        );
+        assert_eq!(
+            watch.step([32_700, 68], [0; 2], false, at(3.1)),
+            Counts::Follow,
+            "it drives on"
+        );
         assert_eq!(watch.restarts(), 1);
     }
 
     #[test]
     fn a_robot_that_comes_back_with_its_counts_is_no_restart() {
         let mut watch = watch();
-        watch.step([32_168, 600], false, at(0.0));
+        watch.step([32_168, 600], [0; 2], false, at(0.0));
         watch.lost();
-        assert_eq!(watch.step([32_000, 768], false, at(3.0)), Counts::Follow);
+        assert_eq!(watch.step([32_000, 768], [0; 2], false, at(3.0)), Counts::Follow);
         watch.lost();
         // The robot stood at its start all the time.
-        watch.step([3, 32_765], false, at(6.0));
+        watch.step([3, 32_765], [0; 2], false, at(6.0));
         watch.lost();
-        assert_eq!(watch.step([0, 0], false, at(9.0)), Counts::Follow);
+        assert_eq!(watch.step([0, 0], [0; 2], false, at(9.0)), Counts::Follow);
     }
 
     #[test]
     fn a_robot_that_turns_back_through_its_start_is_no_restart() {
         let mut watch = watch();
-        watch.step([300, 300], false, at(0.0));
-        assert_eq!(watch.step([2, 1], false, at(0.143)), Counts::Follow);
-        watch.step([800, 900], false, at(0.5));
+        watch.step([300, 300], [0; 2], false, at(0.0));
+        assert_eq!(watch.step([2, 1], [0; 2], false, at(0.143)), Counts::Follow);
+        watch.step([800, 900], [0; 2], false, at(0.5));
         assert_eq!(
-            watch.step([0, 0], false, at(0.643)),
+            watch.step([0, 0], [0; 2], false, at(0.643)),
             Counts::Restarted { was_away: false },
             "nothing turns so fast"
         );
@@ -159,32 +234,82 @@ mod tests {
         let mut watch = watch();
         for tick in 0..7 {
             let now = at(0.143 * f64::from(tick));
-            watch.step([1000 + 112 * tick as u16, 5000], false, now);
+            watch.step([1000 + 112 * tick as u16, 5000], [0; 2], false, now);
         }
-        assert_eq!(watch.step([31_000, 2000], false, at(0.95)), Counts::Implausible);
-        assert_eq!(watch.step([1784, 5000], false, at(1.0)), Counts::Follow);
+        assert_eq!(watch.step([31_000, 2000], [0; 2], false, at(0.95)), Counts::Implausible);
+        assert_eq!(watch.step([1784, 5000], [0; 2], false, at(1.0)), Counts::Follow);
         assert_eq!(watch.restarts(), 0);
     }
 
     #[test]
     fn counts_that_go_on_elsewhere_are_plausible_from_the_third_on() {
         let mut watch = watch();
-        watch.step([1000, 1000], false, at(0.0));
-        assert_eq!(watch.step([9000, 17_000], false, at(0.143)), Counts::Implausible);
-        assert_eq!(watch.step([9100, 17_100], false, at(0.286)), Counts::Implausible);
-        assert_eq!(watch.step([9200, 17_200], false, at(0.429)), Counts::Elsewhere);
-        assert_eq!(watch.step([9300, 17_300], false, at(0.571)), Counts::Follow);
+        watch.step([1000, 1000], [0; 2], false, at(0.0));
+        assert_eq!(watch.step([9000, 17_000], [0; 2], false, at(0.143)), Counts::Implausible);
+        assert_eq!(watch.step([9100, 17_100], [0; 2], false, at(0.286)), Counts::Implausible);
+        assert_eq!(watch.step([9200, 17_200], [0; 2], false, at(0.429)), Counts::Elsewhere);
+        assert_eq!(watch.step([9300, 17_300], [0; 2], false, at(0.571)), Counts::Follow);
         assert_eq!(watch.restarts(), 1, "what lies between is no motion");
     }
 
     #[test]
     fn counts_that_jump_about_are_implausible_one_by_one() {
         let mut watch = watch();
-        watch.step([0, 0], false, at(0.0));
+        watch.step([0, 0], [0; 2], false, at(0.0));
         for tick in 1..5_u16 {
             let jump = tick.wrapping_mul(9973) % 32_768;
-            let are = watch.step([jump, 32_767 - jump], false, at(0.143 * f64::from(tick)));
+            let are = watch.step([jump, 32_767 - jump], [0; 2], false, at(0.143 * f64::from(tick)));
             assert_eq!(are, Counts::Implausible, "{tick}");
+        }
+    }
+
+    #[test]
+    fn counts_that_begin_anew_while_the_robot_drives_are_no_motion_however_near_the_start() {
+        // 0.3 m/s are 674 counts/s, 96 a tick; a look turns the wheels against each other.
+        for (driven, start) in [([674, 674], [300, 300]), ([-580, 580], [32_568, 200])] {
+            let mut watch = watch();
+            let speeds = driven.map(i32::from);
+            let tick = |watch: &mut RestartWatch, first: [u16; 2], tick: i16, time: f64| {
+                let turned = driven.map(|speed: i16| (i32::from(speed) * i32::from(tick)) / 7);
+                let count =
+                    |wheel: usize| (i32::from(first[wheel]) + turned[wheel]).rem_euclid(32_768);
+                watch.commanded(driven, at(time));
+                watch.step([count(0) as u16, count(1) as u16], speeds, false, at(time))
+            };
+            for number in 0..5 {
+                let are = tick(&mut watch, start, number, 0.143 * f64::from(number));
+                assert_eq!(are, Counts::Follow, "{driven:?}");
+            }
+            for (number, want) in
+                [Counts::Implausible, Counts::Implausible, Counts::Elsewhere, Counts::Follow]
+                    .into_iter()
+                    .enumerate()
+            {
+                let time = 0.143 * (5.0 + number as f64);
+                assert_eq!(
+                    tick(&mut watch, [20, 20], number as i16, time),
+                    want,
+                    "{driven:?} {number}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn wheels_that_follow_their_commands_are_plausible_also_backwards_and_bunched() {
+        let mut watch = watch();
+        let mut counts = [20_000_i32; 2];
+        // The wheels count the wrong way, start and stop, and every third frame comes with the next.
+        for number in 0..60_i32 {
+            let speed = if number / 10 % 2 == 1 { 1100 } else { 0 };
+            watch.commanded([speed; 2], at(0.143 * f64::from(number)));
+            let late = if number % 3 == 0 { 0.142 } else { 0.0 };
+            counts = counts
+                .map(|count| count - if number % 10 == 0 { 79 } else { i32::from(speed) / 7 });
+            let now = at(0.143 * f64::from(number) + late);
+            let are =
+                watch.step(counts.map(|count| count.rem_euclid(32_768) as u16), [0; 2], false, now);
+            assert_eq!(are, Counts::Follow, "{number}");
         }
     }
 }

@@ -44,7 +44,7 @@ impl Link {
             // The robot was stopped by another method than velocity, and must be set up again.
             effects.push(Effect::Send(self.drive.greeting()));
         }
-        self.observe(Observation::Commanded(counts), now_ns);
+        self.commanded(counts, now_ns);
         effects.push(Effect::Send(self.drive.velocity(counts, limit)));
     }
 
@@ -66,8 +66,13 @@ impl Link {
         } else {
             return;
         }
-        self.observe(Observation::Commanded([0, 0]), now_ns);
+        self.commanded([0, 0], now_ns);
         self.stop_sent_ns = Some(now_ns);
+    }
+
+    fn commanded(&mut self, counts: [i16; 2], now_ns: u64) {
+        self.observe(Observation::Commanded(counts), now_ns);
+        self.restart.commanded(counts, self.now);
     }
 
     fn next_stop_method(&mut self) -> Option<StopMethod> {

@@ -76,10 +76,11 @@ impl Link {
                 return;
             }
         }
-        // Implausible counts start no tick.
-        if let Some(sensors) = motor
-            && counts != Some(Counts::Implausible)
-        {
+        if counts == Some(Counts::Implausible) {
+            // They start no tick. The robot stands until its motion is known again, so that little of it is lost.
+            self.repeat = None;
+            self.tell([0, 0], self.drive.limit(), now_ns, effects);
+        } else if let Some(sensors) = motor {
             self.begin_tick(&sensors, now_ns, effects);
         }
     }
@@ -99,8 +100,9 @@ impl Link {
             return Counts::Follow;
         }
         self.observe(currents, now_ns);
+        let speeds = [wheels.left_counts_per_s, wheels.right_counts_per_s];
         let was_away = !self.connected();
-        let are = self.restart.step(counts, was_away, self.now);
+        let are = self.restart.step(counts, speeds, was_away, self.now);
         self.observe(Observation::Motor(counts, are), now_ns);
         are
     }
