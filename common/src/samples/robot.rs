@@ -130,6 +130,8 @@ wire_enum! {
         RobotLate = 18 "robot late",
         /// Something holds a wheel that was told to turn.
         WheelsHeld = 19 "wheels held",
+        /// The front sonar's reading does not change although the robot moves.
+        RangeImplausible = 20 "front sonar implausible",
     }
 }
 

@@ -10,6 +10,7 @@ pub mod monitor;
 pub mod odometry;
 pub mod orders;
 pub mod presence;
+pub mod range;
 pub mod restart;
 pub mod staleness;
 pub mod stop_monitor;
@@ -54,6 +55,7 @@ monitors! {
     odometry: odometry::Odometry,
     orders: orders::Orders,
     presence: presence::Presence,
+    range: range::Range,
     staleness: staleness::Staleness,
     stop: stop_monitor::StopMonitor,
     streams: streams::Streams,
@@ -180,6 +182,13 @@ pub const TABLE: &[Rule] = &[
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.streams,
+    },
+    Rule {
+        cause: Cause::RangeImplausible,
+        when: "the front sonar says the same within 1 cm while the robot drives 0.4 m or turns by 90 degrees; 255 is not judged",
+        action: Action::Stop,
+        clears: Clears::OnResume { or_after: Some(range::CHANGES) },
+        monitor: |all| &all.range,
     },
     Rule {
         cause: Cause::CommandStale,

@@ -169,6 +169,17 @@ const CASES: &[(Break, Action, Cause)] = &[
         Action::Stop,
         Cause::RangeSilent,
     ),
+    (
+        |it| {
+            for tick in 0..10 {
+                it.monitors.range.observe(&Observation::Standard(&standard(100, 7.2)), now());
+                let motor = Observation::Motor([200 * tick; 2], Counts::Follow);
+                it.monitors.range.observe(&motor, now());
+            }
+        },
+        Action::Stop,
+        Cause::RangeImplausible,
+    ),
     (|it| it.monitors.staleness = fresh(None), Action::Stop, Cause::CommandStale),
     (
         |it| it.monitors.staleness = fresh(Some(command(LIMIT_MS * MS + MOMENT_NS, 0, 0))),
