@@ -10,6 +10,7 @@ use rand_pcg::{Pcg64, rand_core::Rng};
 use crate::chaos::robot_fault::RobotFault;
 
 const LATE: Duration = Duration::from_secs(2);
+const LATE_FROM_BOOT: Duration = Duration::from_millis(500);
 /// Age of an old frame that comes again.
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
@@ -17,6 +18,9 @@ const AGAIN_EVERY: Duration = Duration::from_secs(2);
 const SLOW: Duration = Duration::from_millis(333);
 /// The stuck echo, centimetres.
 const STUCK_CM: u8 = 8;
+/// The frozen echo of a ranger that has heard nothing yet, centimetres.
+const FROZEN_CM: u8 = 150;
+const NOTHING: u8 = 255;
 /// Ultrasonic bytes at the front of a standard frame's data.
 const ULTRASONIC: usize = 6;
 /// Motor frames that are stored: as many as come in [`OLD`] at ten times the usual rate.
@@ -44,6 +48,8 @@ pub(crate) struct FaultInjector {
     last: MotorSensors,
     base: MotorSensors,
     base_data: Vec<u8>,
+    /// The newest ultrasonic bytes before the fault that are distances.
+    heard: [u8; ULTRASONIC],
     /// Motor frames of the last seconds, oldest first.
     kept: VecDeque<Late>,
     next_again: Duration,
@@ -68,6 +74,7 @@ impl FaultInjector {
             last: MotorSensors::default(),
             base: MotorSensors::default(),
             base_data: Vec::new(),
+            heard: [FROZEN_CM; ULTRASONIC],
             kept: VecDeque::new(),
             next_again: Duration::ZERO,
             next_slow: [Duration::ZERO; 256],
@@ -96,6 +103,13 @@ impl FaultInjector {
                 }
                 self.keep(&frame, now);
             }
+            if frame.did == did::STANDARD && !self.faulty {
+                for (heard, &byte) in self.heard.iter_mut().zip(frame.data) {
+                    if !matches!(byte, 0 | NOTHING) {
+                        *heard = byte;
+                    }
+                }
+            }
             if self.faulty {
                 self.pass(&frame, now, &mut out);
             } else {
@@ -108,7 +122,11 @@ impl FaultInjector {
             let old = self.kept.iter().rfind(|kept| kept.at + OLD <= now);
             more.extend(old.map(|old| Late { at: now, bytes: old.bytes.clone() }));
         }
-        let at = if self.faulty && self.fault == RobotFault::FramesLate { now + LATE } else { now };
+        let at = match self.fault {
+            RobotFault::FramesLate if self.faulty => now + LATE,
+            RobotFault::LateFromBoot if self.faulty => now + LATE_FROM_BOOT,
+            _ => now,
+        };
         let first = (!out.is_empty()).then_some(Late { at, bytes: out });
         first.into_iter().chain(more).collect()
     }
@@ -176,11 +194,22 @@ impl FaultInjector {
             (RobotFault::MotorOnes, did::MOTOR) => with_data(&vec![0xff; frame.data.len()], out),
             (RobotFault::MotorZeros, did::MOTOR) => with_data(&vec![0; frame.data.len()], out),
             (RobotFault::MotorRepeated, did::MOTOR) => with_data(&self.base_data, out),
-            (RobotFault::SonarZero | RobotFault::SonarStuck, did::STANDARD) => {
-                let stuck = self.fault == RobotFault::SonarStuck;
+            (
+                RobotFault::SonarZero
+                | RobotFault::SonarStuck
+                | RobotFault::SonarSilent
+                | RobotFault::SonarFrozen,
+                did::STANDARD,
+            ) => {
+                let told = match self.fault {
+                    RobotFault::SonarStuck => [STUCK_CM; ULTRASONIC],
+                    RobotFault::SonarSilent => [NOTHING; ULTRASONIC],
+                    RobotFault::SonarFrozen => self.heard,
+                    _ => [0; ULTRASONIC],
+                };
                 let mut data = frame.data.to_vec();
-                for byte in data.iter_mut().take(ULTRASONIC) {
-                    *byte = if stuck { STUCK_CM } else { 0 };
+                for (byte, told) in data.iter_mut().zip(told) {
+                    *byte = told;
                 }
                 with_data(&data, out);
             }

@@ -25,6 +25,8 @@ pub enum Promise {
     Unharmed,
     /// As [`Promise::Unharmed`], and it rests when its mission ends.
     EndsAtRest,
+    /// Nothing notices it: the table only shows how it ends.
+    Nothing,
 }
 
 /// A fault of a robot's data. [`TABLE`] says what each does.
@@ -51,6 +53,9 @@ pub enum RobotFault {
     LinkKilled,
     SupervisorKilled,
     AllKilled,
+    SonarSilent,
+    SonarFrozen,
+    LateFromBoot,
 }
 
 #[derive(Debug)]
@@ -79,7 +84,7 @@ pub static TABLE: &[Row] = &[
     row(RobotFault::CountsReset, "counts-reset", Promise::Unharmed, "counts begin again from 0 without silence"),
     row(RobotFault::SonarZero, "sonar-zero", Promise::Rests, "every ultrasonic byte is 0, which is not valid"),
     row(RobotFault::SonarMissing, "sonar-missing", Promise::Rests, "no standard frame comes"),
-    row(RobotFault::SonarStuck, "sonar-stuck", Promise::Unharmed, "every ultrasonic byte is 8 cm"),
+    row(RobotFault::SonarStuck, "sonar-stuck", Promise::RestsLater, "every ultrasonic byte is 8 cm"),
     row(RobotFault::FramesLate, "frames-late", Promise::Rests, "all frames come 2 s late"),
     row(RobotFault::OldFrames, "old-frames", Promise::Unharmed, "every 2 s a motor frame of 3 s ago comes again"),
     row(RobotFault::StreamsStop, "streams-stop", Promise::Rests, "no sensor frame comes, acknowledgements do"),
@@ -89,6 +94,9 @@ pub static TABLE: &[Row] = &[
     row(RobotFault::LinkKilled, "link-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the link under a frozen supervisor"),
     row(RobotFault::SupervisorKilled, "supervisor-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the supervisor"),
     row(RobotFault::AllKilled, "all-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of all processes, then `firsthand stop`"),
+    row(RobotFault::SonarSilent, "sonar-silent", Promise::Nothing, "every ultrasonic byte is 255, nothing in range"),
+    row(RobotFault::SonarFrozen, "sonar-frozen", Promise::RestsLater, "the last ultrasonic bytes that are distances repeat for ever"),
+    row(RobotFault::LateFromBoot, "late-from-boot", Promise::Unharmed, "from its start on, all frames come 0.5 s late"),
 ];
 
 impl Promise {
@@ -98,7 +106,7 @@ impl Promise {
             Self::RestsAtOnce => Some(REST_AT_ONCE_S),
             Self::Rests => Some(REST_WITHIN_S),
             Self::RestsLater => Some(REST_LATER_S),
-            Self::Unharmed | Self::EndsAtRest => None,
+            Self::Unharmed | Self::EndsAtRest | Self::Nothing => None,
         }
     }
 }
@@ -112,6 +120,11 @@ impl RobotFault {
     pub fn row(self) -> &'static Row {
         // A test ensures that every fault has a row.
         TABLE.iter().find(|row| row.fault == self).unwrap_or(&TABLE[0])
+    }
+
+    /// Whether the robot has it from its start on.
+    pub const fn from_boot(self) -> bool {
+        matches!(self, Self::LateFromBoot)
     }
 
     pub fn named(name: &str) -> Option<Self> {
@@ -137,7 +150,7 @@ mod tests {
             assert_eq!(RobotFault::named(row.name), Some(row.fault));
             assert_eq!(row.fault.row().name, row.name);
         }
-        assert_eq!(RobotFault::AllKilled as usize + 1, TABLE.len());
+        assert_eq!(RobotFault::LateFromBoot as usize + 1, TABLE.len());
         assert_eq!(RobotFault::named("none"), None);
     }
 
@@ -148,6 +161,7 @@ mod tests {
             let promise = match (row.promise.rest_within_s(), row.promise) {
                 (Some(within_s), _) => format!("rests within {within_s} s"),
                 (None, Promise::EndsAtRest) => "ends at rest".to_owned(),
+                (None, Promise::Nothing) => "nothing: unnoticed".to_owned(),
                 (None, _) => "unharmed".to_owned(),
             };
             let what = row.what;

@@ -32,8 +32,11 @@ pub struct Entry {
 impl Entry {
     /// Whether the robot did as promised.
     pub fn is_kept(&self) -> bool {
-        let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
         let promise = self.fault.row().promise;
+        if promise == Promise::Nothing {
+            return self.fault_began;
+        }
+        let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
         let Some(limit_s) = promise.rest_within_s() else {
             let rests =
                 self.rest_s.is_some_and(|rest_s| rest_s + AT_REST_BEFORE_S <= self.watched_s);
@@ -89,11 +92,13 @@ impl fmt::Display for StopTimeTable {
         writeln!(
             to,
             "Times are from the fault, the longest of each kind; at most {REST_WITHIN_S} s, {REST_LATER_S} s: {}, or \
-             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}.",
+             {REST_AT_ONCE_S} s: {}; except where the robot may go on unharmed: {}, {}, and \
+             where nothing is promised: {}.",
             names(Promise::RestsLater),
             names(Promise::RestsAtOnce),
             names(Promise::Unharmed),
-            names(Promise::EndsAtRest)
+            names(Promise::EndsAtRest),
+            names(Promise::Nothing)
         )
     }
 }
@@ -142,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_promise_is_broken_by_motion_a_touch_a_wrong_place_or_silence_about_the_reason() {
-        use RobotFault::{CountsReset, Silence};
+        use RobotFault::{CountsReset, Silence, SonarSilent};
         #[rustfmt::skip]
         let rows = [
             (entry(Silence), true),
@@ -154,6 +159,8 @@ mod tests {
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
             (Entry { outcome: "wrong_place".to_owned(), ..entry(CountsReset) }, false),
+            (Entry { collisions: 1, ..entry(SonarSilent) }, true),
+            (Entry { fault_began: false, ..entry(SonarSilent) }, false),
         ];
         for (entry, kept) in rows {
             assert_eq!(entry.is_kept(), kept, "{entry:?}");

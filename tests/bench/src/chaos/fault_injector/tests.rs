@@ -111,12 +111,23 @@ fn the_sonar_is_wrong_as_the_table_says() {
     assert_eq!(told(RobotFault::SonarMissing), None);
     assert_eq!(told(RobotFault::SonarStuck), Some(STUCK_CM));
     assert_eq!(told(RobotFault::EncoderDead), Some(90));
+    assert_eq!(told(RobotFault::SonarSilent), Some(255));
+    // What the robot hears after the fault began changes nothing.
+    let mut injector = FaultInjector::new(RobotFault::SonarFrozen, 1);
+    injector.report(&tick([100, 200]), at(1.0));
+    injector.begin();
+    let mut later = Vec::new();
+    let heard = StandardSensors { ultrasonic: [40; 6], ..StandardSensors::default() };
+    Report::Standard(heard).encode(Addressing::Numbered, &mut later);
+    assert_eq!(sonar(&injector.report(&later, at(1.1))), Some(90));
 }
 
 #[test]
 fn frames_are_late_old_or_rare_as_the_table_says() {
     let (_, late) = faulted(RobotFault::FramesLate, [150, 190]);
     assert_eq!(late[0].at, at(1.1) + LATE);
+    let (_, late) = faulted(RobotFault::LateFromBoot, [150, 190]);
+    assert_eq!(late[0].at, at(1.6));
 
     let mut injector = FaultInjector::new(RobotFault::OldFrames, 1);
     for number in 0..40 {
