@@ -4,6 +4,8 @@
 //! 256 passes the CRC, and the good frames after it would count as its data. So a frame with wrong end bytes is accepted only if no
 //! frame with right end bytes begins inside it.
 
+use std::cell::Cell;
+
 use super::{
     crc::crc8,
     frame::{BEFORE_DATA, Frame, HEADER, MAX_FRAME_BYTES},
@@ -15,6 +17,10 @@ const CAPACITY: usize = 65_536 + MAX_FRAME_BYTES;
 /// back the complete frames behind it while the rest of its own is missing.
 const LONGEST_PLAUSIBLE: usize = 64;
 
+/// The bytes whose CRC is computed after one push at most. Sound frames need as many as they have; a flood of false headers would need
+/// a thousand times as many, and hold up whoever decodes.
+const MOST_WORK: usize = 1 << 20;
+
 /// Counts of what the bytes so far were.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecoderTally {
@@ -24,20 +30,22 @@ pub struct DecoderTally {
     pub bad_crc: u64,
     /// Bytes that belonged to no frame.
     pub noise_bytes: u64,
-    /// Bytes dropped unread because more came than is held.
+    /// Bytes dropped unread because more came than is held, or too many false headers.
     pub dropped_bytes: u64,
 }
 
 /// A streaming decoder: [`Decoder::push`] what came, then take every [`Decoder::next_frame`].
 ///
 /// It holds at most 64 KiB and a frame; of a push that exceeds that, the oldest bytes are dropped and
-/// counted. A half frame waits for its rest; a header that was noise waits until its claimed length
+/// counted, and of false headers that take too long all that is held. A half frame waits for its rest; a header that was noise waits until its claimed length
 /// has come, and then what follows it is found.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     buffer: Vec<u8>,
     start: usize,
     tally: DecoderTally,
+    /// Bytes whose CRC was computed since the last push.
+    work: Cell<usize>,
 }
 
 /// The bytes at a header.
@@ -71,23 +79,28 @@ impl Decoder {
         self.buffer.drain(..from_held);
         self.buffer.extend_from_slice(&bytes[excess - from_held..]);
         self.tally.dropped_bytes += excess as u64;
+        self.work.set(0);
     }
 
     /// The next complete frame, in the order they came.
     pub fn next_frame(&mut self) -> Option<Frame<'_>> {
         let end = loop {
+            if self.work.get() > MOST_WORK {
+                self.tally.dropped_bytes += (self.buffer.len() - self.start) as u64;
+                self.start = self.buffer.len();
+            }
             let bytes = &self.buffer[self.start..];
             let Some(noise) = header_in(bytes) else {
                 self.skip(bytes.len());
                 return None;
             };
             let bytes = &bytes[noise..];
-            match candidate(bytes) {
+            match candidate(bytes, &self.work) {
                 Candidate::Sound { end, ending: Ending::Right } => {
                     self.skip(noise);
                     break end;
                 }
-                Candidate::Sound { end, ending } => match inside(bytes, end) {
+                Candidate::Sound { end, ending } => match inside(bytes, end, &self.work) {
                     Inside::Nothing => {
                         self.skip(noise);
                         break end;
@@ -108,7 +121,7 @@ impl Decoder {
                         return None;
                     }
                     let bytes = &self.buffer[self.start..];
-                    let Inside::Frame(at) = inside(bytes, bytes.len()) else {
+                    let Inside::Frame(at) = inside(bytes, bytes.len(), &self.work) else {
                         return None;
                     };
                     self.skip(at);
@@ -159,11 +172,12 @@ fn header_in(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Judge what stands at the start of `bytes`, which is a header or the beginning of one.
-fn candidate(bytes: &[u8]) -> Candidate {
+fn candidate(bytes: &[u8], work: &Cell<usize>) -> Candidate {
     let Some(&len) = bytes.get(BEFORE_DATA - 1) else {
         return Candidate::Half { len: 0 };
     };
     let crc_at = BEFORE_DATA + usize::from(len);
+    work.set(work.get() + crc_at);
     match bytes.get(crc_at) {
         None => Candidate::Half { len: usize::from(len) },
         Some(&crc) if crc == crc8(&bytes[HEADER.len()..crc_at]) => {
@@ -192,13 +206,13 @@ enum Inside {
 }
 
 /// Search for a frame that begins after the start of `bytes` and before `end`.
-fn inside(bytes: &[u8], end: usize) -> Inside {
+fn inside(bytes: &[u8], end: usize, work: &Cell<usize>) -> Inside {
     let mut found = Inside::Nothing;
     for at in 1..end.min(bytes.len()) {
         if !HEADER.starts_with(&bytes[at..(at + 2).min(bytes.len())]) {
             continue;
         }
-        match candidate(&bytes[at..]) {
+        match candidate(&bytes[at..], work) {
             Candidate::Sound { ending, .. } => match ending {
                 Ending::Right => return Inside::Frame(at),
                 Ending::Missing => return Inside::Unknown,

@@ -97,6 +97,18 @@ fn a_whole_frame_inside_data_is_data_with_either_ending() {
 }
 
 #[test]
+fn a_datagram_of_false_headers_takes_bounded_work_and_the_next_frame_is_found() {
+    // Every third byte begins a header that claims 255 bytes of data.
+    let mut decoder = Decoder::default();
+    decoder.push(&[0x5e, 0x02, 0xff].repeat(18_000));
+    drain(&mut decoder);
+    assert!(decoder.work.get() < 2 * MOST_WORK, "{}", decoder.work.get());
+    assert!(decoder.tally().dropped_bytes > 0, "{:?}", decoder.tally());
+    decoder.push(&PING);
+    assert_eq!(drain(&mut decoder), vec![ping()]);
+}
+
+#[test]
 fn a_bad_crc_loses_only_its_own_frame() {
     let mut bad = encoded(9, &[1, 2, 3]);
     bad[6] ^= 0x10;
