@@ -265,7 +265,12 @@ fn prepare(options: &Options) -> Result<SummaryFile, Failure> {
         tracing::warn!("{remark}");
         write_stderr(&format!("firsthand: {remark}\n"));
     }
-    Ok(SummaryFile::reserve(directory)?)
+    // A run that is resumed has its files.
+    let needed = match options.recovered {
+        Some(_) => 0,
+        None => summary_file::room_of_run(options.mission.grid_frame().area()),
+    };
+    Ok(SummaryFile::reserve(directory, needed)?)
 }
 
 /// Report a failure of summary, picture or report. The exit code of the mission stays.

@@ -7,7 +7,7 @@ use std::{
 };
 
 use rustix::{
-    fs::{FallocateFlags, fallocate},
+    fs::{FallocateFlags, fallocate, fstatvfs},
     io::Errno,
 };
 use supervisor::recovery::SUMMARY;
@@ -18,6 +18,15 @@ use crate::console::failure::Refused;
 const UNFINISHED: &str = "summary.json.unfinished";
 /// A summary takes 2 kB.
 const ROOM: u64 = 16 << 10;
+/// Logs, checkpoints and the beginning of a recording.
+const RUN_ROOM: u64 = 2 << 20;
+/// Room for a cell of the map in the mapper's checkpoint.
+const CELL_ROOM: u64 = 16;
+
+/// The room that the files of a new run need, with a map of so many `cells`.
+pub(crate) const fn room_of_run(cells: usize) -> u64 {
+    RUN_ROOM + CELL_ROOM * cells as u64
+}
 
 pub(crate) struct SummaryFile {
     file: File,
@@ -25,10 +34,12 @@ pub(crate) struct SummaryFile {
 }
 
 impl SummaryFile {
-    /// Reserve its room in the run `directory`.
-    pub(crate) fn reserve(directory: &Path) -> Result<Self, Refused> {
+    /// Reserve its room in the run `directory`, where `needed` bytes more must be free.
+    pub(crate) fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
-        let reserved = File::create(&path).and_then(|file| {
+        // A run that is resumed has its room.
+        let opened = File::options().create(true).truncate(false).write(true).open(&path);
+        let reserved = opened.and_then(|file| {
             match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {
                 // This file system cannot reserve.
                 Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
@@ -40,6 +51,16 @@ impl SummaryFile {
             let code = if full { "disk-full" } else { "not-writable" };
             Refused::new(code, failed("reserve room for", &path)(error))
         })?;
+        // A file system that does not say what is free is not full.
+        let free = fstatvfs(&file).map_or(u64::MAX, |space| space.f_bavail * space.f_frsize);
+        if free < needed {
+            let _ = fs::remove_file(&path);
+            let (directory, free, needed) = (directory.display(), free >> 10, needed >> 10);
+            let text = format!(
+                "the disk of {directory} has {free} KiB free of the {needed} KiB that the files of a run need; remove old runs, or give another directory"
+            );
+            return Err(Refused::new("disk-full", text));
+        }
         Ok(Self { file, directory: directory.to_path_buf() })
     }
 
