@@ -4,14 +4,13 @@ use std::collections::BTreeSet;
 
 use common::{
     bus::{Bus, OpenedBy},
-    domain::Domain,
     topics,
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Topics},
 };
 use rustix::process::Signal;
 use supervisor::stages;
 
-use crate::support::{Run, in_own_process, pid};
+use crate::support::{Run, domain, in_own_process, pid};
 
 fn names(lists: &[Topics]) -> BTreeSet<&'static str> {
     let listed = lists.iter().copied().flatten();
@@ -23,7 +22,7 @@ fn every_stage_has_open_what_its_row_lists_and_nothing_else() {
     in_own_process(|| {
         let mut run = Run::start("wiring", "obstacle-course", &["--pace", "1"]);
         let status = run.wait_until_under_way(0.3);
-        let bus = Bus::join(&Domain::of("wiring".parse().unwrap()), "test").unwrap();
+        let bus = Bus::join(&domain("wiring"), "test").unwrap();
         let opened: Vec<_> = topics::OPEN
             .iter()
             .map(|topic| (topic.spec().name, topic.opened_by(&bus).unwrap()))

@@ -2,12 +2,15 @@
 
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 
+use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
+
+use super::robot::suite;
 
 /// A command that gets SIGKILL when the thread that starts it ends.
 pub(super) fn with_parent(line: &[&str]) -> Command {
     let mut command = Command::new("setpriv");
-    command.args(["--pdeathsig", "KILL", "--"]).args(line);
+    command.args(["--pdeathsig", "KILL", "--"]).args(line).env(SUITE_VARIABLE, suite());
     command
 }
 

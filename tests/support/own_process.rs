@@ -23,16 +23,25 @@ pub fn in_own_process<T: FnOnce()>(test: T) {
 /// Run `test` in a process of its own with a file system of `mebibytes` MiB. An ordinary user may mount it in a user namespace with
 /// mounts of its own. If the system allows no such namespace, the test does not run and says so.
 pub fn on_small_disk<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
+    let directory = tempfile::tempdir().unwrap();
+    on_small_file_system(directory.path(), mebibytes, test);
+}
+
+/// [`on_small_disk`] with so little shared memory.
+pub fn on_small_shared_memory<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
+    on_small_file_system(Path::new("/dev/shm"), mebibytes, test);
+}
+
+fn on_small_file_system<T: FnOnce(SmallDisk)>(mount: &Path, mebibytes: u32, test: T) {
     let namespaces = ["unshare", "--user", "--map-root-user", "--mount"];
     if !can_run(&namespaces) {
         return not_run(name_of::<T>(), "no user namespace with mounts can be had here");
     }
-    let directory = tempfile::tempdir().unwrap();
     // The inner namespace gives the test its own user back, because files of the robot have that user's number in their names.
     let script = format!(
         "mount -t tmpfs -o size={mebibytes}m tmpfs {disk} && exec unshare --user --map-user={user} --map-group={group} \
          -- env {DISK}={disk} \"$@\"",
-        disk = directory.path().display(),
+        disk = mount.display(),
         user = geteuid().as_raw(),
         group = getegid().as_raw(),
     );
@@ -51,6 +60,11 @@ pub struct SmallDisk(PathBuf);
 impl SmallDisk {
     pub fn path(&self) -> &Path {
         &self.0
+    }
+
+    /// Give back what [`SmallDisk::fill`] used up.
+    pub fn empty(&self) {
+        fs::remove_file(self.0.join("filler")).unwrap();
     }
 
     /// Use up the free space.

@@ -4,10 +4,14 @@ use std::{
     fs,
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
+    sync::LazyLock,
     time::{Duration, Instant},
 };
 
-use common::{bus_instance::BusInstance, domain::Domain};
+use common::{
+    bus_instance::BusInstance,
+    domain::{Domain, SUITE_VARIABLE, set_apart},
+};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -64,7 +68,46 @@ pub fn half_make(path: &Path) {
 }
 
 pub fn domain(robot: &str) -> Domain {
+    suite();
     Domain::of(robot.parse().unwrap())
+}
+
+/// The letters that set the robots of this process, and of those that it starts, apart from all others on the machine.
+pub fn suite() -> &'static str {
+    static SUITE: LazyLock<String> = LazyLock::new(|| {
+        let suite = std::env::var(SUITE_VARIABLE).unwrap_or_else(|_| {
+            remove_ended_suites();
+            suite_of(std::process::id())
+        });
+        set_apart(&suite);
+        suite
+    });
+    &SUITE
+}
+
+/// `t` and the process number to the base 36, the last four places of it.
+fn suite_of(process: u32) -> String {
+    let place = |power| char::from_digit(process / 36_u32.pow(power) % 36, 36).unwrap();
+    std::iter::once('t').chain([3, 2, 1, 0].map(place)).collect()
+}
+
+/// Remove what suites left that were killed.
+fn remove_ended_suites() {
+    let run = processes("").into_iter().map(|(pid, _)| suite_of(pid)).collect::<Vec<_>>();
+    let left = |name: &str| {
+        let name = name.strip_prefix("firsthand-").or_else(|| name.strip_prefix("fh"))?;
+        let suite = name.get(..5).filter(|suite| suite.starts_with('t'))?;
+        let whole = name.len() == 5 || name.as_bytes()[5] == b'_';
+        (whole && !run.iter().any(|running| running == suite)).then_some(())
+    };
+    let entries = ["/tmp", "/dev/shm"].map(|directory| fs::read_dir(directory).unwrap().flatten());
+    for entry in entries.into_iter().flatten() {
+        if entry.file_name().to_str().and_then(left).is_some() {
+            let path = entry.path();
+            // Another suite may remove it at the same time, and another user's cannot be removed.
+            let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        }
+    }
 }
 
 /// The current bus instance of `robot`.

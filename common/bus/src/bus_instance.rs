@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn the_bus_that_is_there_is_the_one_made_last() {
-        let domain = Domain::of("instance".parse().unwrap());
+        let domain = Domain::of(format!("link-{}", std::process::id()).parse().unwrap());
         let mut own = fs::DirBuilder::new();
         own.recursive(true).mode(0o700).create(domain.directory()).unwrap();
         assert!(BusInstance::current(&domain).is_err());

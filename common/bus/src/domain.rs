@@ -3,11 +3,13 @@
 //! Two robots share nothing: each has its own directory, lock, prefix in `/dev/shm` and services.
 
 use std::{
-    fmt,
-    fs::{File, TryLockError},
-    io::{self, Read as _},
+    env, fmt,
+    fs::{self, File, TryLockError},
+    io::{self, ErrorKind::NotFound, Read as _},
+    os::unix::fs::MetadataExt as _,
     path::{Path, PathBuf},
     str::FromStr,
+    sync::OnceLock,
 };
 
 use serde::{Deserialize, Serialize};
@@ -68,7 +70,8 @@ pub const SHARED_MEMORY: &str = "/dev/shm";
 pub struct Domain {
     /// The robot.
     pub robot: RobotName,
-    user: u32,
+    /// The user's number, or the letters of a suite of tests.
+    owner: String,
     directory: PathBuf,
 }
 
@@ -77,10 +80,11 @@ impl Domain {
     #[must_use]
     pub fn of(robot: RobotName) -> Self {
         let user = rustix::process::geteuid().as_raw();
-        // $XDG_RUNTIME_DIR would differ between a login, a service and a container of one user. A consumer must find the robot from
-        // any of them.
-        let directory = PathBuf::from(format!("/tmp/firsthand-{user}/{robot}"));
-        Self { robot, user, directory }
+        let suite =
+            SUITE.get_or_init(|| env::var(SUITE_VARIABLE).ok().filter(|suite| is_suite(suite)));
+        let owner = suite.clone().unwrap_or_else(|| user.to_string());
+        let directory = place(&places(&owner), user, &robot.0).join(&robot.0);
+        Self { robot, owner, directory }
     }
 
     /// The directory of the domain's files. Only its owner may enter it.
@@ -98,7 +102,7 @@ impl Domain {
     /// The process that holds the supervisor's lock; none if the lock is free.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         let lock = match File::open(self.lock_file()) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) if error.kind() == NotFound => return Ok(None),
             opened => opened?,
         };
         match lock.try_lock_shared() {
@@ -113,7 +117,7 @@ impl Domain {
     pub fn is_supervised(&self) -> bool {
         match File::open(self.lock_file()) {
             Ok(lock) => lock.try_lock_shared().is_err(),
-            Err(error) => error.kind() != io::ErrorKind::NotFound,
+            Err(error) => error.kind() != NotFound,
         }
     }
 
@@ -174,8 +178,60 @@ impl Domain {
     /// because robot names have no `_`.
     #[must_use]
     pub fn shared_memory_prefix(&self) -> String {
-        format!("fh{}_{}_", self.user, self.robot)
+        format!("fh{}_{}_", self.owner, self.robot)
     }
+}
+
+/// The environment variable that sets a suite of tests apart, so that two of them may run at once: `t` and four of a-z and 0-9, which
+/// stand in the place of the user's number.
+pub const SUITE_VARIABLE: &str = "FIRSTHAND_SUITE";
+static SUITE: OnceLock<Option<String>> = OnceLock::new();
+
+/// Set the robots that this process knows apart, as [`SUITE_VARIABLE`] does. Call it before the first [`Domain::of`].
+pub fn set_apart(suite: &str) {
+    // Once a domain has been named, it is too late.
+    let _ = SUITE.set(Some(suite.to_owned()).filter(|suite| is_suite(suite)));
+}
+
+fn is_suite(text: &str) -> bool {
+    let allowed = |byte: u8| matches!(byte, b'a'..=b'z' | b'0'..=b'9');
+    text.len() == 5 && text.starts_with('t') && text.bytes().all(allowed)
+}
+
+/// The longest path of a directory of robots. The paths of sockets in it have at most 108 bytes.
+const LONGEST_PLACE: usize = 80;
+
+/// The directories in which the robots of `user` may be, the preferred first. Another user can take the name in `/tmp`, and no other:
+/// the package makes `/run/firsthand` for its user, and nobody else writes in the directories of a login and of a home.
+/// `$XDG_RUNTIME_DIR` is not asked, because it differs between a login, a service and a container of one user.
+fn places(user: &str) -> Vec<PathBuf> {
+    let home = env::var_os("HOME").map(|home| Path::new(&home).join(".firsthand"));
+    [
+        format!("/tmp/firsthand-{user}"),
+        "/run/firsthand".to_owned(),
+        format!("/run/user/{user}/firsthand"),
+    ]
+    .into_iter()
+    .map(PathBuf::from)
+    .chain(home.filter(|home| home.is_absolute()))
+    .collect()
+}
+
+/// The one of `places` that has `robot`, or else the first that this user has or may make. A robot that runs is found this way,
+/// whatever places were made or taken since its start. If no place is left, it is the first, and an error names that.
+fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
+    let is_own = |path: &Path| {
+        fs::symlink_metadata(path).is_ok_and(|found| found.is_dir() && found.uid() == user)
+    };
+    let may_have = |place: &&PathBuf| {
+        let absent = || fs::symlink_metadata(place).is_err_and(|error| error.kind() == NotFound);
+        let may_make = || place.starts_with("/tmp") || place.parent().is_some_and(is_own);
+        place.as_os_str().len() <= LONGEST_PLACE && (is_own(place) || absent() && may_make())
+    };
+    let usable: Vec<_> = places.iter().filter(may_have).collect();
+    let has_robot = usable.iter().find(|place| place.join(robot).exists());
+    let found = has_robot.or(usable.first()).copied().or(places.first());
+    found.cloned().unwrap_or_default()
 }
 
 /// The process that holds `lock`, the supervisor's. The system's list of locks names it; where the list misses it, the number in the
@@ -200,6 +256,25 @@ mod tests {
             assert!(bad.parse::<RobotName>().is_err(), "{bad:?} was accepted");
         }
         assert!("x80-2".parse::<RobotName>().is_ok());
+    }
+
+    #[test]
+    fn a_place_that_another_user_took_is_passed_over_and_a_robot_that_runs_is_found() {
+        let directory = tempfile::tempdir().unwrap();
+        let places = ["taken", "own", "home"].map(|name| directory.path().join(name));
+        let user = rustix::process::geteuid().as_raw();
+        let found = || place(&places, user, "x80");
+        assert_eq!(found(), places[0]);
+        // Whatever is no directory of this user stands for a directory of another.
+        std::os::unix::fs::symlink(directory.path(), &places[0]).unwrap();
+        assert_eq!(found(), places[1]);
+        fs::create_dir_all(places[2].join("x80")).unwrap();
+        assert_eq!(found(), places[2]);
+        for taken in &places[1..] {
+            let _ = fs::remove_dir_all(taken);
+            fs::write(taken, "").unwrap();
+        }
+        assert_eq!(found(), places[0], "the error names it");
     }
 
     #[test]

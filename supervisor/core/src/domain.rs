@@ -265,11 +265,14 @@ mod tests {
 
     use super::*;
 
+    /// A robot of this process: a test that was killed leaves nothing for the next.
+    fn domain(name: &str) -> Domain {
+        Domain::of(format!("{name}-{}", std::process::id()).parse().unwrap())
+    }
+
     #[test]
     fn a_domain_that_could_not_be_acquired_keeps_no_lock() {
-        let domain = Domain::of("no-lock".parse().unwrap());
-        // A test that was killed left it.
-        let _ = fs::remove_dir_all(domain.directory());
+        let domain = domain("no-lock");
         make_directory(&domain).unwrap();
         // A directory cannot be removed as the file that should be there.
         fs::create_dir(domain.middleware_config()).unwrap();
@@ -285,7 +288,7 @@ mod tests {
 
     #[test]
     fn a_supervisor_is_known_whatever_other_locks_come_and_go() {
-        let domain = Domain::of("many-locks".parse().unwrap());
+        let domain = domain("locks");
         let held = DomainLock::acquire(domain.clone(), 1).unwrap();
         let files = tempfile::tempdir().unwrap();
         let over = AtomicBool::new(false);
@@ -315,7 +318,7 @@ mod tests {
 
     #[test]
     fn a_consumer_that_joins_for_ever_keeps_no_bus() {
-        let domain = Domain::of("joins-on".parse().unwrap());
+        let domain = domain("joins");
         let held = DomainLock::acquire(domain.clone(), 1).unwrap();
         let joining = domain.joining().unwrap();
         drop(held);

@@ -60,7 +60,7 @@ static BYTES: SliceTopic<Test, u8> = SliceTopic::new(&spec("bytes"));
 
 /// Run `test` on a bus of these topics, and remove the bus.
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
-    let domain = Domain::of(robot.parse().unwrap());
+    let domain = Domain::of(format!("{robot}-{}", std::process::id()).parse().unwrap());
     fs::DirBuilder::new().recursive(true).mode(0o700).create(domain.directory()).unwrap();
     let table: [&dyn AnyTopic; 3] = [&STRUCTS, &SLICES, &BYTES];
     let (bus, services) = Bus::make(&domain, robot, &table).unwrap();
@@ -74,7 +74,7 @@ const TIME: MissionTime = MissionTime(7);
 
 #[test]
 fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() {
-    with_bus("ports-typed", |bus| {
+    with_bus("typed", |bus| {
         let name = |name: &str| ServiceName::new(name).unwrap();
         let structs = bus.node.service_builder(&name("structs"));
         let structs = structs.publish_subscribe::<Test>().open().unwrap();
@@ -115,7 +115,7 @@ fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() 
 
 #[test]
 fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
-    with_bus("ports-slices", |bus| {
+    with_bus("slices", |bus| {
         let mut reader = bus.slice_reader(&BYTES).unwrap();
         let mut writer = bus.slice_writer(&BYTES, 1, 3).unwrap();
         for sent in [&[][..], &[1], &[1, 2, 3]] {
@@ -130,7 +130,7 @@ fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
 
 #[test]
 fn a_topic_is_not_opened_as_another_payload_or_another_shape() {
-    with_bus("ports-foreign", |bus| {
+    with_bus("foreign", |bus| {
         let as_cells = SliceTopic::<Test, Cell>::new(BYTES.spec());
         let as_slices = SliceTopic::<Test, Test>::new(STRUCTS.spec());
         let as_structs = Topic::<Test>::new(SLICES.spec());

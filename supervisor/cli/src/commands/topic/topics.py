@@ -21,7 +21,7 @@ class Follower:
         iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
         self.topics = {topic: TOPICS[topic] for topic in topics}
         self.name = name
-        self.directory = f"/tmp/firsthand-{os.geteuid()}/{robot}"
+        self.robot = robot
 
     def __iter__(self):
         while True:
@@ -81,6 +81,17 @@ class Follower:
                 else:
                     yield topic, sample.payload().contents
                 del sample
+
+    @property
+    def directory(self):
+        """The robot's directory: where it is, or else in the first place that is this user's."""
+        user = os.geteuid()
+        home = os.path.expanduser("~/.firsthand")
+        places = [f"/tmp/firsthand-{user}", "/run/firsthand", f"/run/user/{user}/firsthand", home]
+        # Another user may have made a directory of such a name.
+        own = [place for place in places if os.path.isdir(place) and os.lstat(place).st_uid == user]
+        own.sort(key=lambda place: not os.path.exists(f"{place}/{self.robot}"))
+        return f"{(own or places)[0]}/{self.robot}"
 
     def _instance(self):
         try:
