@@ -12,8 +12,8 @@ use std::{
 
 use crate::support::{
     self, Run, STAGES, all_run, assert_nothing_left, assert_reached, assert_refused, directory_of,
-    find, firsthand, firsthand_under, generation, json_of, on_small_disk, output, pid, refused,
-    signal_process, start_quietly,
+    find, firsthand, firsthand_under, generation, json_of, on_small_disk, on_small_shared_memory,
+    output, pid, refused, signal_process, start_quietly,
 };
 use rustix::process::Signal;
 use serde_json::Value;
@@ -87,7 +87,35 @@ fn a_disk_without_room_for_the_result_is_told_before_the_start_and_names_the_fil
         let out = out.to_str().unwrap();
         let run = ["run", "open-room", "--robot", robot, "--out", out];
         assert_eq!(refused(&run, "disk-full", &["summary.json"]), Some(1));
+        disk.empty();
+        // Room for the summary, and not for the other files of a run.
+        assert_eq!(refused(&run, "disk-full", &[out, "KiB"]), Some(1));
+        assert_eq!(fs::read_dir(out).unwrap().filter(is_summary).count(), 0);
         assert_nothing_left(robot);
+    });
+}
+
+fn is_summary(file: &io::Result<fs::DirEntry>) -> bool {
+    let name = file.as_ref().unwrap().file_name();
+    name.to_string_lossy().starts_with("summary")
+}
+
+#[test]
+fn shared_memory_that_is_full_is_refused_at_the_start_and_harms_no_run_later() {
+    on_small_shared_memory(96, |memory| {
+        let robot = "mach-shm";
+        memory.fill();
+        let run = ["run", "open-room", "--robot", robot, "--runs"];
+        let runs = directory_of(robot);
+        let runs = runs.path().to_str().unwrap();
+        refused(&[&run[..], &[runs]].concat(), "shared-memory", &["--shm-size"]);
+        memory.empty();
+        let mut run = Run::start(robot, "obstacle-course", &["--pace", "4"]);
+        run.wait_until_under_way(0.3);
+        memory.fill();
+        let summary = run.arrives();
+        let restarts = summary["restarts"].as_object().unwrap();
+        assert!(restarts.values().all(|times| times == 0), "{summary}");
     });
 }
 
@@ -303,9 +331,8 @@ fn a_latency_measurement_removes_no_directory_but_its_own() {
     // Another robot of this user, whose directory is below the one that was removed.
     let mut run = Run::start("mach-lat", "open-room", &SLOW);
     run.wait_until_under_way(0.3);
-    let robot = user.to_string();
-    support::printed(&["bench", "tick", "--robot", &robot, "--rounds", "1", "--json"]);
-    let root = fs::metadata(format!("/tmp/firsthand-{user}/mach-lat")).unwrap();
+    support::printed(&["bench", "tick", "--robot", support::suite(), "--rounds", "1", "--json"]);
+    let root = fs::metadata(support::domain("mach-lat").directory()).unwrap();
     assert!(root.is_dir() && root.uid() == user);
     assert!(run.status().is_some());
     run.stop();

@@ -2,8 +2,10 @@
 
 use std::{
     fs,
+    mem::MaybeUninit,
     os::unix::fs::{MetadataExt as _, PermissionsExt as _},
     path::Path,
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
@@ -14,10 +16,19 @@ use crate::support::{
 use common::{
     bus::{Bus, BusError},
     clock::MissionTime,
-    samples::{CommandSample, CommandState, DirectiveSample, Order},
+    poll,
+    samples::{
+        CommandSample, CommandState, DirectiveSample, GridHeader, GuidanceSample, LinkSample,
+        Order, PoseSample, RangeSample, WheelSample,
+    },
     topics,
 };
-use rustix::process::Signal;
+use rustix::{
+    fs::inotify,
+    process::Signal,
+    thread::{Uid, set_thread_res_uid},
+};
+use supervisor::domain::DomainLock;
 
 /// The files of a robot in shared memory.
 fn shared(robot: &str) -> Vec<std::path::PathBuf> {
@@ -71,6 +82,122 @@ fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with
 }
 
 #[test]
+fn samples_that_seem_newer_than_all_others_wedge_no_mission_whatever_their_topic() {
+    in_own_process(|| {
+        let mut run = Run::start("forged", "open-room", &["--pace", "2"]);
+        run.wait_until_under_way(0.3);
+        let bus = Bus::join(&domain("forged"), "forger").unwrap();
+        macro_rules! forge {
+            ($($topic:ident),*) => {
+                ($(bus.writer(&topics::$topic, u32::MAX).unwrap()),*)
+            };
+        }
+        let (mut range, mut wheels, mut pose, mut guidance, mut link) =
+            forge!(RANGE, WHEELS, POSE, GUIDANCE, LINK);
+        let mut grid = bus.slice_writer(&topics::GRID, u32::MAX, 1).unwrap();
+        for tick in [0, u64::MAX] {
+            let time = MissionTime(tick);
+            range.publish(tick, time, RangeSample::default()).unwrap();
+            wheels.publish(tick, time, WheelSample::default()).unwrap();
+            pose.publish(tick, time, PoseSample::default()).unwrap();
+            grid.publish(tick, time, GridHeader::default(), std::iter::empty()).unwrap();
+            guidance.publish(tick, time, GuidanceSample::default()).unwrap();
+            link.publish(tick, time, LinkSample::default()).unwrap();
+        }
+        let own = format!("pid={}", std::process::id());
+        for reader in ["dead-reckoning", "mapper", "planner", "controller"] {
+            let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
+            support::wait_until("the forger is told", told);
+        }
+        drop((range, wheels, pose, grid, guidance, link, bus));
+        let summary = run.arrives();
+        let restarts = summary["restarts"].as_object().unwrap();
+        assert!(restarts.values().all(|times| times == 0), "{summary}");
+    });
+}
+
+#[test]
+fn another_user_who_waits_for_the_files_of_a_new_bus_opens_none() {
+    if !rustix::process::geteuid().is_root() {
+        let test = "another_user_who_waits_for_the_files_of_a_new_bus_opens_none";
+        return support::not_run(test, "only root can act as another user");
+    }
+    in_own_process(|| {
+        let robot = domain("raced");
+        let over = AtomicBool::new(false);
+        let (seen, won) = std::thread::scope(|scope| {
+            let racer = scope.spawn(|| race(&robot.shared_memory_prefix(), &over));
+            for _ in 0..200 {
+                DomainLock::acquire(robot.clone(), 1).unwrap();
+            }
+            over.store(true, Ordering::Relaxed);
+            racer.join().unwrap()
+        });
+        println!("tried to open {seen} files, opened {won}");
+        assert!(seen >= 200, "{seen}");
+        assert_eq!(won, 0);
+    });
+}
+
+/// As another user, open each file of that prefix for writing when it is made or its permissions change. Returns how many files were
+/// tried, and how many opened.
+fn race(prefix: &str, over: &AtomicBool) -> (usize, usize) {
+    let nobody = Uid::from_raw(65534);
+    // The user of this thread alone.
+    set_thread_res_uid(nobody, nobody, nobody).unwrap();
+    let watched = inotify::init(inotify::CreateFlags::NONBLOCK).unwrap();
+    let events = inotify::WatchFlags::CREATE | inotify::WatchFlags::ATTRIB;
+    inotify::add_watch(&watched, "/dev/shm", events).unwrap();
+    let mut room = [MaybeUninit::uninit(); 4096];
+    let mut reader = inotify::Reader::new(&watched, &mut room);
+    let (mut seen, mut won) = (0, 0);
+    while !over.load(Ordering::Relaxed) {
+        let Ok(event) = reader.next() else {
+            poll::is_readable(&watched, Duration::from_millis(20)).unwrap();
+            continue;
+        };
+        let name = event.file_name().and_then(|name| name.to_str().ok()).unwrap_or_default();
+        if name.starts_with(prefix) && name.contains('.') {
+            seen += 1;
+            won += usize::from(
+                fs::File::options().write(true).open(format!("/dev/shm/{name}")).is_ok(),
+            );
+        }
+    }
+    (seen, won)
+}
+
+#[test]
+fn a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start() {
+    let test = "a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start";
+    let as_user = ["setpriv", "--reuid=54322", "--regid=54322", "--clear-groups"];
+    if !rustix::process::geteuid().is_root() || !support::can_run(&as_user) {
+        return support::not_run(test, "only root can act as another user");
+    }
+    let home = tempfile::tempdir().unwrap();
+    std::os::unix::fs::chown(home.path(), Some(54322), Some(54322)).unwrap();
+    let squatted = Path::new("/tmp/firsthand-54322");
+    fs::create_dir_all(squatted).unwrap();
+    let start = |arguments: &[&str]| {
+        let mut command = support::firsthand_under(&as_user, arguments);
+        command.env("HOME", home.path()).env_remove("FIRSTHAND_SUITE").current_dir(home.path());
+        command
+    };
+    let slowly = ["run", "open-room", "--robot", "squatted", "--pace", "1", "--json"];
+    let mut run = start(&slowly).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    // Another process of the user finds the robot, and stops it.
+    support::wait_until("it is found", || {
+        let status = start(&["status", "--robot", "squatted", "--json"]).output().unwrap();
+        status.status.success() && home.path().join(".firsthand/squatted/lock").exists()
+    });
+    signal_process(run.id(), Signal::TERM);
+    let code = run.wait().unwrap().code();
+    let taken = fs::read_dir(squatted).unwrap().count();
+    fs::remove_dir(squatted).unwrap();
+    assert_eq!((code, taken), (Some(0), 0));
+}
+
+#[test]
 fn no_file_of_a_run_is_open_to_other_users() {
     let mut run = Run::start("closed", "open-room", &["--pace", "1"]);
     run.wait_until_under_way(0.3);
@@ -90,7 +217,8 @@ fn a_file_of_another_user_with_a_name_of_the_robots_blocks_no_start() {
         let test = "a_file_of_another_user_with_a_name_of_the_robots_blocks_no_start";
         return support::not_run(test, "only root can make a file of another user");
     }
-    let planted = Path::new("/dev/shm/fh0_planted_9204_node.0_10_0.global_mgmt");
+    let prefix = domain("planted").shared_memory_prefix();
+    let planted = &Path::new("/dev/shm").join(prefix + "9204_node.0_10_0.global_mgmt");
     fs::write(planted, "").unwrap();
     fs::set_permissions(planted, fs::Permissions::from_mode(0o666)).unwrap();
     std::os::unix::fs::chown(planted, Some(65534), Some(65534)).unwrap();

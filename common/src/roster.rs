@@ -3,11 +3,14 @@
 use std::time::{Duration, Instant};
 
 use crate::{
-    bus::{Bus, BusError, SliceReader},
-    samples::{RosterEntry, RosterHeader},
+    bus::{Author, Bus, BusError, SliceReader},
+    samples::{RosterEntry, RosterHeader, name_str},
     topics,
     waiter::Waiter,
 };
+
+/// The supervisor answers the first heartbeat of a process with a roster. On a loaded machine that takes a while.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Reads the topic `roster`.
 #[derive(Debug)]
@@ -18,12 +21,47 @@ pub struct Roster {
     pub waiter: Waiter,
 }
 
+/// The processes that a roster names, by their stages.
+pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> {
+    let running = entries.iter().filter(|entry| entry.pid != 0);
+    running.map(|entry| {
+        let author = Author { process: entry.pid, generation: entry.generation };
+        (name_str(&entry.stage).to_owned(), author)
+    })
+}
+
 impl Roster {
     /// Read the roster on `bus`.
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::ROSTER)?);
         Ok(Self { samples: bus.slice_reader(&topics::ROSTER)?, waiter })
+    }
+
+    /// Wait until the supervisor names this process, then let its readers on `bus` admit the processes that rosters name. A roster that
+    /// names this process comes before all that it publishes; readers in other processes know it by then.
+    pub(crate) fn admit_named(mut self, bus: &Bus) -> Result<(), BusError> {
+        let Some(writers) = bus.writers() else {
+            return Ok(());
+        };
+        let own = std::process::id();
+        let first = self.find(PATIENCE, |_, entries| {
+            let names_own = entries.iter().any(|entry| entry.pid == own);
+            names_own.then(|| named(entries).collect::<Vec<_>>())
+        })?;
+        match first {
+            Some(stages) => writers.name(stages),
+            None => tracing::warn!("the supervisor does not name this process; is it frozen?"),
+        }
+        let mut samples = self.samples;
+        writers.read_from(Box::new(move || {
+            let mut newest = None;
+            while let Some(entries) = samples.take()? {
+                newest = Some(named(&entries).collect());
+            }
+            Ok(newest)
+        }));
+        Ok(())
     }
 
     /// The first result of `find` in a roster; none if there is no result for `patience`.

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use crate::{
     bus::{
         AnyTopic, Bus, Layout, Payload, Reader, SliceReader, SliceTopic, Stamp, Stamped, Topic,
-        Writer,
+        Writer, Writers,
     },
     checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
@@ -26,6 +26,7 @@ use crate::{
     journal::{Journal, Restored},
     latency_budget::{self, LatencyBudget},
     poll,
+    roster::Roster,
     run::{self, Run},
     samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
     saved::Saved,
@@ -77,6 +78,11 @@ impl Context {
     {
         self.opened.add(Access::Read, topic.spec().name)?;
         Ok(self.bus.slice_reader(topic)?)
+    }
+
+    /// The processes whose samples the readers return.
+    pub fn writers(&self) -> Option<Writers> {
+        self.bus.writers().cloned()
     }
 
     /// Write a topic of the wiring.
@@ -223,7 +229,9 @@ pub fn run_stage<P: Process>(start: &Start) -> Result<(), StageError> {
     }
     let mut stop = StopRequest { terminated, supervisor };
     let mut heartbeat = Heartbeat::new(&bus, &generation)?;
+    let roster = Roster::open(&bus)?;
     heartbeat.beat(HealthState::Starting, Progress::default())?;
+    roster.admit_named(&bus)?;
     let number = generation.number;
     let mut context = Context {
         generation,
@@ -282,6 +290,8 @@ fn work(
     let simulated = context.run.mission.robot.address.is_none();
     let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
     let mut busy = true;
+    // The process whose samples were ignored last.
+    let mut foreign = 0;
     while !stop.came() {
         let pause = (busy && process.has_idle_work()).then_some(TICK_OVER);
         let patience = [pause, process.looks_again_after()]
@@ -297,6 +307,14 @@ fn work(
         }
         busy = came;
         if heartbeat.beat_if_due(progress)? {
+            let ignored = context.bus.writers().map(Writers::ignored).unwrap_or_default();
+            if ignored.process != foreign {
+                foreign = ignored.process;
+                tracing::warn!(
+                    pid = foreign,
+                    "a process that the supervisor does not name writes samples; they are ignored; end it"
+                );
+            }
             while let Some(Asked { id, fault }) = faults.take()? {
                 let answer = inject(process, fault)?;
                 tracing::warn!(?fault, ?answer, "asked for a fault");

@@ -7,14 +7,14 @@ use thiserror::Error;
 
 use crate::{
     bus::OpenTopic,
-    topics::{FAULTS, HEALTH, INPUTS, Rate},
+    topics::{FAULTS, HEALTH, INPUTS, ROSTER, Rate},
 };
 
 /// Rows of the table of topics.
 pub type Topics = &'static [&'static dyn OpenTopic];
 
-/// Every stage's process also reads the requests of faults.
-pub static EVERY_STAGE_READS: Topics = &[&FAULTS];
+/// Every stage's process also reads the requests of faults, and the roster, which names the processes that it admits.
+pub static EVERY_STAGE_READS: Topics = &[&FAULTS, &ROSTER];
 /// Every stage's process also writes its heartbeats, and the inputs of its step.
 pub static EVERY_STAGE_WRITES: Topics = &[&HEALTH, &INPUTS];
 

@@ -1,11 +1,12 @@
 //! Readers of any topic, for consumers that count or show samples without knowing their payload.
 
 use super::{
+    authors::Author,
     error::BusError,
     layout::{Layout, Value},
     make::Bus,
     payload::{Payload, Stamp, Stamped},
-    read::{Author, Reader, Slice, SliceReader},
+    read::{Reader, Slice, SliceReader},
     topic::{AnyTopic, SliceTopic, Topic},
 };
 

@@ -18,7 +18,9 @@
 //! | `make` | creating and joining a bus, and removing what killed processes leave on it |
 //! | `leftovers` | the files that killed processes leave |
 //! | `ownership` | checks of the owner and the permissions of a bus's files |
+//! | `reserve` | the memory of segments, reserved when they are made |
 //! | `close_on_exec` | descriptors that a child must not inherit |
+//! | `authors` | the processes whose samples a reader returns |
 //! | `write`, `read` | writers; readers and wakeups |
 //! | `any` | readers of any topic |
 //! | `open` | writers of any topic, and the processes that have it open |
@@ -34,6 +36,7 @@
 //! - An event only wakes a reader. The reader then takes samples until there are none.
 
 mod any;
+mod authors;
 pub mod bus_instance;
 pub mod cdr;
 pub mod clock;
@@ -51,6 +54,7 @@ mod payload;
 pub mod poll;
 mod ports;
 mod read;
+mod reserve;
 mod spec;
 mod topic;
 pub mod waiter;
@@ -58,6 +62,7 @@ mod write;
 
 pub use self::{
     any::{AnyReader, AnySample, ReadableTopic},
+    authors::{Author, Ignored, Names, Writers},
     close_on_exec::close_all_on_exec,
     encoded::{EncodedReader, EncodedTopic, EncodedWriter},
     error::BusError,
@@ -69,7 +74,7 @@ pub use self::{
     open::OpenTopic,
     payload::{Payload, Stamp, Stamped, ZeroCopySend},
     ports::OpenedBy,
-    read::{Author, Ignored, Reader, Slice, SliceReader, Wakeup},
+    read::{Reader, Slice, SliceReader, Wakeup},
     spec::{EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec},
     topic::{AnyTopic, SliceTopic, Topic},
     write::{SliceWriter, Writer},

@@ -19,6 +19,7 @@ use iceoryx2::{
 };
 
 use super::{
+    authors::Writers,
     error::BusError,
     leftovers, ownership,
     ports::{self, BusNode},
@@ -33,9 +34,8 @@ use crate::{
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
-    /// The process of the supervisor, if this is a stage's connection: only its samples are read from the supervisor's topics. None for
-    /// a consumer.
-    pub(super) supervisor: Option<u32>,
+    /// The processes whose samples are read; none for a consumer.
+    pub(super) writers: Option<Writers>,
     instance: BusInstance,
 }
 
@@ -60,8 +60,9 @@ impl Bus {
         // A directory that exists is an error, because another user may have created it.
         DirBuilder::new().mode(0o700).create(instance.root()).map_err(failed)?;
         Self::write_config(&instance)?;
+        ownership::create_count_of_nodes(&instance).map_err(failed)?;
         let mut bus = Self::join_instance(instance, name)?;
-        bus.supervisor = Some(std::process::id());
+        bus.writers = Some(Writers::of(std::process::id()));
         let services = table
             .iter()
             .map(|topic| ports::create(&bus.node, topic.spec(), &topic.carried()))
@@ -102,10 +103,10 @@ impl Bus {
         Self::join_instance(instance, name)
     }
 
-    /// Join with [`Bus::join`] as a stage of the supervisor with the process number `supervisor`. Samples of other processes on the
-    /// supervisor's topics are ignored, and the stage may take the places that consumers leave free.
+    /// Join with [`Bus::join`] as a stage of the supervisor with the process number `supervisor`. Samples of processes that the
+    /// supervisor does not name are ignored, and the stage may take the places that consumers leave free.
     pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self, BusError> {
-        Ok(Self { supervisor: Some(supervisor), ..Self::join(domain, name)? })
+        Ok(Self { writers: Some(Writers::of(supervisor)), ..Self::join(domain, name)? })
     }
 
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self, BusError> {
@@ -128,9 +129,13 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| join(format!("{error:?}")))?;
-        // Creating the node may have created the count of nodes, which the middleware opens to everyone.
-        ownership::close_to_others(&instance).map_err(failed)?;
-        Ok(Self { node: node.into(), supervisor: None, instance })
+        Ok(Self { node: node.into(), writers: None, instance })
+    }
+
+    /// The processes whose samples are read; none for a consumer, which reads the newest generation.
+    #[must_use]
+    pub const fn writers(&self) -> Option<&Writers> {
+        self.writers.as_ref()
     }
 
     /// Whether this bus is no longer used: another bus replaced it, in this run or the next one, or the run has ended. A consumer then

@@ -1,18 +1,21 @@
 //! Checks of the owner and the permissions of a bus's files. Every user may create files in the directories of shared memory, so files
-//! of another user are not used. The middleware lets everyone write one file, its count of nodes, so its permissions are
-//! restricted here.
+//! of another user are not used. The middleware would let everyone write one file, its count of nodes, so that file is created here.
 
 use std::{
     fs,
-    io::{self, Error, ErrorKind},
-    os::unix::fs::{MetadataExt as _, PermissionsExt as _},
+    io::{self, Error, ErrorKind, Write as _},
+    os::unix::fs::{MetadataExt as _, OpenOptionsExt as _},
     path::{Path, PathBuf},
 };
+
+use iceoryx2_bb_elementary::package_version::PackageVersion;
 
 use crate::{bus_instance::BusInstance, domain::SHARED_MEMORY};
 
 /// The name of the middleware's count of nodes ends with this.
 const COUNT_OF_NODES: &str = ".global_mgmt";
+/// The middleware's name of the count's type: the SHA-1 of `iceoryx2::node::global_management_segment::State`.
+const TYPE_OF_COUNT: &str = "9204dd183d1c4d8e1ff592a30766ffa6765aa8b5";
 /// The permissions of all users but the owner, in a file's mode.
 const OTHERS: u32 = 0o077;
 
@@ -25,25 +28,38 @@ pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
         check_one(path, true)?;
     }
     check_one(&instance.config(), false)?;
-    for count in counts_of_nodes(instance)? {
+    let counts = counts_of_nodes(instance)?;
+    if counts.is_empty() {
+        let missing = Path::new(SHARED_MEMORY).join(instance.shared_memory_prefix());
+        return Err(wrong(&missing, "has lost its count of nodes; start the robot again"));
+    }
+    for count in counts {
         check_one(&count, false)?;
-        if fs::symlink_metadata(&count)?.len() == 0 {
+        let found = fs::symlink_metadata(&count)?;
+        if found.mode() & OTHERS != 0 {
+            return Err(wrong(&count, "is open to other users"));
+        }
+        if found.len() == 0 {
             return Err(wrong(&count, "is empty; start the robot again"));
         }
     }
     Ok(())
 }
 
-/// Take the permissions of other users away from the middleware's counts of nodes.
-pub(super) fn close_to_others(instance: &BusInstance) -> io::Result<()> {
-    for count in counts_of_nodes(instance)? {
-        let mut permissions = fs::symlink_metadata(&count)?.permissions();
-        if permissions.mode() & OTHERS != 0 {
-            permissions.set_mode(permissions.mode() & !OTHERS);
-            fs::set_permissions(&count, permissions)?;
-        }
-    }
-    Ok(())
+/// Create the middleware's count of nodes, closed to other users. The middleware uses a count that exists; it would create one that
+/// another user can open before its permissions are restricted.
+pub(super) fn create_count_of_nodes(instance: &BusInstance) -> io::Result<()> {
+    let version = PackageVersion::get();
+    let [major, minor, patch] = [version.major(), version.minor(), version.patch()];
+    let prefix = instance.shared_memory_prefix();
+    let name = format!("{prefix}{TYPE_OF_COUNT}_node.{major}_{minor}_{patch}{COUNT_OF_NODES}");
+    let mut file = fs::File::options()
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(Path::new(SHARED_MEMORY).join(name))?;
+    // The version of the middleware, then the count, which is 0, padded to the alignment of the version.
+    file.write_all(&[version.to_u64(), 0].map(u64::to_ne_bytes).concat())
 }
 
 fn counts_of_nodes(instance: &BusInstance) -> io::Result<Vec<PathBuf>> {

@@ -1,4 +1,4 @@
-//! Readers and wakeups. A reader returns only samples of the writer's newest generation.
+//! Readers and wakeups. A reader returns only samples of the authors that `authors` admits.
 
 use std::{
     ops::Deref,
@@ -6,11 +6,12 @@ use std::{
 };
 
 use super::{
+    authors::{Admitted, Author},
     error::BusError,
     make::Bus,
     payload::{Payload, Stamp, Stamped},
     ports::{Listener, Sample, Service, Subscriber},
-    spec::{Limits, SUPERVISOR, Spec},
+    spec::{Limits, Spec},
     topic::{AnyTopic, SliceTopic, Topic},
 };
 
@@ -28,7 +29,10 @@ impl Bus {
     ) -> Result<Reader<P>, BusError> {
         let service = Service::of_structs(&self.node, topic.spec)?;
         self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
-        Ok(Reader { subscriber: service.subscriber(buffer)?, authors: self.authors(topic.spec) })
+        Ok(Reader {
+            subscriber: service.subscriber(buffer)?,
+            admitted: Admitted::of(topic.spec, self.writers.as_ref()),
+        })
     }
 
     /// Read the slices of `topic`. It fails if the topic is missing, carries another payload, or has no place left.
@@ -49,7 +53,7 @@ impl Bus {
         self.leave_places(topic.spec, topic.spec.limits.readers, service.number_of_readers())?;
         Ok(SliceReader {
             subscriber: service.subscriber(buffer)?,
-            authors: self.authors(topic.spec),
+            admitted: Admitted::of(topic.spec, self.writers.as_ref()),
         })
     }
 
@@ -64,94 +68,11 @@ impl Bus {
 
     /// Refuse a consumer the last places, which the stages may need.
     fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result<(), BusError> {
-        if self.supervisor.is_none() && taken + Limits::KEPT_FREE >= places {
+        if self.writers.is_none() && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
             return Err(BusError::NoPlace { topic, places });
         }
         Ok(())
-    }
-
-    fn authors(&self, spec: &Spec) -> Authors {
-        let admitted = match self.supervisor {
-            Some(process) if spec.writer == SUPERVISOR => {
-                Admitted::One(Author { process, generation: 1 }, None)
-            }
-            _ if spec.has_one_writer() => Admitted::Newest(0),
-            _ => Admitted::All,
-        };
-        Authors { admitted, ignored: Ignored::default() }
-    }
-}
-
-/// A process that writes a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Author {
-    /// Its process number.
-    pub process: u32,
-    /// The generation in its stamps.
-    pub generation: u32,
-}
-
-/// Samples of processes that should not write.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Ignored {
-    /// The number of samples.
-    pub samples: u64,
-    /// The process that wrote the last sample; 0 for none.
-    pub process: u32,
-}
-
-/// The authors whose samples a reader returns.
-#[derive(Debug)]
-enum Admitted {
-    /// All authors: several processes write the topic at a time.
-    All,
-    /// The newest generation, and the generation that was newest so far.
-    Newest(u32),
-    /// One author, and the author before, which is admitted until the first sample of the new author comes.
-    One(Author, Option<Author>),
-}
-
-/// The authors whose samples a reader returns, and the samples that it ignored.
-#[derive(Debug)]
-struct Authors {
-    admitted: Admitted,
-    ignored: Ignored,
-}
-
-impl Authors {
-    /// Whether a sample of `author` is returned. Samples of older generations are dropped, because their process has ended.
-    fn admits(&mut self, author: Author) -> bool {
-        match &mut self.admitted {
-            Admitted::All => true,
-            Admitted::Newest(newest) => {
-                let new = author.generation >= *newest;
-                *newest = author.generation.max(*newest);
-                new
-            }
-            Admitted::One(one, before) if *one == author => {
-                *before = None;
-                true
-            }
-            Admitted::One(_, Some(before)) if *before == author => true,
-            Admitted::One(one, _) => {
-                let superseded = author.generation < one.generation;
-                if one.process != 0 && one.process != author.process && !superseded {
-                    self.ignored.samples += 1;
-                    self.ignored.process = author.process;
-                }
-                false
-            }
-        }
-    }
-
-    const fn follow(&mut self, author: Author) {
-        let before = match self.admitted {
-            Admitted::One(one, _) if one.process == author.process => return,
-            Admitted::One(one, _) if one.process != 0 => Some(one),
-            _ => None,
-        };
-        self.admitted = Admitted::One(author, before);
     }
 }
 
@@ -164,7 +85,7 @@ fn author<H: Payload, T: Payload>(sample: &Sample<H, T>, stamp: &Stamp) -> Autho
 #[derive(Debug)]
 pub struct Reader<P: Payload> {
     subscriber: Subscriber<(), P>,
-    authors: Authors,
+    admitted: Admitted,
 }
 
 impl<P: Payload + Stamped> Reader<P> {
@@ -180,30 +101,18 @@ impl<P: Payload + Stamped> Reader<P> {
                 continue;
             };
             let author = author(&sample, payload.stamp());
-            if self.authors.admits(author) {
+            if self.admitted.admits(author)? {
                 return Ok(Some((author, payload)));
             }
         }
         Ok(None)
     }
 
-    /// Return only samples of `author` from now on; none if its process is 0. Samples of the author before are returned until the first
-    /// one of `author` comes.
-    pub const fn follow(&mut self, author: Author) {
-        self.authors.follow(author);
-    }
-
     /// Return the samples of all generations. Samples of an older generation may arrive after the first of the next one.
     #[must_use]
     pub fn of_all_generations(mut self) -> Self {
-        self.authors.admitted = Admitted::All;
+        self.admitted = Admitted::All;
         self
-    }
-
-    /// The samples that were ignored.
-    #[must_use]
-    pub const fn ignored(&self) -> Ignored {
-        self.authors.ignored
     }
 
     /// Take all samples, and return the newest.
@@ -220,7 +129,7 @@ impl<P: Payload + Stamped> Reader<P> {
 #[derive(Debug)]
 pub struct SliceReader<H: Payload, T: Payload> {
     subscriber: Subscriber<H, T>,
-    authors: Authors,
+    admitted: Admitted,
 }
 
 /// A header with its slice in shared memory, which the writer cannot reuse while this is held.
@@ -253,15 +162,10 @@ impl<H: Payload, T: Payload> Deref for Slice<H, T> {
 }
 
 impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
-    /// [`Reader::follow`] for slices.
-    pub const fn follow(&mut self, author: Author) {
-        self.authors.follow(author);
-    }
-
     /// [`Reader::of_all_generations`] for slices.
     #[must_use]
     pub fn of_all_generations(mut self) -> Self {
-        self.authors.admitted = Admitted::All;
+        self.admitted = Admitted::All;
         self
     }
 
@@ -269,7 +173,7 @@ impl<H: Payload + Stamped, T: Payload> SliceReader<H, T> {
     pub fn take(&mut self) -> Result<Option<Slice<H, T>>, BusError> {
         while let Some(sample) = self.subscriber.take()? {
             let author = author(&sample, sample.header().stamp());
-            if self.authors.admits(author) {
+            if self.admitted.admits(author)? {
                 return Ok(Some(Slice { sample }));
             }
         }

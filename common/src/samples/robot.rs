@@ -157,7 +157,7 @@ pub struct LinkSample {
     pub foreign_datagrams: u64,
     /// Messages that could not be sent, lost.
     pub unsent: u64,
-    /// Commands and orders of processes that are neither the controller nor the supervisor, ignored.
+    /// Samples that the link ignored, because the supervisor does not name their process.
     pub ignored_samples: u64,
     /// The process that wrote the last of them; 0 for none.
     pub ignored_writer: u32,

@@ -9,7 +9,6 @@
 //! | `rangers` | the readings of a tick that go into the map |
 //! | [`telemetry`] | batteries and the other sensors, in the units of the topics |
 //! | [`backoff`] | pauses between attempts |
-//! | `writers` | the processes whose commands and orders the link accepts |
 //! | [`stage`] | the link as a stage: the entries of a recording, and the samples that it publishes |
 //! | [`shell`] | the process of the link: the wire and the topics that it reads |
 //! | [`stop_guard`] | the process that stops a moving robot when the link's process ended |
@@ -24,4 +23,3 @@ pub mod step;
 pub mod stop_guard;
 pub mod telemetry;
 pub mod transport;
-mod writers;

@@ -1,10 +1,10 @@
-//! The process of the link. It reads the wire, `command`, `directive`, `tick_limit` and `roster`, and writes the wire, `range`,
-//! `wheels`, `link` and telemetry.
+//! The process of the link. It reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `range`, `wheels`,
+//! `link` and telemetry.
 
 use std::{io, time::Duration};
 
 use common::{
-    bus::Reader,
+    bus::{Reader, Writers},
     clock::{MissionClock, monotonic_ns},
     domain::Domain,
     latency::Histogram,
@@ -29,17 +29,19 @@ use crate::{
     step::{Effect, Event},
     stop_guard::StopGuard,
     transport::Transport,
-    writers::Writers,
 };
 
 /// Without input the link checks its deadlines so often, which is a fifth of the shortest of them.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
+/// A robot that floods the link delays its heartbeat by no more than this, and a datagram. The rest is taken in the next turn.
+const MOST_LISTENING_NS: u64 = 20_000_000;
+
 /// The link process.
 pub struct Shell {
     transport: Transport,
     command: Reader<CommandSample>,
-    writers: Writers,
+    writers: Option<Writers>,
     directive: Reader<DirectiveSample>,
     tick_limit: Reader<TickLimitSample>,
     runner: Runner<LinkStage>,
@@ -61,7 +63,7 @@ pub struct Shell {
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&topics::DIRECTIVE, &topics::TICK_LIMIT, &topics::ROSTER],
+        inputs: &[&topics::DIRECTIVE, &topics::TICK_LIMIT],
         feedback: &[&topics::COMMAND],
         wakes: &[&topics::COMMAND, &topics::DIRECTIVE, &topics::TICK_LIMIT],
         outputs: &[
@@ -99,12 +101,10 @@ impl Process for Shell {
             context.waiter.on_readable(socket)?;
         }
         let runner = Runner::open(context, |_: &LinkStage| WIRE_PIECE)?;
-        let mut command = context.reader(&topics::COMMAND)?;
-        let writers = Writers::open(context, &mut command)?;
         let mut shell = Self {
             transport,
-            command,
-            writers,
+            command: context.reader(&topics::COMMAND)?,
+            writers: context.writers(),
             directive: context.reader(&topics::DIRECTIVE)?,
             tick_limit: context.reader(&topics::TICK_LIMIT)?,
             runner,
@@ -137,14 +137,17 @@ impl Process for Shell {
         if let Some(limit) = self.tick_limit.newest()? {
             self.take(Event::TickLimit(limit.last_tick), monotonic_ns())?;
         }
-        self.writers.follow(&mut self.command)?;
         while let Some(command) = self.command.take()? {
             self.take(Event::Command(&command), monotonic_ns())?;
         }
+        let began_ns = monotonic_ns();
         loop {
             // A tick begins with its datagram.
             self.budget.awake();
             let now_ns = monotonic_ns();
+            if now_ns - began_ns > MOST_LISTENING_NS {
+                break;
+            }
             let Some(bytes) = self.transport.receive(now_ns)? else {
                 break;
             };
@@ -352,11 +355,7 @@ impl Shell {
             None => (absence.pings, absence.next_ping_ns),
         };
         let carried = self.transport.tally();
-        let ignored = self.writers.tell([
-            self.command.ignored(),
-            self.directive.ignored(),
-            self.tick_limit.ignored(),
-        ]);
+        let ignored = self.writers.as_ref().map(Writers::ignored).unwrap_or_default();
         let sample = LinkSample {
             connected: link.connected().into(),
             action: link.decision().action.into(),

@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use common::{
-    bus::{Author, Bus, BusError, Reader, SliceReader},
+    bus::{Bus, BusError, Reader, SliceReader, Writers},
     grid::{Applied, Replica},
     latency::Histogram,
+    roster,
     samples::{
         CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
-        GuidanceSample, HealthSample, LinkSample, PoseSample, RosterEntry, name_str,
+        GuidanceSample, HealthSample, LinkSample, PoseSample, name_str,
     },
     topics::{self, AnyTopic},
     waiter::Waiter,
@@ -36,6 +37,7 @@ pub struct Observer {
     guidance: Reader<GuidanceSample>,
     field: SliceReader<FieldHeader, FieldCell>,
     command: Reader<CommandSample>,
+    writers: Writers,
     /// The data read so far.
     pub record: Record,
 }
@@ -88,43 +90,15 @@ impl Observer {
             guidance: bus.reader(&topics::GUIDANCE)?,
             field: bus.slice_reader(&topics::FIELD)?,
             command: bus.reader(&topics::COMMAND)?,
+            writers: bus.writers().cloned().unwrap_or_default(),
             record,
         })
     }
 
-    /// Read only samples that the stages of `roster` write.
-    fn follow(&mut self, roster: &[RosterEntry]) {
-        for entry in roster.iter().filter(|entry| entry.pid != 0) {
-            let author = Author { process: entry.pid, generation: entry.generation };
-            let stage = name_str(&entry.stage);
-            let writes = |topic: &dyn AnyTopic| topic.spec().writer == stage;
-            if writes(&topics::LINK) {
-                self.link.follow(author);
-            }
-            if writes(&topics::CONTACT) {
-                self.contact.follow(author);
-            }
-            if writes(&topics::POSE) {
-                self.pose.follow(author);
-            }
-            if writes(&topics::GRID) {
-                self.grid.follow(author);
-            }
-            if writes(&topics::GUIDANCE) {
-                self.guidance.follow(author);
-            }
-            if writes(&topics::FIELD) {
-                self.field.follow(author);
-            }
-            if writes(&topics::COMMAND) {
-                self.command.follow(author);
-            }
-        }
-    }
-
     /// Read all new samples. Returns whether the roster changed by them.
     pub fn take(&mut self, stages: &mut StageProcesses) -> Result<bool, BusError> {
-        self.follow(&stages.roster());
+        // Only samples of the stages' own processes are read.
+        self.writers.name(roster::named(&stages.roster()));
         let mut roster_changed = false;
         while let Some(health) = self.health.take()? {
             roster_changed |= stages.on_health(&health);

@@ -127,7 +127,7 @@ impl StageProcess {
         true
     }
 
-    /// A heartbeat of this stage came. Returns whether its process became ready by it.
+    /// A heartbeat of this stage came. Returns whether the roster is to be published.
     pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
         if self.process.is_none() || self.pid() != health.pid {
             return false;
@@ -141,7 +141,8 @@ impl StageProcess {
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
         };
         self.policy.step(event, now);
-        !was_running && event == Event::BeatReady
+        // A process that starts waits for a roster that names it.
+        state == HealthState::Starting || !was_running && event == Event::BeatReady
     }
 
     pub(crate) fn on_output(&mut self, now: Now) {

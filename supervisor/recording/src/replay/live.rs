@@ -21,12 +21,12 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, EncodedWriter, Reader},
+    bus::{Bus, BusError, EncodedWriter, Reader, SliceWriter},
     clock::{MissionClock, MissionTime, Pace},
     domain::{Domain, RobotName},
     mission::Mission,
     run::Run,
-    samples::{HealthSample, HealthState, name_str},
+    samples::{HealthSample, HealthState, RosterEntry, RosterHeader, name_str},
     topics::{self, AnyTopic, EncodedTopic},
     waiter::Waiter,
 };
@@ -132,6 +132,8 @@ struct Player {
     stages: Vec<LiveStage>,
     writers: BTreeMap<&'static str, Box<dyn EncodedWriter>>,
     health: Reader<HealthSample>,
+    roster: SliceWriter<RosterHeader, RosterEntry>,
+    named: Vec<RosterEntry>,
     waiter: Waiter,
     bus: Rc<Bus>,
     _lock: DomainLock,
@@ -170,6 +172,7 @@ impl Player {
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         let health = bus.reader(&topics::HEALTH)?.of_all_generations();
+        let roster = bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?;
         let start = |stage: &&'static Stage| {
             LiveStage::start(stage, &run, directory.path(), &bus, &mut waiter)
         };
@@ -179,6 +182,8 @@ impl Player {
             stages,
             writers: BTreeMap::new(),
             health,
+            roster,
+            named: Vec::new(),
             waiter,
             bus,
             _lock: lock,
@@ -201,6 +206,7 @@ impl Player {
         let mut waiting: Vec<_> = self.stages.iter().map(|live| live.stage.name).collect();
         while !waiting.is_empty() {
             while let Some(health) = self.health.take()? {
+                self.name(&health)?;
                 let ready = HealthState::from_byte(health.state) == HealthState::Ready;
                 let named = |stage: &&str| *stage == name_str(&health.stage);
                 if let Some(place) = waiting.iter().position(|stage| ready && named(stage)) {
@@ -214,6 +220,17 @@ impl Player {
             self.waiter.wait(POLL)?;
         }
         Ok(true)
+    }
+
+    /// Name a live stage in the roster, as a supervisor does: it waits for that.
+    fn name(&mut self, health: &HealthSample) -> Result<(), BusError> {
+        let HealthSample { stamp, stage, pid, .. } = *health;
+        let entry =
+            RosterEntry { stage, pid, generation: stamp.generation, ..RosterEntry::default() };
+        self.named.retain(|named| named.stage != stage);
+        self.named.push(entry);
+        let header = RosterHeader { supervisor_pid: std::process::id(), ..RosterHeader::default() };
+        self.roster.publish(0, MissionTime::default(), header, self.named.iter().copied())
     }
 
     fn check_stages(&mut self) -> Result<(), LiveError> {

@@ -42,7 +42,8 @@ pub fn measure(
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
     let bus = lock.bus().ok_or(BenchError::Lost)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
-    let mut end = bus.reader(&topics::COMMAND)?;
+    // No roster names a forwarder.
+    let mut end = bus.reader(&topics::COMMAND)?.of_all_generations();
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::COMMAND)?);
     let own = std::process::id().to_string();

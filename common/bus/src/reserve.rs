@@ -1,0 +1,87 @@
+//! Memory of segments is reserved when they are made. The middleware makes a segment by `ftruncate`, which gives it a length and no
+//! memory: if another process fills the file system of shared memory later, the first write to a page raises SIGBUS. So this crate
+//! defines the `ftruncate` that the middleware calls. It also reserves memory, or fails, and then the middleware refuses the port.
+//!
+//! Most segments have places for samples that frozen consumers hold, many times as many as are used. The middleware takes the place
+//! that was given back last, so only the first part of such a segment is used, and only that is reserved.
+//!
+//! Why `unsafe` is allowed here: a function of that name replaces the one of the C library for the whole program. Here it has the same
+//! signature and meaning; it only fails earlier. The standard library and `rustix` do not call it. It borrows the descriptor that the
+//! caller owns until it returns, and sets `errno` as the C library does.
+#![allow(unsafe_code)]
+
+use std::{
+    ffi::{c_int, c_long},
+    os::fd::BorrowedFd,
+};
+
+use rustix::{
+    fs::{FallocateFlags, fallocate, ftruncate as set_length},
+    io::{Errno, Result, retry_on_intr},
+};
+
+/// Segments up to this length are reserved as a whole.
+const WHOLE: u64 = 512 << 10;
+/// The share of a longer segment that is reserved: eight maps of the field, more than are under way at once.
+const SHARE: u64 = 32;
+
+unsafe extern "C" {
+    fn __errno_location() -> *mut c_int;
+}
+
+/// `ftruncate` of POSIX, which also reserves memory.
+#[unsafe(no_mangle)]
+extern "C" fn ftruncate(descriptor: c_int, length: c_long) -> c_int {
+    // SAFETY: the caller owns the descriptor.
+    let file = (descriptor >= 0).then(|| unsafe { BorrowedFd::borrow_raw(descriptor) });
+    let outcome = match (file, u64::try_from(length)) {
+        (None, _) => Err(Errno::BADF),
+        (_, Err(_)) => Err(Errno::INVAL),
+        (Some(file), Ok(length)) => lengthen(file, length),
+    };
+    let Err(error) = outcome else {
+        return 0;
+    };
+    // SAFETY: the C library gives the address of this thread's error number.
+    unsafe { *__errno_location() = error.raw_os_error() };
+    -1
+}
+
+fn lengthen(file: BorrowedFd<'_>, length: u64) -> Result<()> {
+    set_length(file, length)?;
+    let reserved = length.min(WHOLE.max(length / SHARE));
+    if reserved == 0 {
+        return Ok(());
+    }
+    match retry_on_intr(|| fallocate(file, FallocateFlags::KEEP_SIZE, 0, reserved)) {
+        // Such a file system does not reserve.
+        Err(Errno::OPNOTSUPP) => Ok(()),
+        reserved => reserved,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::{fd::AsRawFd as _, unix::fs::MetadataExt as _};
+
+    unsafe extern "C" {
+        #[link_name = "ftruncate"]
+        safe fn called_by_the_middleware(descriptor: c_int, length: c_long) -> c_int;
+    }
+
+    #[test]
+    fn a_segment_that_the_middleware_makes_has_its_memory() {
+        let file = tempfile::tempfile_in(crate::domain::SHARED_MEMORY).unwrap();
+        for (length, reserved) in [(1 << 16, 1 << 16), (64 << 20, 2 << 20)] {
+            assert_eq!(called_by_the_middleware(file.as_raw_fd(), length), 0);
+            let found = file.metadata().unwrap();
+            assert_eq!((found.len(), found.blocks() * 512), (length as u64, reserved));
+        }
+        assert_eq!(called_by_the_middleware(-1, 1), -1);
+        assert_eq!(
+            std::io::Error::last_os_error().raw_os_error(),
+            Some(Errno::BADF.raw_os_error())
+        );
+    }
+}
