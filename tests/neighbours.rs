@@ -3,6 +3,7 @@
 use std::{
     fs,
     mem::MaybeUninit,
+    net::UdpSocket,
     os::unix::fs::{MetadataExt as _, PermissionsExt as _},
     path::Path,
     sync::atomic::{AtomicBool, Ordering},
@@ -14,6 +15,7 @@ use crate::support::{
     in_own_process, pid, signal_process,
 };
 use common::{
+    address::Address,
     bus::{Bus, BusError},
     clock::MissionTime,
     poll,
@@ -22,6 +24,7 @@ use common::{
         Order, PoseSample, RangeSample, WheelSample,
     },
     topics,
+    wire::{Addressing, Command},
 };
 use rustix::{
     fs::inotify,
@@ -195,6 +198,34 @@ fn a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start() {
     let taken = fs::read_dir(squatted).unwrap().count();
     fs::remove_dir(squatted).unwrap();
     assert_eq!((code, taken), (Some(0), 0));
+}
+
+#[test]
+fn datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run() {
+    if !rustix::process::geteuid().is_root() {
+        let test = "datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run";
+        return support::not_run(test, "only root can act as another user");
+    }
+    in_own_process(|| {
+        let mut run = Run::start("driven", "open-room", &["--pace", "2"]);
+        run.wait_until_under_way(0.3);
+        let robot = common::run::Run::load(&run.directory()).unwrap().address;
+        let Address::Udp(robot) = robot else { panic!("{robot}") };
+        // The thread ends with the process of this test.
+        std::thread::spawn(move || {
+            let nobody = Uid::from_raw(65534);
+            set_thread_res_uid(nobody, nobody, nobody).unwrap();
+            let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+            let mut backwards = Vec::new();
+            Command::velocity([Some(-500); 2], None).encode(Addressing::default(), &mut backwards);
+            loop {
+                let _ = socket.send_to(&backwards, robot);
+                std::thread::park_timeout(Duration::from_millis(5));
+            }
+        });
+        let summary = run.arrives();
+        assert_eq!(summary["safety_events"], 0, "{summary}");
+    });
 }
 
 #[test]

@@ -46,6 +46,8 @@ pub struct SimOptions {
     pub listen: SocketAddr,
     /// The transport to listen by.
     pub transport: Transport,
+    /// Whether datagrams are taken only from processes of this user on this machine.
+    pub own_user_only: bool,
     /// The file in which the robot's state is saved, and from which it goes on; none saves nothing.
     pub keep: Option<PathBuf>,
     /// The file of the ground truth: a [`common::ground_truth::GroundTruthHeader`], then a
@@ -57,8 +59,9 @@ pub struct SimOptions {
 
 /// Run a simulated robot until `stop` becomes readable (or its other end is closed).
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result<(), SimError> {
-    let SimOptions { mission, pace, listen, transport, keep, ground_truth } = options;
-    let way = Way::open(transport, listen)?;
+    let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth } =
+        options;
+    let way = Way::open(transport, listen, own_user_only)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
     let (robot, checkpoint, _lock) = match keep {
         None => (Robot::new(&mission), None, None),

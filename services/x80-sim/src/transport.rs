@@ -1,5 +1,6 @@
 //! The transport of bytes to the robot: datagrams, a connection or a serial line.
 
+mod owner;
 mod pty;
 mod source;
 mod tcp;
@@ -31,11 +32,15 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    /// Open `transport`, at `address` where it has one.
-    pub(crate) fn open(transport: Transport, address: SocketAddr) -> Result<Self, SimError> {
+    /// Open `transport`, at `address` where it has one. Datagrams of other users may be refused.
+    pub(crate) fn open(
+        transport: Transport,
+        address: SocketAddr,
+        own_user_only: bool,
+    ) -> Result<Self, SimError> {
         let bound = |source| SimError::Bind { address, source };
         match transport {
-            Transport::Udp => udp::Udp::bind(address).map(Self::Udp).map_err(bound),
+            Transport::Udp => udp::Udp::bind(address, own_user_only).map(Self::Udp).map_err(bound),
             Transport::Tcp => tcp::Tcp::bind(address).map(Self::Tcp).map_err(bound),
             Transport::Pty => pty::Pty::open().map(Self::Pty).map_err(SimError::Line),
         }

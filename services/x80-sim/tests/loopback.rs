@@ -190,6 +190,7 @@ fn a_port_in_use_is_named_with_its_remedy() {
         pace: Pace::Max,
         listen,
         transport: Transport::Udp,
+        own_user_only: false,
         keep: None,
         ground_truth: None,
     };
@@ -214,6 +215,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
         pace: Pace::Max,
         listen,
         transport: Transport::Udp,
+        own_user_only: false,
         keep: None,
         ground_truth: Some(Box::new(writer)),
     };

@@ -6,20 +6,22 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use super::source::Source;
+use super::{owner::OwnUser, source::Source};
 
 #[derive(Debug)]
 pub(crate) struct Udp {
     socket: UdpSocket,
     address: SocketAddr,
+    /// None where every sender is admitted.
+    own_user: Option<OwnUser>,
 }
 
 impl Udp {
-    pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
+    pub(super) fn bind(address: SocketAddr, own_user_only: bool) -> io::Result<Self> {
         let socket = UdpSocket::bind(address)?;
         socket.set_nonblocking(true)?;
         let address = socket.local_addr()?;
-        Ok(Self { socket, address })
+        Ok(Self { socket, address, own_user: own_user_only.then(OwnUser::default) })
     }
 
     pub(super) fn address(&self) -> SocketAddr {
@@ -30,9 +32,10 @@ impl Udp {
         self.socket.as_fd()
     }
 
-    pub(super) fn receive(&self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
+    pub(super) fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
         loop {
             match self.socket.recv_from(buffer) {
+                Ok((_, from)) if self.own_user.as_mut().is_some_and(|own| !own.admits(from)) => {}
                 Ok((length, from)) => return Ok(Some((Source::Peer(from), length))),
                 Err(error) => match error.kind() {
                     ErrorKind::WouldBlock => return Ok(None),

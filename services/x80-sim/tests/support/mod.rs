@@ -55,6 +55,7 @@ impl Sim {
             pace,
             listen: SocketAddr::from(([127, 0, 0, 1], 0)),
             transport,
+            own_user_only: false,
             keep: None,
             ground_truth: Some(Box::new(truth_writer)),
         };

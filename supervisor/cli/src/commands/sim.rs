@@ -78,6 +78,8 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         pace: arguments.pace,
         listen: arguments.listen,
         transport: arguments.transport.into(),
+        // The robot of a run obeys the link of that run.
+        own_user_only: arguments.supervisor.is_some(),
         keep: arguments.keep.clone(),
         ground_truth: arguments.ground_truth.then(|| Box::new(std::io::stdout()) as Box<_>),
     };
