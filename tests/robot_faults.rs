@@ -33,6 +33,14 @@ fn a_robot_that_does_not_stop_is_told_as_long_as_it_moves() {
 }
 
 #[test]
+fn a_robot_whose_wheels_are_held_on_the_way_is_unreachable_and_reports_no_arrival() {
+    let (code, entry) = stop_time("rf-held", "held-wheels");
+    assert_eq!(code, Some(0), "{entry}");
+    assert_eq!(entry["fault_began"], true, "{entry}");
+    assert_eq!(entry["outcome"], "unreachable", "{entry}");
+}
+
+#[test]
 fn an_unknown_robot_fault_is_refused_with_the_known_ones() {
     let unknown = ["bench", "chaos", "--robot-faults=honest"];
     refused(&unknown, "usage", &["honest", "encoder-dead"]);

@@ -21,6 +21,8 @@ const STUCK_CM: u8 = 8;
 /// The frozen echo of a ranger that has heard nothing yet, centimetres.
 const FROZEN_CM: u8 = 150;
 const NOTHING: u8 = 255;
+/// The current of a held motor, as that of the simulated robot, AD counts.
+const HELD_AD: u16 = 1520;
 /// Ultrasonic bytes at the front of a standard frame's data.
 const ULTRASONIC: usize = 6;
 /// Motor frames that are stored: as many as come in [`OLD`] at ten times the usual rate.
@@ -56,6 +58,8 @@ pub(crate) struct FaultInjector {
     next_slow: [Duration; 256],
     /// The last command that moved the wheels.
     moving: Option<Motion>,
+    /// The newest command of a speed moves the wheels.
+    pushes: bool,
     /// The link stopped the robot by other means than speed 0.
     disabled: bool,
 }
@@ -79,6 +83,7 @@ impl FaultInjector {
             next_again: Duration::ZERO,
             next_slow: [Duration::ZERO; 256],
             moving: None,
+            pushes: false,
             disabled: false,
         }
     }
@@ -140,10 +145,17 @@ impl FaultInjector {
             let command = Command::parse(&frame);
             match command {
                 Ok(Command::Motion(motion)) if is_moving(&motion) => {
-                    (self.moving, self.disabled) = (Some(motion), false);
+                    (self.moving, self.disabled, self.pushes) = (Some(motion), false, true);
                     moves();
+                    if self.holds_wheels() {
+                        let addressing = Addressing::of_robot(frame.rid).unwrap_or_default();
+                        let stand = Command::velocity([Some(0); 2], motion.limit_ms);
+                        stand.encode(addressing, &mut out);
+                        continue;
+                    }
                 }
                 Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => {
+                    self.pushes = false;
                     if let (true, false, Some(moving)) =
                         (self.keeps_speed(), self.disabled, self.moving)
                     {
@@ -159,6 +171,10 @@ impl FaultInjector {
         }
         self.from_host = decoder;
         out
+    }
+
+    fn holds_wheels(&self) -> bool {
+        self.faulty && self.fault == RobotFault::HeldWheels
     }
 
     fn keeps_speed(&self) -> bool {
@@ -258,6 +274,7 @@ impl FaultInjector {
                     encoder.position = wrapped(0, encoder.counts_since(base));
                 }
             }
+            RobotFault::HeldWheels if self.pushes => told.currents[..2].fill(HELD_AD),
             _ => {}
         }
         told

@@ -56,6 +56,7 @@ pub enum RobotFault {
     SonarSilent,
     SonarFrozen,
     LateFromBoot,
+    HeldWheels,
 }
 
 #[derive(Debug)]
@@ -97,6 +98,7 @@ pub static TABLE: &[Row] = &[
     row(RobotFault::SonarSilent, "sonar-silent", Promise::Nothing, "every ultrasonic byte is 255, nothing in range"),
     row(RobotFault::SonarFrozen, "sonar-frozen", Promise::RestsLater, "the last ultrasonic bytes that are distances repeat for ever"),
     row(RobotFault::LateFromBoot, "late-from-boot", Promise::Unharmed, "from its start on, all frames come 0.5 s late"),
+    row(RobotFault::HeldWheels, "held-wheels", Promise::EndsAtRest, "the wheels stand, and their motors draw the current of held ones"),
 ];
 
 impl Promise {
@@ -150,7 +152,7 @@ mod tests {
             assert_eq!(RobotFault::named(row.name), Some(row.fault));
             assert_eq!(row.fault.row().name, row.name);
         }
-        assert_eq!(RobotFault::LateFromBoot as usize + 1, TABLE.len());
+        assert_eq!(RobotFault::HeldWheels as usize + 1, TABLE.len());
         assert_eq!(RobotFault::named("none"), None);
     }
 
