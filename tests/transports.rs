@@ -80,7 +80,12 @@ fn goes_away_and_comes_back(transport: &str) {
     });
     assert_eq!(back["link"]["losses"], 1, "{back}");
     let (code, summary) = run.finish();
-    assert_reached(code, &summary);
+    // Nobody knows how far its wheels rolled while it was away: the longer that took, the less sure the pose is.
+    let outcome = summary["outcome"].as_str().unwrap();
+    assert!(
+        [("reached", Some(0)), ("reached_unsure", Some(11))].contains(&(outcome, code)),
+        "{summary}"
+    );
     assert_eq!(summary["restarts"]["x80-link"], 0, "{summary}");
     // Each robot counts from its own start, so the run's path length is the sum of both ways.
     let went = first_part + robot.kill();
