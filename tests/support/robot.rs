@@ -155,9 +155,11 @@ pub fn assert_nothing_left(robot: &str) {
     assert!(shared.is_empty(), "left in shared memory: {shared:?}");
     let directory = domain.directory();
     assert!(!directory.exists(), "{} is left", directory.display());
-    // A stop guard ends after its link, when its robot rests or is gone.
-    wait_until("no stop guard is left", || {
-        !processes_of(robot).iter().any(|line| line.contains("stop-guard"))
+    // A stop guard ends after its link, when its robot rests or is gone; a recorder whose supervisor was killed writes the rest first.
+    wait_until("no stop guard and no recorder is left", || {
+        let lasts =
+            |line: &String| line.contains("stop-guard") || line.contains("firsthand record");
+        !processes_of(robot).iter().any(lasts)
     });
     assert_eq!(processes_of(robot), Vec::<String>::new());
 }
