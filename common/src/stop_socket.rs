@@ -56,10 +56,7 @@ impl StopSocket {
     /// The socket of the robot of `domain`, in the place of that of an earlier link.
     pub fn bind(domain: &Domain) -> io::Result<Self> {
         let path = domain.stop_socket();
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
+        remove(&path)?;
         let socket = UnixDatagram::bind(&path)?;
         socket.set_nonblocking(true)?;
         Ok(Self { socket, asking: Vec::new() })
@@ -196,9 +193,14 @@ impl StopMark {
         if stopped {
             return fs::File::create(&self.path).map(drop);
         }
-        match fs::remove_file(&self.path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-            _ => Ok(()),
-        }
+        remove(&self.path)
+    }
+}
+
+/// Remove a file, if it exists.
+fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
     }
 }
