@@ -45,8 +45,7 @@ pub(crate) fn stop(
 /// Stop what still runs: the stages, then the simulated robot.
 pub(crate) fn finish(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
     supervisor.stages.start_no_more();
-    stop_stages(supervisor, 1)?;
-    stop_stages(supervisor, 0)?;
+    stop_all(supervisor)?;
     if let Some(simulator) = &mut supervisor.robot.simulator {
         simulator.stop()?;
     }
@@ -66,7 +65,7 @@ pub(crate) fn recreate_bus<'a>(
     stand(&mut supervisor)?;
     // A stage that dies meanwhile is not started again on the old bus.
     supervisor.stages.start_no_more();
-    stop_stages(&mut supervisor, 0)?;
+    stop_all(&mut supervisor)?;
     let mut supervisor = supervisor.with_new_bus(lock)?;
     supervisor.publish_state()?;
     supervisor.stages.start_all(supervisor.first_tick());
@@ -134,6 +133,12 @@ pub(crate) fn turn(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorErro
         supervisor.publish_state()?;
     }
     Ok(())
+}
+
+/// Stop all stages, the link last.
+fn stop_all(supervisor: &mut Supervisor<'_>) -> Result<(), SupervisorError> {
+    stop_stages(supervisor, 1)?;
+    stop_stages(supervisor, 0)
 }
 
 /// Stop the stages from the `first` of the start order on, all at once.
