@@ -20,7 +20,7 @@ const SLOW: [&str; 6] = [
     "--set",
     "controller.speed_m_s=0.004",
     "--set",
-    "dead_reckoning.slip_noise=0.001",
+    "robot.odometry.slip=0.001",
     "--timeout",
     "20000",
 ];

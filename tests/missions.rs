@@ -42,7 +42,7 @@ fn the_default_mission_reaches_its_target_untouched_for_seeds_1_to_10() {
 fn by_the_papers_method_it_does_for_seeds_1_to_8() {
     // The way is twice as long, so by wheels like measured ones the arrival would be unsure. Those of the laboratory are better.
     let wheels =
-        ["--set", "dead_reckoning.diameter_spread=0", "--set", "dead_reckoning.slip_noise=0.001"];
+        ["--set", "robot.odometry.diameter_ratio_sd=0", "--set", "robot.odometry.slip=0.001"];
     for seed in 1..=8 {
         let seed = seed.to_string();
         let arguments = [&PAPER[..], &wheels, &["--seed", &seed]].concat();

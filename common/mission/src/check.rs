@@ -21,7 +21,7 @@ use crate::grid::{MAX_CELLS, MIN_CELLS};
 /// A mission is a page or two; a file without end is no mission.
 const MAX_BYTES: u64 = 8 << 20;
 
-fn read_bounded(path: &Path) -> io::Result<String> {
+pub(crate) fn read_bounded(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     // Opening a pipe would wait for its writer.
     if !fs::metadata(path)?.is_file() {
@@ -107,7 +107,14 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
             "{file}:{line}: robot.model: a car turns in no less than {radius:.2} m, so it does not turn on the spot to look before it drives"
         )
     });
-    renamed.into_iter().chain(car).collect()
+    let robot = tree.get("robot").and_then(|value| value.get_ref().as_table());
+    let twice =
+        robot.filter(|robot| mission.robot.calibration.is_some() && robot.contains_key("odometry"));
+    let twice = twice.map(|_| {
+        let line = line("robot.calibration");
+        format!("{file}:{line}: robot.calibration: its values replace those of robot.odometry; remove one of them")
+    });
+    renamed.into_iter().chain(car).chain(twice).collect()
 }
 
 /// 1-based line of byte `offset`.
@@ -227,14 +234,6 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
     let perimeter = &mission.perimeter;
     within("mapper.margin_m", mission.mapper.margin_m, 0.0..=perimeter.width_m / 4.0, "m")?;
     within("mapper.clearance_m", mission.mapper.clearance_m, 0.0..=1.0, "m")?;
-    let wheels = &mission.dead_reckoning;
-    for (key, value, most) in [
-        ("dead_reckoning.slip_noise", wheels.slip_noise, 0.5),
-        ("dead_reckoning.diameter_spread", wheels.diameter_spread, 0.1),
-        ("dead_reckoning.track_spread", wheels.track_spread, 0.1),
-    ] {
-        within(key, value, 0.0..=most, "")?;
-    }
     if let Some(executable) = &mission.planner.executable
         && executable.as_os_str().is_empty()
     {

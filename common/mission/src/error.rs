@@ -27,6 +27,16 @@ pub enum MissionError {
         /// The parser's word.
         problem: String,
     },
+    /// The calibration that it names cannot be used.
+    #[error(
+        "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or leave the key out"
+    )]
+    Calibration {
+        /// The file of the calibration.
+        file: PathBuf,
+        /// The problem.
+        problem: String,
+    },
     /// A value cannot be.
     #[error("{file}:{line}: {key}: {problem}; {remedy}")]
     Value {
@@ -50,6 +60,7 @@ impl MissionError {
         match self {
             Self::Unreadable { source, .. } => source.to_string(),
             Self::Syntax { problem, .. } => problem.clone(),
+            Self::Calibration { .. } => self.to_string(),
             Self::Value { key, problem, remedy, .. } => format!("{key}: {problem}; {remedy}"),
         }
     }

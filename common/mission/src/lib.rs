@@ -12,6 +12,7 @@
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows of cells |
 //! | [`kinematics`] | equations (1)-(3) and their inverses |
 //! | [`infrared`], [`sonar`] | how the rangers are mounted, (19) |
+//! | `odometry` | how the wheels differ from nominal ones, and the calibration file |
 //! | [`address`] | where a robot answers, and over which transport |
 
 pub mod address;
@@ -21,6 +22,7 @@ pub mod geometry;
 pub mod grid;
 pub mod infrared;
 pub mod kinematics;
+mod odometry;
 mod robot;
 mod simulation;
 pub mod sonar;
@@ -31,6 +33,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use error::MissionError;
+pub use odometry::{Calibration, Odometry, Provenance};
 pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig, Steering};
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, Move, Physics, Radio, Ranger,
@@ -165,31 +168,12 @@ impl Perimeter {
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
-/// The values of dead reckoning.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// The values of dead reckoning. Those of the wheels are in [`Odometry`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeadReckoning {
     /// The integration rule.
     pub integration: Integration,
-    /// Standard deviation of the way that a wheel is taken to lose or win by slip, metres per square root of a metre.
-    pub slip_noise: f64,
-    /// Greatest share by which the ratio of the wheels' diameters is taken to be off.
-    pub diameter_spread: f64,
-    /// Greatest share by which the track is taken to be off.
-    pub track_spread: f64,
-}
-
-impl Default for DeadReckoning {
-    /// The errors of the simulated robot in `measured` realism.
-    fn default() -> Self {
-        let wheels = simulation::WheelKeys::default().over(Realism::Measured);
-        Self {
-            integration: Integration::default(),
-            slip_noise: wheels.slip_noise,
-            diameter_spread: wheels.diameter_spread,
-            track_spread: wheels.track_spread,
-        }
-    }
 }
 
 /// The rule that integrates (20) into (21).

@@ -1,6 +1,9 @@
 //! The robot's body: presets and what a mission overrides.
 
+use std::path::PathBuf;
+
 use crate::{
+    Odometry,
     kinematics::{Ackermann, DifferentialDrive, Drive},
     sonar::Mount,
 };
@@ -78,6 +81,11 @@ pub struct RobotConfig {
     /// The motor current of a wheel that something holds, AD counts: a wheel that does not turn as told and draws less is taken for a
     /// wheel whose encoder is dead; 0 takes each for that. The default is that of the simulated robot, because no X80 was measured.
     pub held_current_ad: u16,
+    /// The file of a calibration, whose values replace `odometry` before a run starts: see [`crate::Mission::with_calibration`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<PathBuf>,
+    /// How its wheels differ from the nominal ones.
+    pub odometry: Odometry,
 }
 
 /// The voltages below which the batteries are low, volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells,
@@ -120,6 +128,8 @@ impl Default for RobotConfig {
             command_limit_s: 0.25,
             low_battery_v: BatteryLimits::default(),
             held_current_ad: 1000,
+            calibration: None,
+            odometry: Odometry::default(),
         }
     }
 }

@@ -8,7 +8,7 @@
 
 use common::{
     kinematics::{Pose2, Twist},
-    mission::{Body, DeadReckoning},
+    mission::{Body, Odometry},
 };
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -31,12 +31,10 @@ pub(crate) struct ErrorModel {
 }
 
 impl ErrorModel {
-    pub(crate) fn new(settings: &DeadReckoning, body: &Body) -> Self {
-        // Evenly distributed within the spread.
-        let variance = |spread: f64| spread * spread / 3.0;
+    pub(crate) fn new(odometry: &Odometry, body: &Body) -> Self {
         Self {
-            slip: settings.slip_noise * settings.slip_noise,
-            systematic: [variance(settings.diameter_spread), variance(settings.track_spread)],
+            slip: odometry.slip.powi(2),
+            systematic: [odometry.diameter_ratio_sd.powi(2), odometry.track_scale_sd.powi(2)],
             track_m: body.track_m,
             steers: body.steering.is_some(),
         }
@@ -115,9 +113,9 @@ mod tests {
     use std::path::Path;
 
     fn model(settings: &str) -> ErrorModel {
-        let text = format!("target = [3, 0]\n[dead_reckoning]\n{settings}");
+        let text = format!("target = [3, 0]\n[robot.odometry]\n{settings}");
         let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
-        ErrorModel::new(&mission.dead_reckoning, &mission.body())
+        ErrorModel::new(&mission.robot.odometry, &mission.body())
     }
 
     const AHEAD: Twist = Twist { v: 0.002, omega: 0.0 };
@@ -139,7 +137,7 @@ mod tests {
     #[test]
     fn slip_on_a_straight_way_by_hand() {
         // Variance of the heading 2 q s / W^2, aside its integral q s^3 2 / (3 W^2), ahead q s / 2.
-        let model = model("slip_noise = 0.01\ndiameter_spread = 0\ntrack_spread = 0");
+        let model = model("slip = 0.01\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0");
         let [xx, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
         let per_metre = 2.0 * 1e-4 / (0.26 * 0.26);
         close(heading, per_metre * 2.0);
@@ -149,20 +147,20 @@ mod tests {
 
     #[test]
     fn unequal_wheels_bend_a_straight_way_into_a_circle() {
-        // The heading is off by e s / W and the way aside by e s^2 / 2 W; e is evenly drawn: e^2 / 3.
-        let model = model("slip_noise = 0\ndiameter_spread = 0.006\ntrack_spread = 0");
+        // The heading is off by e s / W and the way aside by e s^2 / 2 W.
+        let model = model("slip = 0\ndiameter_ratio_sd = 0.006\ntrack_scale_sd = 0");
         let [_, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
-        let variance = 0.006 * 0.006 / 3.0;
+        let variance = 0.006 * 0.006;
         close(heading, variance * (2.0_f64 / 0.26).powi(2));
         close(yy, variance * (4.0_f64 / 2.0 / 0.26).powi(2));
     }
 
     #[test]
     fn an_uncertain_track_is_undone_by_turning_back() {
-        let model = model("slip_noise = 0\ndiameter_spread = 0\ntrack_spread = 0.01");
+        let model = model("slip = 0\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0.01");
         let there = Twist { v: 0.0, omega: 0.02 };
         let [.., heading] = drive(&model, 50, there);
-        close(heading, 1e-4 / 3.0);
+        close(heading, 1e-4);
         let (mut covariance, mut pose) = (model.start(), Pose2::default());
         for omega in [0.02; 50].into_iter().chain([-0.02; 50]) {
             covariance = model.after(&covariance, pose, Twist { v: 0.0, omega });

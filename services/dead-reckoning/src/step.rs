@@ -91,7 +91,7 @@ impl Step for DeadReckoning {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
         let start = mission.start_pose();
-        let errors = ErrorModel::new(&mission.dead_reckoning, &body);
+        let errors = ErrorModel::new(&mission.robot.odometry, &body);
         let period_s = 1.0 / mission.robot.rate_hz;
         Self {
             drive: body.drive(),

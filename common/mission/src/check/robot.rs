@@ -23,6 +23,9 @@ pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
     within("robot.track_m", body.track_m, 0.01..=5.0, "m")?;
     within("robot.counts_per_turn", body.counts_per_turn, 1.0..=100_000.0, "counts")?;
     steering(mission)?;
+    for (key, value, range) in robot.odometry.ranges() {
+        within(key, value, range, "")?;
+    }
     within("robot.radius_m", body.radius_m, 0.01..=5.0, "m")?;
     within("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s")?;
     within("robot.command_limit_s", robot.command_limit_s, 0.02..=5.0, "s")?;

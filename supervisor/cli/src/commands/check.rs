@@ -18,7 +18,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
-    let mission = Mission::load(&arguments.file)?;
+    let mission = Mission::load(&arguments.file)?.with_calibration()?;
     for remark in &mission.remarks {
         write_stderr(&format!("firsthand: {remark}\n"));
     }

@@ -39,8 +39,13 @@ pub(crate) fn shipped(name: &str) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
-/// The shipped mission `name`, or the one in the file `name`, with `KEY=VALUE` assignments on top.
+/// The shipped mission `name`, or the one in the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration
+/// in place.
 pub(crate) fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    Ok(as_assigned(name, assignments)?.with_calibration()?)
+}
+
+fn as_assigned(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let file = Path::new(name);
     let (text, origin) = match shipped(name) {
         Some(text) => (text.to_owned(), format!("{name}.toml")),
@@ -87,7 +92,10 @@ pub(crate) fn with(
     let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
     let assigned = assign(table, assignments)?;
     let mission = Mission::parse(&assigned, Path::new(&mission.name));
-    mission.map(Some).map_err(|error| failed(error.without_place()))
+    mission
+        .and_then(Mission::with_calibration)
+        .map(Some)
+        .map_err(|error| failed(error.without_place()))
 }
 
 /// The text of `table` with all assignments.

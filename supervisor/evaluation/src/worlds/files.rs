@@ -101,7 +101,7 @@ fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn add_mission(found: &mut Found, file: &Path, body: &BodySize) -> Result<(), WorldError> {
-    let mission = Mission::load(file)?;
+    let mission = Mission::load(file)?.with_calibration()?;
     found.add_solvable(Trial::of_mission(mission.name.clone(), mission, body));
     Ok(())
 }
