@@ -86,12 +86,13 @@ impl Robot {
 
     /// The robot of `mission` with the noise of `seed`.
     fn with_noise(mission: &Mission, seed: u64) -> Self {
-        let physics = mission.simulation.physics();
+        let mut physics = mission.simulation.physics();
         let size = mission.body();
         let top_counts = size.top_speed_m_s / size.metres_per_count();
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
         let world = World::new(mission);
         let wheel_errors = WheelErrors::of(mission);
+        physics.wheels.slip_share = wheel_errors.slip_share;
         let car = Car::new(mission, &wheel_errors);
         let top_counts = |channel| match &car {
             Some(car) if car.steers_by(channel) => car.top_steering_counts(),

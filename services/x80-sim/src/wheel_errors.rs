@@ -3,7 +3,7 @@
 //! They are a property of the robot, not of the moment: drawn once from the seed of the mission, with a stream of their
 //! own, and the same in each process of a run.
 
-use common::mission::{Mission, WheelPhysics};
+use common::mission::Mission;
 
 use crate::{
     body::Wheels,
@@ -17,19 +17,21 @@ pub struct WheelErrors {
     pub diameter: Wheels<f64>,
     /// Track.
     pub track: f64,
+    /// Share of the rolled way that slips away; below 0 it is won.
+    pub slip_share: f64,
 }
 
 impl WheelErrors {
     /// The errors of `mission`'s robot.
     pub fn of(mission: &Mission) -> Self {
-        let WheelPhysics { diameter_ratio, diameter_spread, track_scale, track_spread, .. } =
-            mission.simulation.physics().wheels;
+        let physics = mission.simulation.physics().wheels;
         let mut noise = Noise::new(mission.seed, Source::WheelErrors);
-        let mut off = |spread: f64| 1.0 + spread * (2.0 * noise.uniform() - 1.0);
-        let ratio = diameter_ratio * off(diameter_spread);
+        let mut off = |spread: f64| spread * (2.0 * noise.uniform() - 1.0);
+        let ratio = physics.diameter_ratio * (1.0 + off(physics.diameter_spread));
         Self {
             diameter: Wheels { left: 2.0 / (1.0 + ratio), right: 2.0 * ratio / (1.0 + ratio) },
-            track: track_scale * off(track_spread),
+            track: physics.track_scale * (1.0 + off(physics.track_spread)),
+            slip_share: physics.slip_share + off(physics.slip_share_spread),
         }
     }
 }
@@ -46,24 +48,38 @@ mod tests {
 
     #[test]
     fn wheels_in_the_laboratory_are_exactly_the_nominal_ones() {
-        let exact = WheelErrors { diameter: Wheels { left: 1.0, right: 1.0 }, track: 1.0 };
+        let diameter = Wheels { left: 1.0, right: 1.0 };
+        let exact = WheelErrors { diameter, track: 1.0, slip_share: 0.0 };
         assert_eq!(errors("seed = 7"), exact);
     }
 
     #[test]
-    fn each_seed_has_wheels_of_its_own_within_the_spread() {
+    fn each_seed_has_wheels_of_its_own_within_the_spread_and_no_bias_is_common_to_all() {
         let robots = (1..=200)
             .map(|seed| errors(&format!("seed = {seed}\nsimulation.realism = 'measured'")));
-        let (mut ratios, mut tracks) = (Vec::new(), Vec::new());
-        for robot in robots {
-            ratios.push(robot.diameter.right / robot.diameter.left - 1.0);
-            tracks.push(robot.track - 1.0);
-        }
-        for off in [ratios, tracks] {
-            assert!(off.iter().all(|off| off.abs() <= 0.005 + 1e-12));
+        let robots: Vec<_> = robots.collect();
+        let ratio = |robot: &WheelErrors| robot.diameter.right / robot.diameter.left - 1.0;
+        let of = |value: &dyn Fn(&WheelErrors) -> f64| robots.iter().map(value).collect();
+        let drawn: [(Vec<f64>, f64); 3] = [
+            (of(&ratio), 0.008),
+            (of(&|robot| robot.track - 1.0), 0.025),
+            (of(&|robot| robot.slip_share), 0.005),
+        ];
+        for (off, spread) in drawn {
+            assert!(off.iter().all(|off| off.abs() <= spread + 1e-12));
             let most = off.iter().copied().fold(f64::MIN, f64::max);
             let least = off.iter().copied().fold(f64::MAX, f64::min);
-            assert!(most > 0.0045 && least < -0.0045, "{least} to {most}");
+            assert!(most > 0.9 * spread && least < -0.9 * spread, "{least} to {most}");
+            let mean = off.iter().sum::<f64>() / 200.0;
+            assert!(mean.abs() < 0.2 * spread, "{mean}");
         }
+    }
+
+    #[test]
+    fn a_calibration_has_no_effect_on_the_wheels_of_the_simulated_robot() {
+        let text = "seed = 7\nsimulation.realism = 'measured'";
+        let calibrated =
+            format!("{text}\n[robot.odometry]\ndiameter_ratio = 1.02\ntrack_scale = 0.9");
+        assert_eq!(errors(text), errors(&calibrated));
     }
 }

@@ -39,6 +39,7 @@ macro_rules! guide {
 static GUIDE: &[Page] = guide! {
     "method",
     "mission-file",
+    "simulation",
     "operate",
     "attach",
     "recordings",

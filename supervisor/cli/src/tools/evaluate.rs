@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     /// Several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     sensors: Vec<String>,
-    /// laboratory or measured.
+    /// laboratory, measured or harsh.
     #[arg(long, default_value = "measured")]
     realism: String,
     /// The robot's model.

@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     /// Some of the experiments, with commas: 1a, 1b, 2, 3, 4-180, 4-90, 4-0, 5-constant, 5-modulated.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
-    /// measured: wheels and sonar as measured, the radio out 20 % of the time; or laboratory.
+    /// measured or harsh: the errors of real robots, and the radio out 20 % of the time; or laboratory.
     #[arg(long, default_value = "measured", value_parser = realism)]
     realism: Realism,
     /// Missions at once; by default one for each processor.
@@ -49,11 +49,8 @@ pub(crate) struct Arguments {
 const FIRST_SEED: u64 = 1;
 
 fn realism(text: &str) -> Result<Realism, String> {
-    match text {
-        "laboratory" => Ok(Realism::Laboratory),
-        "measured" => Ok(Realism::Measured),
-        _ => Err("give laboratory or measured".to_owned()),
-    }
+    let named = Realism::ALL.into_iter().find(|realism| realism.as_str() == text);
+    named.ok_or_else(|| "give laboratory, measured or harsh".to_owned())
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
@@ -95,10 +92,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
 /// The command that gives these rows.
 fn described(arguments: &Arguments, chosen: &[&Experiment]) -> String {
     let names: Vec<_> = chosen.iter().map(|it| it.name).collect();
-    let realism = match arguments.realism {
-        Realism::Laboratory => "laboratory",
-        Realism::Measured => "measured",
-    };
+    let realism = arguments.realism.as_str();
     format!(
         "firsthand experiments --seeds {} --only {} --realism {realism}",
         arguments.seeds,

@@ -4,7 +4,7 @@ use common::mission::Realism;
 
 use crate::setting::{HARMONIC, Setting};
 
-/// Share of the time of radio outage with measured realism. The paper's link fades; the paper gives no number.
+/// Share of the time of radio outage except with laboratory realism. The paper's link fades; the paper gives no number.
 const OUTAGE_SHARE: f64 = 0.2;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,8 +32,8 @@ impl Method {
             Self::Evidential => &["method='evidential'"],
         };
         let mut set: Vec<String> = own.iter().map(|&text| text.to_owned()).collect();
-        if realism == Realism::Measured {
-            set.push("simulation.realism='measured'".to_owned());
+        if realism != Realism::Laboratory {
+            set.push(format!("simulation.realism='{}'", realism.as_str()));
             set.push(format!("simulation.radio.outage_share={OUTAGE_SHARE}"));
         }
         Setting { name: self.as_str().to_owned(), planner: HARMONIC.to_owned(), set }

@@ -8,6 +8,8 @@ use std::{
 
 mod printed;
 
+use common::mission::Simulation;
+
 use super::*;
 use crate::{
     commands::{self, parse},
@@ -284,29 +286,20 @@ fn the_readme_is_shorter_than_200_lines() {
 }
 
 #[test]
-fn the_guides_values_of_the_simulation_are_the_presets() {
-    let physics = |realism: &str, setting: &str| {
-        let set = [format!("simulation.realism='{realism}'"), setting.to_owned()];
-        let mission = missions::load("obstacle-course", &set);
-        mission.unwrap_or_else(|error| panic!("{setting}: {error}")).simulation.physics()
-    };
-    let mut values = 0;
-    for line in page("mission-file").unwrap().text.lines() {
-        let cells: Vec<_> = line.trim_matches('|').split('|').map(str::trim).collect();
-        let (key, columns) = match *cells.as_slice() {
-            [key, value, _] => (format!("heights.{}", key.trim_matches('`')), [value, value]),
-            [key, laboratory, measured, _] => {
-                (key.trim_matches('`').to_owned(), [laboratory, measured])
-            }
-            _ => continue,
-        };
-        for (realism, value) in ["laboratory", "measured"].into_iter().zip(columns) {
-            if value.parse::<f64>().is_ok() {
-                let written = physics(realism, &format!("simulation.{key}={value}"));
-                assert_eq!(written, physics(realism, "seed=1"), "{key} = {value}");
-                values += 1;
-            }
-        }
+fn the_guide_has_the_three_presets_of_every_key_of_the_simulation_and_its_source() {
+    let rows: Vec<Vec<&str>> = page("simulation")
+        .unwrap()
+        .text
+        .lines()
+        .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
+        .collect();
+    for (key, presets) in Simulation::presets() {
+        let key = format!("`{}`", key.trim_start_matches("simulation."));
+        let row = rows.iter().find(|row| row[0] == key).unwrap_or_else(|| panic!("no row {key}"));
+        let values: Vec<f64> = row[1..4].iter().map(|value| value.parse().unwrap()).collect();
+        assert_eq!(values, presets, "{key}");
+        let source = row[5];
+        let told = ["nominal", "1", "2", "3"].iter().any(|start| source.starts_with(start));
+        assert!(told, "{key}: {source}");
     }
-    assert_eq!(values, 28, "values were found");
 }
