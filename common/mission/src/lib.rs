@@ -202,9 +202,12 @@ pub struct Mapper {
 }
 
 /// The planner's executable, and the values of its field.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
+    /// The evidential method: the time in which the robot must be able to stop before it meets what it believes in or has not scanned,
+    /// seconds. The sonar's period, the radio's delay and the wheels' lag add up to 0.36 s.
+    pub stops_within_s: f64,
     /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without
     /// it the paper's method has no screening, which is exactly (11), and the evidential one takes
     /// [`Planner::EVIDENTIAL_SCREENING_M`].
@@ -228,8 +231,14 @@ pub struct Controller {
     /// vd: the most tangential speed asked for, m/s; without it what [`Mission::speed_m_s`] says.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_m_s: Option<f64>,
-    /// wd: the most turn rate asked for, rad/s.
-    pub turn_rad_s: f64,
+    /// wd: the most turn rate asked for, rad/s; without it what [`Mission::turn_rad_s`] says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_rad_s: Option<f64>,
+    /// The evidential method drives at full speed while it faces its way within this angle, degrees.
+    pub full_speed_within_deg: f64,
+    /// The evidential method turns on the spot while its way lies farther than this to a side, degrees. In between the speed falls with
+    /// the cosine.
+    pub turns_beyond_deg: f64,
     /// The greatest turn rate on the spot of the evidential method, rad/s. At 2.0 a sonar of 7 Hz measures every 16 degrees, so its cone
     /// of 15 degrees to either side covers each direction nearly twice.
     pub look_rad_s: f64,
@@ -268,11 +277,19 @@ impl Default for Mapper {
     }
 }
 
+impl Default for Planner {
+    fn default() -> Self {
+        Self { stops_within_s: 0.4, screening_m: None, executable: None }
+    }
+}
+
 impl Default for Controller {
     fn default() -> Self {
         Self {
             speed_m_s: None,
-            turn_rad_s: 0.8,
+            turn_rad_s: None,
+            full_speed_within_deg: 26.0,
+            turns_beyond_deg: 73.0,
             look_rad_s: 2.0,
             slow_radius_m: 0.4,
             dead_zone: 0.05,
@@ -323,6 +340,19 @@ impl Mission {
             Sensors::FrontInfrared => 0.7,
         };
         self.controller.speed_m_s.unwrap_or(default)
+    }
+
+    /// wd, rad/s: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.
+    #[must_use]
+    pub fn turn_rad_s(&self) -> f64 {
+        let default = if self.looks_first() { 2.4 } else { 0.8 };
+        self.controller.turn_rad_s.unwrap_or(default)
+    }
+
+    /// Whether the link makes good that the wheels turn slower than commanded: `robot.speed_trim`, by default if the robot looks first.
+    #[must_use]
+    pub fn speed_trim(&self) -> bool {
+        self.robot.speed_trim.unwrap_or_else(|| self.looks_first())
     }
 
     /// The greatest distance of mapped hits, metres: `mapper.map_within_m`, by default 0.6 for a robot that looks first and 1.0 for

@@ -74,6 +74,9 @@ pub struct RobotConfig {
     pub left: Channel,
     /// The right wheel's channel; that of a car's steering, positive to the left.
     pub right: Channel,
+    /// Whether the link makes good that the wheels turn slower than commanded; without it what [`crate::Mission::speed_trim`] says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_trim: Option<bool>,
     /// Age at which a command no longer moves the robot, seconds.
     pub command_limit_s: f64,
     /// Below what a battery is low.
@@ -125,6 +128,7 @@ impl Default for RobotConfig {
             top_speed_m_s: None,
             left: Channel { channel: 0, reversed: true },
             right: Channel { channel: 1, reversed: false },
+            speed_trim: None,
             command_limit_s: 0.25,
             low_battery_v: BatteryLimits::default(),
             held_current_ad: 1000,

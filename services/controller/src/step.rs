@@ -10,7 +10,6 @@ use common::{
     step::{ForeignState, Step},
 };
 use glam::DVec2;
-use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Least turn rate on the spot, rad/s: below it the wheels stick.
 const LEAST_TURN_RAD_S: f64 = 0.25;
@@ -57,6 +56,10 @@ pub struct Controller {
     speed: f64,
     turn: f64,
     look: f64,
+    /// Cosines of the angles to the guidance within which the evidential method drives at full speed, and beyond which it turns on the
+    /// spot.
+    full_speed: f64,
+    turns: f64,
     slow_radius: f64,
     dead_zone: f64,
     /// Whether alignment slows the robot by the paper's law.
@@ -81,8 +84,10 @@ impl Step for Controller {
             target: mission.target,
             tolerance: mission.arrival_tolerance_m,
             speed: mission.speed_m_s(),
-            turn: settings.turn_rad_s,
+            turn: mission.turn_rad_s(),
             look: settings.look_rad_s,
+            full_speed: settings.full_speed_within_deg.to_radians().cos(),
+            turns: settings.turns_beyond_deg.to_radians().cos(),
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
             modulated: settings.modulated,
@@ -204,10 +209,10 @@ impl Controller {
         side * (TURN_GAIN * angle).clamp(least, self.look)
     }
 
-    /// The evidential method's vc: none before the robot faces within 45 degrees of the guidance, never more than
-    /// `limit`, and never so little that the wheels stick.
+    /// The evidential method's vc: none before the robot nearly faces the guidance, never more than `limit`, and never so little that the
+    /// wheels stick.
     fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
-        let sharp = (alignment.cosine - FRAC_1_SQRT_2) / (1.0 - FRAC_1_SQRT_2);
+        let sharp = ((alignment.cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
         let slow = (distance / self.slow_radius).min(1.0);
         let wanted = self.speed * sharp.max(0.0) * slow;
         let least = LEAST_SPEED_M_S.min(self.speed);

@@ -5,8 +5,9 @@
 //! touched there. The robot drives no faster than it could stop before the next thing it believes in, or the next ground
 //! it has not scanned.
 //!
-//! All of it is computed from the belief and the pose alone: a scan only turns the sonar, tick by tick, to ground that is not
-//! scanned yet, so a planner that is restarted goes on with it.
+//! It is computed from the belief and the pose: a scan only turns the sonar, tick by tick, to ground that is not scanned yet, so a
+//! planner that is restarted goes on with it. The only memory is the side to which a scan turns: wheels lag, so a side that is chosen
+//! anew with each tick may change with each tick.
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
@@ -25,8 +26,6 @@ use crate::{
 const SCANNED_AHEAD_M: f64 = 0.25;
 /// How far ahead the way is followed, metres.
 const AHEAD_M: f64 = 0.6;
-/// In this time the robot must be able to stop: the sonar's period, the radio's, the wheels' lag.
-const STOPS_WITHIN_S: f64 = 0.6;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Advice {
@@ -36,13 +35,24 @@ pub(crate) enum Advice {
     Look(DVec2),
 }
 
+/// A side of the robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Left,
+    Right,
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
     speed: f64,
     turn: f64,
+    /// The time in which the robot must be able to stop, seconds.
+    stops_within_s: f64,
     /// Unit vector from the robot's axis to the sonar's.
     bearing: DVec2,
+    /// The side to which the present scan turns; none while there is no scan.
+    scan_side: Option<Side>,
 }
 
 impl ActiveSensing {
@@ -50,14 +60,16 @@ impl ActiveSensing {
         Self {
             radius: mission.body().radius_m,
             speed: mission.speed_m_s(),
-            turn: mission.controller.turn_rad_s,
+            turn: mission.turn_rad_s(),
+            stops_within_s: mission.planner.stops_within_s,
             bearing: DVec2::from_angle(mission.sonar.bearing_deg.to_radians()),
+            scan_side: None,
         }
     }
 
     /// Advice for a robot at `pose` that is to go along `direction`, a unit vector, by the readings in `belief`.
     pub(crate) fn advise(
-        &self,
+        &mut self,
         view: &View<'_>,
         belief: &GridHeader,
         pose: &Pose2,
@@ -77,7 +89,7 @@ impl ActiveSensing {
             undetected.normals(to, along)
         });
         let unseen = ground.chain(surfaces);
-        match scan(self.bearing.rotate(pose.axis()), unseen) {
+        match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
             // The robot turns until its sonar faces there.
             Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
@@ -90,7 +102,7 @@ impl ActiveSensing {
         if clear_m < STANDS_BEFORE_M {
             return 0.0;
         }
-        clear_m / STOPS_WITHIN_S
+        clear_m / self.stops_within_s
     }
 
     /// The speed allowed by the readings and by the arc on which the controller brings the robot into `direction`, m/s.
@@ -116,17 +128,21 @@ impl ActiveSensing {
                 && undetected.normals(at, ahead.axis()).next().is_none()
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
-        let on_arc = free as f64 * STEP_M / STOPS_WITHIN_S;
+        let on_arc = free as f64 * STEP_M / self.stops_within_s;
         let faces = pose.axis().dot(direction) > FACES_COSINE;
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
         on_arc.max(least).min(self.limit_before_echoes(belief, pose))
     }
 }
 
-/// Where to turn from `axis` to scan all directions in `unseen`: first to the side whose nearest one is nearer, and there to
-/// the far end without a stop.
-fn scan(axis: DVec2, unseen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
-    // For each side: the least angle, the greatest one, and the direction of the greatest.
+/// Where to turn from `axis` to scan all directions in `unseen`: to the far end of a side without a stop. A scan that began on a `side`
+/// turns there until nothing is unseen on it; a new one begins on the side whose nearest direction is nearer.
+fn scan(
+    axis: DVec2,
+    unseen: impl Iterator<Item = DVec2>,
+    side: &mut Option<Side>,
+) -> Option<DVec2> {
+    // For the left and the right: the least angle, the greatest one, and the direction of the greatest.
     let mut sides = [None::<(f64, f64, DVec2)>; 2];
     for there in unseen {
         let angle = axis.angle_to(there);
@@ -138,9 +154,20 @@ fn scan(axis: DVec2, unseen: impl Iterator<Item = DVec2>) -> Option<DVec2> {
             Some((least, greatest, end)) => (least.min(angle), greatest, end),
         });
     }
-    let nearer = sides.into_iter().flatten();
-    let nearer = nearer.min_by(|a, b| a.0.total_cmp(&b.0));
-    nearer.map(|(_, _, end)| end)
+    let [left, right] = sides;
+    let nearer = |a: (f64, f64, DVec2), b: (f64, f64, DVec2)| a.0 <= b.0;
+    *side = match (left, right, *side) {
+        (None, None, _) => None,
+        (Some(_), None, _) | (Some(_), Some(_), Some(Side::Left)) => Some(Side::Left),
+        (None, Some(_), _) | (Some(_), Some(_), Some(Side::Right)) => Some(Side::Right),
+        (Some(left), Some(right), None) if nearer(left, right) => Some(Side::Left),
+        (Some(_), Some(_), None) => Some(Side::Right),
+    };
+    let (_, _, end) = match (*side)? {
+        Side::Left => left?,
+        Side::Right => right?,
+    };
+    Some(end)
 }
 
 #[cfg(test)]
@@ -151,8 +178,21 @@ mod tests {
     fn a_scan_turns_to_the_nearer_side_and_there_to_its_far_end() {
         let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
         let unseen = [at(20.0), at(50.0), at(35.0), at(-30.0), at(-80.0)];
-        let there = scan(DVec2::X, unseen.into_iter());
+        let there = scan(DVec2::X, unseen.into_iter(), &mut None);
         assert_eq!(there, Some(at(50.0)));
-        assert_eq!(scan(DVec2::X, std::iter::empty()), None);
+        assert_eq!(scan(DVec2::X, std::iter::empty(), &mut Some(Side::Left)), None);
+    }
+
+    #[test]
+    fn a_scan_keeps_its_side_until_nothing_is_unseen_there() {
+        let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
+        let mut side = None;
+        let mut turn = |unseen: &[f64]| scan(DVec2::X, unseen.iter().copied().map(at), &mut side);
+        assert_eq!(turn(&[-40.0, 30.0]), Some(at(30.0)));
+        assert_eq!(turn(&[-10.0, 60.0]), Some(at(60.0)), "the other side is nearer now");
+        assert_eq!(turn(&[-10.0, -20.0]), Some(at(-20.0)), "nothing is left on this side");
+        assert_eq!(turn(&[-20.0, 10.0]), Some(at(-20.0)));
+        assert_eq!(turn(&[]), None);
+        assert_eq!(turn(&[-20.0, 10.0]), Some(at(10.0)), "a new scan begins on the nearer side");
     }
 }

@@ -50,7 +50,7 @@ impl Arcs {
         Some(Self {
             most_curvature: 1.0 / car.least_turning_radius(),
             speed: mission.speed_m_s(),
-            turn: mission.controller.turn_rad_s,
+            turn: mission.turn_rad_s(),
             slow_radius: mission.controller.slow_radius_m,
         })
     }

@@ -221,7 +221,7 @@ impl Planner {
     }
 
     /// The guidance for a robot at that pose.
-    fn guide(&self, sample: &PoseSample) -> GuidanceSample {
+    fn guide(&mut self, sample: &PoseSample) -> GuidanceSample {
         let pose = sample.pose();
         let cells = self.grid.cells();
         let (status, direction) = match &self.live {
@@ -247,7 +247,7 @@ impl Planner {
 
     /// Status, direction and speed limit to give where the field says `status` and `direction`.
     fn advise(
-        &self,
+        &mut self,
         pose: &Pose2,
         status: GuidanceStatus,
         direction: DVec2,
@@ -256,7 +256,7 @@ impl Planner {
             return (status, direction, f64::INFINITY);
         };
         let view = live.view(self.grid.cells());
-        let sensing = match (&self.advisor, status) {
+        let sensing = match (&mut self.advisor, status) {
             (Advisor::LookFirst(sensing), _) => sensing,
             (Advisor::Steer(arcs), GuidanceStatus::Along | GuidanceStatus::WayOut) => {
                 let distance = pose.position.distance(self.target);

@@ -18,6 +18,7 @@ pub mod drive;
 pub mod failsafe;
 mod rangers;
 pub mod shell;
+mod speed_trim;
 pub mod stage;
 pub mod step;
 pub mod stop_guard;

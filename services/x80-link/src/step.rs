@@ -31,6 +31,7 @@ use crate::{
         restart::RestartWatch,
     },
     rangers::Rangers,
+    speed_trim::SpeedTrim,
     telemetry::Telemetry,
 };
 
@@ -86,6 +87,8 @@ pub struct Link {
     pinged_ns: Option<u64>,
     telemetry: Telemetry,
     rangers: Rangers,
+    /// None if the mission wants commands sent as they are.
+    trim: Option<SpeedTrim>,
     /// The encoders of the newest tick.
     wheels: WheelSample,
     /// Mission time of the newest tick.
@@ -120,6 +123,10 @@ impl Step for Link {
             pinged_ns: None,
             telemetry: Telemetry::default(),
             rangers: Rangers::new(mission),
+            trim: mission.speed_trim().then(|| {
+                let wheels = if mission.body().steering.is_some() { 1 } else { 2 };
+                SpeedTrim::new(wheels, 1.0 / mission.robot.rate_hz)
+            }),
             wheels: WheelSample::default(),
             time: MissionTime::default(),
             open: None,
@@ -292,6 +299,9 @@ impl Link {
         let wheels =
             WheelSample { restarts: self.restart.restarts(), ..self.drive.wheels(sensors) };
         self.wheels = wheels;
+        if let Some(trim) = &mut self.trim {
+            trim.rolled(&wheels, self.time.seconds());
+        }
         self.open = Some(OpenTick {
             range: self.rangers.for_tick(),
             wheels,
@@ -333,9 +343,15 @@ impl Link {
             _ => 1.0,
         };
         let counts = match CommandState::from_byte(command.state) {
-            CommandState::Driving => self.drive.counts(command, share, &self.wheels),
+            CommandState::Driving => {
+                let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
+                self.drive.counts(command, share / reached, &self.wheels)
+            }
             CommandState::Halt | CommandState::Arrived => [0, 0],
         };
+        if let Some(trim) = &mut self.trim {
+            trim.told(counts);
+        }
         self.tell(counts, self.drive.limit(), now_ns, effects);
         let stamp = command.stamp.time();
         self.repeat = Some(Repeat {

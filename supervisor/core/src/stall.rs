@@ -130,16 +130,16 @@ impl StallWatch {
     pub(crate) fn new(mission: &Mission) -> Self {
         let seconds = STALLED_AFTER.as_secs_f64();
         let controller = &mission.controller;
-        let slowest_turn = TAU / controller.turn_rad_s.min(controller.look_rad_s);
+        let slowest_turn = TAU / mission.turn_rad_s().min(controller.look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         let car = mission.body().ackermann();
         // It turns on the spot, or as it drives.
         let on_the_spot = mission.method == Method::Evidential && car.is_none();
         let tightest = car.map_or(0.0, |car| car.least_turning_radius());
-        let circle = tightest.max(mission.speed_m_s() / controller.turn_rad_s);
+        let circle = tightest.max(mission.speed_m_s() / mission.turn_rad_s());
         Self {
             moved_m: MOVED_M.min(mission.speed_m_s() * seconds * SHARE),
-            turned_rad: TURNED_RAD.min(controller.turn_rad_s * seconds * SHARE),
+            turned_rad: TURNED_RAD.min(mission.turn_rad_s() * seconds * SHARE),
             place_m: if on_the_spot {
                 PLACE_M.min(mission.speed_m_s() * at_a_place * SHARE)
             } else {

@@ -141,11 +141,14 @@ fn a_look_turns_on_the_spot_and_ends_where_it_should() {
 }
 
 #[test]
-fn an_evidential_robot_stands_until_it_faces_within_45_degrees_of_its_way() {
+fn an_evidential_robot_turns_on_the_spot_beyond_73_degrees_and_hurries_within_26() {
     let guidance = ahead();
-    close(evidential().at(facing(FRAC_PI_4 + 0.01), &guidance).v_m_s, 0.0);
-    assert!(evidential().at(facing(FRAC_PI_4 - 0.1), &guidance).v_m_s > 0.0);
-    close(evidential().at(facing(0.0), &guidance).v_m_s, 0.4);
+    let at = |degrees: f64| evidential().at(facing(degrees.to_radians()), &guidance);
+    assert_eq!((at(73.5).v_m_s, at(-73.5).v_m_s), (0.0, 0.0));
+    assert!(at(73.5).omega_rad_s < 0.0);
+    assert!((0.04..0.4).contains(&at(60.0).v_m_s));
+    close(at(26.0).v_m_s, 0.4);
+    close(at(0.0).v_m_s, 0.4);
 }
 
 #[test]

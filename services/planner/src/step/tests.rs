@@ -62,7 +62,7 @@ fn a_screening_length_in_metres_is_the_same_on_any_grid() {
 
 #[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
-    let planner = Planner::new(&mission());
+    let mut planner = Planner::new(&mission());
     assert_eq!(status(&planner.guide(&at(0.0, 0.0))), GuidanceStatus::Waiting);
     assert!(planner.snapshot().is_none());
 }
@@ -149,7 +149,7 @@ fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
 #[test]
 fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
     // All is scanned but the ground to the left of the way ahead.
-    let planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
+    let mut planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
     let guidance = planner.guide(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
     assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
@@ -206,7 +206,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
 #[test]
 fn a_scan_goes_on_in_a_planner_that_was_restarted() {
     let scanned = |at: DVec2| at.x < 0.2 || at.y < 0.1;
-    let (one, other) = (evidential(scanned), evidential(scanned));
+    let (mut one, mut other) = (evidential(scanned), evidential(scanned));
     for heading in [0.0, 0.2, 0.4] {
         let pose = PoseSample { heading_rad: heading, ..at(0.0, 0.0) };
         assert_eq!(one.guide(&pose), other.guide(&pose));
@@ -267,7 +267,7 @@ impl LargeRoom {
         assert_eq!(self.planner.swap_in(solve(&job)).unwrap(), Work::SwappedIn);
     }
 
-    fn status_at(&self, x: f64, y: f64) -> GuidanceStatus {
+    fn status_at(&mut self, x: f64, y: f64) -> GuidanceStatus {
         status(&self.planner.guide(&at(x, y)))
     }
 }

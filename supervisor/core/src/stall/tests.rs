@@ -180,7 +180,7 @@ fn a_robot_that_moves_and_stays_where_it_is_gets_a_fresh_planner_twice_then_a_fr
 fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to_it_is_not() {
     let path = std::path::Path::new("test.toml");
     let mission = Mission::parse("target = [3, 0]\nmethod = 'paper'", path).unwrap();
-    let (speed, turn) = (mission.speed_m_s(), mission.controller.turn_rad_s);
+    let (speed, turn) = (mission.speed_m_s(), mission.turn_rad_s());
     let radius = speed / turn;
     let mut circling = StallWatch::new(&mission);
     let mut crawling = StallWatch::new(&mission);

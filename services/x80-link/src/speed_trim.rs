@@ -1,0 +1,131 @@
+//! The speed trim: makes good that the wheels turn slower than commanded.
+//!
+//! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed, and no part of the robot makes good the rest. The link knows what
+//! it commanded and what the encoders counted. It estimates the share that the wheels reach, and divides the commands by it. Both wheels
+//! have one estimate, so that commands keep their curve.
+
+use common::{samples::WheelSample, wire::counts_between};
+
+/// A wheel has reached its steady speed once so many commands agree: its delay and its lag take 0.15 s, a period at 7 Hz.
+const STEADY: usize = 3;
+/// Commands agree if the least of them is at least this share of the greatest.
+const AGREE: f64 = 0.8;
+/// Slower commands give no evidence, counts/s: the dead band and the noise of the speed loop are too large a part of them.
+const LEAST_COUNTS_S: f64 = 250.0;
+/// The weight of one interval in the estimate.
+const WEIGHT: f64 = 0.1;
+/// A wheel outside of these shares slips, is held, or has a faulty encoder: that is no evidence about its speed loop.
+const SHARES: std::ops::RangeInclusive<f64> = 0.6..=1.15;
+/// The least share that is made good.
+const LEAST_SHARE: f64 = 0.7;
+
+/// The estimate of the share of a commanded speed that the wheels reach.
+#[derive(Clone, Debug)]
+pub(crate) struct SpeedTrim {
+    /// How many of the two channels drive: a car's second one steers.
+    wheels: usize,
+    /// The newest commands, oldest first, counts/s.
+    told: [[f64; 2]; STEADY],
+    /// The counts of the newest tick, and its mission time, seconds.
+    tick: Option<([u16; 2], f64)>,
+    longest_gap_s: f64,
+    share: f64,
+}
+
+impl SpeedTrim {
+    /// The trim of a robot that ticks every `period_s` seconds.
+    pub(crate) const fn new(wheels: usize, period_s: f64) -> Self {
+        let told = [[0.0; 2]; STEADY];
+        Self { wheels, told, tick: None, longest_gap_s: 2.0 * period_s, share: 1.0 }
+    }
+
+    /// The estimated share, at most 1.
+    pub(crate) const fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// Take a command as it was sent, counts/s.
+    pub(crate) fn told(&mut self, counts: [i16; 2]) {
+        self.told.rotate_left(1);
+        self.told[STEADY - 1] = counts.map(f64::from);
+    }
+
+    /// Take the encoders of a tick at `time_s`.
+    pub(crate) fn rolled(&mut self, wheels: &WheelSample, time_s: f64) {
+        let counts = [wheels.left_counts, wheels.right_counts];
+        let Some((before, then_s)) = self.tick.replace((counts, time_s)) else {
+            return;
+        };
+        let gap_s = time_s - then_s;
+        if gap_s <= 0.0 || gap_s > self.longest_gap_s {
+            return;
+        }
+        for wheel in 0..self.wheels {
+            let told = self.told.map(|told| told[wheel]);
+            let newest = told[STEADY - 1];
+            let along = told.map(|counts_s| counts_s * newest.signum());
+            let least = along.into_iter().fold(f64::INFINITY, f64::min);
+            let greatest = along.into_iter().fold(0.0, f64::max);
+            if least < LEAST_COUNTS_S || least < AGREE * greatest {
+                continue;
+            }
+            let rolled = f64::from(counts_between(before[wheel], counts[wheel])) / gap_s;
+            let share = rolled * newest.signum() / ((along[STEADY - 2] + along[STEADY - 1]) / 2.0);
+            if SHARES.contains(&share) {
+                self.share += WEIGHT * (share - self.share);
+                self.share = self.share.clamp(LEAST_SHARE, 1.0);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::wire::COUNT_CYCLE;
+
+    use super::*;
+
+    const PERIOD_S: f64 = 1.0 / 7.0;
+
+    /// The share that the trim finds after `ticks` of a robot whose wheels reach `reached` of these commands.
+    fn found(reached: f64, ticks: usize, command: impl Fn(usize) -> [f64; 2]) -> f64 {
+        let mut trim = SpeedTrim::new(2, PERIOD_S);
+        let mut rolled = [0.0; 2];
+        for tick in 0..ticks {
+            let [left_counts, right_counts] =
+                rolled.map(|counts: f64| counts.rem_euclid(COUNT_CYCLE.into()) as u16);
+            let wheels = WheelSample { left_counts, right_counts, ..WheelSample::default() };
+            trim.rolled(&wheels, tick as f64 * PERIOD_S);
+            let told = command(tick).map(|counts| counts / trim.share());
+            trim.told(told.map(|counts| counts as i16));
+            for (rolled, told) in rolled.iter_mut().zip(told) {
+                *rolled += told * reached * PERIOD_S;
+            }
+        }
+        trim.share()
+    }
+
+    #[test]
+    fn slow_wheels_are_made_good_within_seconds_forward_and_on_the_spot() {
+        assert!((found(0.78, 28, |_| [600.0, 600.0]) - 0.78).abs() < 0.02);
+        assert!((found(0.78, 28, |_| [-600.0, 600.0]) - 0.78).abs() < 0.02);
+        assert!((found(1.0, 28, |_| [600.0, 600.0]) - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn wheels_that_are_held_or_race_or_change_their_speed_change_nothing() {
+        let unchanged = |reached, command: fn(usize) -> [f64; 2]| {
+            assert!((found(reached, 50, command) - 1.0).abs() < 1e-9, "{reached}");
+        };
+        unchanged(0.0, |_| [600.0, 600.0]);
+        unchanged(-0.8, |_| [600.0, 600.0]);
+        unchanged(1.6, |_| [600.0, 600.0]);
+        unchanged(0.78, |_| [100.0, 100.0]);
+        unchanged(0.78, |tick| if tick % 2 == 0 { [600.0; 2] } else { [300.0; 2] });
+    }
+
+    #[test]
+    fn no_command_grows_by_more_than_a_seventh_over_the_least_share() {
+        assert!(found(0.62, 200, |_| [600.0, 600.0]) >= LEAST_SHARE);
+    }
+}
