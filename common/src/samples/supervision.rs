@@ -286,6 +286,8 @@ wire_enum! {
         CutOff = 3,
         /// Something holds its wheels.
         Held = 4,
+        /// It drives far and comes no nearer to its target.
+        Wandering = 5,
     }
 }
 

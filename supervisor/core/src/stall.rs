@@ -9,6 +9,7 @@
 //! | pinned | it drives or turns, and stays at its place | replan |
 //! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
 //! | held | something holds its wheels: its motors push and its encoders stand | replan |
+//! | wandering | it has driven several times as far as its target was away | reset |
 //! | cut off | no way leads from its place to the target, and it has looked around | reset |
 
 use std::{f64::consts::TAU, time::Duration};
@@ -45,6 +46,11 @@ const SHARE: f64 = 0.05;
 const WAY_OUT_M: f64 = 1.0;
 /// Contacts within this distance are at the same place, metres: a robot that turns about a blocked wheel stays within it.
 const HELD_WITHIN_M: f64 = 0.5;
+/// A robot wanders once it has driven this many times as far as its target was away, and at least [`WANDERS_LEAST_M`]. The way around a
+/// trap takes two to three times as far.
+const WANDERS: f64 = 3.0;
+/// See [`WANDERS`], metres.
+const WANDERS_LEAST_M: f64 = 12.0;
 /// Replans before the map is reset.
 const MOST_REPLANS: u32 = 2;
 /// Resets of the map before the target is unreachable.
@@ -54,6 +60,9 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
     let cause = match cause {
         StallCause::Still => "the robot neither drives nor turns, whatever is planned",
         StallCause::Pinned => "the robot moves and does not get away, whatever is planned",
+        StallCause::Wandering => {
+            "the robot drives around and does not get nearer, whatever is forgotten"
+        }
         StallCause::Held => "the wheels are held fast, whatever is planned",
         StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
         StallCause::CutOff => "the belief isolates the robot from the target, again and again",
@@ -97,6 +106,10 @@ pub(crate) struct StallWatch {
     waits_since: Option<MissionTime>,
     /// Distance travelled when it was first seen in a hazard, metres.
     inside_hazard_since: Option<f64>,
+    /// Whether long ways are a reason to reset the map. The paper's method has no such rule.
+    forgets: bool,
+    /// The distance travelled at which the robot wanders, metres; none before the first tick, and after a reset.
+    wanders_at: Option<f64>,
     /// Replans at this place, since the last reset.
     replans_here: u32,
     replans: u32,
@@ -157,6 +170,8 @@ impl StallWatch {
             cut_off_since: None,
             waits_since: None,
             inside_hazard_since: None,
+            forgets: mission.method == Method::Evidential,
+            wanders_at: None,
             replans_here: 0,
             replans: 0,
             held_at: None,
@@ -219,13 +234,16 @@ impl StallWatch {
             (self.anchor, self.place) = (None, None);
             return None;
         } else {
-            self.without_policy(pose, guidance).or_else(|| self.without_motion(pose, guidance))?
+            self.without_policy(pose, guidance)
+                .or_else(|| self.without_motion(pose, guidance))
+                .or_else(|| self.without_end(pose, guidance))?
         };
         let recovery = if self.may_replan(cause, pose.pose().position) {
             self.replans += 1;
             RecoveryStep::Replan
         } else if self.epoch < MOST_RESETS {
             self.epoch += 1;
+            self.wanders_at = None;
             self.replans_here = 0;
             self.held_at = None;
             RecoveryStep::Reset
@@ -262,7 +280,7 @@ impl StallWatch {
                 self.held_at.take_if(elsewhere);
                 &mut self.held_at.get_or_insert((here, 0)).1
             }
-            StallCause::InsideHazard | StallCause::CutOff => return false,
+            StallCause::InsideHazard | StallCause::CutOff | StallCause::Wandering => return false,
         };
         let may = *replans < MOST_REPLANS;
         *replans += u32::from(may);
@@ -306,6 +324,13 @@ impl StallWatch {
             return Some(StallCause::InsideHazard);
         }
         None
+    }
+
+    /// Whether the robot has driven for so long, since the start or the last reset, that its map must be wrong.
+    fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
+        let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
+        let wanders_at = *self.wanders_at.get_or_insert(pose.travelled_m + most_m);
+        (self.forgets && pose.travelled_m >= wanders_at).then_some(StallCause::Wandering)
     }
 
     /// Whether the robot has not moved or turned for a while; or moves or turns for longer and stays at its place.

@@ -288,3 +288,37 @@ fn held_wheels_get_a_fresh_planner_at_once_and_again_elsewhere_and_are_held_fast
     let body = Mission::parse("target = [3, 0]", std::path::Path::new("m.toml")).unwrap().body();
     assert!(words(watch.gave_up().unwrap().cause(), &body).contains("held fast"));
 }
+
+#[test]
+fn a_robot_that_drives_three_times_as_far_as_its_target_was_away_forgets_and_in_the_end_gives_up() {
+    let stalls = |method: &str, target_m: f64| {
+        let text = format!("target = [3, 0]\nmethod = '{method}'");
+        let mission = Mission::parse(&text, std::path::Path::new("test.toml")).unwrap();
+        let mut watch = StallWatch::new(&mission);
+        let mut stalls = Vec::new();
+        for metre in (0..200).map(f64::from) {
+            let along = GuidanceSample {
+                distance_m: target_m,
+                ..guidance(GuidanceStatus::Along, watch.epoch())
+            };
+            let pose = PoseSample { x_m: metre % 2.0, ..pose(2.0 * metre, metre) };
+            if let Some(stall) = watch.step(&pose, &along, false, false) {
+                stalls.push((metre, stall.cause(), stall.recovery()));
+                if stall.recovery() == RecoveryStep::GiveUp {
+                    break;
+                }
+            }
+        }
+        stalls
+    };
+    let at = |metre, recovery| (metre, StallCause::Wandering, recovery);
+    let want = [
+        at(24.0, RecoveryStep::Reset),
+        at(49.0, RecoveryStep::Reset),
+        at(74.0, RecoveryStep::Reset),
+        at(99.0, RecoveryStep::GiveUp),
+    ];
+    assert_eq!(stalls("evidential", 8.0), want);
+    assert_eq!(stalls("evidential", 1.0)[0], at(12.0, RecoveryStep::Reset));
+    assert_eq!(stalls("paper", 8.0), []);
+}

@@ -32,6 +32,7 @@ pub(super) fn stall(stall: &StallSample) -> String {
         StallCause::InsideHazard => "is inside a hazard",
         StallCause::CutOff => "is cut off",
         StallCause::Held => "is held by its wheels",
+        StallCause::Wandering => "wanders",
     };
     let recovery = match stall.recovery() {
         RecoveryStep::Replan => "new planner",
