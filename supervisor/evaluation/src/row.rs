@@ -97,19 +97,26 @@ pub struct Row {
 
 /// A robot that takes the first number of optimal times or less gets the best score, the second or more the worst.
 const BARN_CLIP: [f64; 2] = [2.0, 8.0];
+/// The speed of the challenge's optimal times, m/s.
+const BARN_SPEED_M_S: f64 = 2.0;
 
 impl Row {
     /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
     pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
         let rules = &trial.rules;
         let straight_m = trial.mission.target.length();
-        let outcome = outcome(summary, rules.success_within_m);
-        let success = outcome == Outcome::Success;
         let started_s =
             if rules.clock_after_departure { summary.departed_s.unwrap_or_default() } else { 0.0 };
         let time_s = (summary.mission_time_s - started_s).max(0.0);
+        let late = rules.most_s.is_some_and(|most_s| time_s > most_s);
+        let outcome = match outcome(summary, rules.success_within_m) {
+            Outcome::Success if late => Outcome::Timeout,
+            outcome => outcome,
+        };
+        let success = outcome == Outcome::Success;
         let spl = trial.shortest_m / summary.path_length_m.max(trial.shortest_m);
-        let barn_score = rules.optimal_time_s.map(|optimal| {
+        let reference_s = rules.optimal_time_s.unwrap_or(trial.shortest_m / BARN_SPEED_M_S);
+        let barn_score = rules.scored.then_some(reference_s).map(|optimal| {
             let [least, most] = BARN_CLIP.map(|times| times * optimal);
             if success { optimal / time_s.clamp(least, most) } else { 0.0 }
         });
@@ -201,6 +208,7 @@ mod tests {
             shortest_m: 4.0,
             rules: Rules {
                 optimal_time_s,
+                scored: optimal_time_s.is_some(),
                 clock_after_departure: optimal_time_s.is_some(),
                 ..Rules::default()
             },

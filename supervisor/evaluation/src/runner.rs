@@ -1,6 +1,7 @@
 //! The missions of an evaluation: each a `firsthand run` of its own, several at a time.
 
 use std::{
+    collections::BTreeSet,
     fs, io,
     path::{Path, PathBuf},
     process::Stdio,
@@ -17,6 +18,7 @@ use crate::{
     results::Results,
     row::{Outcome, Row},
     setting::Setting,
+    table::Record as _,
     trial::Trial,
 };
 
@@ -147,7 +149,9 @@ pub fn run(
         let file = plan.mission_file(trial);
         text.and_then(|text| fs::write(&file, text)).map_err(FileError::of("write", &file))?;
     }
-    let done = results.rows.keys();
+    // An aborted mission says nothing about navigation, only about the machine, so it is run again.
+    let settled = results.rows.rows().iter().filter(|row| row.outcome != Outcome::Aborted);
+    let done: BTreeSet<_> = settled.map(Row::key).collect();
     let all = plan.jobs().count();
     let left = plan.jobs().filter(|job| {
         let key = (job.trial.world.clone(), job.seed, job.setting.name.clone());
@@ -166,7 +170,13 @@ pub fn run(
                     let Some(job) = job else {
                         return;
                     };
-                    if give.send(mission(plan, &job, worker)).is_err() {
+                    let ended = match mission(plan, &job, worker) {
+                        Ok((row, _)) if row.outcome == Outcome::Aborted => {
+                            mission(plan, &job, worker)
+                        }
+                        ended => ended,
+                    };
+                    if give.send(ended).is_err() {
                         return;
                     }
                 }

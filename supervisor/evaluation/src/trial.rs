@@ -22,13 +22,23 @@ pub struct Rules {
     pub success_within_m: f64,
     /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does, or with the mission.
     pub clock_after_departure: bool,
-    /// Time of the reference path at 2 m/s, seconds, for the BARN score; none elsewhere.
+    /// Time after the clock's start within which an arrival is a success, seconds; none where the mission's timeout says it.
+    pub most_s: Option<f64>,
+    /// Whether missions get a BARN score.
+    pub scored: bool,
+    /// Time of the reference path at 2 m/s, seconds, for the score; none where the shortest path of the body takes its place.
     pub optimal_time_s: Option<f64>,
 }
 
 impl Default for Rules {
     fn default() -> Self {
-        Self { success_within_m: RIGHT_PLACE_M, clock_after_departure: false, optimal_time_s: None }
+        Self {
+            success_within_m: RIGHT_PLACE_M,
+            clock_after_departure: false,
+            most_s: None,
+            scored: false,
+            optimal_time_s: None,
+        }
     }
 }
 

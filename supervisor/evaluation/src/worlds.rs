@@ -41,13 +41,16 @@ const fn kind(stream: u64, name: &'static str, draw: fn(&mut Random, usize) -> S
     Kind { stream, name, draw }
 }
 
-static KINDS: [Kind; 6] = [
+static KINDS: [Kind; 8] = [
     kind(1, "rooms", |random, number| rooms::draw(random, number, Doors::Some)),
     kind(2, "doors", |random, number| rooms::draw(random, number, Doors::All)),
     kind(3, "traps", traps::draw),
     kind(4, "corridors", |random, _| corridors::draw(random, Bends::Oblique)),
     kind(5, "straight-corridors", |random, _| corridors::draw(random, Bends::None)),
     kind(6, "furnished", furnished::draw),
+    // Stream 7 draws starts and targets on maps.
+    kind(8, "rotated-rooms", |random, number| rooms::rotated(random, number, Doors::Some)),
+    kind(9, "rotated-doors", |random, number| rooms::rotated(random, number, Doors::All)),
 ];
 
 impl FromStr for Worlds {

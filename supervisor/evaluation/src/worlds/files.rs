@@ -115,7 +115,6 @@ fn add_barn(
     for (world, scene, rules) in worlds {
         if let Some(trial) = found.add(world, &scene, rules, body)? {
             trial.mission.timeout_s = barn::TIMEOUT_S;
-            trial.mission.arrival_tolerance_m = rules.success_within_m * 0.7;
         }
     }
     Ok(())

@@ -1,5 +1,5 @@
 //! Rooms: four walls, drums, boxes and loose walls at any angle, at three densities; in one of three a partition with
-//! a door of 0.8 to 1.2 m.
+//! a door of 0.8 to 1.2 m. Rotated rooms lie at any angle to the grid, and their partitions at an angle to the walls.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -24,8 +24,32 @@ pub(super) enum Doors {
     All,
 }
 
+/// Greatest angle between an oblique partition and the walls that it would be parallel to, degrees.
+const MOST_OBLIQUE_DEG: f64 = 35.0;
+
 /// Room `number`. The number selects the density.
 pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
+    room(random, number, doors, false)
+}
+
+/// Room `number` with an oblique partition, rotated against the grid.
+pub(super) fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
+    let mut scene = room(random, number, doors, true);
+    let angle = random.within(-PI, PI);
+    let turn = |at: &mut DVec2| *at = DVec2::from_angle(angle).rotate(*at);
+    let Shapes { drums, boxes, walls } = &mut scene.shapes;
+    drums.iter_mut().for_each(|drum| turn(&mut drum.at));
+    walls.iter_mut().flat_map(|wall| &mut wall.points).for_each(turn);
+    for block in boxes {
+        turn(&mut block.at);
+        block.angle_deg = (block.angle_deg + angle.to_degrees()).rem_euclid(180.0);
+    }
+    turn(&mut scene.target);
+    scene.heading = (scene.heading + angle + PI).rem_euclid(TAU) - PI;
+    scene
+}
+
+fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scene {
     let distance = random.within(4.0, 8.0);
     let half_width = random.within(1.6, 3.0);
     let target = DVec2::new(distance, random.within(-0.5, 0.5) * half_width);
@@ -35,7 +59,13 @@ pub(super) fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
         let at = random.within(1.2, distance - 1.2);
         let gap = random.within(0.8, 1.2);
         let reach = half_width - gap / 2.0 - 0.1;
-        partition(&mut shapes, at, random.within(-reach, reach), gap, half_width);
+        let middle = random.within(-reach, reach);
+        let most = if oblique { MOST_OBLIQUE_DEG } else { 0.0 };
+        // It stays clear of start and target.
+        let most = most
+            .min((0.7 * (at.min(distance - at) - KEPT_FREE_M) / half_width).atan().to_degrees());
+        let slant = if oblique { random.within(-most, most).to_radians().tan() } else { 0.0 };
+        partition(&mut shapes, at, slant, middle, gap, half_width);
     }
     let extent = greatest - least;
     let things = (extent.x * extent.y * DENSITIES[number % DENSITIES.len()]).round() as usize;
@@ -59,11 +89,13 @@ pub(super) fn closed(least: DVec2, greatest: DVec2) -> Wall {
     Wall { points: corners.to_vec(), ..Wall::default() }
 }
 
-/// A wall across the room at x = `at` with a door of `gap` metres around y = `middle`.
-fn partition(shapes: &mut Shapes, at: f64, middle: f64, gap: f64, half_width: f64) {
-    for (from, to) in [(-half_width, middle - gap / 2.0), (middle + gap / 2.0, half_width)] {
+/// A wall across the room through (`at`, 0), which leads `slant` metres along x for each along y, with a door of `gap` metres around
+/// y = `middle`.
+fn partition(shapes: &mut Shapes, at: f64, slant: f64, middle: f64, gap: f64, half_width: f64) {
+    let half_gap = gap / 2.0 / slant.hypot(1.0);
+    for (from, to) in [(-half_width, middle - half_gap), (middle + half_gap, half_width)] {
         shapes.walls.push(Wall {
-            points: vec![DVec2::new(at, from), DVec2::new(at, to)],
+            points: [from, to].map(|y| DVec2::new(at + slant * y, y)).to_vec(),
             ..Wall::default()
         });
     }
