@@ -257,4 +257,20 @@ mod tests {
         assert_eq!(row(1.0).barn_score, Some(0.125), "eight optimal times and more");
         assert_eq!(row(20.0).barn_score, Some(0.5), "two optimal times and less");
     }
+
+    #[test]
+    fn an_arrival_after_the_challenges_time_is_a_timeout_and_a_world_without_an_optimal_time_is_scored()
+     {
+        let row = |most_s| {
+            let mut trial = trial(None);
+            trial.rules = Rules { most_s, scored: true, ..trial.rules };
+            Row::new(&trial, 1, &setting(), &summary(Reported::Reached, 0.1))
+        };
+        let time_s = row(None).time_s;
+        assert_eq!(row(Some(time_s)).outcome, Outcome::Success);
+        // The shortest path of 4 m takes 2 s at 2 m/s; the best score is half of that share, the least an eighth.
+        assert!(row(None).barn_score >= Some(0.125));
+        assert_eq!(row(Some(time_s - 1.0)).outcome, Outcome::Timeout);
+        assert_eq!(row(Some(time_s - 1.0)).barn_score, Some(0.0));
+    }
 }
