@@ -1,6 +1,6 @@
 //! How the wheels of a robot differ from its nominal body, as far as is known, and the file in which a calibration says so.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
@@ -149,7 +149,7 @@ impl Mission {
     /// If the file cannot be read, or is no calibration.
     pub fn with_calibration(mut self) -> Result<Self, MissionError> {
         if let Some(file) = self.robot.calibration.take() {
-            self.robot.odometry = Calibration::read(&PathBuf::from(file))?;
+            self.robot.odometry = Calibration::read(&file)?;
         }
         Ok(self)
     }
