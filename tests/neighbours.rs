@@ -21,7 +21,7 @@ use common::{
     poll,
     samples::{
         CommandSample, CommandState, DirectiveSample, GridHeader, GuidanceSample, LinkSample,
-        Order, PoseSample, RangeSample, WheelSample,
+        Order, PoseSample, RangesHeader, WheelSample,
     },
     topics,
     wire::{Addressing, Command},
@@ -95,12 +95,12 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_whatever_their_topic
                 ($(bus.writer(&topics::$topic, u32::MAX).unwrap()),*)
             };
         }
-        let (mut range, mut wheels, mut pose, mut guidance, mut link) =
-            forge!(RANGE, WHEELS, POSE, GUIDANCE, LINK);
+        let (mut wheels, mut pose, mut guidance, mut link) = forge!(WHEELS, POSE, GUIDANCE, LINK);
+        let mut ranges = bus.slice_writer(&topics::RANGES, u32::MAX, 1).unwrap();
         let mut grid = bus.slice_writer(&topics::GRID, u32::MAX, 1).unwrap();
         for tick in [0, u64::MAX] {
             let time = MissionTime(tick);
-            range.publish(tick, time, RangeSample::default()).unwrap();
+            ranges.publish(tick, time, RangesHeader::default(), std::iter::empty()).unwrap();
             wheels.publish(tick, time, WheelSample::default()).unwrap();
             pose.publish(tick, time, PoseSample::default()).unwrap();
             grid.publish(tick, time, GridHeader::default(), std::iter::empty()).unwrap();
@@ -112,7 +112,7 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_whatever_their_topic
             let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
             support::wait_until("the forger is told", told);
         }
-        drop((range, wheels, pose, grid, guidance, link, bus));
+        drop((ranges, wheels, pose, grid, guidance, link, bus));
         let summary = run.arrives();
         let restarts = summary["restarts"].as_object().unwrap();
         assert!(restarts.values().all(|times| times == 0), "{summary}");

@@ -2,7 +2,13 @@
 
 use std::{collections::BTreeMap, fmt::Debug, time::Duration};
 
-use common::{bus::Bus, grid::Replica, samples::Stamped, topics, waiter::Waiter};
+use common::{
+    bus::Bus,
+    grid::Replica,
+    samples::{RangeReading, Stamped},
+    topics,
+    waiter::Waiter,
+};
 use serde_json::Value;
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
@@ -36,6 +42,10 @@ impl Recording {
         self.samples.insert((topic, tick), format!("{sample:?}"));
     }
 
+    fn add_readings(&mut self, tick: u64, readings: &[RangeReading]) {
+        self.samples.insert(("ranges", tick), format!("{readings:?}"));
+    }
+
     /// Whether a sample of each of so many topics was received for each tick.
     fn is_whole(&self, topics: usize) -> bool {
         let ticks = self.summary["ticks"].as_u64().unwrap();
@@ -53,7 +63,7 @@ fn record(robot: &str) -> Recording {
             Err(error) => assert!(run.is_running(), "{error}"),
         }
     };
-    let mut ranges = bus.reader(&topics::RANGE).unwrap();
+    let mut ranges = bus.slice_reader(&topics::RANGES).unwrap();
     let mut wheels = bus.reader(&topics::WHEELS).unwrap();
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut guidances = bus.reader(&topics::GUIDANCE).unwrap();
@@ -75,7 +85,7 @@ fn record(robot: &str) -> Recording {
             }
         }
         while let Ok(Some(sample)) = ranges.take() {
-            received.add("range", sample);
+            received.add_readings(sample.header().stamp.tick, &sample);
         }
         while let Ok(Some(sample)) = wheels.take() {
             received.add("wheels", sample);

@@ -57,7 +57,7 @@ pub mod topics;
 pub mod wiring;
 
 pub use bus::{self, bus_instance, clock, domain, lock_holders, poll, waiter};
-pub use mission::{self, address, geometry, infrared, kinematics, sonar};
+pub use mission::{self, address, geometry, kinematics, sonar};
 pub use x80_protocol as wire;
 
 /// The guide's Rust is compiled with the doc tests.

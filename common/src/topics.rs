@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use crate::samples::*;
+use crate::{mission::MOST_SENSORS, samples::*};
 
 pub use crate::bus::{
     AnyTopic, EVERY_STAGE, EncodedTopic, Limits, Logged, OPERATOR, OpenTopic, Rate, ReadableTopic,
@@ -59,9 +59,9 @@ macro_rules! topics {
 }
 
 topics! {
-    /// Front sonar: distance to the nearest thing ahead; the infrared rangers of the same tick.
-    RANGE: Topic<RangeSample> {
-        name: "range", writer: "x80-link", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,
+    /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
+    RANGES: SliceTopic<RangesHeader, RangeReading> {
+        name: "ranges", writer: "x80-link", rate: Rate::EachTick, limits: Limits::slices(MOST_SENSORS), logged: Yes,
     }
     /// Encoder counts and wheel speeds.
     WHEELS: Topic<WheelSample> {

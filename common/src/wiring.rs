@@ -151,8 +151,8 @@ mod tests {
         assert_eq!(opened.add(Access::Read, "guidance"), Ok(()));
         let refused = opened.add(Access::Write, "guidance");
         assert_eq!(refused, Err(WiringError::NotListed(Access::Write, "guidance")));
-        let refused = opened.add(Access::Read, "range");
-        assert_eq!(refused, Err(WiringError::NotListed(Access::Read, "range")));
+        let refused = opened.add(Access::Read, "ranges");
+        assert_eq!(refused, Err(WiringError::NotListed(Access::Read, "ranges")));
     }
 
     #[test]

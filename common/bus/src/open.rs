@@ -40,6 +40,7 @@ impl<H: Payload + Layout + Stamped, T: Payload + Layout> OpenTopic for SliceTopi
         generation: u32,
         longest: usize,
     ) -> Result<Box<dyn Any>, BusError> {
+        let longest = longest.min(self.spec.limits.longest);
         Ok(Box::new(bus.slice_writer(self, generation, longest)?))
     }
 }

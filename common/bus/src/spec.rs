@@ -74,17 +74,27 @@ pub struct Limits {
     pub borrowed: usize,
     /// Readers at once: stages, displays and recorders. Consumers leave three places free.
     pub readers: usize,
+    /// The most elements of a slice, where its writer does not say fewer.
+    pub longest: usize,
 }
 
 impl Limits {
     /// The limits of topics of one small struct.
-    pub const SMALL: Self = Self { buffer: 128, recorder_buffer: 1024, borrowed: 2, readers: 16 };
+    pub const SMALL: Self =
+        Self { buffer: 128, recorder_buffer: 1024, borrowed: 2, readers: 16, longest: usize::MAX };
     /// The limits of topics that a replay needs without gaps. A recorder that is not scheduled for 0.1 s loses nothing.
-    pub const DEEP: Self = Self { buffer: 1024, recorder_buffer: 1024, borrowed: 2, readers: 8 };
+    pub const DEEP: Self = Self { buffer: 1024, borrowed: 2, readers: 8, ..Self::SMALL };
     /// The limits of topics whose slices may be a whole map.
-    pub const MAP: Self = Self { buffer: 4, recorder_buffer: 256, borrowed: 2, readers: 24 };
+    pub const MAP: Self = Self { buffer: 4, recorder_buffer: 256, readers: 24, ..Self::SMALL };
     /// The limits of topics whose every slice is most of a whole map.
     pub const WHOLE_MAP: Self = Self { recorder_buffer: 8, ..Self::MAP };
+
+    /// The limits of topics of slices of at most so many small elements.
+    #[must_use]
+    pub const fn slices(longest: usize) -> Self {
+        Self { longest, ..Self::SMALL }
+    }
+
     /// Writers at once. One is enough, but a process that is killed while it starts may occupy a place for ever.
     pub(super) const WRITERS: usize = 16;
     /// Listeners at once on a topic. Many consumers listen to the topic that ends a tick and then read the others.

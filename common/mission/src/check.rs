@@ -2,6 +2,7 @@
 
 mod objection;
 mod robot;
+mod sensor;
 mod shapes;
 mod simulation;
 
@@ -155,7 +156,7 @@ impl Checker {
                 "use letters, digits, '-' and '_'",
             ));
         }
-        if mission.method == Method::Paper && mission.sensors != Sensors::Front {
+        if mission.method == Method::Paper && mission.sensor_set() != Sensors::Front {
             return Err(objection(
                 "sensors",
                 "the paper's method has the front sonar alone",
@@ -167,6 +168,7 @@ impl Checker {
         within("timeout_s", mission.timeout_s, 1.0..=MAX_TIMEOUT_S, "s")?;
         within("start.heading_deg", mission.start.heading_deg, -360.0..=360.0, "degrees")?;
         robot::check(mission)?;
+        sensor::check(mission)?;
         stages(mission)?;
         self.shapes("known", &mission.known)?;
         self.shapes("world", &mission.world)?;

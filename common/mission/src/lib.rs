@@ -11,8 +11,8 @@
 //! | `robot`, `simulation` | its two largest parts |
 //! | [`geometry`], [`grid`] | shapes; cells and metres, windows of cells |
 //! | [`kinematics`] | equations (1)-(3) and their inverses |
-//! | [`infrared`], [`sonar`] | how the rangers are mounted, (19) |
 //! | `odometry` | how the wheels differ from nominal ones, and the calibration file |
+//! | `sensor`, [`sonar`] | the table of the ranging sensors, and how one is mounted, (19) |
 //! | [`address`] | where a robot answers, and over which transport |
 
 pub mod address;
@@ -20,10 +20,10 @@ mod check;
 mod error;
 pub mod geometry;
 pub mod grid;
-pub mod infrared;
 pub mod kinematics;
 mod odometry;
 mod robot;
+mod sensor;
 mod simulation;
 pub mod sonar;
 
@@ -35,6 +35,9 @@ use serde::{Deserialize, Serialize};
 pub use error::MissionError;
 pub use odometry::{Calibration, Odometry, Provenance};
 pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig, Steering};
+pub use sensor::{
+    INFRARED_RANGERS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow, Sensors,
+};
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, Move, Physics, Radio, Ranger,
     Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
@@ -64,9 +67,9 @@ pub struct Mission {
     /// Whether readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
     #[serde(default = "defaults::sensing")]
     pub sensing: bool,
-    /// The sensors whose readings go into the map.
-    #[serde(default)]
-    pub sensors: Sensors,
+    /// The sensors whose readings go into the map; without it what [`Mission::sensor_set`] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensors: Option<Sensors>,
     /// The distance within which the target counts as reached, metres.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
@@ -85,7 +88,7 @@ pub struct Mission {
     /// The robot's body and where it answers.
     #[serde(default)]
     pub robot: RobotConfig,
-    /// The front ultrasonic sensor.
+    /// The front ultrasonic sensor of a robot without `[[robot.sensor]]`.
     #[serde(default)]
     pub sonar: SonarConfig,
     /// The values of dead reckoning, which turns wheel counts into the pose.
@@ -126,18 +129,6 @@ pub enum Method {
     /// The paper's method: every hit is a hazard with its margin, (19), the map only grows, (10), and the robot drives in the direction
     /// of the field, (15), (16).
     Paper,
-}
-
-/// The sensors whose readings the mapper uses as evidence. The paper's method uses only the front sonar.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Sensors {
-    /// The front sonar.
-    #[default]
-    #[serde(rename = "front")]
-    Front,
-    /// The front sonar and the ring of infrared rangers, mounted as [`crate::infrared`] says.
-    #[serde(rename = "front+infrared")]
-    FrontInfrared,
 }
 
 /// The robot's heading at the start.
@@ -334,12 +325,42 @@ impl Mission {
     /// paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
-        let default = match self.sensors {
-            _ if !self.looks_first() => 0.25,
-            Sensors::Front => 0.5,
-            Sensors::FrontInfrared => 0.7,
-        };
-        self.controller.speed_m_s.unwrap_or(default)
+        self.controller.speed_m_s.unwrap_or_else(|| {
+            let ray = |sensor: &Sensor| sensor.used && sensor.kind == SensorKind::Ray;
+            match self.looks_first() {
+                false => 0.25,
+                true if self.sensor_table().iter().any(ray) => 0.7,
+                true => 0.5,
+            }
+        })
+    }
+
+    /// The set of sensors that the mapper uses: `sensors`, or by default all that the robot has with the evidential method, and the front
+    /// sonar alone with the paper's method or on a car.
+    #[must_use]
+    pub fn sensor_set(&self) -> Sensors {
+        self.sensors.unwrap_or(match (self.method, self.robot.model) {
+            (Method::Paper, _) | (_, Model::Car) => Sensors::Front,
+            (Method::Evidential, _) => Sensors::All,
+        })
+    }
+
+    /// The robot's ranging sensors. A reading names its sensor by the row of this table.
+    #[must_use]
+    pub fn sensor_table(&self) -> Vec<Sensor> {
+        sensor::table(&self.robot, &self.sonar, self.sensor_set())
+    }
+
+    /// The row of the front sonar in [`Mission::sensor_table`].
+    #[must_use]
+    pub fn front_row(&self) -> usize {
+        sensor::front(&self.sensor_table(), &self.sonar).unwrap_or_default()
+    }
+
+    /// The front sonar.
+    #[must_use]
+    pub fn front_sonar(&self) -> Sensor {
+        self.sensor_table().swap_remove(self.front_row())
     }
 
     /// wd, rad/s: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::{
     Odometry,
     kinematics::{Ackermann, DifferentialDrive, Drive},
-    sonar::Mount,
+    sensor::SensorRow,
 };
 use serde::{Deserialize, Serialize};
 
@@ -89,6 +89,9 @@ pub struct RobotConfig {
     pub calibration: Option<PathBuf>,
     /// How its wheels differ from the nominal ones.
     pub odometry: Odometry,
+    /// The ranging sensors that it has, at most [`crate::MOST_SENSORS`]. Without rows they are those of the X80.
+    #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<SensorRow>,
 }
 
 /// The voltages below which the batteries are low, volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells,
@@ -134,6 +137,7 @@ impl Default for RobotConfig {
             held_current_ad: 1000,
             calibration: None,
             odometry: Odometry::default(),
+            sensors: Vec::new(),
         }
     }
 }
@@ -279,7 +283,7 @@ impl RobotConfig {
     }
 }
 
-/// The front ultrasonic sensor: which one it is and how it is mounted.
+/// The front ultrasonic sensor of a robot without `[[robot.sensor]]`: which one it is and how it is mounted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SonarConfig {
@@ -289,14 +293,6 @@ pub struct SonarConfig {
     pub forward_m: f64,
     /// delta of (19): its bearing from the robot's axis, degrees.
     pub bearing_deg: f64,
-}
-
-impl SonarConfig {
-    /// Its mounting.
-    #[must_use]
-    pub fn mount(&self) -> Mount {
-        Mount { forward_m: self.forward_m, bearing_rad: self.bearing_deg.to_radians() }
-    }
 }
 
 impl Default for SonarConfig {

@@ -31,11 +31,17 @@ fn the_papers_method_has_no_screening_unless_the_mission_says_so() {
 }
 
 #[test]
-fn the_sensors_are_the_front_sonar_unless_the_mission_adds_the_infrared_ring() {
+fn the_sets_of_sensors_have_these_names_and_no_others() {
     let parse = |text: &str| Mission::parse(text, Path::new("test.toml"));
-    assert_eq!(parse("target = [1, 0]").unwrap().sensors, Sensors::Front);
-    let both = parse("target = [1, 0]\nsensors = 'front+infrared'").unwrap();
-    assert_eq!(both.sensors, Sensors::FrontInfrared);
+    for (name, set) in [
+        ("front", Sensors::Front),
+        ("front+infrared", Sensors::FrontInfrared),
+        ("three-front", Sensors::ThreeFront),
+        ("all", Sensors::All),
+    ] {
+        let mission = parse(&format!("target = [1, 0]\nsensors = '{name}'")).unwrap();
+        assert_eq!(mission.sensor_set(), set);
+    }
     let error = parse("target = [1, 0]\nsensors = 'infrared'").unwrap_err();
     assert!(error.to_string().contains("front+infrared"), "{error}");
 }

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bus::{Stamp, ZeroCopySend, layouts},
     grid::Part,
-    infrared,
     kinematics::{Pose2, Twist},
+    mission::INFRARED_RANGERS,
 };
 
 payloads! {
@@ -66,8 +66,8 @@ impl PoseSample {
     }
 }
 
-/// How many readings a `grid` sample carries at most.
-pub const CLEAR_BEAMS: usize = 128;
+/// How many readings of sonars a `grid` sample carries at most: those of 128 ticks of three sonars.
+pub const CLEAR_BEAMS: usize = 3 * 128;
 
 /// One reading as evidence of free ground. A reading of the sonar says that nothing square to the beam stands nearer than
 /// `clear_m`.
@@ -86,7 +86,7 @@ pub struct ClearBeam {
 }
 
 /// How many rays of infrared rangers a `grid` sample carries at most: the rays of 32 ticks.
-pub const CLEAR_RAYS: usize = 32 * infrared::RANGERS;
+pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
 /// Topic `grid`, header; the slice is one [`crate::grid::CellState`] byte a cell of the window.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]

@@ -4,38 +4,50 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::{Stamp, ZeroCopySend, layouts},
-    infrared, latency,
+    latency,
+    mission::INFRARED_RANGERS,
 };
 
 wire_enum! {
-    /// The kind of a front sonar reading.
+    /// The kind of a reading.
     RangeStatus, unknown = Absent {
-        /// No sonar frame came since the last tick: the map stays as it is.
+        /// No frame with it came since the last tick: the map stays as it is.
         Absent = 0,
         /// `range_m` holds a distance.
         Measured = 1,
-        /// 255: nothing in range, or no echo.
+        /// Nothing in range: no echo, or a ray without end.
         Nothing = 2,
-        /// 4: at 4 cm or nearer.
+        /// A sonar at 4 cm or nearer.
         AtContact = 3,
-        /// 0: no valid reading.
+        /// No valid reading: a sonar's 0, or the voltage of an infrared ranger that is dead or saturated.
         Invalid = 4,
     }
 }
 
 payloads! {
-    /// Topic `range`: the rangers of a tick: the front sonar, and the ring of infrared rangers.
-    #[derive(Serialize, Deserialize)]
-    "firsthand.Range" RangeSample {
-        /// S of (19): metres from the sensor, where the status says so; else 0.
-        range_m: f64,
-        /// A [`RangeStatus`].
-        status: u8,
-        /// The byte as the robot sent it, cm.
-        raw_cm: u8,
-        /// The infrared rangers in the order of [`infrared::rangers`], AD counts; all 0 if none came
-        /// since the last tick, as if the rangers were dead.
-        infrared_ad: [u16; infrared::RANGERS],
+    /// Topic `ranges`, header; the slice is one [`RangeReading`] a sensor of the mission.
+    "firsthand.RangesHeader" RangesHeader {}
+}
+
+/// The reading of a ranging sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ZeroCopySend)]
+#[type_name("firsthand.RangeReading")]
+#[repr(C)]
+pub struct RangeReading {
+    /// S of (19): metres from the sensor, where the status says that it holds a distance; else 0.
+    pub range_m: f64,
+    /// The value as the robot sent it: centimetres of a sonar, AD counts of an infrared ranger; 0 if none came.
+    pub raw: u16,
+    /// The row of [`crate::mission::Mission::sensor_table`].
+    pub sensor: u8,
+    /// A [`RangeStatus`].
+    pub status: u8,
+}
+
+impl RangeReading {
+    /// What the reading is.
+    pub const fn status(&self) -> RangeStatus {
+        RangeStatus::from_byte(self.status)
     }
 }
 
@@ -235,12 +247,12 @@ impl LinkSample {
 }
 
 payloads! {
-    /// Topic `infrared`: the seven infrared rangers, in the order of [`infrared::rangers`].
+    /// Topic `infrared`: the seven infrared rangers, in the order of their channels.
     "firsthand.Infrared" InfraredSample {
         /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
-        range_m: [f64; infrared::RANGERS],
+        range_m: [f64; INFRARED_RANGERS],
         /// The readings as the robot sent them, AD counts.
-        raw_ad: [u16; infrared::RANGERS],
+        raw_ad: [u16; INFRARED_RANGERS],
     }
 }
 
@@ -308,5 +320,6 @@ payloads! {
 }
 
 layouts! {
+    RangeReading { range_m raw sensor status }
     LinkSample { stamp connected action cause at_rest frames_in bytes_dropped foreign_datagrams unsent ignored_samples ignored_writer other_port losses reboots lost_ns attempts next_attempt_ns commands_out repeated_commands repeated_ticks latency_ns latency_max_ns latency_histogram }
 }

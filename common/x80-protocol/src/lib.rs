@@ -56,8 +56,8 @@ pub use sensors::{
     counts_restarted,
 };
 pub use units::{
-    Echo, LOGIC_SCALE_V, MOTOR_SCALE_V, board_celsius, driver_celsius, infrared_ad, infrared_m,
-    volts,
+    Echo, INFRARED_LIVE_AD, LOGIC_SCALE_V, MOTOR_SCALE_V, board_celsius, driver_celsius,
+    infrared_ad, infrared_m, volts,
 };
 
 #[cfg(test)]

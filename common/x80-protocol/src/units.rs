@@ -1,5 +1,7 @@
 //! Bytes and AD counts in metres and volts.
 
+use std::ops::RangeInclusive;
+
 /// The meaning of an ultrasonic byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Echo {
@@ -42,6 +44,10 @@ impl Echo {
 
 /// Nearest and farthest range of an infrared ranger, metres.
 const INFRARED_M: (f64, f64) = (0.09, 0.81);
+
+/// Counts of an infrared ranger that is powered and connected, 0.2 V to 3.0 V: the least where it sees nothing, the most at the peak of
+/// its curve. Other counts come from a ranger that is dead or saturated.
+pub const INFRARED_LIVE_AD: RangeInclusive<u16> = 268..=4_060;
 
 /// The range an infrared ranger means by `ad`, metres, clamped to 0.09..0.81; 0.81 is also nothing.
 #[must_use]

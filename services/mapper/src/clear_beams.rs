@@ -14,7 +14,10 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// Readings, oldest first: at most [`CLEAR_BEAMS`] of the sonar and [`CLEAR_RAYS`] of infrared rangers.
+/// Readings for each sonar.
+const OF_ONE_SONAR: usize = CLEAR_BEAMS / 3;
+
+/// Readings, oldest first: at most [`OF_ONE_SONAR`] for each sonar and [`CLEAR_RAYS`] of infrared rangers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ClearBeams {
     beams: Vec<Dated>,
@@ -32,12 +35,13 @@ impl ClearBeams {
     /// Size of the largest saved state, bytes.
     pub(crate) const SAVED_BYTES: usize = (CLEAR_BEAMS + CLEAR_RAYS) * size_of::<Dated>();
 
-    /// Take a reading after the wheels have rolled `rolled_m` metres, and drop the readings that are too old.
-    pub(crate) fn take(&mut self, sonar: &SonarModel, reading: &Reading, rolled_m: f64) {
+    /// Take a reading of one of `sonars` sonars after the wheels have rolled `rolled_m` metres, and drop the readings that are too old.
+    pub(crate) fn take(&mut self, sonars: usize, reading: &Reading, rolled_m: f64) {
+        let sonar = &reading.sonar;
         let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - sonar.ahead_of_echo_m);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(sonar.clear_m));
         let newest = Dated { beam, rolled_m };
-        append(&mut self.beams, CLEAR_BEAMS, sonar, newest);
+        append(&mut self.beams, (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS), sonar, newest);
     }
 
     /// Take a reading of an infrared ranger, as [`ClearBeams::take`] does of the sonar.

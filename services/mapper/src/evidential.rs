@@ -12,7 +12,7 @@ use crate::{
     clear_beams::ClearBeams,
     evidence_grid::{EvidenceGrid, Flip, lattice, step_m},
     inflation::{Geometry, Inflation},
-    reading::{Ray, Reading, Touch},
+    reading::{Ray, Reading, Rows, Touch},
     sonar_model::SonarModel,
 };
 
@@ -42,6 +42,8 @@ pub(crate) struct Evidential {
     geometry: Geometry,
     radius: f64,
     map_within: f64,
+    /// Number of sonars that are used.
+    sonars: usize,
 }
 
 impl Evidential {
@@ -56,6 +58,7 @@ impl Evidential {
             geometry: Geometry { lattice: lattice(&sonar, mission, reach), grid, reach },
             radius,
             map_within: mission.map_within_m(),
+            sonars: Rows::new(mission).cones(),
         }
     }
 
@@ -97,14 +100,14 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take the reading of the sonar, if there is one, and the rays of the infrared rangers, of a robot at `robot` whose
-    /// wheels have rolled `rolled_m` metres.
+    /// Take the readings of the sonars and the rays of the infrared rangers of a robot at `robot` whose wheels have rolled `rolled_m`
+    /// metres.
     pub(crate) fn take(
         &self,
         map: &mut EvidenceMap,
         robot: DVec2,
-        reading: Option<Reading>,
-        rays: &[Ray],
+        beams: impl Iterator<Item = Reading>,
+        rays: impl Iterator<Item = Ray>,
         rolled_m: f64,
     ) -> Observed {
         let mut flips = Vec::new();
@@ -113,14 +116,14 @@ impl Evidential {
         let mut touched = Window::default();
         // Rays come first, because what they show explains echoes.
         for ray in rays {
-            map.beams.take_ray(&self.sonar, ray, rolled_m);
-            let seen = map.evidence.take_ray(&self.sonar, lattice, ray, body, &mut flips);
+            map.beams.take_ray(&self.sonar, &ray, rolled_m);
+            let seen = map.evidence.take_ray(&self.sonar, lattice, &ray, body, &mut flips);
             touched = touched.union(seen);
         }
-        if let Some(reading) = reading {
-            map.beams.take(&self.sonar, &reading, rolled_m);
+        for reading in beams {
+            map.beams.take(self.sonars, &reading, rolled_m);
             let beam = (&reading, self.map_within);
-            let heard = map.evidence.take(&self.sonar, lattice, beam, body, &mut flips);
+            let heard = map.evidence.take(&reading.sonar, lattice, beam, body, &mut flips);
             touched = touched.union(heard);
         }
         let mut window = self.on_grid(touched);

@@ -5,13 +5,11 @@
 //! than 10 cm the voltage falls again: such a reading says that an obstacle is near, but not how near. Glass and surfaces
 //! that do not reflect infrared are not seen; the sonar hears those.
 
-use std::ops::RangeInclusive;
+use common::{
+    samples::{RangeReading, RangeStatus},
+    wire::infrared_ad,
+};
 
-use common::wire::{infrared_ad, infrared_m};
-
-/// Counts of a ranger that is powered and connected, 0.2 V to 3.0 V: the least where it sees nothing, the most at the peak
-/// of its curve. Other counts come from a ranger that is dead or saturated.
-const LIVE_AD: RangeInclusive<u16> = 268..=4_060;
 /// A reading nearer than this may come from an obstacle that is nearer still, metres.
 const UNAMBIGUOUS_M: f64 = 0.10;
 /// A reading farther than this is not a hit, metres: a ranger that sees nothing can give it.
@@ -36,17 +34,20 @@ pub(crate) struct Seen {
     pub(crate) hit_m: Option<f64>,
 }
 
-/// The meaning of `ad` counts; none where the ranger may be dead or saturated.
-pub(crate) fn seen(ad: u16) -> Option<Seen> {
-    if !LIVE_AD.contains(&ad) {
-        return None;
-    }
-    let range_m = infrared_m(ad);
+/// The meaning of a reading of a ranger whose ranges are used up to `reach_m`; none where the ranger may be dead or saturated.
+pub(crate) fn seen(reading: &RangeReading, reach_m: f64) -> Option<Seen> {
+    let range_m = match reading.status() {
+        RangeStatus::Measured if reading.range_m > 0.0 => reading.range_m,
+        RangeStatus::Nothing => reach_m,
+        _ => return None,
+    };
+    let is_hit = range_m <= HIT_WITHIN_M && range_m < reach_m;
+    let range_m = range_m.min(reach_m);
     let ambiguous = range_m < UNAMBIGUOUS_M;
     let clear_m = range_m - SURE_DEVIATIONS * deviation_m(range_m) - FORMULA_M;
     Some(Seen {
         clear_m: if ambiguous { 0.0 } else { clear_m.max(0.0) },
-        hit_m: Some(range_m).filter(|range| *range <= HIT_WITHIN_M),
+        hit_m: is_hit.then_some(range_m),
     })
 }
 
@@ -62,12 +63,17 @@ fn deviation_m(range_m: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn reads(range_m: f64) -> Seen {
+        let status = RangeStatus::Measured.into();
+        seen(&RangeReading { range_m, status, ..RangeReading::default() }, 0.81).unwrap()
+    }
+
     #[test]
     fn a_ray_is_free_to_less_than_the_reading_and_the_less_the_farther() {
         for (range, clear, hit) in
             [(0.2, 0.176, true), (0.5, 0.454, true), (0.7, 0.629, true), (0.81, 0.722, false)]
         {
-            let seen = seen(infrared_ad(range)).unwrap();
+            let seen = reads(range);
             assert!((seen.clear_m - clear).abs() < 0.003, "{range} m: {seen:?}");
             let near = seen.hit_m.is_some_and(|hit| (hit - range).abs() < 0.002);
             assert_eq!(near, hit, "{range} m: {seen:?}");
@@ -75,15 +81,17 @@ mod tests {
     }
 
     #[test]
-    fn a_dead_or_saturated_ranger_says_nothing() {
-        for ad in [0, 100, 4_080, 4_095, u16::MAX] {
-            assert_eq!(seen(ad), None, "{ad}");
-        }
+    fn a_ray_counts_no_further_than_the_reach_of_its_row() {
+        let reading = RangeReading { range_m: 0.6, ..RangeReading::default() };
+        let status = RangeStatus::Measured.into();
+        let seen = seen(&RangeReading { status, ..reading }, 0.5).unwrap();
+        assert!(seen.hit_m.is_none() && seen.clear_m < 0.5, "{seen:?}");
+        assert_eq!(super::seen(&reading, 0.81), None);
     }
 
     #[test]
     fn a_reading_nearer_than_10_cm_frees_nothing() {
-        let seen = seen(infrared_ad(0.095)).unwrap();
+        let seen = reads(0.095);
         assert_eq!(seen.clear_m, 0.0);
         assert!(seen.hit_m.is_some());
     }

@@ -6,13 +6,13 @@
 //! | `sonar_model` | every number of the sonar's inverse model |
 //! | `infrared_model` | every number of the infrared rangers' model |
 //! | `evidence_grid` | the occupancy evidence grid: evidence for and against every cell, and where the sonar looked |
-//! | `reading` | readings of the sonar and of an infrared ranger, where they were taken |
+//! | `reading` | the rows of the sensors: their readings, where they were taken |
 //! | `clear_beams` | the newest readings as evidence of free ground, for the planner |
 //! | `inflation` | occupied cells grown by the robot's body |
 //! | `evidential` | evidence and inflation together: the evidential method's state of a cell |
 //! | `fault` | hazard of injected faults |
 //! | [`stage`] | what a recording holds of it, what it publishes and persists |
-//! | [`shell`] | its process: reads the topics `pose`, `range` and `directive`, publishes keyframes |
+//! | [`shell`] | its process: reads the topics `pose`, `ranges` and `directive`, publishes keyframes |
 
 mod clear_beams;
 mod evidence_grid;

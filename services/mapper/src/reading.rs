@@ -1,18 +1,121 @@
-//! Readings of the rangers in the mission's frame.
+//! Readings of the ranging sensors in the mission's frame, by the rows of the mission's sensors.
 
 use std::f64::consts::PI;
 
 use common::{
-    infrared,
     kinematics::Pose2,
-    mission::Sensors,
-    samples::{ContactSample, RangeSample},
+    mission::{Mission, SensorKind},
+    samples::{ContactSample, RangeReading, RangeStatus},
+    sonar::Mount,
 };
 use glam::DVec2;
 
-use crate::infrared_model::{self, Seen};
+use crate::{
+    infrared_model::{self, Seen},
+    sonar_model::SonarModel,
+};
 
-/// A reading of the sonar in the mission's frame.
+/// The range at which the reading "4 cm or nearer" is mapped, metres.
+const CONTACT_M: f64 = 0.04;
+
+/// The robot's sensors, with the model of each that is used.
+#[derive(Clone, Debug)]
+pub(crate) struct Rows {
+    rows: Vec<Option<Row>>,
+    front: u8,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    mount: Mount,
+    reach_m: f64,
+    /// The model of a cone; none for a ray.
+    cone: Option<SonarModel>,
+}
+
+impl Rows {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        let row = |sensor: common::mission::Sensor| {
+            sensor.used.then(|| Row {
+                mount: sensor.mount,
+                reach_m: sensor.reach_m,
+                cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
+            })
+        };
+        Self {
+            rows: mission.sensor_table().into_iter().map(row).collect(),
+            front: mission.front_row() as u8,
+        }
+    }
+
+    /// Number of cones that are used.
+    pub(crate) fn cones(&self) -> usize {
+        self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
+    }
+
+    /// The row of a reading; none if the mission does not use it. The sample comes from shared memory and may hold anything.
+    fn of(&self, reading: &RangeReading) -> Option<Row> {
+        *self.rows.get(usize::from(reading.sensor))?
+    }
+
+    pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
+        self.of(reading).is_some()
+    }
+
+    /// The hit of (19), metres, with its distance S: where the front sonar of a robot at `robot` hears something.
+    pub(crate) fn front_hit(
+        &self,
+        robot: Pose2,
+        readings: &[RangeReading],
+    ) -> Option<(f64, DVec2)> {
+        let reading = readings.iter().find(|reading| reading.sensor == self.front)?;
+        let distance = safety_distance(reading)?;
+        Some((distance, self.of(reading)?.mount.hit(robot, distance)))
+    }
+
+    /// The readings of the cones on a robot at `robot`, in the order of `readings`.
+    pub(crate) fn beams(
+        &self,
+        robot: Pose2,
+        readings: &[RangeReading],
+    ) -> impl Iterator<Item = Reading> {
+        readings.iter().filter_map(move |reading| {
+            let row = self.of(reading)?;
+            let sonar = row.cone?;
+            let echo = match reading.status() {
+                RangeStatus::Nothing => None,
+                _ => Some(safety_distance(reading)?).filter(|range| *range <= row.reach_m),
+            };
+            let ranger = row.mount.on(robot);
+            Some(Reading { origin: ranger.position, axis: ranger.axis(), echo, sonar })
+        })
+    }
+
+    /// The readings of the live rays on a robot at `robot`, in the order of `readings`.
+    pub(crate) fn rays(
+        &self,
+        robot: Pose2,
+        readings: &[RangeReading],
+    ) -> impl Iterator<Item = Ray> {
+        readings.iter().filter_map(move |reading| {
+            let row = self.of(reading).filter(|row| row.cone.is_none())?;
+            let seen = infrared_model::seen(reading, row.reach_m)?;
+            let ranger = row.mount.on(robot);
+            Some(Ray { origin: ranger.position, axis: ranger.axis(), seen })
+        })
+    }
+}
+
+/// S of (19), if the reading says where something is.
+fn safety_distance(reading: &RangeReading) -> Option<f64> {
+    match reading.status() {
+        RangeStatus::Measured if reading.range_m >= 0.0 => Some(reading.range_m),
+        RangeStatus::AtContact => Some(CONTACT_M),
+        _ => None,
+    }
+}
+
+/// A reading of a sonar in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
     /// Position of the sensor, metres.
@@ -21,6 +124,8 @@ pub(crate) struct Reading {
     pub(crate) axis: DVec2,
     /// Range of the echo, metres; none where nothing answered.
     pub(crate) echo: Option<f64>,
+    /// The model of the sensor.
+    pub(crate) sonar: SonarModel,
 }
 
 /// A reading of an infrared ranger in the mission's frame.
@@ -31,29 +136,6 @@ pub(crate) struct Ray {
     /// Direction of the ray, a unit vector.
     pub(crate) axis: DVec2,
     pub(crate) seen: Seen,
-}
-
-impl Ray {
-    /// The readings of all live rangers among `sensors`, on a robot at `pose` with a body of `radius` metres.
-    pub(crate) fn all(
-        pose: Pose2,
-        radius: f64,
-        sensors: Sensors,
-        range: &RangeSample,
-    ) -> Vec<Self> {
-        if sensors != Sensors::FrontInfrared {
-            return Vec::new();
-        }
-        let rangers = infrared::rangers(pose, radius).into_iter();
-        let ray = |(ranger, ad): (Pose2, u16)| {
-            infrared_model::seen(ad).map(|seen| Self {
-                origin: ranger.position,
-                axis: ranger.axis(),
-                seen,
-            })
-        };
-        rangers.zip(range.infrared_ad).filter_map(ray).collect()
-    }
 }
 
 /// Something that touches the body, in the mission's frame.

@@ -1,17 +1,18 @@
-//! `pose`, `range` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
+//! `pose`, `ranges` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and now and
 //! then, nothing but a stamp otherwise, so that every tick goes on to the planner.
 
 use std::time::Duration;
 
 use common::{
-    bus::Reader,
+    bus::{Reader, SliceReader},
     clock::MissionTime,
-    samples::{ContactSample, DirectiveSample, FaultKind, PoseSample, RangeSample},
+    mission::MOST_SENSORS,
+    samples::{ContactSample, DirectiveSample, FaultKind, PoseSample, RangeReading, RangesHeader},
     shell::{Context, Process, Progress},
     stage::Runner,
     start::StageError,
     step::Step as _,
-    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGE},
+    topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES},
     wiring::{Persists, Wiring},
 };
 
@@ -26,18 +27,19 @@ const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
 /// The mapper process.
 pub struct Shell {
     pose: Reader<PoseSample>,
-    range: Reader<RangeSample>,
+    ranges: SliceReader<RangesHeader, RangeReading>,
     contact: Reader<ContactSample>,
     directive: Reader<DirectiveSample>,
     runner: Runner<Mapper>,
-    latest_range: Option<RangeSample>,
+    /// The newest readings that are used, and their tick.
+    latest_ranges: Option<(u64, Vec<RangeReading>)>,
     latest_contact: Option<ContactSample>,
     last_keyframe: Option<MissionTime>,
 }
 
 impl Process for Shell {
     const WIRING: &'static Wiring = &Wiring {
-        inputs: &[&RANGE, &CONTACT, &POSE, &DIRECTIVE],
+        inputs: &[&RANGES, &CONTACT, &POSE, &DIRECTIVE],
         // A planner that becomes ready is a new reader of the grid.
         wakes: &[&POSE, &DIRECTIVE, &HEALTH],
         outputs: &[&GRID],
@@ -53,11 +55,11 @@ impl Process for Shell {
         }
         Ok(Self {
             pose: context.reader(&POSE)?,
-            range: context.reader(&RANGE)?,
+            ranges: context.slice_reader(&RANGES)?,
             contact: context.reader(&CONTACT)?,
             directive: context.reader(&DIRECTIVE)?,
             runner,
-            latest_range: None,
+            latest_ranges: None,
             latest_contact: None,
             last_keyframe: None,
         })
@@ -65,13 +67,10 @@ impl Process for Shell {
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.pose.take()? {
-            let range = self.range_of(pose.stamp.tick)?;
+            let ranges = self.ranges_of(pose.stamp.tick)?;
             self.runner.out.at = Progress::of(&pose.stamp);
-            let input = match self.contact_of(pose.stamp.tick)? {
-                Some(contact) => Input::Contact { pose, range, contact },
-                None => Input::Tick { pose, range },
-            };
-            self.step(input)?;
+            let contact = self.contact_of(pose.stamp.tick)?;
+            self.step(Input::Tick { pose, ranges, contact })?;
         }
         if let Some(DirectiveSample { epoch, .. }) = self.directive.newest()?
             && self.step(Input::Reset { epoch })?
@@ -120,18 +119,21 @@ impl Shell {
         Ok(published.is_some())
     }
 
-    /// The range sample of `tick`; those before it are dropped, one after it waits for its pose.
-    fn range_of(&mut self, tick: u64) -> Result<Option<RangeSample>, StageError> {
-        while self.latest_range.is_none_or(|range| range.stamp.tick < tick) {
-            match self.range.take()? {
-                Some(range) => self.latest_range = Some(range),
-                None => break,
-            }
+    /// The readings of `tick`; those before it are dropped, those after it wait for their pose.
+    fn ranges_of(&mut self, tick: u64) -> Result<Vec<RangeReading>, StageError> {
+        while self.latest_ranges.as_ref().is_none_or(|(latest, _)| *latest < tick) {
+            let Some(slice) = self.ranges.take()? else {
+                break;
+            };
+            let readings = slice.iter().take(MOST_SENSORS).copied();
+            let used = readings.filter(|reading| self.runner.stage.uses(reading)).collect();
+            self.latest_ranges = Some((slice.header().stamp.tick, used));
         }
-        Ok(self.latest_range.filter(|range| range.stamp.tick == tick))
+        let latest = self.latest_ranges.as_ref().filter(|(latest, _)| *latest == tick);
+        Ok(latest.map(|(_, readings)| readings.clone()).unwrap_or_default())
     }
 
-    /// The contact of `tick`, likewise; most ticks have none.
+    /// The contact of `tick`; most ticks have none.
     fn contact_of(&mut self, tick: u64) -> Result<Option<ContactSample>, StageError> {
         while self.latest_contact.is_none_or(|contact| contact.stamp.tick < tick) {
             match self.contact.take()? {

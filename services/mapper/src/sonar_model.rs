@@ -8,6 +8,8 @@
 
 use std::f64::consts::TAU;
 
+use common::mission::{Sensor, SensorModel};
+
 const DEGREE: f64 = TAU / 360.0;
 
 /// The inverse sensor model of the evidence grid, with the bounds and the ageing of evidence. [`SonarModel::default`] is the
@@ -83,6 +85,25 @@ pub(crate) struct SonarModel {
     pub(crate) rim_m: f64,
     /// An obstacle nearer than this to the robot survives the first reset of the sensed belief, metres: the robot may touch it.
     pub(crate) near_m: f64,
+}
+
+impl SonarModel {
+    /// The model of a sonar: that of the X80's with the cone's angles and ranges in the ratio of field of view and reach.
+    pub(crate) fn of(sensor: &Sensor) -> Self {
+        let x80 = Self::default();
+        let wide = sensor.field_of_view_deg / SensorModel::Dur5200.field_of_view_deg();
+        let far = (sensor.reach_m / SensorModel::Dur5200.reach_m()).min(1.0);
+        Self {
+            arc: x80.arc * wide,
+            against: x80.against * wide,
+            against_at_edge: x80.against_at_edge * wide,
+            scanned: x80.scanned * wide,
+            pointed: x80.pointed * wide,
+            scanned_m: x80.scanned_m * far,
+            clear_m: x80.clear_m * far,
+            ..x80
+        }
+    }
 }
 
 impl Default for SonarModel {

@@ -60,7 +60,7 @@ impl Stage for Mapper {
         let change = match entry {
             Entry::Step(input, at) => {
                 out.at = at;
-                let change = self.step(input, at.time);
+                let change = self.step(input.clone(), at.time);
                 // A belief that is wrong is wrong in its journal, too.
                 if change != Change::None || matches!(input, Input::Fault(_)) {
                     out.append(&input)?;

@@ -6,9 +6,9 @@
 use common::{
     clock::MissionTime,
     grid::{Cell, CellState, GridFrame, Part, Window},
-    mission::{Method, Mission, Sensors},
-    samples::{ContactSample, FaultKind, GridHeader, PoseSample, RangeSample, RangeStatus},
-    sonar::Mount,
+    kinematics::Pose2,
+    mission::{Method, Mission},
+    samples::{ContactSample, FaultKind, GridHeader, PoseSample, RangeReading},
     step::{ForeignState, Step},
 };
 use glam::DVec2;
@@ -17,20 +17,19 @@ use serde::{Deserialize, Serialize};
 use crate::{
     evidential::{EvidenceMap, Evidential},
     fault,
-    reading::{Ray, Reading, Touch},
+    reading::{Rows, Touch},
 };
 
-/// The range at which the reading "4 cm or nearer" is mapped, metres.
-const CONTACT_M: f64 = 0.04;
-
 /// An input of the step. The belief follows from its inputs alone, so the journal holds the inputs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
-    /// The pose of a tick with the readings of the rangers.
+    /// The pose of a tick with what the robot sensed.
     Tick {
         pose: PoseSample,
-        /// The range sample of this tick; none if none came.
-        range: Option<RangeSample>,
+        /// The readings of this tick; none if none came.
+        ranges: Vec<RangeReading>,
+        /// Where something holds the wheels at this tick.
+        contact: Option<ContactSample>,
     },
     /// The supervisor's reset of the sensed belief.
     Reset {
@@ -39,8 +38,6 @@ pub enum Input {
     },
     /// A fault that an operator injects into the belief; it acts from the next tick on.
     Fault(FaultKind),
-    /// As [`Input::Tick`], for a tick at which something holds the wheels.
-    Contact { pose: PoseSample, range: Option<RangeSample>, contact: ContactSample },
 }
 
 /// The part of the map that an input changed and that is published.
@@ -71,7 +68,7 @@ pub struct Belief {
     cells: Vec<u8>,
     /// Grows by one with every change.
     version: u64,
-    /// Range samples that put a hazard on the map.
+    /// Ticks whose readings put a hazard on the map.
     safety_events: u64,
     /// Resets of the sensed belief.
     epoch: u64,
@@ -113,9 +110,8 @@ pub struct Mapper {
     margin: u32,
     evidential: Evidential,
     sensing: bool,
-    sensors: Sensors,
+    rows: Rows,
     map_within: f64,
-    mount: Mount,
     footprint: f64,
     half_track: f64,
     belief: Belief,
@@ -143,9 +139,8 @@ impl Step for Mapper {
             margin,
             evidential,
             sensing: mission.sensing,
-            sensors: mission.sensors,
+            rows: Rows::new(mission),
             map_within: mission.map_within_m(),
-            mount: mission.sonar.mount(),
             footprint: mission.body().radius_m,
             half_track: mission.body().track_m / 2.0,
             belief: Belief {
@@ -184,9 +179,8 @@ impl Step for Mapper {
 
     fn step(&mut self, input: Input, _: MissionTime) -> Change {
         match input {
-            Input::Tick { pose, range } => Change::Window(self.map(&pose, range.as_ref(), None)),
-            Input::Contact { pose, range, contact } => {
-                Change::Window(self.map(&pose, range.as_ref(), Some(&contact)))
+            Input::Tick { pose, ranges, contact } => {
+                Change::Window(self.map(&pose, &ranges, contact.as_ref()))
             }
             Input::Reset { epoch } if self.reset_belief(epoch) => Change::Whole,
             Input::Reset { .. } => Change::None,
@@ -199,6 +193,11 @@ impl Step for Mapper {
 }
 
 impl Mapper {
+    /// Whether the mission uses the sensor of a reading.
+    pub fn uses(&self, reading: &RangeReading) -> bool {
+        self.rows.uses(reading)
+    }
+
     pub const fn frame(&self) -> GridFrame {
         self.frame
     }
@@ -253,12 +252,12 @@ impl Mapper {
         }
     }
 
-    /// Map one reading taken at `pose`, and the contact of that tick. Returns the window that changed, empty for none. A tick given
+    /// Map the readings taken at `pose`, and the contact of that tick. Returns the window that changed, empty for none. A tick given
     /// twice is mapped once.
     fn map(
         &mut self,
         pose: &PoseSample,
-        range: Option<&RangeSample>,
+        ranges: &[RangeReading],
         contact: Option<&ContactSample>,
     ) -> Window {
         if self.belief.tick == Some(pose.stamp.tick) {
@@ -270,10 +269,10 @@ impl Mapper {
         self.belief.rolled += last.distance(now.position)
             + self.half_track * (now.heading - self.belief.heading).abs();
         (self.belief.robot, self.belief.heading) = (now.position, now.heading);
-        let range = range.filter(|_| self.sensing);
+        let ranges = if self.sensing { ranges } else { &[] };
         let changed = match &self.belief.sensed {
-            Sensed::Hits => self.mark_hit(pose, range),
-            Sensed::Evidence(_) => self.weigh(pose, range, rolled),
+            Sensed::Hits => self.mark_hit(now, ranges),
+            Sensed::Evidence(_) => self.weigh(now, ranges, rolled),
         };
         let contact = contact.and_then(|contact| Touch::of(now, contact));
         let felt = contact.map_or_else(Window::default, |touch| self.mark_touch(&touch));
@@ -282,37 +281,27 @@ impl Mapper {
         changed
     }
 
-    /// Method `paper`: mark hazard where a reading shows an obstacle.
-    fn mark_hit(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
-        let Some(distance) = range.and_then(safety_distance) else {
+    /// Method `paper`: mark hazard where the front sonar hears an obstacle.
+    fn mark_hit(&mut self, robot: Pose2, ranges: &[RangeReading]) -> Window {
+        let Some((distance, hit)) = self.rows.front_hit(robot, ranges) else {
             return Window::default();
         };
         if distance > self.map_within {
             return Window::default();
         }
-        let robot = pose.pose();
-        let changed = self.mark(self.mount.hit(robot, distance), robot.position);
+        let changed = self.mark(hit, robot.position);
         self.belief.safety_events += u64::from(changed.area() > 0);
         changed
     }
 
-    /// Method `evidential`: take the reading as evidence for and against hazard, and note which ground was scanned.
-    fn weigh(&mut self, pose: &PoseSample, range: Option<&RangeSample>, rolled: f64) -> Window {
+    /// Method `evidential`: take the readings as evidence for and against hazard, and note which ground was scanned.
+    fn weigh(&mut self, robot: Pose2, ranges: &[RangeReading], rolled: f64) -> Window {
         let Sensed::Evidence(map) = &mut self.belief.sensed else {
             return Window::default();
         };
-        let robot = pose.pose();
-        let echo = range.and_then(|range| match RangeStatus::from_byte(range.status) {
-            RangeStatus::Nothing => Some(None),
-            _ => safety_distance(range).map(Some),
-        });
-        let ranger = self.mount.on(robot);
-        let reading =
-            echo.map(|echo| Reading { origin: ranger.position, axis: ranger.axis(), echo });
-        let rays = range
-            .map_or_else(Vec::new, |range| Ray::all(robot, self.footprint, self.sensors, range));
         let stale = self.evidential.roll(map, rolled, self.belief.rolled);
-        let news = self.evidential.take(map, robot.position, reading, &rays, self.belief.rolled);
+        let (beams, rays) = (self.rows.beams(robot, ranges), self.rows.rays(robot, ranges));
+        let news = self.evidential.take(map, robot.position, beams, rays, self.belief.rolled);
         let changed = self.redraw(stale.union(news.window));
         self.belief.safety_events += u64::from(news.safety_event);
         changed
@@ -427,15 +416,6 @@ impl Mapper {
             }
         }
         changed
-    }
-}
-
-/// S of (19), if the reading says where something is.
-fn safety_distance(range: &RangeSample) -> Option<f64> {
-    match RangeStatus::from_byte(range.status) {
-        RangeStatus::Measured if range.range_m >= 0.0 => Some(range.range_m),
-        RangeStatus::AtContact => Some(CONTACT_M),
-        _ => None,
     }
 }
 

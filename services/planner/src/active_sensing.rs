@@ -62,7 +62,7 @@ impl ActiveSensing {
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
             stops_within_s: mission.planner.stops_within_s,
-            bearing: DVec2::from_angle(mission.sonar.bearing_deg.to_radians()),
+            bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
             scan_side: None,
         }
     }

@@ -1,35 +1,38 @@
-//! The readings of the rangers for the next tick, collected from several frames.
+//! The readings of the ranging sensors for the next tick, collected from several frames.
 
 use common::{
-    infrared,
-    mission::Mission,
-    samples::{InfraredSample, RangeSample, RangeStatus},
-    wire::{CustomSensors, Echo, StandardSensors, infrared_m},
+    mission::{INFRARED_RANGERS, Mission, Sensor, SensorKind},
+    samples::{InfraredSample, RangeReading, RangeStatus},
+    wire::{CustomSensors, Echo, INFRARED_LIVE_AD, StandardSensors, infrared_m},
 };
 
-/// The newest readings since the last tick.
+/// The newest reading of each sensor since the last tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Rangers {
-    sonar_index: usize,
-    sonar: Option<u8>,
+    table: Vec<Sensor>,
+    newest: Vec<RangeReading>,
+    /// The readings that came since [`Rangers::take_fresh`].
+    fresh: Vec<RangeReading>,
     /// The first infrared ranger comes in the standard frame, the other six in the custom one.
     first_infrared: Option<u16>,
-    infrared: Option<[u16; infrared::RANGERS]>,
+    ticks: u64,
 }
 
 impl Rangers {
     pub(crate) fn new(mission: &Mission) -> Self {
+        let table = mission.sensor_table();
         Self {
-            sonar_index: usize::from(mission.sonar.index),
-            sonar: None,
+            newest: absent(&table).collect(),
+            table,
+            fresh: Vec::new(),
             first_infrared: None,
-            infrared: None,
+            ticks: 0,
         }
     }
 
     pub(crate) fn take_standard(&mut self, standard: &StandardSensors) {
-        self.sonar = standard.ultrasonic.get(self.sonar_index).copied();
         self.first_infrared = Some(standard.infrared);
+        self.take(SensorKind::Cone, |channel| standard.ultrasonic.get(channel).copied().map(heard));
     }
 
     /// Take a custom frame. Returns no sample until a standard frame has brought the first ranger's reading.
@@ -37,38 +40,68 @@ impl Rangers {
         let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
         let first = self.first_infrared?;
         let raw_ad = [first, second, third, fourth, fifth, sixth, seventh];
-        self.infrared = Some(raw_ad);
-        Some(InfraredSample {
-            range_m: raw_ad.map(infrared_m),
-            raw_ad,
-            ..InfraredSample::default()
-        })
+        self.take(SensorKind::Ray, |channel| raw_ad.get(channel).copied().map(seen));
+        let range_m: [f64; INFRARED_RANGERS] = raw_ad.map(infrared_m);
+        Some(InfraredSample { range_m, raw_ad, ..InfraredSample::default() })
     }
 
-    /// Take the readings for a tick. The next tick has none until new ones come.
-    pub(crate) fn for_tick(&mut self) -> RangeSample {
-        RangeSample {
-            infrared_ad: self.infrared.take().unwrap_or_default(),
-            ..reading(self.sonar.take())
+    fn take(&mut self, kind: SensorKind, read: impl Fn(usize) -> Option<RangeReading>) {
+        for (row, sensor) in self.table.iter().enumerate() {
+            if sensor.kind == kind
+                && let Some(reading) = read(sensor.channel.into())
+            {
+                self.newest[row] = RangeReading { sensor: row as u8, ..reading };
+                self.fresh.push(self.newest[row]);
+            }
         }
+    }
+
+    /// The readings of the frames since the last call.
+    pub(crate) fn take_fresh(&mut self) -> Vec<RangeReading> {
+        std::mem::take(&mut self.fresh)
+    }
+
+    /// Take the readings for a tick, one for each row. The next tick has none until new ones come.
+    pub(crate) fn for_tick(&mut self) -> Vec<RangeReading> {
+        let tick = self.ticks;
+        self.ticks += 1;
+        let absent = absent(&self.table).collect();
+        let mut readings = std::mem::replace(&mut self.newest, absent);
+        for (reading, sensor) in readings.iter_mut().zip(&self.table) {
+            if !tick.is_multiple_of(sensor.every_ticks) {
+                *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
+            }
+        }
+        readings
     }
 }
 
-/// The sample with the reading of a sonar byte.
-fn reading(byte: Option<u8>) -> RangeSample {
-    let (status, range_m) = match byte.map(Echo::from_byte) {
-        None => (RangeStatus::Absent, None),
-        Some(None) => (RangeStatus::Invalid, None),
-        Some(Some(echo @ Echo::Touching)) => (RangeStatus::AtContact, echo.metres()),
-        Some(Some(echo @ Echo::At(_))) => (RangeStatus::Measured, echo.metres()),
-        Some(Some(Echo::Nothing)) => (RangeStatus::Nothing, None),
+fn absent(table: &[Sensor]) -> impl Iterator<Item = RangeReading> {
+    (0..).zip(table).map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() })
+}
+
+/// The reading of a sonar byte.
+fn heard(byte: u8) -> RangeReading {
+    let echo = Echo::from_byte(byte);
+    let status = match echo {
+        None => RangeStatus::Invalid,
+        Some(Echo::Touching) => RangeStatus::AtContact,
+        Some(Echo::At(_)) => RangeStatus::Measured,
+        Some(Echo::Nothing) => RangeStatus::Nothing,
     };
-    RangeSample {
-        range_m: range_m.unwrap_or_default(),
-        status: status.into(),
-        raw_cm: byte.unwrap_or_default(),
-        ..RangeSample::default()
-    }
+    let range_m = echo.and_then(Echo::metres).unwrap_or_default();
+    RangeReading { range_m, raw: byte.into(), status: status.into(), ..RangeReading::default() }
+}
+
+/// The reading of an infrared ranger's counts.
+fn seen(ad: u16) -> RangeReading {
+    let range_m = infrared_m(ad);
+    let (status, range_m) = match INFRARED_LIVE_AD.contains(&ad) {
+        false => (RangeStatus::Invalid, 0.0),
+        true if range_m >= infrared_m(0) => (RangeStatus::Nothing, 0.0),
+        true => (RangeStatus::Measured, range_m),
+    };
+    RangeReading { range_m, raw: ad, status: status.into(), ..RangeReading::default() }
 }
 
 #[cfg(test)]
@@ -76,27 +109,75 @@ mod tests {
     use super::*;
     use std::path::Path;
 
+    fn rangers(extra: &str) -> Rangers {
+        let text = format!("target = [3, 0]\n{extra}");
+        Rangers::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    }
+
+    fn is(reading: &RangeReading, status: RangeStatus, range_m: f64, raw: u16) -> bool {
+        reading.status() == status && (reading.range_m - range_m).abs() < 1e-5 && reading.raw == raw
+    }
+
     #[test]
     fn the_seven_infrared_rangers_come_from_two_frames() {
-        let mut rangers =
-            Rangers::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap());
-        let custom = CustomSensors { ad: [9, 9, 1000, 0, 4095, 0, 0, 0], io: 0 };
+        let mut rangers = rangers("");
+        let custom = CustomSensors { ad: [9, 9, 1000, 0, 4095, 0, 0, 300], io: 0 };
         assert_eq!(rangers.take_custom(&custom), None, "one is missing");
         rangers.take_standard(&StandardSensors { infrared: 1000, ..StandardSensors::default() });
         let infrared = rangers.take_custom(&custom).unwrap();
-        assert_eq!(infrared.raw_ad, [1000, 1000, 0, 4095, 0, 0, 0]);
+        assert_eq!(infrared.raw_ad, [1000, 1000, 0, 4095, 0, 0, 300]);
         assert_eq!(infrared.range_m[2..4], [0.81, 0.09]);
         assert!((infrared.range_m[0] - 0.375_79).abs() < 1e-5);
+        let readings = rangers.for_tick();
+        assert!(is(&readings[3], RangeStatus::Measured, 0.375_79, 1000));
+        assert!(is(&readings[9], RangeStatus::Nothing, 0.0, 300));
+    }
+
+    #[test]
+    fn a_dead_or_saturated_ranger_says_nothing() {
+        for ad in [0, 100, 4_080, 4_095, u16::MAX] {
+            assert_eq!(seen(ad).status(), RangeStatus::Invalid, "{ad}");
+        }
     }
 
     #[test]
     fn every_sonar_byte_is_read_as_the_protocol_says() {
-        let status = |byte| RangeStatus::from_byte(reading(Some(byte)).status);
+        let status = |byte| heard(byte).status();
         assert_eq!(status(0), RangeStatus::Invalid);
         assert_eq!(status(4), RangeStatus::AtContact);
         assert_eq!(status(5), RangeStatus::Measured);
         assert_eq!(status(254), RangeStatus::Measured);
         assert_eq!(status(255), RangeStatus::Nothing);
-        assert_eq!(reading(None).status, u8::from(RangeStatus::Absent));
+    }
+
+    #[test]
+    fn every_sonar_that_has_a_row_is_read_and_the_next_tick_has_no_readings_until_new_ones_come() {
+        let mut rangers = rangers("");
+        let ultrasonic = [45, 80, 135, 0, 0, 0];
+        rangers.take_standard(&StandardSensors { ultrasonic, ..StandardSensors::default() });
+        assert_eq!(rangers.take_fresh().len(), 3);
+        let readings = rangers.for_tick();
+        assert_eq!(readings.len(), 10);
+        for (row, cm) in [(0, 80), (1, 45), (2, 135)] {
+            let measured = is(&readings[row], RangeStatus::Measured, f64::from(cm) / 100.0, cm);
+            assert!(measured && usize::from(readings[row].sensor) == row, "{readings:?}");
+        }
+        let is_absent = |reading: &RangeReading| reading.status() == RangeStatus::Absent;
+        assert!(rangers.for_tick().iter().all(is_absent));
+    }
+
+    #[test]
+    fn a_slower_sensor_has_a_reading_only_as_often_as_it_measures() {
+        let row = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\nrate_hz = 2.4";
+        let mut rangers = rangers(row);
+        let measured: Vec<_> = (0..6)
+            .filter(|_| {
+                let ultrasonic = [0, 80, 0, 0, 0, 0];
+                let standard = StandardSensors { ultrasonic, ..StandardSensors::default() };
+                rangers.take_standard(&standard);
+                rangers.for_tick()[0].status() == RangeStatus::Measured
+            })
+            .collect();
+        assert_eq!(measured, [0, 3]);
     }
 }

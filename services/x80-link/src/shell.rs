@@ -1,4 +1,4 @@
-//! The process of the link. It reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `range`, `wheels`,
+//! The process of the link. It reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `ranges`, `wheels`,
 //! `link` and telemetry.
 
 use std::{io, time::Duration};
@@ -68,7 +68,7 @@ impl Process for Shell {
         wakes: &[&topics::COMMAND, &topics::DIRECTIVE, &topics::TICK_LIMIT],
         outputs: &[
             &topics::CONTACT,
-            &topics::RANGE,
+            &topics::RANGES,
             &topics::WHEELS,
             &topics::LINK,
             &topics::INFRARED,

@@ -7,7 +7,7 @@ use common::{
     mission::Mission,
     outputs::Outputs,
     samples::{
-        CommandSample, Direction, HoldReason, InfraredSample, Order, PowerSample,
+        CommandSample, Direction, HoldReason, InfraredSample, Order, PowerSample, RangesHeader,
         SurroundingsSample, WireHeader,
     },
     shell::{Context, Progress},
@@ -15,7 +15,7 @@ use common::{
     start::StageError,
     step::{ForeignState, Step as _},
     stop_socket::Request,
-    topics::{CONTACT, INFRARED, POWER, RANGE, SURROUNDINGS, WHEELS, WIRE},
+    topics::{CONTACT, INFRARED, POWER, RANGES, SURROUNDINGS, WHEELS, WIRE},
 };
 use serde::{Deserialize, Serialize};
 
@@ -115,12 +115,12 @@ impl LinkStage {
         out: &mut Outputs,
     ) -> Result<Option<Effect>, StageError> {
         match effect {
-            Effect::Tick { tick, time, range, wheels, contact } => {
+            Effect::Tick { tick, time, ranges, wheels, contact } => {
                 out.at = Progress { tick, time };
                 if let Some(contact) = contact {
                     out.publish(&CONTACT, contact)?;
                 }
-                out.publish(&RANGE, range)?;
+                out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
                 out.publish(&WHEELS, wheels)?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),

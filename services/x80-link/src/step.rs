@@ -1,6 +1,6 @@
 //! The pure step of the link: events and their times in, samples and bytes for the robot out.
 //!
-//! A tick starts with a motor frame and the newest sonar reading, and ends with the command computed from them. In lockstep (a
+//! A tick starts with a motor frame and the newest readings, and ends with the command computed from them. In lockstep (a
 //! simulated robot at `--pace max`) the robot waits for that command, so the link repeats a tick that gets none because a stage
 //! ended. On the wall clock the robot does not wait, so an unanswered tick is dropped when the next one starts.
 
@@ -14,7 +14,7 @@ use common::{
     clock::{MissionTime, Pace},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeSample,
+        Action, Cause, CommandSample, CommandState, ContactSample, HoldReason, Order, RangeReading,
         WheelSample,
     },
     step::{ForeignState, Step},
@@ -53,9 +53,9 @@ const STOPS: u32 = 3;
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 /// A tick that waits for its command.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct OpenTick {
-    range: RangeSample,
+    ranges: Vec<RangeReading>,
     wheels: WheelSample,
     contact: Option<ContactSample>,
     began_ns: u64,
@@ -303,7 +303,7 @@ impl Link {
             trim.rolled(&wheels, self.time.seconds());
         }
         self.open = Some(OpenTick {
-            range: self.rangers.for_tick(),
+            ranges: self.rangers.for_tick(),
             wheels,
             contact: self.failsafe.monitors.odometry.take_contact(),
             began_ns: now_ns,
@@ -312,9 +312,9 @@ impl Link {
         self.give_tick(now_ns, effects);
     }
 
-    fn tick_effect(&self, tick: u64, open: &OpenTick) -> Effect {
-        let OpenTick { range, wheels, contact, .. } = *open;
-        Effect::Tick { tick, time: self.time, range, wheels, contact }
+    fn tick_effect(&self, tick: u64, open: OpenTick) -> Effect {
+        let OpenTick { ranges, wheels, contact, .. } = open;
+        Effect::Tick { tick, time: self.time, ranges, wheels, contact }
     }
 
     /// The number of the open tick.
@@ -389,12 +389,12 @@ impl Link {
 
     /// Publish the open tick if the supervisor's limit allows it. In lockstep, publish it again if it stays unanswered.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let Some(mut open) = self.open else {
+        let (tick, in_ticks) = (self.open_number(), self.in_ticks());
+        let Some(open) = &mut self.open else {
             return;
         };
-        let tick = self.open_number();
         match open.given_ns {
-            None if self.in_ticks() && self.last_tick.is_some_and(|last| tick > last) => {
+            None if in_ticks && self.last_tick.is_some_and(|last| tick > last) => {
                 if !passed(Some(open.began_ns), now_ns, LIMIT_WAITED) {
                     return;
                 }
@@ -403,14 +403,14 @@ impl Link {
                 open.began_ns = now_ns;
             }
             None => open.began_ns = now_ns,
-            Some(given) if self.in_ticks() && passed(Some(given), now_ns, REPEAT_AFTER) => {
+            Some(given) if in_ticks && passed(Some(given), now_ns, REPEAT_AFTER) => {
                 self.tally.repeated_ticks += 1;
             }
             Some(_) => return,
         }
         open.given_ns = Some(now_ns);
-        self.open = Some(open);
-        effects.push(self.tick_effect(tick, &open));
+        let open = open.clone();
+        effects.push(self.tick_effect(tick, open));
     }
 
     /// Send the newest command once more, halfway to the next tick. Its time limit is what is left of the first one, so the robot stops

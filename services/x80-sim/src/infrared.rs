@@ -1,9 +1,9 @@
 //! The infrared ring: seven rangers that look straight ahead of themselves.
 
 use common::{
-    infrared::{RANGERS, rangers},
     kinematics::Pose2,
-    mission::InfraredPhysics,
+    mission::{INFRARED_RANGERS, InfraredPhysics},
+    sonar::Mount,
     wire::infrared_ad,
 };
 
@@ -12,15 +12,18 @@ use crate::{noise::Noise, world::World};
 /// A ranger without an obstacle in reach reads as if one were at this distance, metres.
 const NOTHING_M: f64 = 0.81;
 
-/// Readings of the rangers on a robot of `radius` at `pose`, AD counts.
+/// Readings of the rangers that are mounted on a robot at `pose`, AD counts; 0 of the others.
 pub fn read(
     world: &World,
     pose: Pose2,
-    radius: f64,
+    mounts: &[Option<Mount>; INFRARED_RANGERS],
     physics: &InfraredPhysics,
     noise: &mut Noise,
-) -> [u16; RANGERS] {
-    rangers(pose, radius).map(|ranger| {
+) -> [u16; INFRARED_RANGERS] {
+    mounts.map(|mount| {
+        let Some(ranger) = mount.map(|mount| mount.on(pose)) else {
+            return 0;
+        };
         let height_m = world.heights().infrared_m;
         let range = if world.is_between(pose.position, ranger.position, height_m) {
             // A ranger pressed against what the body touches sees that, not what is behind.
@@ -44,14 +47,18 @@ mod tests {
     #[test]
     fn each_ranger_reads_what_stands_straight_ahead_of_it() {
         let mission = Mission::parse(
-            "target = [0, -5]\nworld.wall = [{ points = [[-1, 0.6], [1, 0.6]] }, { points = [[-0.5, -1], [-0.5, 1]] }]",
+            "target = [0, -5]\nrobot.radius_m = 0.2\nworld.wall = [{ points = [[-1, 0.6], [1, 0.6]] }, { points = [[-0.5, -1], [-0.5, 1]] }]",
             Path::new("m"),
         )
         .unwrap();
         let physics = InfraredPhysics { noise_counts: 0.0 };
         let mut noise = Noise::new(1, Source::Infrared);
         let world = World::new(&mission);
-        let read = read(&world, Pose2::default(), 0.2, &physics, &mut noise).map(infrared_m);
+        let mut mounts = [None; INFRARED_RANGERS];
+        for sensor in mission.sensor_table().into_iter().skip(3) {
+            mounts[usize::from(sensor.channel)] = Some(sensor.mount);
+        }
+        let read = read(&world, Pose2::default(), &mounts, &physics, &mut noise).map(infrared_m);
         // The left one, 0.127 m from the centre, is 0.473 m from the upper wall, the one at 33.75 degrees 0.6 / sin - 0.2 m,
         // out of reach; the rear one is 0.3 m from the wall behind.
         let want = [0.81, 0.81, 0.81, 0.81, 0.81, 0.3, 0.473];

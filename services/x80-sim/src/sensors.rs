@@ -1,7 +1,7 @@
 //! Readings of the robot's sensors at a tick.
 
 use common::{
-    mission::{Mission, Physics, SonarPhysics},
+    mission::{INFRARED_RANGERS, Mission, Physics, SONARS, SensorKind, SonarPhysics},
     sonar::Mount,
     wire::{COUNT_CYCLE, CustomSensors, Encoder, LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors},
 };
@@ -16,9 +16,6 @@ use crate::{
     world::World,
 };
 
-/// Bearing of the two rangers beside the front one, degrees; and their distance from the centre, metres.
-const SIDE_BEARING_DEG: f64 = 45.0;
-const SIDE_FORWARD_M: f64 = 0.194;
 /// Reading of a sensor that sees nothing out of the ordinary, AD counts.
 pub const MIDDLE: u16 = 2048;
 /// Supply of the AD converters, AD counts: drivers convert with it.
@@ -32,7 +29,8 @@ const STALL_CURRENT: f64 = 1500.0;
 #[derive(Clone, Debug)]
 pub struct Ranging {
     front: usize,
-    mounts: [Option<Mount>; 6],
+    mounts: [Option<Mount>; SONARS],
+    infrared: [Option<Mount>; INFRARED_RANGERS],
     silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
@@ -41,27 +39,29 @@ pub struct Ranging {
 }
 
 impl Ranging {
-    /// The rangers of `mission`'s robot: the front one, one at either side of it, and what the mission
-    /// adds. Their noise follows from `seed`.
+    /// The rangers of `mission`'s robot, and the sonars that `simulation.ring` adds. Their noise follows from `seed`.
     pub fn new(mission: &Mission, seed: u64) -> Self {
-        let front = usize::from(mission.sonar.index) % 6;
-        let mut mounts = [None; 6];
-        let ahead = mission.sonar.bearing_deg;
-        let sides = [
-            ((front + 5) % 6, SIDE_FORWARD_M, ahead + SIDE_BEARING_DEG),
-            ((front + 1) % 6, SIDE_FORWARD_M, ahead - SIDE_BEARING_DEG),
-        ];
-        let written = mission.simulation.ring.iter().map(|ranger| {
-            let index = usize::from(ranger.index) % 6;
-            (index, ranger.forward_m, ranger.bearing_deg)
-        });
-        let last = [(front, mission.sonar.forward_m, ahead)];
-        for (index, forward_m, bearing_deg) in sides.into_iter().chain(written).chain(last) {
-            mounts[index] = Some(Mount { forward_m, bearing_rad: f64::to_radians(bearing_deg) });
+        let (table, front) = (mission.sensor_table(), mission.front_sonar());
+        let (mut mounts, mut infrared) = ([None; SONARS], [None; INFRARED_RANGERS]);
+        for sensor in &table {
+            let mounts = match sensor.kind {
+                SensorKind::Cone => &mut mounts[..],
+                SensorKind::Ray => &mut infrared[..],
+            };
+            if let Some(mount) = mounts.get_mut(usize::from(sensor.channel)) {
+                *mount = Some(sensor.mount);
+            }
         }
+        let front_channel = usize::from(front.channel) % SONARS;
+        for ranger in &mission.simulation.ring {
+            let (forward_m, bearing_rad) = (ranger.forward_m, ranger.bearing_deg.to_radians());
+            mounts[usize::from(ranger.index) % SONARS] = Some(Mount { forward_m, bearing_rad });
+        }
+        mounts[front_channel] = Some(front.mount);
         Self {
-            front,
+            front: front_channel,
             mounts,
+            infrared,
             silence: Silence::new(
                 &mission.simulation.physics().sonar,
                 1.0 / mission.robot.rate_hz,
@@ -135,7 +135,7 @@ impl Ranging {
         let infrared = infrared::read(
             world,
             body.pose(),
-            body.radius(),
+            &self.infrared,
             &physics.infrared,
             &mut self.infrared_noise,
         );

@@ -1,12 +1,12 @@
 //! Messages for viewers, in Foxglove's schemas as JSON (<https://docs.foxglove.dev/docs/sdk/schemas>): the pose, the safety map,
-//! the sonar's cone with the trajectory, log lines.
+//! the sensors' cones and rays with the trajectory, log lines.
 
 use common::{
     bus::{decode_sample, decode_slice},
     grid::Replica,
     kinematics::Pose2,
-    mission::Mission,
-    samples::{GridHeader, PoseSample, RangeSample, RangeStatus},
+    mission::{Mission, Sensor},
+    samples::{GridHeader, PoseSample, RangeReading, RangeStatus, RangesHeader},
     topics::{self, AnyTopic as _},
 };
 use serde_json::{Value, json};
@@ -68,8 +68,9 @@ impl Drawn {
         if topic == topics::POSE.spec().name {
             return Some(self.pose(&decode_sample(message)?, began_ns));
         }
-        if topic == topics::RANGE.spec().name {
-            return self.scene(&decode_sample(message)?, began_ns);
+        if topic == topics::RANGES.spec().name {
+            let (header, readings) = decode_slice(message)?;
+            return self.scene(&header, &readings, began_ns);
         }
         if topic == topics::GRID.spec().name {
             let (header, cells) = decode_slice(message)?;
@@ -114,8 +115,13 @@ impl Drawn {
         Some(("foxglove/grid", stamp_ns, grid))
     }
 
-    fn scene(&mut self, range: &RangeSample, began_ns: u64) -> Option<Drawing> {
-        let stamp_ns = range.stamp.stamp_ns;
+    fn scene(
+        &mut self,
+        header: &RangesHeader,
+        readings: &[RangeReading],
+        began_ns: u64,
+    ) -> Option<Drawing> {
+        let stamp_ns = header.stamp.stamp_ns;
         if !is_due(&mut self.scene_ns, stamp_ns) {
             return None;
         }
@@ -142,27 +148,30 @@ impl Drawn {
         let mut entities =
             vec![entity("trajectory", self.trajectory.items().to_vec(), [0.0, 0.3, 0.8])];
         if let Some(mission) = &self.mission {
-            let cone = cone(mission, self.pose, range);
-            entities.push(entity("sonar", cone, [0.9, 0.5, 0.0]));
+            let table = mission.sensor_table();
+            for reading in readings {
+                let sensor = table.get(usize::from(reading.sensor));
+                if let Some(sensor) = sensor.filter(|sensor| sensor.used) {
+                    let outline = outline(sensor, self.pose, reading);
+                    entities.push(entity(&sensor.name, outline, [0.9, 0.5, 0.0]));
+                }
+            }
         }
         let scene = json!({"deletions": [], "entities": entities});
         Some(("foxglove/scene", stamp_ns, scene))
     }
 }
 
-/// The outline of the front sonar's cone: from the sensor to both ends of the arc, and along it.
-fn cone(mission: &Mission, robot: Pose2, range: &RangeSample) -> Vec<[f64; 2]> {
-    /// Half the angle in which the data sheet promises echoes, degrees.
-    const HALF_CONE_DEG: f64 = 15.0;
+/// The outline of what a sensor saw: of a cone from the sensor to both ends of the arc, and along it.
+fn outline(sensor: &Sensor, robot: Pose2, reading: &RangeReading) -> Vec<[f64; 2]> {
     /// Pieces of the arc.
     const PIECES: i32 = 8;
-    let mount = mission.sonar.mount();
-    let at = mount.on(robot);
-    let reach = match RangeStatus::from_byte(range.status) {
-        RangeStatus::Measured => range.range_m,
+    let at = sensor.mount.on(robot);
+    let reach = match reading.status() {
+        RangeStatus::Measured => reading.range_m,
         _ => 0.0,
     };
-    let half = HALF_CONE_DEG.to_radians();
+    let half = sensor.field_of_view_deg.to_radians() / 2.0;
     let arc = (-PIECES / 2..=PIECES / 2).map(|piece| {
         let bearing = at.heading + half * 2.0 * f64::from(piece) / f64::from(PIECES);
         [at.position.x + reach * bearing.cos(), at.position.y + reach * bearing.sin()]

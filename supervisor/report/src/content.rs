@@ -4,7 +4,9 @@ use common::{
     bus::{Layout, decode_sample, decode_slice},
     grid::{Applied, Replica},
     mission::Mission,
-    samples::{CommandSample, GridHeader, PoseSample, RangeSample, WheelSample},
+    samples::{
+        CommandSample, GridHeader, PoseSample, RangeReading, RangesHeader, Stamp, WheelSample,
+    },
     topics::{self, AnyTopic},
 };
 use recording::{End, Message, Recording, downsampled::Downsampled};
@@ -30,7 +32,10 @@ pub(crate) struct Content {
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
     pub(crate) poses: Downsampled<PoseSample, MOST>,
-    pub(crate) ranges: Downsampled<RangeSample, MOST>,
+    /// The row of the front sonar.
+    front: usize,
+    /// Readings of the front sonar.
+    pub(crate) ranges: Downsampled<(Stamp, RangeReading), MOST>,
     pub(crate) commands: Downsampled<CommandSample, MOST>,
     pub(crate) wheels: Downsampled<WheelSample, MOST>,
     pub(crate) grid: Replica<u8>,
@@ -68,6 +73,7 @@ impl Content {
             remarks: Vec::new(),
             summary: source::summary(recording).unwrap_or_default(),
             poses: Downsampled::default(),
+            front: run.mission.front_row(),
             ranges: Downsampled::default(),
             commands: Downsampled::default(),
             wheels: Downsampled::default(),
@@ -117,10 +123,13 @@ impl Content {
             if self.measured.pose(&pose, &self.mission) {
                 self.poses.push(pose);
             }
-        } else if is(&topics::RANGE) {
-            let range = sample(message)?;
-            self.measured.range(&range, &self.mission);
-            self.ranges.push(range);
+        } else if is(&topics::RANGES) {
+            let (header, readings) = decode_slice::<RangesHeader, RangeReading>(&message.data)?;
+            let front = |reading: &&RangeReading| usize::from(reading.sensor) == self.front;
+            if let Some(reading) = readings.iter().find(front) {
+                self.measured.range(reading, &self.mission);
+                self.ranges.push((header.stamp, *reading));
+            }
         } else if is(&topics::WHEELS) {
             self.wheels.push(sample(message)?);
         } else if is(&topics::COMMAND) {
@@ -175,7 +184,7 @@ impl Content {
 
 const TOPICS: [&dyn AnyTopic; 13] = [
     &topics::POSE,
-    &topics::RANGE,
+    &topics::RANGES,
     &topics::WHEELS,
     &topics::COMMAND,
     &topics::GUIDANCE,

@@ -167,9 +167,9 @@ fn timeline(content: &Content) -> Figure {
 
 fn sonar(content: &Content) -> Figure {
     let ranges = content.ranges.items();
-    let of = |is_shown: fn(RangeStatus) -> bool, metres: fn(f64, u8) -> f64| -> Vec<[f64; 2]> {
-        let shown = ranges.iter().filter(|range| is_shown(RangeStatus::from_byte(range.status)));
-        shown.map(|range| [seconds(&range.stamp), metres(range.range_m, range.raw_cm)]).collect()
+    let of = |is_shown: fn(RangeStatus) -> bool, metres: fn(f64, u16) -> f64| -> Vec<[f64; 2]> {
+        let shown = ranges.iter().filter(|(_, reading)| is_shown(reading.status()));
+        shown.map(|(at, reading)| [seconds(at), metres(reading.range_m, reading.raw)]).collect()
     };
     let is_distance = |status| matches!(status, RangeStatus::Measured | RangeStatus::AtContact);
     let is_none = |status| matches!(status, RangeStatus::Nothing | RangeStatus::Invalid);

@@ -3,7 +3,7 @@
 use common::{
     latency::Histogram,
     mission::Mission,
-    samples::{CommandSample, GuidanceSample, LinkSample, PoseSample, RangeSample, RangeStatus},
+    samples::{CommandSample, GuidanceSample, LinkSample, PoseSample, RangeReading, RangeStatus},
 };
 
 #[derive(Default)]
@@ -53,9 +53,10 @@ impl Measured {
         is_told
     }
 
-    pub(crate) fn range(&mut self, range: &RangeSample, mission: &Mission) {
+    /// Take a reading of the front sonar.
+    pub(crate) fn range(&mut self, range: &RangeReading, mission: &Mission) {
         self.ranges += 1;
-        match RangeStatus::from_byte(range.status) {
+        match range.status() {
             RangeStatus::Measured | RangeStatus::AtContact => {
                 self.near += u64::from(range.range_m < mission.map_within_m());
             }

@@ -5,7 +5,7 @@ use std::path::Path;
 use common::{
     latency::Histogram,
     samples::{
-        CommandSample, DeathSample, LinkSample, PoseSample, RangeSample, Stamp, name, words,
+        CommandSample, DeathSample, LinkSample, PoseSample, RangeReading, Stamp, name, words,
     },
 };
 use recording::Recording;
@@ -106,7 +106,7 @@ fn metrics_count_every_generation_and_every_sample() {
             PoseSample { stamp: stamp(tick, 1), v_m_s: tick as f64 * 0.5, ..PoseSample::default() };
         content.measured.pose(&pose, &content.mission);
         let range =
-            RangeSample { range_m: 0.2, status: u8::from(tick == 0), ..RangeSample::default() };
+            RangeReading { range_m: 0.2, status: u8::from(tick == 0), ..RangeReading::default() };
         content.measured.range(&range, &content.mission);
         content.measured.command(&CommandSample {
             left_rad_s: -1.0,

@@ -2,14 +2,18 @@ mod evidential;
 mod fault;
 
 use super::*;
-use common::samples::Stamp;
+use common::samples::{RangeStatus, Stamp};
 use std::{f64::consts::FRAC_PI_2, path::Path};
 
 /// Inputs one at a time.
 impl Mapper {
-    fn hear(&mut self, pose: &PoseSample, range: Option<&RangeSample>) -> Window {
-        let (pose, range) = (*pose, range.copied());
-        match self.step(Input::Tick { pose, range }, pose.stamp.time()) {
+    fn hear(&mut self, pose: &PoseSample, range: Option<&RangeReading>) -> Window {
+        self.sense(pose, range.into_iter().copied().collect())
+    }
+
+    fn sense(&mut self, pose: &PoseSample, ranges: Vec<RangeReading>) -> Window {
+        let input = Input::Tick { pose: *pose, ranges, contact: None };
+        match self.step(input, pose.stamp.time()) {
             Change::Window(window) => window,
             other => panic!("a tick gave {other:?}"),
         }
@@ -18,7 +22,7 @@ impl Mapper {
     fn touch(&mut self, pose: &PoseSample, bearing_rad: f64) {
         let half_width_rad = 0.8;
         let contact = ContactSample { bearing_rad, half_width_rad, ..ContactSample::default() };
-        let input = Input::Contact { pose: *pose, range: None, contact };
+        let input = Input::Tick { pose: *pose, ranges: Vec::new(), contact: Some(contact) };
         let changed = self.step(input, pose.stamp.time());
         assert!(matches!(changed, Change::Window(window) if window.area() > 0));
     }
@@ -57,8 +61,8 @@ fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
     }
 }
 
-fn reading(status: RangeStatus, range_m: f64) -> RangeSample {
-    RangeSample { range_m, status: status.into(), ..RangeSample::default() }
+fn reading(status: RangeStatus, range_m: f64) -> RangeReading {
+    RangeReading { range_m, status: status.into(), ..RangeReading::default() }
 }
 
 fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {

@@ -5,7 +5,7 @@ use std::{fmt, time::Duration};
 use common::{
     clock::{MissionTime, Pace},
     mission::Mission,
-    samples::{Cause, CommandSample, HoldReason, Order},
+    samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
     wire::StandardSensors,
 };
 
@@ -45,6 +45,8 @@ pub enum Observation<'a> {
     Motor([u16; 2], Counts),
     /// A standard frame came.
     Standard(&'a StandardSensors),
+    /// Readings of ranging sensors came.
+    Readings(&'a [RangeReading]),
     /// The robot answers after it did not, and was asked for its streams.
     Found {
         /// Whether it had answered before.

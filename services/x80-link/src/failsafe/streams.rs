@@ -3,7 +3,11 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use common::{clock::MissionTime, mission::Mission, samples::Cause};
+use common::{
+    clock::MissionTime,
+    mission::Mission,
+    samples::{Cause, RangeStatus},
+};
 
 use super::{
     monitor::{Condition, Moment, Monitor, Observation},
@@ -38,7 +42,7 @@ pub struct Streams {
     limit: Duration,
     silence: Silence,
     sensing: bool,
-    sonar_index: u8,
+    front: u8,
     found_ns: u64,
     motor_ns: u64,
     range_ns: u64,
@@ -99,7 +103,7 @@ impl Monitor for Streams {
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             silence: Silence::new(mission),
             sensing: mission.sensing,
-            sonar_index: mission.sonar.index,
+            front: mission.front_row() as u8,
             found_ns: 0,
             motor_ns: 0,
             range_ns: 0,
@@ -113,10 +117,9 @@ impl Monitor for Streams {
         match *what {
             Observation::Pace(pace) => self.silence.set_pace(pace),
             Observation::Motor(..) => self.motor(now.time, now.machine_ns),
-            Observation::Standard(standard) => {
-                let byte = standard.ultrasonic.get(usize::from(self.sonar_index));
-                // 0 means no reading. 255 is a reading and means that nothing is in range.
-                if byte.is_some_and(|&byte| byte != 0) {
+            Observation::Readings(readings) => {
+                let front = super::range::front(readings, self.front);
+                if front.is_some_and(|reading| reading.status() != RangeStatus::Invalid) {
                     self.range_ns = now.machine_ns;
                 }
             }
@@ -142,10 +145,7 @@ impl Monitor for Streams {
 
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         match (cause, self.motor_frames(now.machine_ns)) {
-            (Cause::RangeSilent, _) => Some(format!(
-                "the front sonar, index {} of the standard frame (sonar.index), is missing or 0",
-                self.sonar_index
-            )),
+            (Cause::RangeSilent, _) => Some("the front sonar is missing or 0".to_owned()),
             (Cause::FramesSilent, _) => {
                 Some("the robot answers and sends no motor frames; they are asked for".to_owned())
             }

@@ -4,7 +4,7 @@ use super::{
 };
 use common::{
     clock::{MissionTime, Pace},
-    samples::{CommandSample, HoldReason, Order, Stamp},
+    samples::{CommandSample, HoldReason, Order, RangeReading, RangeStatus, Stamp},
     wire::StandardSensors,
 };
 use std::path::Path;
@@ -38,14 +38,15 @@ fn command(tick_ago: u64, pose_ago: u64, guidance_ago: u64) -> CommandSample {
     }
 }
 
-/// A standard frame with this byte of the front sonar and these volts of all batteries.
-fn standard(sonar: u8, volts: f64) -> StandardSensors {
-    let mut standard = StandardSensors {
-        board_battery: (volts / 9.0 * 4095.0).round() as u16,
-        ..StandardSensors::default()
-    };
-    standard.ultrasonic[1] = sonar;
-    standard
+/// A standard frame with these volts of all batteries.
+fn standard(volts: f64) -> StandardSensors {
+    let board_battery = (volts / 9.0 * 4095.0).round() as u16;
+    StandardSensors { board_battery, ..StandardSensors::default() }
+}
+
+/// A reading of the front sonar.
+fn front(status: RangeStatus, raw: u16) -> [RangeReading; 1] {
+    [RangeReading { status: status.into(), raw, ..RangeReading::default() }]
 }
 
 /// A failsafe in which no cause applies, with all inputs as old as they may be.
@@ -59,7 +60,8 @@ fn well() -> Failsafe {
         (Observation::Pace(Pace::Rate(1.0)), now()),
         (Observation::Directive(Order::Drive, HoldReason::None), supervisor_silent),
         (Observation::Found { again: false }, frame),
-        (Observation::Standard(&standard(255, 7.2)), frame),
+        (Observation::Standard(&standard(7.2)), frame),
+        (Observation::Readings(&front(RangeStatus::Nothing, 255)), frame),
         (Observation::Command(&command(limit, limit, limit)), now()),
     ] {
         failsafe.observe(&what, when);
@@ -110,7 +112,7 @@ const CASES: &[(Break, Action, Cause)] = &[
     (
         |it| {
             for when in [ago(2000 * MS), now()] {
-                it.observe(&Observation::Standard(&standard(255, 5.9)), when);
+                it.observe(&Observation::Standard(&standard(5.9)), when);
             }
         },
         Action::End,
@@ -162,9 +164,9 @@ const CASES: &[(Break, Action, Cause)] = &[
     (wheels_are_held, Action::Stop, Cause::WheelsHeld),
     (
         |it| {
-            let reading = standard(255, 7.2);
-            it.observe(&Observation::Standard(&reading), ago(SILENT_MS * MS));
-            it.observe(&Observation::Standard(&standard(0, 7.2)), now());
+            let reading = front(RangeStatus::Nothing, 255);
+            it.observe(&Observation::Readings(&reading), ago(SILENT_MS * MS));
+            it.observe(&Observation::Readings(&front(RangeStatus::Invalid, 0)), now());
         },
         Action::Stop,
         Cause::RangeSilent,
@@ -172,7 +174,8 @@ const CASES: &[(Break, Action, Cause)] = &[
     (
         |it| {
             for tick in 0..10 {
-                it.monitors.range.observe(&Observation::Standard(&standard(100, 7.2)), now());
+                let reading = front(RangeStatus::Measured, 100);
+                it.monitors.range.observe(&Observation::Readings(&reading), now());
                 let motor = Observation::Motor([200 * tick; 2], Counts::Follow);
                 it.monitors.range.observe(&motor, now());
             }
@@ -197,7 +200,7 @@ const CASES: &[(Break, Action, Cause)] = &[
         Cause::GuidanceStale,
     ),
     (
-        |it| it.observe(&Observation::Standard(&standard(255, 6.5)), now()),
+        |it| it.observe(&Observation::Standard(&standard(6.5)), now()),
         Action::Slow,
         Cause::BatteryLow,
     ),

@@ -3,7 +3,7 @@
 use common::{
     clock::{MissionTime, Pace},
     samples::{
-        CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeSample,
+        CommandSample, ContactSample, HoldReason, InfraredSample, Order, PowerSample, RangeReading,
         SurroundingsSample, WheelSample,
     },
     stop_socket::Request,
@@ -63,14 +63,14 @@ pub enum Event<'a> {
 pub enum Effect {
     /// Send these bytes to the robot.
     Send(Vec<u8>),
-    /// Publish the tick: `range` first, since `wheels` wakes the pipeline.
+    /// Publish the tick: `ranges` first, since `wheels` wakes the pipeline.
     Tick {
         /// Its number.
         tick: u64,
         /// Its mission time.
         time: MissionTime,
-        /// The newest sonar reading.
-        range: RangeSample,
+        /// The newest reading of each sensor.
+        ranges: Vec<RangeReading>,
         /// The encoders.
         wheels: WheelSample,
         /// The contact that these encoders show.

@@ -1,6 +1,6 @@
 use super::*;
 use common::{
-    samples::{RangeStatus, Stamp},
+    samples::{RangeReading, RangeStatus, Stamp},
     wire::{
         Addressing, Command, CustomSensors, Mode, Parameter, Report, StandardSensors, SystemSignal,
     },
@@ -110,9 +110,9 @@ fn decided(effects: &[Effect]) -> Vec<(Action, Cause)> {
     effects.iter().filter_map(decision).collect()
 }
 
-fn ticks(effects: &[Effect]) -> Vec<(u64, RangeSample, WheelSample)> {
+fn ticks(effects: &[Effect]) -> Vec<(u64, Vec<RangeReading>, WheelSample)> {
     let tick = |effect: &Effect| match effect {
-        Effect::Tick { tick, range, wheels, .. } => Some((*tick, *range, *wheels)),
+        Effect::Tick { tick, ranges, wheels, .. } => Some((*tick, ranges.clone(), *wheels)),
         _ => None,
     };
     effects.iter().filter_map(tick).collect()
@@ -147,7 +147,7 @@ fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() 
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; STOPS as usize]);
     let effects = link.at(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
-    assert_eq!(ticks(&effects)[0].1.raw_cm, 80, "{effects:?}");
+    assert_eq!(ticks(&effects)[0].1[0].raw, 80, "{effects:?}");
 }
 
 #[test]
@@ -283,9 +283,11 @@ fn a_tick_has_the_infrared_counts_that_came_with_it_and_the_next_without_any_has
     Report::Standard(standard).encode(Addressing::default(), &mut bytes);
     Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
     let given = ticks(&link.at(Event::Datagram(&bytes), 10 * MS));
-    assert_eq!(given[0].1.infrared_ad, [601, 602, 603, 604, 605, 606, 607]);
+    let counts =
+        |ranges: &[RangeReading]| ranges[3..].iter().map(|reading| reading.raw).collect::<Vec<_>>();
+    assert_eq!(counts(&given[0].1), [601, 602, 603, 604, 605, 606, 607]);
     let given = ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS));
-    assert_eq!(given[0].1.infrared_ad, [0; 7]);
+    assert_eq!(counts(&given[0].1), [0; 7]);
 }
 
 #[test]
@@ -324,12 +326,12 @@ fn a_tick_carries_the_newest_sonar_and_forward_counts() {
     let mut link = driving(on_the_wall());
     // Channel 0 counts down when driving forward: 32768 - 100 there is 100 counts forward.
     let effects = link.at(Event::Datagram(&datagram(80, 32_668, 250)), 10 * MS);
-    let [(tick, range, wheels)] = ticks(&effects)[..] else {
+    let [(tick, ranges, wheels)] = &ticks(&effects)[..] else {
         panic!("{effects:?}");
     };
-    assert_eq!((tick, wheels.left_counts, wheels.right_counts), (0, 100, 250));
-    assert_eq!((range.range_m, range.raw_cm), (0.8, 80));
-    assert_eq!(range.status, u8::from(RangeStatus::Measured));
+    assert_eq!((*tick, wheels.left_counts, wheels.right_counts), (0, 100, 250));
+    assert_eq!((ranges[0].range_m, ranges[0].raw), (0.8, 80));
+    assert_eq!(ranges[0].status(), RangeStatus::Measured);
 }
 
 #[test]
@@ -339,7 +341,7 @@ fn a_motor_frame_alone_makes_a_tick_without_a_reading() {
     Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
     link.at(Event::Datagram(&datagram(80, 0, 0)), MS);
     let effects = link.at(Event::Datagram(&bytes), 2 * MS);
-    assert_eq!(ticks(&effects)[0].1.status, u8::from(RangeStatus::Absent));
+    assert_eq!(ticks(&effects)[0].1[0].status(), RangeStatus::Absent);
 }
 
 #[test]

@@ -57,6 +57,10 @@ impl Link {
             self.observe(Observation::Standard(standard), now_ns);
         }
         self.take_telemetry(motor.as_ref(), standard.as_ref(), custom.as_ref(), effects);
+        let readings = self.rangers.take_fresh();
+        if !readings.is_empty() {
+            self.observe(Observation::Readings(&readings), now_ns);
+        }
         if heard && self.failsafe.monitors.presence.heard(now_ns) {
             let again = self.losses() > 0;
             self.observe(Observation::Found { again }, now_ns);

@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     /// The file; the robot's next run goes into F-2.mcap beside it.
     #[arg(long, value_name = "F.mcap", default_value = "recording.mcap")]
     out: PathBuf,
-    /// Only these topics, by their names and with commas between: `pose,range`. A replay needs `inputs`.
+    /// Only these topics, by their names and with commas between: `pose,ranges`. A replay needs `inputs`.
     #[arg(long, value_name = "TOPICS", value_delimiter = ',')]
     topics: Option<Vec<String>>,
     /// Fields, too: they are larger than all else together.

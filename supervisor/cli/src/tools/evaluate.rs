@@ -60,8 +60,8 @@ pub(crate) struct Arguments {
     /// commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,
-    /// front (the sonar alone) or front+infrared: what the evidential method senses; the paper's has the sonar alone.
-    /// Several, with commas, are compared on the same worlds.
+    /// front (the front sonar alone), front+infrared, three-front (the front sonar and the two beside it) or all, the default: what the
+    /// evidential method senses; the paper's has the front sonar alone. Several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     sensors: Vec<String>,
     /// laboratory, measured or harsh.

@@ -11,7 +11,7 @@ use crate::replay::values;
 
 /// The topics of a tick that are compared, in causal order.
 pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
-    &topics::RANGE,
+    &topics::RANGES,
     &topics::WHEELS,
     &topics::POSE,
     &topics::GRID,

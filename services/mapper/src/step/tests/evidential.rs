@@ -1,7 +1,7 @@
 //! The evidential method, reading by reading.
 
 use super::*;
-use common::wire::infrared_ad;
+use common::wire::{infrared_ad, infrared_m};
 
 /// Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead, the body's radius 0.19 m.
 fn mapper(extra: &str) -> Mapper {
@@ -16,13 +16,7 @@ fn hear(mapper: &mut Mapper, tick: u64, x: f64, heading: f64, echo: Option<f64>)
     let stamp = Stamp { tick, ..Stamp::default() };
     let pose = PoseSample { stamp, x_m: x, heading_rad: heading, ..PoseSample::default() };
     let status = echo.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
-    let range = RangeSample {
-        stamp,
-        range_m: echo.unwrap_or_default(),
-        status: status.into(),
-        ..RangeSample::default()
-    };
-    mapper.hear(&pose, Some(&range))
+    mapper.hear(&pose, Some(&reading(status, echo.unwrap_or_default())))
 }
 
 fn state(mapper: &Mapper, x: f64, y: f64) -> CellState {
@@ -57,8 +51,20 @@ fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
 fn see(mapper: &mut Mapper, tick: u64, infrared_ad: [u16; 7]) {
     let stamp = Stamp { tick, ..Stamp::default() };
     let pose = PoseSample { stamp, ..PoseSample::default() };
-    let range = RangeSample { stamp, infrared_ad, ..RangeSample::default() };
-    mapper.hear(&pose, Some(&range));
+    mapper.sense(&pose, rays(infrared_ad));
+}
+
+/// The readings that the link makes of these counts.
+fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
+    let of = |(sensor, ad)| {
+        let status = match ad {
+            0 | 4095 => RangeStatus::Invalid,
+            _ if infrared_m(ad) >= 0.81 => RangeStatus::Nothing,
+            _ => RangeStatus::Measured,
+        };
+        RangeReading { sensor, ..reading(status, infrared_m(ad)) }
+    };
+    (3..).zip(infrared_ad).map(of).collect()
 }
 
 const INFRARED: &str = "sensors = 'front+infrared'";
@@ -125,7 +131,7 @@ fn silence_of_the_sonar_does_not_take_back_what_infrared_saw() {
 
 #[test]
 fn without_infrared_among_the_sensors_its_readings_are_not_mapped() {
-    let mut mapper = mapper("");
+    let mut mapper = mapper("sensors = 'front'");
     see(&mut mapper, 0, rear(0.6));
     assert_eq!(state(&mapper, -0.4, 0.0), CellState::Free);
     assert_eq!(mapper.state().safety_events(), 0);
@@ -242,7 +248,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
         let header = mapper.header(Part::default());
         header.clear_beams().to_vec()
     };
-    let mut mapper = mapper("");
+    let mut mapper = mapper("sensors = 'front'");
     hear(&mut mapper, 0, 0.0, 0.0, Some(0.7));
     hear(&mut mapper, 1, 0.0, 0.5, None);
     let [echo, silence] = beams(&mapper)[..] else {
@@ -275,12 +281,53 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
     for tick in 1..40 {
         let stamp = Stamp { tick, ..Stamp::default() };
         let pose = PoseSample { stamp, x_m: -0.3, ..PoseSample::default() };
-        let status = RangeStatus::Nothing.into();
-        let range = RangeSample { stamp, status, infrared_ad: far, ..RangeSample::default() };
-        mapper.hear(&pose, Some(&range));
+        let mut readings = rays(far);
+        readings.push(reading(RangeStatus::Nothing, 0.0));
+        mapper.sense(&pose, readings);
     }
     assert!(touched(&mapper));
     // Where the body is, nothing stands.
     hear(&mut mapper, 40, 0.2, 0.0, None);
     assert!(!state(&mapper, 0.2, 0.0).is_hazard());
+}
+
+/// The number of `grid`'s readings of sonars after so many ticks of a robot that stands.
+fn beams_after(sensors: &str, ticks: u64) -> usize {
+    let mut mapper = mapper(&format!("sensors = '{sensors}'"));
+    for tick in 0..ticks {
+        let stamp = Stamp { tick, ..Stamp::default() };
+        let heard = |sensor| RangeReading { sensor, ..reading(RangeStatus::Nothing, 0.0) };
+        mapper.sense(&PoseSample { stamp, ..PoseSample::default() }, (0..3).map(heard).collect());
+    }
+    mapper.header(Part::default()).clear_beams().len()
+}
+
+#[test]
+fn three_sonars_have_room_for_as_many_ticks_of_readings_as_one() {
+    assert_eq!(beams_after("front", 200), 128);
+    assert_eq!(beams_after("three-front", 200), 384);
+}
+
+#[test]
+fn the_sonars_beside_the_front_one_map_what_is_at_45_degrees() {
+    let there = DVec2::from_angle(std::f64::consts::FRAC_PI_4) * (0.194 + 0.5);
+    let left = RangeReading { sensor: 1, ..reading(RangeStatus::Measured, 0.5) };
+    for (sensors, is_mapped) in [("front", false), ("three-front", true), ("all", true)] {
+        let mut mapper = mapper(&format!("sensors = '{sensors}'"));
+        mapper.sense(&PoseSample::default(), vec![left]);
+        assert_eq!(state(&mapper, there.x, there.y).is_hazard(), is_mapped, "{sensors}");
+        assert!(!state(&mapper, there.x, -there.y).is_hazard());
+    }
+}
+
+#[test]
+fn a_reading_that_no_sensor_can_give_is_ignored() {
+    let mut mapper = mapper("");
+    let wrong = [(200, 0.5), (0, f64::NAN), (4, f64::NAN), (5, -1.0)];
+    let readings = wrong.map(|(sensor, range_m)| RangeReading {
+        sensor,
+        ..reading(RangeStatus::Measured, range_m)
+    });
+    mapper.sense(&PoseSample::default(), readings.to_vec());
+    assert_eq!(mapper.state().safety_events(), 0);
 }

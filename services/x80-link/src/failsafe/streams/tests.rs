@@ -1,5 +1,5 @@
 use super::*;
-use common::wire::StandardSensors;
+use common::samples::RangeReading;
 use std::path::Path;
 
 const MS: u64 = 1_000_000;
@@ -13,10 +13,9 @@ fn streams(text: &str) -> Streams {
 
 /// Take a standard frame with a reading of the front sonar.
 fn range(streams: &mut Streams, machine_ns: u64) {
-    let mut standard = StandardSensors::default();
-    standard.ultrasonic[1] = 255;
+    let front = RangeReading { status: RangeStatus::Nothing.into(), ..RangeReading::default() };
     let now = Moment { time: MissionTime(machine_ns), machine_ns };
-    streams.observe(&Observation::Standard(&standard), now);
+    streams.observe(&Observation::Readings(&[front]), now);
 }
 
 /// Take motor frames after these intervals, milliseconds. Returns the time of the last frame.

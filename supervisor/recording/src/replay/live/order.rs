@@ -59,13 +59,13 @@ mod tests {
 
     #[test]
     fn samples_that_were_recorded_topic_by_topic_come_tick_by_tick() {
-        let recorded = [("range", 1), ("range", 2), ("pose", 1), ("pose", 2)];
+        let recorded = [("ranges", 1), ("ranges", 2), ("pose", 1), ("pose", 2)];
         let messages = recorded.map(|(topic, tick)| Ok(message(topic, tick)));
         let ordered: Vec<_> = ByTick::new(messages.into_iter())
             .map(|message| message.unwrap())
             .map(|message| (message.topic.to_string(), tick_of(&message.data)))
             .collect();
-        let expected = [("range", 1), ("pose", 1), ("range", 2), ("pose", 2)];
+        let expected = [("ranges", 1), ("pose", 1), ("ranges", 2), ("pose", 2)];
         assert_eq!(ordered, expected.map(|(topic, tick)| (topic.to_owned(), tick)));
     }
 }

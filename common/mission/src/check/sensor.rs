@@ -1,0 +1,145 @@
+//! The ranging sensors of a mission: its rows, and the set that it uses.
+
+use super::objection::{Objection, objection, within};
+use crate::{
+    INFRARED_RANGERS, MOST_SENSORS, Mission, SONARS, SensorKind, SensorRow, Sensors, SonarConfig,
+};
+
+const KEY: &str = "robot.sensor";
+/// The longest name of a sensor, bytes.
+const LONGEST_NAME: usize = 23;
+
+pub(super) fn check(mission: &Mission) -> Result<(), Objection> {
+    let sonar = &mission.sonar;
+    channel("sonar.index", SensorKind::Cone, sonar.index)?;
+    within("sonar.forward_m", sonar.forward_m, -5.0..=5.0, "m")?;
+    within("sonar.bearing_deg", sonar.bearing_deg, -180.0..=180.0, "degrees")?;
+    let rows = &mission.robot.sensors;
+    if rows.len() > MOST_SENSORS {
+        let problem = format!("{} rows, and a sample holds {MOST_SENSORS}", rows.len());
+        return Err(objection(KEY, problem, "remove some"));
+    }
+    for (index, row) in rows.iter().enumerate() {
+        self::row(row, mission.robot.rate_hz)?;
+        let earlier = &rows[..index];
+        if earlier.iter().any(|other| other.name == row.name) {
+            return Err(objection(KEY, format!("two are called {:?}", row.name), "rename one"));
+        }
+        if earlier.iter().any(|other| (other.kind, other.channel) == (row.kind, row.channel)) {
+            let problem = format!("{:?} has the channel of another {:?}", row.name, row.kind);
+            return Err(objection(KEY, problem, "give each a channel of its own"));
+        }
+    }
+    let is_cone = |row: &SensorRow| row.kind == SensorKind::Cone;
+    if !rows.is_empty() && !rows.iter().any(is_cone) {
+        return Err(objection(KEY, "no row is a cone", "add the front sonar"));
+    }
+    if !rows.is_empty() && *sonar != SonarConfig::default() {
+        let remedy = "remove it: the rows of robot.sensor say where the front sonar is";
+        return Err(objection("sonar", "it is written beside robot.sensor", remedy));
+    }
+    let table = mission.sensor_table();
+    let used = |kind| table.iter().filter(|sensor| sensor.used && sensor.kind == kind).count();
+    let lacks = match mission.sensors {
+        Some(Sensors::FrontInfrared) if used(SensorKind::Ray) == 0 => "a ray",
+        Some(Sensors::ThreeFront) if used(SensorKind::Cone) < 2 => "a cone beside the front one",
+        _ => return Ok(()),
+    };
+    Err(objection("sensors", format!("robot.sensor lacks {lacks}"), "add a row, or give \"all\""))
+}
+
+fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    if row.name.is_empty() || row.name.len() > LONGEST_NAME || !row.name.chars().all(plain) {
+        let remedy = format!("use letters, digits and '-', at most {LONGEST_NAME}");
+        return Err(objection(KEY, format!("{:?} is no name of a sensor", row.name), remedy));
+    }
+    channel(KEY, row.kind, row.channel)?;
+    within(KEY, row.forward_m, -5.0..=5.0, "m of forward_m")?;
+    within(KEY, row.bearing_deg, -180.0..=180.0, "degrees of bearing_deg")?;
+    if let Some(model) = row.model
+        && model.kind() != row.kind
+    {
+        let problem = format!("{model:?} is no {:?}", row.kind);
+        return Err(objection(KEY, problem, "remove model, or change kind"));
+    }
+    let reach = match row.kind {
+        SensorKind::Cone => 0.3..=2.55,
+        SensorKind::Ray => 0.2..=0.81,
+    };
+    within(KEY, row.reach_m.unwrap_or(*reach.end()), reach, "m of reach_m")?;
+    match (row.kind, row.field_of_view_deg) {
+        (SensorKind::Ray, Some(_)) => {
+            return Err(objection(KEY, "a ray has no field of view", "remove field_of_view_deg"));
+        }
+        (SensorKind::Cone, Some(deg)) => {
+            within(KEY, deg, 5.0..=60.0, "degrees of field_of_view_deg")?
+        }
+        (_, None) => {}
+    }
+    row.rate_hz.map_or(Ok(()), |hz| within(KEY, hz, 0.1..=rate_hz, "Hz of rate_hz"))
+}
+
+fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result<(), Objection> {
+    let (channels, remedy) = match kind {
+        SensorKind::Cone => (SONARS, "give 0 to 5 for a sonar; 1 is the front one of an X80"),
+        SensorKind::Ray => (INFRARED_RANGERS, "give 0 to 6 for an infrared ranger"),
+    };
+    if usize::from(channel) < channels {
+        return Ok(());
+    }
+    Err(objection(key, format!("the robot has no {kind:?} on channel {channel}"), remedy))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const FRONT: &str = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\n";
+
+    fn refusal(text: &str) -> String {
+        let text = format!("target = [3, 0]\n{text}");
+        match Mission::parse(&text, Path::new("m.toml")) {
+            Ok(_) => panic!("accepted: {text}"),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn a_row_that_the_robot_cannot_have_is_refused_with_its_key() {
+        let second = |set: &str| format!("{FRONT}{}{set}", FRONT.replace("'front'", "'second'"));
+        let many: String =
+            (0..17).map(|index| FRONT.replace("front", &format!("s{index}"))).collect();
+        for (text, problem) in [
+            (FRONT.replace("= 1", "= 6"), "channel 6"),
+            (FRONT.replace("cone", "ray").replace("= 1", "= 7"), "channel 7"),
+            (FRONT.replace("cone", "ray"), "no row is a cone"),
+            (FRONT.replace("'front'", "'a b'"), "no name"),
+            (FRONT.replace("bearing_deg = 0", "bearing_deg = 200"), "bearing_deg"),
+            (FRONT.replace("0.19", "nan"), "forward_m"),
+            (format!("{FRONT}reach_m = 3"), "reach_m"),
+            (format!("{FRONT}field_of_view_deg = 90"), "field_of_view_deg"),
+            (format!("{FRONT}rate_hz = 100"), "rate_hz"),
+            (format!("{FRONT}model = 'x80-infrared'"), "X80Infrared"),
+            (second("").replace("'second'", "'front'"), "two are called"),
+            (second(""), "channel of another"),
+            (many, "17 rows"),
+        ] {
+            let refusal = refusal(&text);
+            assert!(refusal.starts_with("m.toml:2: robot.sensor: "), "{text}: {refusal}");
+            assert!(refusal.contains(problem), "{text}: {refusal}");
+        }
+        let both = refusal(&format!("sonar.index = 2\n{FRONT}"));
+        assert!(both.starts_with("m.toml:2: sonar: "), "{both}");
+    }
+
+    #[test]
+    fn a_set_that_the_rows_do_not_have_is_refused() {
+        for set in ["front+infrared", "three-front"] {
+            let refusal = refusal(&format!("sensors = '{set}'\n{FRONT}"));
+            assert!(refusal.starts_with("m.toml:2: sensors: "), "{refusal}");
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! THE table of the robot's ranging sensors: the kind of each, where it looks, and the channel that gives its readings. Link, mapper
+//! and simulator read it, and a reading names its sensor by the row.
+//!
+//! A mission writes rows as `[[robot.sensor]]`. Without them the table is that of the X80: the front sonar as `[sonar]` says, the two
+//! beside it, and the ring of seven infrared rangers. The key `sensors` says which rows the mapper uses.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{RobotConfig, SonarConfig, sonar::Mount};
+
+/// The greatest number of rows, and of the readings in a sample of `ranges`.
+pub const MOST_SENSORS: usize = 16;
+/// Infrared rangers of the X80.
+pub const INFRARED_RANGERS: usize = 7;
+/// Sonars of the standard frame.
+pub const SONARS: usize = 6;
+
+/// Bearing of the two sonars beside the front one, degrees from it, and their distance from the robot's centre, metres.
+const SIDE_BEARING_DEG: f64 = 45.0;
+const SIDE_FORWARD_M: f64 = 0.194;
+/// Sonars within this of the front one's bearing belong to the set "three-front", degrees.
+const BESIDE_FRONT_DEG: f64 = 60.0;
+
+/// The bearing of each infrared ranger from the robot's axis, degrees counter-clockwise, and its distance from the robot's centre as a
+/// share of the body's radius. The order is that of the frames, on which two independent drivers agree: from left to right in front,
+/// then right, rear, left. The rangers at the sides of an X80 are 121 mm from the centre, the others at the rim.
+const RING: [(f64, f64); INFRARED_RANGERS] = [
+    (33.75, 1.0),
+    (11.25, 1.0),
+    (-11.25, 1.0),
+    (-33.75, 1.0),
+    (-90.0, 0.121 / 0.19),
+    (180.0, 1.0),
+    (90.0, 0.121 / 0.19),
+];
+
+/// What a reading says about the ground before the sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SensorKind {
+    /// A sonar: something stands on the arc of an echo, and nothing that is square to the beam stands nearer.
+    Cone,
+    /// An infrared ranger: the ray is free up to where it ends.
+    Ray,
+}
+
+/// The product whose readings the mapper's model describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SensorModel {
+    /// The DUR5200 of the X80, 40 kHz, a cone. Source: the X80's user manual, 2006; `sonar_model` of the mapper has its numbers.
+    Dur5200,
+    /// The infrared ranger of the X80, 10 to 80 cm, a ray. Source: the formula in the X80's user manual, 2006; `infrared_model` of the
+    /// mapper has its numbers.
+    X80Infrared,
+}
+
+impl SensorModel {
+    /// The kind of its readings.
+    #[must_use]
+    pub const fn kind(self) -> SensorKind {
+        match self {
+            Self::Dur5200 => SensorKind::Cone,
+            Self::X80Infrared => SensorKind::Ray,
+        }
+    }
+
+    /// The model of the X80's sensor of a kind.
+    const fn of(kind: SensorKind) -> Self {
+        match kind {
+            SensorKind::Cone => Self::Dur5200,
+            SensorKind::Ray => Self::X80Infrared,
+        }
+    }
+
+    /// The angle in which it detects, degrees; 0 of a ray.
+    #[must_use]
+    pub const fn field_of_view_deg(self) -> f64 {
+        match self {
+            Self::Dur5200 => 30.0,
+            Self::X80Infrared => 0.0,
+        }
+    }
+
+    /// The greatest range that it gives, metres.
+    #[must_use]
+    pub const fn reach_m(self) -> f64 {
+        match self {
+            Self::Dur5200 => 2.55,
+            Self::X80Infrared => 0.81,
+        }
+    }
+}
+
+/// A sensor as a mission writes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorRow {
+    /// Its name in logs and reasons.
+    pub name: String,
+    /// The kind of its readings.
+    pub kind: SensorKind,
+    /// The channel of the robot that gives it: of a cone the sonar's index in the standard frame, 0 to 5; of a ray the infrared ranger, 0
+    /// to 6.
+    pub channel: u8,
+    /// Its distance from the robot's centre along its bearing, metres.
+    pub forward_m: f64,
+    /// delta of (19): its bearing from the robot's axis, degrees counter-clockwise.
+    pub bearing_deg: f64,
+    /// The angle in which it detects, degrees; of a cone only. By default that of its model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field_of_view_deg: Option<f64>,
+    /// The greatest range that is used, metres. By default that of its model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reach_m: Option<f64>,
+    /// Readings a second, where it measures less often than the frames come. Readings between are not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// The product. By default that of the X80.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<SensorModel>,
+}
+
+/// A sensor, every value known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    /// Its name in logs and reasons.
+    pub name: String,
+    /// The kind of its readings.
+    pub kind: SensorKind,
+    /// The channel of the robot that gives it.
+    pub channel: u8,
+    /// Its mounting.
+    pub mount: Mount,
+    /// The angle in which it detects, degrees; 0 of a ray.
+    pub field_of_view_deg: f64,
+    /// The greatest range that is used, metres.
+    pub reach_m: f64,
+    /// It measures once in so many ticks.
+    pub every_ticks: u64,
+    /// Its product.
+    pub model: SensorModel,
+    /// Whether the mission uses its readings.
+    pub used: bool,
+}
+
+impl Sensor {
+    fn of(row: &SensorRow, rate_hz: f64) -> Self {
+        let model = row.model.unwrap_or(SensorModel::of(row.kind));
+        Self {
+            name: row.name.clone(),
+            kind: row.kind,
+            channel: row.channel,
+            mount: Mount { forward_m: row.forward_m, bearing_rad: row.bearing_deg.to_radians() },
+            field_of_view_deg: row.field_of_view_deg.unwrap_or(model.field_of_view_deg()),
+            reach_m: row.reach_m.unwrap_or(model.reach_m()),
+            every_ticks: row.rate_hz.map_or(1.0, |hz| (rate_hz / hz).round().max(1.0)) as u64,
+            model,
+            used: false,
+        }
+    }
+
+    /// Its bearing from the robot's axis, degrees.
+    #[must_use]
+    pub fn bearing_deg(&self) -> f64 {
+        self.mount.bearing_rad.to_degrees()
+    }
+}
+
+/// A set of sensors: the rows whose readings the mapper uses as evidence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sensors {
+    /// The front sonar: the cone whose bearing is the least.
+    #[serde(rename = "front")]
+    Front,
+    /// The front sonar and all rays.
+    #[serde(rename = "front+infrared")]
+    FrontInfrared,
+    /// The front sonar and the cones within 60 degrees of it.
+    #[serde(rename = "three-front")]
+    ThreeFront,
+    /// All that the robot has.
+    #[serde(rename = "all")]
+    All,
+}
+
+/// The rows of a robot, with those of `set` marked as used.
+pub(crate) fn table(robot: &RobotConfig, sonar: &SonarConfig, set: Sensors) -> Vec<Sensor> {
+    let rows = if robot.sensors.is_empty() { x80(robot, sonar) } else { robot.sensors.clone() };
+    let mut table: Vec<_> = rows.iter().map(|row| Sensor::of(row, robot.rate_hz)).collect();
+    let Some(front) = front(&table, sonar) else {
+        return table;
+    };
+    let front_deg = table[front].bearing_deg();
+    for (index, sensor) in table.iter_mut().enumerate() {
+        let beside = (sensor.bearing_deg() - front_deg).abs() <= BESIDE_FRONT_DEG;
+        let is_cone = sensor.kind == SensorKind::Cone;
+        sensor.used = index == front
+            || match set {
+                Sensors::Front => false,
+                Sensors::FrontInfrared => !is_cone,
+                Sensors::ThreeFront => is_cone && beside,
+                Sensors::All => true,
+            };
+    }
+    table
+}
+
+/// The row of the front sonar. Without rows of the mission it is the first, wherever `[sonar]` says that it looks.
+pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
+    let ahead = |sensor: &Sensor| (sensor.bearing_deg() - sonar.bearing_deg).abs();
+    let cones = table.iter().enumerate().filter(|(_, sensor)| sensor.kind == SensorKind::Cone);
+    cones.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
+}
+
+/// The rows of an X80. The car has its boards and sensors.
+fn x80(robot: &RobotConfig, sonar: &SonarConfig) -> Vec<SensorRow> {
+    let row = |name: String, kind, channel, forward_m, bearing_deg| SensorRow {
+        name,
+        kind,
+        channel,
+        forward_m,
+        bearing_deg,
+        field_of_view_deg: None,
+        reach_m: None,
+        rate_hz: None,
+        model: None,
+    };
+    let cone = |name: &str, beside: u8, forward_m, bearing_deg| {
+        let channel = (sonar.index % SONARS as u8 + beside) % SONARS as u8;
+        row(name.to_owned(), SensorKind::Cone, channel, forward_m, bearing_deg)
+    };
+    let ahead = sonar.bearing_deg;
+    let cones = [
+        cone("front", 0, sonar.forward_m, ahead),
+        cone("front-left", 5, SIDE_FORWARD_M, ahead + SIDE_BEARING_DEG),
+        cone("front-right", 1, SIDE_FORWARD_M, ahead - SIDE_BEARING_DEG),
+    ];
+    let radius_m = robot.body().radius_m;
+    let rays = (0..).zip(RING).map(|(channel, (bearing_deg, share))| {
+        let name = format!("infrared-{channel}");
+        row(name, SensorKind::Ray, channel, share * radius_m, bearing_deg)
+    });
+    cones.into_iter().chain(rays).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::{Mission, kinematics::Pose2};
+
+    fn mission(extra: &str) -> Mission {
+        Mission::parse(&format!("target = [1, 0]\n{extra}"), Path::new("test.toml")).unwrap()
+    }
+
+    fn used(extra: &str) -> Vec<String> {
+        let table = mission(extra).sensor_table();
+        table.into_iter().filter(|sensor| sensor.used).map(|sensor| sensor.name).collect()
+    }
+
+    const ROWS: &str = "[[robot.sensor]]\nname = 'nose'\nkind = 'cone'\nchannel = 4\nforward_m = 0.2\nbearing_deg = 5\nrate_hz = 3.5\n\
+        [[robot.sensor]]\nname = 'eye'\nkind = 'ray'\nchannel = 2\nforward_m = 0.1\nbearing_deg = -30\nreach_m = 0.5\n";
+
+    #[test]
+    fn the_ring_turns_with_the_robot_and_ranger_5_looks_to_its_right() {
+        let pose = Pose2 { position: DVec2::new(1.0, 2.0), heading: std::f64::consts::FRAC_PI_2 };
+        let right = mission("").sensor_table()[3 + 4].mount.on(pose);
+        assert!(right.position.distance(DVec2::new(1.121, 2.0)) < 1e-9);
+        assert!(right.axis().distance(DVec2::X) < 1e-9);
+    }
+
+    #[test]
+    fn the_sonars_beside_the_front_one_look_45_degrees_to_either_side_of_it() {
+        for (sonar, channels, bearings) in [
+            ("", [1, 0, 2], [0.0, 45.0, -45.0]),
+            ("[sonar]\nindex = 5\nbearing_deg = 10", [5, 4, 0], [10.0, 55.0, -35.0]),
+        ] {
+            let table = mission(sonar).sensor_table();
+            for (row, (channel, bearing_deg)) in channels.into_iter().zip(bearings).enumerate() {
+                assert_eq!(table[row].channel, channel);
+                assert!((table[row].bearing_deg() - bearing_deg).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_robot_that_looks_first_uses_all_it_has_and_the_papers_method_and_a_car_the_front_sonar() {
+        assert_eq!(used("").len(), 10);
+        assert_eq!(used("method = 'paper'"), ["front"]);
+        assert_eq!(used("robot.model = 'car'"), ["front"]);
+        assert_eq!(used("sensors = 'front'"), ["front"]);
+        assert_eq!(used("sensors = 'front+infrared'").len(), 8);
+        assert_eq!(used("sensors = 'three-front'"), ["front", "front-left", "front-right"]);
+    }
+
+    #[test]
+    fn written_rows_replace_the_table_and_the_key_sensors_selects_from_them() {
+        let table = mission(ROWS).sensor_table();
+        let [nose, eye] = &table[..] else {
+            panic!("{table:?}");
+        };
+        assert_eq!((nose.channel, nose.every_ticks, nose.reach_m), (4, 2, 2.55));
+        assert_eq!((eye.kind, eye.reach_m, eye.used), (SensorKind::Ray, 0.5, true));
+        assert_eq!(used(&format!("sensors = 'front'\n{ROWS}")), ["nose"]);
+        assert_eq!(mission(ROWS).front_sonar().name, "nose");
+    }
+
+    #[test]
+    fn a_mission_with_rows_survives_its_run_file() {
+        let written = mission(ROWS);
+        let again = Mission::parse(&toml::to_string(&written).unwrap(), Path::new("run.toml"));
+        assert_eq!(again.unwrap().robot.sensors, written.robot.sensors);
+    }
+}
