@@ -73,7 +73,7 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result<(), Objection> {
             return Err(objection(KEY, "a ray has no field of view", "remove field_of_view_deg"));
         }
         (SensorKind::Cone, Some(deg)) => {
-            within(KEY, deg, 5.0..=60.0, "degrees of field_of_view_deg")?
+            within(KEY, deg, 5.0..=60.0, "degrees of field_of_view_deg")?;
         }
         (_, None) => {}
     }
