@@ -389,14 +389,24 @@ impl Link {
 
     /// Publish the open tick if the supervisor's limit allows it. In lockstep, publish it again if it stays unanswered.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let (tick, in_ticks) = (self.open_number(), self.in_ticks());
-        let Some(open) = &mut self.open else {
+        let Some(mut open) = self.open.take() else {
             return;
         };
+        if self.is_due(&mut open, now_ns, effects) {
+            open.given_ns = Some(now_ns);
+            let tick = self.open_number();
+            effects.push(self.tick_effect(tick, open.clone()));
+        }
+        self.open = Some(open);
+    }
+
+    /// Whether the open tick is to be published now.
+    fn is_due(&mut self, open: &mut OpenTick, now_ns: u64, effects: &mut Vec<Effect>) -> bool {
+        let (tick, in_ticks) = (self.open_number(), self.in_ticks());
         match open.given_ns {
             None if in_ticks && self.last_tick.is_some_and(|last| tick > last) => {
                 if !passed(Some(open.began_ns), now_ns, LIMIT_WAITED) {
-                    return;
+                    return false;
                 }
                 self.last_tick = None;
                 effects.push(Effect::Unlimited { tick });
@@ -406,11 +416,9 @@ impl Link {
             Some(given) if in_ticks && passed(Some(given), now_ns, REPEAT_AFTER) => {
                 self.tally.repeated_ticks += 1;
             }
-            Some(_) => return,
+            Some(_) => return false,
         }
-        open.given_ns = Some(now_ns);
-        let open = open.clone();
-        effects.push(self.tick_effect(tick, open));
+        true
     }
 
     /// Send the newest command once more, halfway to the next tick. Its time limit is what is left of the first one, so the robot stops
