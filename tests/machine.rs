@@ -50,7 +50,7 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
         let robot = "mach-full";
         let out = disk.path().join("run");
         let run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"])
-            .args(["--pace", "4", "--out"])
+            .args(["--pace", "4", "--set", "sure_within_m=9", "--out"])
             .arg(&out)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -8,7 +8,7 @@
 //! Any bit pattern may arrive from another process: states travel as bytes and are read through
 //! `from_byte`, never as Rust enums.
 //!
-//! `robot`, `navigation` and `supervision` hold them; this module holds what they have in common.
+//! `robot`, `navigation`, `localisation` and `supervision` hold them; this module holds what they have in common.
 #![allow(unsafe_code)]
 
 pub use bus::{Stamp, Stamped};
@@ -86,11 +86,12 @@ macro_rules! wire_enum {
 }
 
 // These modules use the macros above, so they come after them.
+mod localisation;
 mod navigation;
 mod robot;
 mod supervision;
 
-pub use self::{navigation::*, robot::*, supervision::*};
+pub use self::{localisation::*, navigation::*, robot::*, supervision::*};
 
 // Their defaults cannot be derived, so they are not written with `payloads`.
 stamped!(GridHeader, LinkSample);

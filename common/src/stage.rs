@@ -3,7 +3,8 @@
 //! A [`Stage`] takes entries and gives outputs. Its process reads topics and makes entries of what came; a replay reads the
 //! same entries from a recording. Both hand them to [`Stage::take`], so a replay computes what the process published.
 //!
-//! A stage that answers each sample of one topic with a sample of another is an [`Answering`] step, and nothing else.
+//! A stage that answers each sample of one topic with a sample of another is an [`Answering`] step, and nothing else. It may take
+//! what came on further topics with the sample.
 
 use std::fmt::Debug;
 
@@ -19,7 +20,7 @@ use crate::{
     shell::{Context, Process, Progress},
     start::StageError,
     step::{ForeignState, Step},
-    wiring::{Persists, Wiring},
+    wiring::{Persists, Topics, Wiring},
 };
 
 /// A stage around its step. A process and a replay run the same one.
@@ -137,6 +138,8 @@ impl<S: Stage> Replay for Generation<S> {
 pub trait Answering: Step<State: Clone + Debug> + 'static {
     type In: Payload + Stamped + Layout;
     type Out: Payload + Stamped + Layout;
+    /// The samples of further topics that it takes with a sample of its input; `()` for none.
+    type Further: Further;
     const NAME: &'static str;
     const INPUT: &'static Topic<Self::In>;
     const OUTPUT: &'static Topic<Self::Out>;
@@ -145,7 +148,37 @@ pub trait Answering: Step<State: Clone + Debug> + 'static {
     const NEWEST_ONLY: bool = false;
 
     /// Take one sample.
-    fn answer(&mut self, input: &Self::In, now: MissionTime) -> Answer<Self::Out>;
+    fn answer(
+        &mut self,
+        input: &Self::In,
+        further: &Self::Further,
+        now: MissionTime,
+    ) -> Answer<Self::Out>;
+}
+
+/// The samples of further topics that came before a sample of an [`Answering`] stage's input. They wake nobody, and the entry
+/// contains them, so a replay takes them with the same sample.
+pub trait Further: Serialize + DeserializeOwned + Debug + 'static {
+    const TOPICS: Topics;
+    type Readers;
+
+    fn open(context: &mut Context) -> Result<Self::Readers, StageError>;
+
+    /// Take what came, and no more than a bounded number of samples.
+    fn take(readers: &mut Self::Readers) -> Result<Self, StageError>;
+}
+
+impl Further for () {
+    const TOPICS: Topics = &[];
+    type Readers = ();
+
+    fn open(_: &mut Context) -> Result<(), StageError> {
+        Ok(())
+    }
+
+    fn take((): &mut ()) -> Result<(), StageError> {
+        Ok(())
+    }
 }
 
 /// The answer to one sample.
@@ -166,12 +199,12 @@ impl<P> From<P> for Answer<P> {
 
 /// The entry of an [`Answering`] stage.
 #[derive(Debug, Serialize, Deserialize)]
-#[serde(bound = "P: Layout")]
-pub struct Sample<P: Layout>(#[serde(with = "inputs::sample")] P);
+#[serde(bound = "P: Layout, F: Further")]
+pub struct Sample<P: Layout, F>(#[serde(with = "inputs::sample")] P, F);
 
 impl<A: Answering> Stage for A {
     type Start = Option<A::State>;
-    type Entry<'a> = Sample<A::In>;
+    type Entry<'a> = Sample<A::In, A::Further>;
     type Outcome = Option<&'static str>;
 
     fn new(mission: &Mission) -> Self {
@@ -192,11 +225,11 @@ impl<A: Answering> Stage for A {
 
     fn take(
         &mut self,
-        Sample(input): Sample<A::In>,
+        Sample(input, further): Sample<A::In, A::Further>,
         out: &mut Outputs,
     ) -> Result<Self::Outcome, StageError> {
         out.at = Progress::of(input.stamp());
-        let answer = self.answer(&input, out.at.time);
+        let answer = self.answer(&input, &further, out.at.time);
         if answer.saves_first {
             out.save(self.state())?;
         }
@@ -207,8 +240,12 @@ impl<A: Answering> Stage for A {
         Ok(answer.warning)
     }
 
-    fn describe(Sample(input): &Sample<A::In>) -> String {
-        format!("{} {input:?}", A::INPUT.spec().name)
+    fn describe(Sample(input, further): &Sample<A::In, A::Further>) -> String {
+        let name = A::INPUT.spec().name;
+        match A::Further::TOPICS.is_empty() {
+            true => format!("{name} {input:?}"),
+            false => format!("{name} {input:?} with {further:?}"),
+        }
     }
 }
 
@@ -216,11 +253,13 @@ impl<A: Answering> Stage for A {
 pub struct Answers<A: Answering> {
     runner: Runner<A>,
     input: Reader<A::In>,
+    further: <A::Further as Further>::Readers,
 }
 
 impl<A: Answering> Process for Answers<A> {
     const WIRING: &'static Wiring = &Wiring {
         inputs: &[A::INPUT],
+        feedback: A::Further::TOPICS,
         wakes: &[A::INPUT],
         outputs: &[A::OUTPUT],
         persists: A::PERSISTS,
@@ -228,7 +267,11 @@ impl<A: Answering> Process for Answers<A> {
     };
 
     fn open(context: &mut Context) -> Result<Self, StageError> {
-        Ok(Self { runner: Runner::open(context, |_| 0)?, input: context.reader(A::INPUT)? })
+        Ok(Self {
+            runner: Runner::open(context, |_| 0)?,
+            input: context.reader(A::INPUT)?,
+            further: A::Further::open(context)?,
+        })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
@@ -240,8 +283,9 @@ impl<A: Answering> Process for Answers<A> {
             let Some(input) = next else {
                 return Ok(self.runner.out.at);
             };
+            let further = A::Further::take(&mut self.further)?;
             self.runner.out.at = Progress::of(input.stamp());
-            if let Some(warning) = self.runner.take(Sample(input))? {
+            if let Some(warning) = self.runner.take(Sample(input, further))? {
                 tracing::warn!(tick = input.stamp().tick, "{warning}");
             }
         }

@@ -71,6 +71,14 @@ topics! {
     CONTACT: Topic<ContactSample> {
         name: "contact", writer: "x80-link", rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
     }
+    /// Where a source outside saw the robot: a camera, a satellite receiver. Any consumer may publish it.
+    FIX: Topic<FixSample> {
+        name: "fix", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
+    /// How far a gyro turned. Any consumer may publish it, one at a time.
+    TURN: Topic<TurnSample> {
+        name: "turn", writer: OPERATOR, rate: Rate::WhenItHappens, limits: Limits::SMALL, logged: Yes,
+    }
     /// Where the robot believes it is.
     POSE: Topic<PoseSample> {
         name: "pose", writer: "dead-reckoning", rate: Rate::EachTick, limits: Limits::SMALL, logged: Yes,

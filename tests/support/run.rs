@@ -30,12 +30,14 @@ pub struct Run {
 }
 
 impl Run {
-    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments.
+    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Wheels that nobody calibrated do not make its
+    /// arrival unsure, unless an argument says so.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
+            .args(["--set", "sure_within_m=9"])
             .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -213,7 +213,8 @@ impl Checker {
             ));
         }
         let half = mission.perimeter.width_m / 2.0;
-        within("arrival_tolerance_m", mission.arrival_tolerance_m, 0.01..=half, "m")
+        within("arrival_tolerance_m", mission.arrival_tolerance_m, 0.01..=half, "m")?;
+        within("sure_within_m", mission.sure_within_m, 0.01..=100.0, "m")
     }
 
     fn point(&mut self, key: &'static str, point: DVec2) -> Result<(), Objection> {

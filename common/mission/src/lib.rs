@@ -73,6 +73,10 @@ pub struct Mission {
     /// The distance within which the target counts as reached, metres.
     #[serde(default = "defaults::arrival_tolerance_m")]
     pub arrival_tolerance_m: f64,
+    /// An arrival is unsure if two standard deviations of the position's error exceed this along the worst axis, metres. A simulated
+    /// robot that is farther off is in the wrong place.
+    #[serde(default = "defaults::sure_within_m")]
+    pub sure_within_m: f64,
     /// Mission time after which the mission is given up, seconds.
     #[serde(default = "defaults::timeout_s")]
     pub timeout_s: f64,
@@ -244,6 +248,9 @@ pub struct Controller {
 mod defaults {
     pub(super) const fn arrival_tolerance_m() -> f64 {
         0.15
+    }
+    pub(super) const fn sure_within_m() -> f64 {
+        0.5
     }
     pub(super) const fn sensing() -> bool {
         true

@@ -7,11 +7,11 @@ use crate::{
     bus::{Stamp, ZeroCopySend, layouts},
     grid::Part,
     kinematics::{Pose2, Twist},
-    mission::INFRARED_RANGERS,
+    mission::{INFRARED_RANGERS, Mission},
 };
 
 payloads! {
-    /// Topic `pose`: where dead reckoning believes the robot is.
+    /// Topic `pose`: where dead reckoning believes the robot is, by its wheels and by what came on `fix` and `turn`.
     #[derive(Serialize, Deserialize)]
     "firsthand.Pose" PoseSample {
         /// Metres in the mission frame.
@@ -33,6 +33,17 @@ payloads! {
         left_counts: u16,
         /// The encoder counts it was computed at.
         right_counts: u16,
+        /// The pose of the frame of odometry in the mission frame: x, y, theta; metres, radians. Odometry is this pose without what
+        /// was corrected by fixes and gyro, and continuous (map from odom of REP 105).
+        map_from_odom: [f64; 3],
+        /// How often fixes that agreed among themselves contradicted the pose, which then became theirs. The map is reset each time.
+        relocations: u64,
+        /// The number of fixes that were used.
+        fixes: u64,
+        /// The number of fixes that were refused.
+        fixes_refused: u64,
+        /// Why the newest fix was refused: a [`FixRefusal`](super::FixRefusal).
+        refusal: u8,
     }
 }
 
@@ -48,16 +59,16 @@ impl PoseSample {
         (xx + yy).max(0.0).sqrt()
     }
 
-    /// Circular error probable: the distance from this pose within which the robot is with a probability of a half, metres. F. E.
-    /// Grubbs, Operations Research 12(1), 1964, by the moments of the squared distance; within 2 %.
-    pub fn position_cep_m(&self) -> f64 {
+    /// Two standard deviations of the position's error along its worst axis, metres.
+    pub fn position_within_m(&self) -> f64 {
         let [xx, xy, _, yy, ..] = self.covariance;
-        let mean = xx + yy;
-        if mean <= 0.0 {
-            return 0.0;
-        }
-        let v = 2.0 * (xx * xx + 2.0 * xy * xy + yy * yy) / (mean * mean);
-        mean.sqrt() * (1.0 - v / 9.0).max(0.0).powf(1.5)
+        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+        2.0 * (mean + half.hypot(xy)).max(0.0).sqrt()
+    }
+
+    /// Whether the position is known well enough for an arrival: within `sure_within_m` of the mission, by two standard deviations.
+    pub fn is_sure(&self, mission: &Mission) -> bool {
+        self.position_within_m() <= mission.sure_within_m
     }
 
     /// Speeds over the last tick.

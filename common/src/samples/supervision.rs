@@ -288,6 +288,8 @@ wire_enum! {
         Held = 4,
         /// It drives far and comes no nearer to its target.
         Wandering = 5,
+        /// Fixes that agree say that it is elsewhere.
+        Relocated = 6,
     }
 }
 

@@ -1,10 +1,10 @@
 //! The covariance of the pose's error, propagated with the motion to first order.
 //!
-//! The error has five parts: x, y, theta, and two errors of the robot that stay the same for a mission, of the ratio of
-//! the wheels' diameters and of the track (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation 12(6), 1996). Each
-//! wheel slips besides, independently, by a variance that grows with the way it rolls (K. S. Chong, L. Kleeman, "Accurate
-//! odometry and error modelling for a mobile robot", ICRA 1997). A car has the driven wheel's slip and,
-//! nominally, the same share of its curvature in place of the ratio of the wheels.
+//! The error has seven parts: x, y, theta, three errors of the robot that stay the same for a mission, of the ratio of
+//! the wheels' diameters, of the track and of the mean diameter (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation
+//! 12(6), 1996), and the bias of a gyro. Each wheel slips besides, independently, by a variance that grows with the way it rolls
+//! (K. S. Chong, L. Kleeman, "Accurate odometry and error modelling for a mobile robot", ICRA 1997). A car has the driven wheel's
+//! slip and, nominally, the same share of its curvature in place of the ratio of the wheels.
 
 use common::{
     kinematics::{Pose2, Twist},
@@ -13,28 +13,49 @@ use common::{
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-type Error = SVector<f64, 5>;
+/// The parts of the error: x, y, theta, ratio of the diameters, track, distance, bias of a gyro; m, rad, shares, rad/s.
+pub(crate) const PARTS: usize = 7;
+/// The place of the bias.
+pub(crate) const BIAS: usize = 6;
 
-/// Covariance of (x, y, theta, ratio of the diameters, track): m, rad, shares.
+pub(crate) type Error = SVector<f64, PARTS>;
+type Matrix = SMatrix<f64, PARTS, PARTS>;
+
+/// Covariance of the error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Covariance(SMatrix<f64, 5, 5>);
+pub(crate) struct Covariance(pub(crate) Matrix);
+
+/// Standard deviation of an unknown gyro's bias, rad/s.
+const BIAS_RAD_S: f64 = 0.02;
+/// Growth of the bias's deviation, rad/s per square root of a second.
+const BIAS_WALK: f64 = 2e-5;
 
 /// The errors that the motions of a robot add to the covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ErrorModel {
     /// Variance of a wheel's slip, m^2 per metre rolled.
     slip: f64,
-    /// Variances of the two systematic errors.
-    systematic: [f64; 2],
+    /// Variances of the three systematic errors.
+    systematic: [f64; 3],
     track_m: f64,
     steers: bool,
+}
+
+/// The effect of a motion on the error: what it makes of the error before, and the covariance that it adds.
+pub(crate) struct Transition {
+    pub(crate) carried: Matrix,
+    pub(crate) noise: Matrix,
 }
 
 impl ErrorModel {
     pub(crate) fn new(odometry: &Odometry, body: &Body) -> Self {
         Self {
             slip: odometry.slip.powi(2),
-            systematic: [odometry.diameter_ratio_sd.powi(2), odometry.track_scale_sd.powi(2)],
+            systematic: [
+                odometry.diameter_ratio_sd.powi(2),
+                odometry.track_scale_sd.powi(2),
+                odometry.distance_scale_sd.powi(2),
+            ],
             track_m: body.track_m,
             steers: body.steering.is_some(),
         }
@@ -42,12 +63,34 @@ impl ErrorModel {
 
     /// The covariance at the start, where the pose is exact because it defines the mission frame.
     pub(crate) fn start(&self) -> Covariance {
-        let [ratio, track] = self.systematic;
-        Covariance(SMatrix::from_diagonal(&Error::from([0.0, 0.0, 0.0, ratio, track])))
+        let [ratio, track, distance] = self.systematic;
+        Covariance(Matrix::from_diagonal(&Error::from([
+            0.0,
+            0.0,
+            0.0,
+            ratio,
+            track,
+            distance,
+            BIAS_RAD_S * BIAS_RAD_S,
+        ])))
     }
 
-    /// The covariance after the arc `moved.v` and the turn `moved.omega`, metres and radians, that were integrated from `pose`.
-    pub(crate) fn after(&self, before: &Covariance, pose: Pose2, moved: Twist) -> Covariance {
+    /// The arc and turn of wheels that are off by the shares `ratio`, `track` and `distance`, where `by_counts` is that of wheels as
+    /// they are known.
+    pub(crate) fn corrected(&self, by_counts: Twist, shares: [f64; 3]) -> Twist {
+        let [ratio, track, distance] = shares;
+        let (v, omega) = (by_counts.v * (1.0 + distance), by_counts.omega * (1.0 + distance));
+        if self.steers {
+            return Twist { v, omega: omega * (1.0 + ratio) };
+        }
+        Twist {
+            v: v + ratio * 0.25 * omega * self.track_m,
+            omega: (omega + ratio * v / self.track_m) / (1.0 + track),
+        }
+    }
+
+    /// The effect of the arc `moved.v` and the turn `moved.omega`, metres and radians, that were integrated from `pose` in `seconds`.
+    pub(crate) fn transition(&self, pose: Pose2, moved: Twist, seconds: f64) -> Transition {
         let Twist { v: arc, omega: turn } = moved;
         let axis = Pose2 { heading: pose.heading + turn / 2.0, ..pose }.axis();
         // The error of the pose that follows from one of arc and turn; the turn's acts half way through the arc.
@@ -59,9 +102,11 @@ impl ErrorModel {
                 turn_error,
                 0.0,
                 0.0,
+                0.0,
+                0.0,
             ])
         };
-        let mut carried = SMatrix::<f64, 5, 5>::identity();
+        let mut carried = Matrix::identity();
         carried[(0, 2)] = -arc * axis.y;
         carried[(1, 2)] = arc * axis.x;
         let half_track = self.track_m / 2.0;
@@ -82,20 +127,20 @@ impl ErrorModel {
         };
         carried.set_column(3, &(carried.column(3) + ratio));
         carried.set_column(4, &(carried.column(4) + track));
-        let noise: SMatrix<f64, 5, 5> = slips.iter().map(|slip| slip * slip.transpose()).sum();
-        Covariance(carried * before.0 * carried.transpose() + noise)
+        carried.set_column(5, &(carried.column(5) + effect(arc, turn)));
+        let mut noise: Matrix = slips.iter().map(|slip| slip * slip.transpose()).sum();
+        noise[(BIAS, BIAS)] += BIAS_WALK * BIAS_WALK * seconds;
+        Transition { carried, noise }
     }
 
-    /// The covariance after a motion that nobody measured: each wheel rolled any way up to `farthest` metres, forward or
+    /// The covariance that is added by a motion that nobody measured: each wheel rolled any way up to `farthest` metres, forward or
     /// back. The robot may have gone as far aside as ahead, because it may have turned first.
-    pub(crate) fn after_lost(&self, before: &Covariance, farthest: f64) -> Covariance {
+    pub(crate) fn lost(&self, farthest: f64) -> Matrix {
         // Evenly distributed, for each wheel. A car turns less than two wheels that roll freely, so this holds for it too.
         let wheel = farthest * farthest / 3.0;
         let place = wheel / 2.0;
         let heading = 2.0 * wheel / (self.track_m * self.track_m);
-        Covariance(
-            before.0 + SMatrix::from_diagonal(&Error::from([place, place, heading, 0.0, 0.0])),
-        )
+        Matrix::from_diagonal(&Error::from([place, place, heading, 0.0, 0.0, 0.0, 0.0]))
     }
 }
 
@@ -118,13 +163,18 @@ mod tests {
         ErrorModel::new(&mission.robot.odometry, &mission.body())
     }
 
+    fn after(model: &ErrorModel, before: &Covariance, pose: Pose2, moved: Twist) -> Covariance {
+        let Transition { carried, noise } = model.transition(pose, moved, 0.1);
+        Covariance(carried * before.0 * carried.transpose() + noise)
+    }
+
     const AHEAD: Twist = Twist { v: 0.002, omega: 0.0 };
 
     /// The covariance after `steps` times the same motion.
     fn drive(model: &ErrorModel, steps: usize, moved: Twist) -> [f64; 6] {
         let (mut pose, mut covariance) = (Pose2::default(), model.start());
         for _ in 0..steps {
-            covariance = model.after(&covariance, pose, moved);
+            covariance = after(model, &covariance, pose, moved);
             pose = pose.along_arc(moved.v, moved.omega);
         }
         covariance.of_pose()
@@ -137,7 +187,8 @@ mod tests {
     #[test]
     fn slip_on_a_straight_way_by_hand() {
         // Variance of the heading 2 q s / W^2, aside its integral q s^3 2 / (3 W^2), ahead q s / 2.
-        let model = model("slip = 0.01\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0");
+        let model =
+            model("slip = 0.01\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
         let [xx, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
         let per_metre = 2.0 * 1e-4 / (0.26 * 0.26);
         close(heading, per_metre * 2.0);
@@ -148,7 +199,8 @@ mod tests {
     #[test]
     fn unequal_wheels_bend_a_straight_way_into_a_circle() {
         // The heading is off by e s / W and the way aside by e s^2 / 2 W.
-        let model = model("slip = 0\ndiameter_ratio_sd = 0.006\ntrack_scale_sd = 0");
+        let model =
+            model("slip = 0\ndiameter_ratio_sd = 0.006\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
         let [_, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
         let variance = 0.006 * 0.006;
         close(heading, variance * (2.0_f64 / 0.26).powi(2));
@@ -156,14 +208,26 @@ mod tests {
     }
 
     #[test]
+    fn wheels_that_are_larger_than_known_drive_farther_and_turn_farther() {
+        let model =
+            model("slip = 0\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0\ndistance_scale_sd = 0.01");
+        let [xx, .., yy, _, _] = drive(&model, 1000, AHEAD);
+        close(xx, 1e-4 * 4.0);
+        assert!(yy < 1e-18);
+        let [.., heading] = drive(&model, 50, Twist { v: 0.0, omega: 0.02 });
+        close(heading, 1e-4);
+    }
+
+    #[test]
     fn an_uncertain_track_is_undone_by_turning_back() {
-        let model = model("slip = 0\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0.01");
+        let model =
+            model("slip = 0\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0.01\ndistance_scale_sd = 0");
         let there = Twist { v: 0.0, omega: 0.02 };
         let [.., heading] = drive(&model, 50, there);
         close(heading, 1e-4);
         let (mut covariance, mut pose) = (model.start(), Pose2::default());
         for omega in [0.02; 50].into_iter().chain([-0.02; 50]) {
-            covariance = model.after(&covariance, pose, Twist { v: 0.0, omega });
+            covariance = after(&model, &covariance, pose, Twist { v: 0.0, omega });
             pose = pose.along_arc(0.0, omega);
         }
         assert!(covariance.of_pose()[5] < 1e-18);

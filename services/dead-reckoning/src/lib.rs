@@ -2,8 +2,11 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`step`] | the pure step: a `wheels` sample to a `pose` |
-//! | [`covariance`] | the covariance of the pose's error |
+//! | [`step`] | the pure step: a `wheels` sample, and the fixes and turns that came with it, to a `pose` |
+//! | `covariance` | how the covariance of the pose's error grows with the motion |
+//! | `filter` | the estimate, and the ticks and fixes of the last 2 s |
+//! | `gyro` | the turn of a tick from a gyro's increments |
+//! | `relocation` | whether fixes that contradict the pose agree among themselves |
 //!
 //! The state is saved after the pose is published, so that the tick does not wait for the file. A process that is killed in between
 //! has published a pose that its saved state does not contain. That is safe: the counts are cumulative, and the link's last sample
@@ -12,47 +15,96 @@
 //! restarted its counts, the state before does not fit the counts, so the new state is saved first. If all processes are killed at
 //! such a tick, a resumed run counts the tick again.
 
-pub mod covariance;
+mod covariance;
+mod filter;
+mod gyro;
+mod relocation;
 pub mod step;
 
 use std::path::Path;
 
 use common::{
-    bus::Topic,
+    bus::{Layout, Payload, Reader, Stamped, Topic},
     checkpoint::{Checkpoint, CheckpointError},
     clock::MissionTime,
     run,
-    samples::{PoseSample, WheelSample},
-    stage::{Answer, Answering},
+    samples::{FixRefusal, FixSample, PoseSample, TurnSample, WheelSample},
+    shell::Context,
+    stage::{Answer, Answering, Further},
+    start::StageError,
     step::Step as _,
-    topics::{POSE, WHEELS},
-    wiring::Persists,
+    topics::{FIX, POSE, TURN, WHEELS},
+    wiring::{Persists, Topics},
 };
+use serde::{Deserialize, Serialize};
 
-use step::{Reckoned, State};
+use step::{Input, Reckoned, State};
 
 pub use step::DeadReckoning;
 
-/// Room for the encoded state, bytes: it is under 300.
-const STATE_BYTES: usize = 512;
+/// Room for the encoded state, bytes: with 64 ticks and 64 fixes it is under 14,000.
+const STATE_BYTES: usize = 16_384;
+/// Samples of a topic that are taken with a tick, at most. Others are taken with the next one.
+const MOST_FIXES: usize = 16;
+const MOST_TURNS: usize = 128;
+
+/// The samples of sources outside that came since the tick before.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Sources {
+    pub fixes: Vec<FixSample>,
+    pub turns: Vec<TurnSample>,
+}
+
+impl Further for Sources {
+    const TOPICS: Topics = &[&FIX, &TURN];
+    type Readers = (Reader<FixSample>, Reader<TurnSample>);
+
+    fn open(context: &mut Context) -> Result<Self::Readers, StageError> {
+        Ok((context.reader(&FIX)?, context.reader(&TURN)?))
+    }
+
+    fn take((fixes, turns): &mut Self::Readers) -> Result<Self, StageError> {
+        Ok(Self { fixes: some(fixes, MOST_FIXES)?, turns: some(turns, MOST_TURNS)? })
+    }
+}
+
+fn some<P>(reader: &mut Reader<P>, most: usize) -> Result<Vec<P>, StageError>
+where
+    P: Payload + Stamped + Layout,
+{
+    let mut taken = Vec::new();
+    while taken.len() < most
+        && let Some(sample) = reader.take()?
+    {
+        taken.push(sample);
+    }
+    Ok(taken)
+}
 
 impl Answering for DeadReckoning {
     type In = WheelSample;
     type Out = PoseSample;
+    type Further = Sources;
     const NAME: &'static str = "dead-reckoning";
     const INPUT: &'static Topic<WheelSample> = &WHEELS;
     const OUTPUT: &'static Topic<PoseSample> = &POSE;
     const PERSISTS: Persists = Persists::State(STATE_BYTES);
 
-    fn answer(&mut self, wheels: &WheelSample, now: MissionTime) -> Answer<PoseSample> {
+    fn answer(
+        &mut self,
+        wheels: &WheelSample,
+        Sources { fixes, turns }: &Sources,
+        now: MissionTime,
+    ) -> Answer<PoseSample> {
         let first = self.state().newest().is_none();
-        let Reckoned { pose, rejected } = self.step(wheels, now);
-        let warning = "the encoder counts restarted or jumped; the pose stays";
-        Answer {
-            sample: pose,
-            saves_first: first || rejected,
-            warning: rejected.then_some(warning),
-        }
+        let Reckoned { pose, rejected, relocated, refused } =
+            self.step(Input { wheels, fixes, turns }, now);
+        let warning = match refused {
+            _ if rejected => Some("the encoder counts restarted or jumped; the pose stays"),
+            _ if relocated => Some("fixes that agree contradict the pose; the pose is theirs now"),
+            refused => refused.map(FixRefusal::words),
+        };
+        Answer { sample: pose, saves_first: first || rejected || relocated, warning }
     }
 }
 

@@ -1,18 +1,23 @@
-//! The step from counts to pose, for two wheels, (20), or for a car's driven wheel and steering, (3). The pose is an integral that
-//! nothing can recompute, so its state is in the checkpoint.
+//! The step from counts to pose, for two wheels, (20), or for a car's driven wheel and steering, (3), corrected by fixes and a gyro
+//! where sources publish them. The pose is an integral that nothing can recompute, so its state is in the checkpoint.
 
 use common::{
     clock::MissionTime,
     kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
-    mission::{Body, Integration, Mission},
-    samples::{PoseSample, WheelSample},
+    mission::{Body, Mission},
+    samples::{FixRefusal, FixSample, PoseSample, TurnSample, WheelSample},
     step::{ForeignState, Step},
     wire::{counts_between, counts_restarted},
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::covariance::{Covariance, ErrorModel};
+use crate::{
+    covariance::ErrorModel,
+    filter::{Filter, Fix, History, Motions, Refused, Tick},
+    gyro::Gyro,
+    relocation::Contradictions,
+};
 
 /// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
 /// below it; a counter that restarted is nearly always above it.
@@ -29,14 +34,25 @@ const COASTS_S: f64 = 0.2;
 /// No robot is switched off and on again and answers sooner, seconds; a link that was killed is back in a tenth.
 const BOOTS_IN_S: f64 = 2.0;
 
+/// Farther the pose does not move to the estimate in a tick: the map around the robot must not tear. Metres and radians.
+const MOST_CORRECTION: (f64, f64) = (0.02, std::f64::consts::PI / 180.0);
+
 /// The state that survives the process: the pose, and the counts it was computed at.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    position: DVec2,
-    heading: f64,
+    /// As it is published: it follows the estimate without jumps.
+    pose: Pose2,
+    /// The pose in the frame of odometry.
+    odometry: Pose2,
+    history: History,
     travelled: f64,
-    covariance: Covariance,
     last: Option<Last>,
+    gyro: Option<Gyro>,
+    contradictions: Contradictions,
+    relocations: u64,
+    fixes: u64,
+    fixes_refused: u64,
+    refusal: u8,
 }
 
 impl State {
@@ -44,6 +60,14 @@ impl State {
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
+}
+
+/// A tick's wheels, and what came from sources outside since the tick before.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    pub wheels: &'a WheelSample,
+    pub fixes: &'a [FixSample],
+    pub turns: &'a [TurnSample],
 }
 
 /// The wheel sample the pose was computed from, and the speeds it gave.
@@ -67,15 +91,22 @@ pub struct Reckoned {
     /// The counts jumped farther than wheels can turn, or the robot restarted its counters: the pose stays, and its covariance grows
     /// by how far the robot can have gone.
     pub rejected: bool,
+    /// Fixes that agree among themselves contradicted the pose, so it is theirs now.
+    pub relocated: bool,
+    /// Why a fix was refused, unless the one before was refused for the same reason.
+    pub refused: Option<FixRefusal>,
 }
 
 /// The integrator of (20) and (21).
 #[derive(Clone, Debug)]
 pub struct DeadReckoning {
     drive: Drive,
+    /// The body with the track as it is known.
     body: Body,
-    integration: Integration,
-    errors: ErrorModel,
+    /// Ways of the left and the right wheel over their nominal ones.
+    wheel_scales: [f64; 2],
+    distance_scale: f64,
+    motions: Motions,
     /// The period of the ticks, seconds.
     period_s: f64,
     /// The longest that wheels turn after a tick that no further one follows, seconds.
@@ -84,28 +115,37 @@ pub struct DeadReckoning {
 }
 
 impl Step for DeadReckoning {
-    type Input<'a> = &'a WheelSample;
+    type Input<'a> = Input<'a>;
     type Output = Reckoned;
     type State = State;
 
     fn new(mission: &Mission) -> Self {
-        let body = mission.body();
+        let odometry = &mission.robot.odometry;
+        let nominal = mission.body();
+        let body = Body { track_m: nominal.track_m * odometry.track_scale, ..nominal };
         let start = mission.start_pose();
-        let errors = ErrorModel::new(&mission.robot.odometry, &body);
+        let errors = ErrorModel::new(odometry, &body);
         let period_s = 1.0 / mission.robot.rate_hz;
         Self {
             drive: body.drive(),
             body,
-            integration: mission.dead_reckoning.integration,
-            errors,
+            wheel_scales: odometry.wheel_scales(),
+            distance_scale: odometry.distance_scale,
+            motions: Motions { errors, integration: mission.dead_reckoning.integration },
             period_s,
             turns_on_s: period_s + mission.robot.command_limit_s + COASTS_S,
             state: State {
-                position: start.position,
-                heading: start.heading,
+                pose: start,
+                odometry: start,
+                history: History::new(Filter::new(start, errors.start())),
                 travelled: 0.0,
-                covariance: errors.start(),
                 last: None,
+                gyro: None,
+                contradictions: Contradictions::default(),
+                relocations: 0,
+                fixes: 0,
+                fixes_refused: 0,
+                refusal: FixRefusal::None.into(),
             },
         }
     }
@@ -120,49 +160,101 @@ impl Step for DeadReckoning {
     }
 
     /// Integrate up to one wheel sample. A tick given twice gives the same pose twice.
-    fn step(&mut self, wheels: &WheelSample, now: MissionTime) -> Reckoned {
-        let (left, right) = (wheels.left_counts, wheels.right_counts);
-        let (mut v, mut omega) = (0.0, 0.0);
-        let mut rejected = false;
+    fn step(&mut self, Input { wheels, fixes, turns }: Input<'_>, now: MissionTime) -> Reckoned {
+        let mut motion = Twist::default();
+        let (mut rejected, mut elapsed) = (false, 0.0);
+        let mut tick = Tick { time: now, ..Tick::default() };
         if let Some(last) = self.state.last {
             if last.tick == wheels.stamp.tick {
-                return Reckoned { pose: self.sample(), rejected };
+                let pose = self.sample();
+                return Reckoned { pose, rejected, relocated: false, refused: None };
             }
-            let elapsed = now.since(last.time).as_secs_f64();
-            let moved = self.moved(last, wheels, elapsed);
-            rejected = moved.is_none();
-            let motion = moved.unwrap_or_default();
-            let pose = Pose2 { position: self.state.position, heading: self.state.heading };
-            let moved = match self.integration {
-                Integration::Arc => pose.along_arc(motion.v, motion.omega),
-                Integration::Euler => pose.along_euler(motion.v, motion.omega),
-            };
-            self.state.covariance = self.errors.after(&self.state.covariance, pose, motion);
-            if rejected {
-                // A robot without ticks gets no commands, so its wheels soon rest.
-                let lost_m = self.body.top_speed_m_s * elapsed.min(self.turns_on_s);
-                self.state.covariance = self.errors.after_lost(&self.state.covariance, lost_m);
-            }
-            self.state.position = moved.position;
-            self.state.heading = moved.heading;
-            self.state.travelled += motion.v.abs();
-            (v, omega) = self.speeds(motion, elapsed);
+            elapsed = now.since(last.time).as_secs_f64();
+            let counted = self.moved(last, wheels, elapsed);
+            rejected = counted.is_none();
+            let Twist { v: arc, omega: turn } = counted.unwrap_or_default();
+            // A robot without ticks gets no commands, so its wheels soon rest.
+            let lost_s = if rejected { elapsed.min(self.turns_on_s) } else { 0.0 };
+            let lost_m = self.body.top_speed_m_s * lost_s;
+            tick = Tick { seconds: elapsed, arc, turn, lost_m, ..tick };
+            motion = self.state.history.newest().moved(&self.motions, &tick);
         }
+        let state = &mut self.state;
+        for pose in [&mut state.pose, &mut state.odometry] {
+            *pose = self.motions.along(*pose, motion);
+        }
+        state.travelled += motion.v.abs();
+        state.history.advance(&self.motions, tick);
+        state.history.turn(&self.motions, &mut state.gyro, turns);
+        let (mut relocated, mut refused) = (false, None);
+        for fix in fixes {
+            let taken = self.take_fix(fix);
+            relocated |= taken == Taken::Relocated;
+            let why = match taken {
+                Taken::Refused(why) => why,
+                Taken::Used | Taken::Relocated => FixRefusal::None,
+            };
+            let new = why != FixRefusal::None && u8::from(why) != self.state.refusal;
+            refused = if new { Some(why) } else { refused };
+            self.state.refusal = why.into();
+        }
+        self.follow(relocated);
+        let Twist { v, omega } = self.speeds(motion, elapsed);
         self.state.last = Some(Last {
             tick: wheels.stamp.tick,
             time: now,
-            left,
-            right,
+            left: wheels.left_counts,
+            right: wheels.right_counts,
             generation: wheels.stamp.generation,
             restarts: wheels.restarts,
             v,
             omega,
         });
-        Reckoned { pose: self.sample(), rejected }
+        Reckoned { pose: self.sample(), rejected, relocated, refused }
     }
 }
 
 impl DeadReckoning {
+    /// Take a fix, unless it is refused.
+    fn take_fix(&mut self, sample: &FixSample) -> Taken {
+        let state = &mut self.state;
+        let fix = Fix::try_from(sample);
+        let taken = fix.map_err(|why| Refused { why, there: None });
+        let taken = taken.and_then(|fix| state.history.take(&self.motions, fix));
+        let Err(Refused { why, there }) = taken else {
+            state.fixes += 1;
+            state.contradictions = Contradictions::default();
+            return Taken::Used;
+        };
+        state.fixes_refused += 1;
+        let estimate = state.history.newest();
+        if let (Ok(fix), Some(there)) = (fix, there)
+            && let Some(elsewhere) = state.contradictions.add(there, &fix, estimate)
+        {
+            state.history.restart(elsewhere);
+            state.relocations += 1;
+            return Taken::Relocated;
+        }
+        Taken::Refused(why)
+    }
+
+    /// Move the pose to the estimate: all the way if the robot was relocated.
+    fn follow(&mut self, relocated: bool) {
+        let estimate = self.state.history.newest().pose;
+        let pose = &mut self.state.pose;
+        let way = estimate.position - pose.position;
+        let turn = estimate.heading - pose.heading;
+        let (most_m, most_rad) = MOST_CORRECTION;
+        pose.position = match relocated || way.length() <= most_m {
+            true => estimate.position,
+            false => pose.position + way.clamp_length_max(most_m),
+        };
+        pose.heading = match relocated || turn.abs() <= most_rad {
+            true => estimate.heading,
+            false => pose.heading + turn.clamp(-most_rad, most_rad),
+        };
+    }
+
     /// Arc and turn since `last`, metres and radians; none if the counts cannot have come from turning wheels.
     fn moved(&self, last: Last, wheels: &WheelSample, elapsed: f64) -> Option<Twist> {
         let (left, right) = (
@@ -179,19 +271,22 @@ impl DeadReckoning {
         let wheel = f64::from(left) * per_count;
         Some(match &self.drive {
             Drive::Differential(drive) => {
-                drive.twist(WheelSpeeds { left: wheel, right: f64::from(right) * per_count })
+                let [left_scale, right_scale] = self.wheel_scales;
+                let right = f64::from(right) * per_count * right_scale;
+                drive.twist(WheelSpeeds { left: wheel * left_scale, right })
             }
             Drive::Ackermann(drive) => {
                 // The mean of the two angles is taken as the steering on the way.
                 let middle = f64::from(counts_between(0, last.right)) + f64::from(right) / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
+                let wheel = wheel * self.distance_scale;
                 drive.twist(SteeredWheel { wheel, steering: angle.unwrap_or_default() })
             }
         })
     }
 
     /// Speed and turn rate of a motion, m/s and rad/s: no faster than the body can go, along the same curve.
-    fn speeds(&self, moved: Twist, elapsed: f64) -> (f64, f64) {
+    fn speeds(&self, moved: Twist, elapsed: f64) -> Twist {
         let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
         let (v, omega) = (moved.v / time, moved.omega / time);
         let wheel = match self.body.steering {
@@ -199,26 +294,49 @@ impl DeadReckoning {
             None => v.abs() + omega.abs() * self.body.track_m / 2.0,
         };
         let share = (self.body.top_speed_m_s / wheel).min(1.0);
-        (v * share, omega * share)
+        Twist { v: v * share, omega: omega * share }
     }
 
     fn sample(&self) -> PoseSample {
-        let State { position, heading, travelled, covariance, last } = self.state;
+        let State { pose, odometry, history, last, .. } = &self.state;
+        let Pose2 { position, heading } = *pose;
         let (left_counts, right_counts, v, omega) =
             last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
+        let estimate = history.newest();
+        // The error of this pose is that of the estimate and the way to it.
+        let [x, y] = (estimate.pose.position - position).to_array();
+        let turn = estimate.pose.heading - heading;
+        let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];
+        let mut covariance = estimate.covariance.of_pose();
+        covariance.iter_mut().zip(way).for_each(|(entry, more)| *entry += more);
+        let turned = heading - odometry.heading;
+        let origin = position - DVec2::from_angle(turned).rotate(odometry.position);
         PoseSample {
             x_m: position.x,
             y_m: position.y,
             heading_rad: heading,
             v_m_s: v,
             omega_rad_s: omega,
-            travelled_m: travelled,
-            covariance: covariance.of_pose(),
+            travelled_m: self.state.travelled,
+            covariance,
             left_counts,
             right_counts,
+            map_from_odom: [origin.x, origin.y, turned],
+            relocations: self.state.relocations,
+            fixes: self.state.fixes,
+            fixes_refused: self.state.fixes_refused,
+            refusal: self.state.refusal,
             ..PoseSample::default()
         }
     }
+}
+
+/// The result of a fix.
+#[derive(Clone, Copy, PartialEq)]
+enum Taken {
+    Used,
+    Refused(FixRefusal),
+    Relocated,
 }
 
 /// Whether the robot restarted its counts after `last`. The link sees that in the frames between; only
@@ -232,5 +350,7 @@ fn restarted(last: Last, wheels: &WheelSample, elapsed: f64) -> bool {
         && counts_restarted([last.left, last.right], [wheels.left_counts, wheels.right_counts])
 }
 
+#[cfg(test)]
+mod source_tests;
 #[cfg(test)]
 mod tests;

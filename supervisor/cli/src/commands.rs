@@ -138,7 +138,7 @@ const EXIT_CODES: &str = "Exit codes of run:
   7  an earlier run was cut off (--resume-last)
   9  in the wrong place: by the ground truth (simulated robot), or where it came to rest
  10  could not be stopped: told to stand by every method, it moves
- 11  reached, unsure: by the covariance of its pose the robot is rather elsewhere
+ 11  reached, unsure: the robot's pose may be farther off than the mission allows
  78  invalid mission file; do not retry
 
 An error message ends with a code in brackets, which scripts can match.";

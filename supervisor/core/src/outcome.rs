@@ -15,7 +15,7 @@ pub enum Outcome {
     Reached,
     /// The robot reports its arrival, and the ground truth contradicts it.
     WrongPlace,
-    /// The robot reports its arrival, and by the covariance of its pose it is rather elsewhere than in the right place.
+    /// The robot reports its arrival, and by the covariance of its pose it may be farther off than the mission allows.
     ReachedUnsure,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
@@ -69,10 +69,7 @@ impl Ending {
     }
 
     /// This ending; or the wrong place, if the robot did not reach its target by the ground truth `ended`, or came to rest elsewhere by
-    /// its own pose `at_rest`; or unsure, if that pose is more likely wrong than right.
-    ///
-    /// The limit is the circular error probable and no whole deviation: the drift of wheels that are as good as `measured` ones has a
-    /// deviation of 0.45 to 0.6 m at the end of the missions that ship, and most of them end in the right place.
+    /// its own pose `at_rest`; or unsure, if the error of that pose may be larger than the mission allows.
     pub(crate) fn checked(
         self,
         mission: &Mission,
@@ -89,20 +86,25 @@ impl Ending {
         let too_far = |distance_m: &f64| *distance_m > allowed_m;
         let said = &self.reason;
         let (outcome, contradicted) = if let Some(distance_m) = by_truth_m.filter(too_far) {
-            let by_truth = format!("{said} by its own pose, {distance_m:.2} m by the ground truth");
+            let by_truth = format!(
+                "{said} by its own pose, {distance_m:.2} m by the ground truth: more than {allowed_m} m"
+            );
             (Outcome::WrongPlace, by_truth)
         } else if let Some(distance_m) = at_rest_m.filter(too_far) {
-            (Outcome::WrongPlace, format!("{said}, and came to rest {distance_m:.2} m from it"))
-        } else if let Some(pose) = at_rest.filter(|pose| too_far(&pose.position_cep_m())) {
-            let (expected_m, cep_m) = (pose.position_rms_m(), pose.position_cep_m());
+            let rest = format!(
+                "{said}, and came to rest {distance_m:.2} m from it: more than {allowed_m} m"
+            );
+            (Outcome::WrongPlace, rest)
+        } else if let Some(pose) = at_rest.filter(|pose| !pose.is_sure(mission)) {
+            let (within_m, sure_m) = (pose.position_within_m(), mission.sure_within_m);
             let unsure = format!(
-                "{said} by its own pose, whose expected error is {expected_m:.2} m, in half of all cases more than {cep_m:.2} m"
+                "{said} by its own pose, which is known to within {within_m:.2} m (2 standard deviations): more than {sure_m} m"
             );
             (Outcome::ReachedUnsure, unsure)
         } else {
             return self;
         };
-        Self::failed(outcome, format!("{contradicted}: more than {allowed_m} m"))
+        Self::failed(outcome, contradicted)
     }
 
     /// This ending, with what the encoders said when the stages were stopped.
@@ -155,9 +157,9 @@ mod tests {
     }
 
     #[test]
-    fn an_arrival_whose_pose_is_rather_wrong_than_right_is_unsure() {
-        let outcome = |said, tolerance: &str, [xx, xy, yy]: [f64; 3], ended: Option<f64>| {
-            let text = format!("target = [3, 0]\n{tolerance}");
+    fn an_arrival_whose_pose_is_not_known_to_two_deviations_is_unsure() {
+        let outcome = |said, set: &str, [xx, xy, yy]: [f64; 3], ended: Option<f64>| {
+            let text = format!("target = [3, 0]\n{set}");
             let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
             let covariance = [xx, xy, 0.0, yy, 0.0, 0.0];
             let pose = PoseSample { x_m: 2.9, covariance, ..PoseSample::default() };
@@ -165,16 +167,14 @@ mod tests {
             ending.checked(&mission, ended.map(at).as_ref(), Some(&pose)).outcome
         };
         use Outcome::{Aborted, Reached, ReachedUnsure, WrongPlace};
-        // In one direction half of all errors are below 0.674 deviations, in all directions alike below 1.177.
-        let (line, circle) = (0.5_f64 / 0.6745, 0.5_f64 / 1.1774);
-        for (share, want) in [(0.98_f64, Reached), (1.02, ReachedUnsure)] {
-            let (line, circle) = ((line * share).powi(2), (circle * share).powi(2));
+        for (deviation, want) in [(0.249_f64, Reached), (0.251, ReachedUnsure)] {
+            let line = deviation.powi(2);
             assert_eq!(outcome(Reached, "", [0.0, 0.0, line], None), want);
             assert_eq!(outcome(Reached, "", [line / 2.0, line / 2.0, line / 2.0], None), want);
-            assert_eq!(outcome(Reached, "", [circle, 0.0, circle], None), want);
+            assert_eq!(outcome(Reached, "", [line, 0.0, line], None), want);
         }
-        let wide = "arrival_tolerance_m = 0.8";
-        assert_eq!(outcome(Reached, wide, [0.3, 0.0, 0.3], None), Reached);
+        let less = "sure_within_m = 0.3";
+        assert_eq!(outcome(Reached, less, [0.04, 0.0, 0.0], None), ReachedUnsure);
         assert_eq!(outcome(Reached, "", [0.3, 0.0, 0.3], Some(3.0)), ReachedUnsure);
         assert_eq!(outcome(Reached, "", [0.3, 0.0, 0.3], Some(2.0)), WrongPlace);
         assert_eq!(outcome(Aborted, "", [9.0, 0.0, 9.0], None), Aborted);

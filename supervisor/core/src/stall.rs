@@ -10,6 +10,7 @@
 //! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
 //! | held | something holds its wheels: its motors push and its encoders stand | replan |
 //! | wandering | it has driven several times as far as its target was away | reset |
+//! | relocated | fixes say that it is elsewhere, so the map is of another place; no limit | reset |
 //! | cut off | no way leads from its place to the target, and it has looked around | reset |
 
 use std::{f64::consts::TAU, time::Duration};
@@ -64,6 +65,7 @@ pub(crate) fn words(cause: StallCause, body: &Body) -> String {
             "the robot drives around and does not get nearer, whatever is forgotten"
         }
         StallCause::Held => "the wheels are held fast, whatever is planned",
+        StallCause::Relocated => "the robot is elsewhere by fixes that agree",
         StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
         StallCause::CutOff => "the belief isolates the robot from the target, again and again",
     };
@@ -116,6 +118,11 @@ pub(crate) struct StallWatch {
     /// Where the wheels were held, and the replans there since the last reset.
     held_at: Option<(DVec2, u32)>,
     epoch: u64,
+    /// Epochs without a reset of their own, and resets because the robot was relocated.
+    skipped: u64,
+    relocated: u64,
+    /// The relocations of the newest pose that was checked.
+    relocations: u64,
     /// The last tick that was checked.
     tick: Option<u64>,
     /// Every stall so far.
@@ -176,6 +183,9 @@ impl StallWatch {
             replans: 0,
             held_at: None,
             epoch: 0,
+            skipped: 0,
+            relocated: 0,
+            relocations: 0,
             tick: None,
             stalls: Vec::new(),
         }
@@ -189,14 +199,19 @@ impl StallWatch {
     /// Replans and resets in this mission up to `tick`, or in all of it.
     pub(crate) fn recoveries(&self, tick: Option<u64>) -> (u32, u64) {
         let Some(tick) = tick else {
-            return (self.replans, self.epoch);
+            return (self.replans, self.resets());
         };
         let after = self.stalls.iter().find(|stall| stall.stamp.tick > tick);
-        after.map_or((self.replans, self.epoch), |stall| match stall.recovery() {
+        after.map_or((self.replans, self.resets()), |stall| match stall.recovery() {
             RecoveryStep::Replan => (stall.replans - 1, stall.resets),
             RecoveryStep::Reset => (stall.replans, stall.resets - 1),
             RecoveryStep::GiveUp => (stall.replans, stall.resets),
         })
+    }
+
+    /// Resets of the map in this mission.
+    const fn resets(&self) -> u64 {
+        self.epoch - self.skipped
     }
 
     /// The stall at which no recovery step was left.
@@ -219,8 +234,10 @@ impl StallWatch {
         held: bool,
         contact: bool,
     ) -> Option<StallSample> {
-        if self.tick.replace(pose.stamp.tick) == Some(pose.stamp.tick) {
-            return None;
+        match self.tick.replace(pose.stamp.tick) {
+            Some(tick) if tick == pose.stamp.tick => return None,
+            Some(_) => {}
+            None => self.relocations = pose.relocations,
         }
         // The map may be older than this supervisor.
         self.epoch = self.epoch.max(guidance.epoch);
@@ -228,7 +245,11 @@ impl StallWatch {
             self.hold(pose.stamp.tick);
             return None;
         }
-        let cause = if contact {
+        let relocated = self.relocations != pose.relocations;
+        self.relocations = pose.relocations;
+        let cause = if relocated {
+            StallCause::Relocated
+        } else if contact {
             StallCause::Held
         } else if self.waits_for_field(pose, guidance) {
             (self.anchor, self.place) = (None, None);
@@ -241,8 +262,12 @@ impl StallWatch {
         let recovery = if self.may_replan(cause, pose.pose().position) {
             self.replans += 1;
             RecoveryStep::Replan
-        } else if self.epoch < MOST_RESETS {
-            self.epoch += 1;
+        } else if relocated || self.resets() - self.relocated < MOST_RESETS {
+            // In an even epoch the mapper drops what is near the robot, too.
+            let skips = u64::from(relocated) * ((self.epoch + 1) % 2);
+            self.relocated += u64::from(relocated);
+            self.skipped += skips;
+            self.epoch += 1 + skips;
             self.wanders_at = None;
             self.replans_here = 0;
             self.held_at = None;
@@ -263,7 +288,7 @@ impl StallWatch {
             y_m: pose.y_m,
             epoch: self.epoch,
             replans: self.replans,
-            resets: self.epoch,
+            resets: self.resets(),
             cause: cause.into(),
             recovery: recovery.into(),
         };
@@ -280,7 +305,10 @@ impl StallWatch {
                 self.held_at.take_if(elsewhere);
                 &mut self.held_at.get_or_insert((here, 0)).1
             }
-            StallCause::InsideHazard | StallCause::CutOff | StallCause::Wandering => return false,
+            StallCause::InsideHazard
+            | StallCause::CutOff
+            | StallCause::Wandering
+            | StallCause::Relocated => return false,
         };
         let may = *replans < MOST_REPLANS;
         *replans += u32::from(may);

@@ -44,6 +44,9 @@ pub struct Summary {
     pub pose_error_m: Option<f64>,
     /// The root mean square of the pose error by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
+    /// Two standard deviations of that pose's position along the worst axis: an arrival is sure within `sure_within_m` of the mission.
+    #[serde(default)]
+    pub pose_within_m: Option<f64>,
     /// Distance from the robot's end to the target, by the ground truth.
     pub true_distance_m: Option<f64>,
     /// The time at which the robot had moved 0.1 m, by the ground truth.
@@ -110,6 +113,7 @@ impl Summary {
                 Some(its.or(truth.last())?.pose_error_m(pose))
             }),
             pose_error_expected_m: pose.map(PoseSample::position_rms_m),
+            pose_within_m: pose.map(PoseSample::position_within_m),
             true_distance_m: truth
                 .last()
                 .map(|tick| (tick.x - mission.target.x).hypot(tick.y - mission.target.y)),
@@ -147,10 +151,10 @@ impl Summary {
         });
         let numbers = [
             format!(
-                "Least true clearance {} · pose error at the end {} (expected {}) · {} full solves",
+                "Least true clearance {} · pose error at the end {} (by the robot within {}) · {} full solves",
                 metres(self.min_clearance_m),
                 metres(self.pose_error_m),
-                metres(self.pose_error_expected_m),
+                metres(self.pose_within_m),
                 self.full_solves,
             ),
             format!(

@@ -24,7 +24,7 @@ fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
 
 /// Success weighted by path length: 1 for the shortest path, 0 if the target was not reached.
 fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
-    if content.outcome()? != "reached" {
+    if !content.outcome()?.starts_with("reached") {
         return Some(0.0);
     }
     let mission = &content.mission;
@@ -53,7 +53,7 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
         summed.or_else(|| latency.quantile_us(share)).map(|us| us / 1e3)
     };
     let success = match content.outcome() {
-        Some("reached") => "1 (reached)".to_owned(),
+        Some(reached) if reached.starts_with("reached") => format!("1 ({reached})"),
         Some(other) => format!("0 ({other})"),
         None => "\u{2013}".to_owned(),
     };
@@ -102,6 +102,15 @@ pub(crate) fn table(content: &Content) -> Vec<Metric> {
             "pose_error_expected_m",
             shown(
                 of("pose_error_expected_m", measured.last_pose().map(|pose| pose.position_rms_m())),
+                3,
+                "m",
+            ),
+        ),
+        row(
+            "pose known within",
+            "pose_within_m",
+            shown(
+                of("pose_within_m", measured.last_pose().map(|pose| pose.position_within_m())),
                 3,
                 "m",
             ),

@@ -7,7 +7,11 @@ fn reckoning(extra: &str) -> DeadReckoning {
     let text = format!(
         "target = [3, 0]\n[robot]\nwheel_radius_m = 0.1\ntrack_m = 0.4\ncounts_per_turn = 1000\n{extra}"
     );
-    DeadReckoning::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    reckoning_of(&text)
+}
+
+pub(super) fn reckoning_of(mission: &str) -> DeadReckoning {
+    DeadReckoning::new(&Mission::parse(mission, Path::new("test.toml")).unwrap())
 }
 
 fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {
@@ -20,19 +24,34 @@ fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {
 }
 
 /// A step at the sample's own time.
-trait Take {
+pub(super) trait Take {
+    fn given(
+        &mut self,
+        wheels: &WheelSample,
+        fixes: &[FixSample],
+        turns: &[TurnSample],
+    ) -> Reckoned;
     fn take(&mut self, wheels: &WheelSample) -> PoseSample;
     /// Whether the counts were rejected.
     fn rejects(&mut self, wheels: &WheelSample) -> bool;
 }
 
 impl Take for DeadReckoning {
+    fn given(
+        &mut self,
+        wheels: &WheelSample,
+        fixes: &[FixSample],
+        turns: &[TurnSample],
+    ) -> Reckoned {
+        self.step(Input { wheels, fixes, turns }, wheels.stamp.time())
+    }
+
     fn take(&mut self, wheels: &WheelSample) -> PoseSample {
-        self.step(wheels, wheels.stamp.time()).pose
+        self.given(wheels, &[], &[]).pose
     }
 
     fn rejects(&mut self, wheels: &WheelSample) -> bool {
-        self.step(wheels, wheels.stamp.time()).rejected
+        self.given(wheels, &[], &[]).rejected
     }
 }
 
@@ -107,7 +126,7 @@ fn a_restored_state_goes_on_as_if_nothing_had_happened() {
         killed.take(&sample);
     }
     let mut successor = reckoning("");
-    successor.restore(*killed.state()).unwrap();
+    successor.restore(killed.state().clone()).unwrap();
     let sample = wheels(4, 250, 400);
     assert_eq!(successor.take(&sample), whole.take(&sample));
 }
@@ -233,11 +252,11 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     let mut killed = reckoning("");
     killed.take(&wheels(0, 0, 0));
     killed.take(&wheels(1, 90, 110));
-    let saved = *killed.state();
+    let saved = killed.state().clone();
     let published = killed.take(&wheels(2, 190, 200));
     let successor = || {
         let mut successor = reckoning("");
-        successor.restore(saved).unwrap();
+        successor.restore(saved.clone()).unwrap();
         successor
     };
     // The link's last sample is still that of the tick.
@@ -249,4 +268,17 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);
     assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 2e-3);
+}
+
+#[test]
+fn counts_are_ways_of_the_wheels_as_they_were_calibrated() {
+    let calibrated =
+        "odometry = { diameter_ratio = 1.02, distance_scale = 0.98, track_scale = 1.1 }";
+    let mut reckoning = reckoning(calibrated);
+    reckoning.take(&wheels(0, 0, 0));
+    let pose = reckoning.take(&wheels(1, 500, 500));
+    // left = counts * s * 2 / (1 + rho), right = rho * left, turn = (right - left) / (W tau).
+    let left = 0.1 * PI * 0.98 * 2.0 / 2.02;
+    close(pose.travelled_m, left * 1.01);
+    close(pose.heading_rad, left * 0.02 / (0.4 * 1.1));
 }

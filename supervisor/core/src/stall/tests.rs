@@ -322,3 +322,27 @@ fn a_robot_that_drives_three_times_as_far_as_its_target_was_away_forgets_and_in_
     assert_eq!(stalls("evidential", 1.0)[0], at(12.0, RecoveryStep::Reset));
     assert_eq!(stalls("paper", 8.0), []);
 }
+
+#[test]
+fn a_relocated_robot_forgets_all_of_its_map_each_time_and_gives_up_for_it_never() {
+    let mut watch = watch();
+    let along = guidance(GuidanceStatus::Along, 0);
+    let mut resets = Vec::new();
+    for second in 0..20 {
+        let place = f64::from(second);
+        let relocations = u64::from(second as u32 / 3);
+        let pose = PoseSample { relocations, x_m: place, ..pose(place, place) };
+        resets.extend(watch.step(&pose, &along, false, false).map(|stall| parts(&stall)));
+    }
+    // Only in an even epoch the mapper drops what is near the robot.
+    let want =
+        [2, 4, 6, 8, 10, 12].map(|epoch| (StallCause::Relocated, RecoveryStep::Reset, epoch));
+    assert_eq!(resets, want);
+    assert_eq!(watch.recoveries(None), (0, 6));
+    let cut_off = guidance(GuidanceStatus::Unreachable, watch.epoch());
+    let stalls = (20..30).filter_map(|second| {
+        let pose = PoseSample { relocations: 6, ..pose(f64::from(second), f64::from(second)) };
+        watch.step(&pose, &cut_off, false, false)
+    });
+    assert_eq!(stalls.map(|stall| stall.recovery()).next(), Some(RecoveryStep::Reset));
+}

@@ -58,12 +58,13 @@ impl Step for Odometer {
 impl Answering for Odometer {
     type In = PoseSample;
     type Out = DistanceSample;
+    type Further = ();
     const NAME: &'static str = "odometer";
     const INPUT: &'static Topic<PoseSample> = &POSE;
     const OUTPUT: &'static Topic<DistanceSample> = &DISTANCE;
     const PERSISTS: Persists = Persists::State(128);
 
-    fn answer(&mut self, pose: &PoseSample, now: MissionTime) -> Answer<DistanceSample> {
+    fn answer(&mut self, pose: &PoseSample, (): &(), now: MissionTime) -> Answer<DistanceSample> {
         self.step(pose, now).into()
     }
 }

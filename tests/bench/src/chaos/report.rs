@@ -143,7 +143,7 @@ impl Report {
             self.worst_pose_excess_m = end.pose_excess_m;
             self.worst_pose_kills = end.kills;
         }
-        let reached = end.outcome == Outcome::Reached;
+        let reached = matches!(end.outcome, Outcome::Reached | Outcome::ReachedUnsure);
         self.reached += u64::from(reached);
         let (seed, excess, allowance) = (end.seed, end.pose_excess_m, end.pose_allowance_m);
         let before = self.wrong.len();

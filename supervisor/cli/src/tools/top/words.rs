@@ -33,6 +33,7 @@ pub(super) fn stall(stall: &StallSample) -> String {
         StallCause::CutOff => "is cut off",
         StallCause::Held => "is held by its wheels",
         StallCause::Wandering => "wanders",
+        StallCause::Relocated => "is elsewhere",
     };
     let recovery = match stall.recovery() {
         RecoveryStep::Replan => "new planner",

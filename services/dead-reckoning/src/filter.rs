@@ -1,0 +1,385 @@
+//! The error-state filter: the pose, the errors of the wheels and a gyro's bias, by the wheels, by fixes and by a gyro.
+//!
+//! [`Filter`] is the estimate at one tick. [`History`] has the estimate of 2 s ago and the ticks and fixes since then. A fix of an
+//! earlier time is taken at that time: the estimate of today is computed again from the old one. So the result is the same as if
+//! the fix had come at once, and a tick costs no more than those 2 s.
+
+use std::{collections::VecDeque, fmt, time::Duration};
+
+use common::{
+    clock::MissionTime,
+    kinematics::{Pose2, Twist},
+    mission::Integration,
+    samples::{FixRefusal, FixSample, TurnSample},
+};
+use glam::DVec2;
+use nalgebra::{Const, DimMin, SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    covariance::{BIAS, Covariance, Error, ErrorModel, PARTS, Transition},
+    gyro::{Gyro, GyroTurn},
+};
+
+/// A fix that is older is refused.
+const OLDEST: Duration = Duration::from_secs(2);
+/// The most ticks of a history. At a high rate they are fewer than [`OLDEST`] has.
+const MOST_TICKS: usize = 64;
+/// The most fixes of a history.
+const MOST_FIXES: usize = 64;
+/// The squared Mahalanobis distance beyond which a fix is refused: one in a thousand good ones, for 2 and 3 degrees of freedom.
+pub(crate) const GATES: [f64; 2] = [13.8, 16.3];
+/// The least variance that a fix may state, m^2: that of 5 mm.
+const LEAST_VARIANCE: f64 = 25e-6;
+/// The least variance of its heading, rad^2: that of a tenth of a degree.
+const LEAST_HEADING_VARIANCE: f64 = 3e-6;
+/// A gyro's scale is taken to be off by this share.
+const GYRO_SCALE: f64 = 0.005;
+
+/// The parts of the error, and one more.
+const JOINT: usize = PARTS + 1;
+
+/// The motions that a filter takes, and their errors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motions {
+    pub(crate) errors: ErrorModel,
+    pub(crate) integration: Integration,
+}
+
+impl Motions {
+    /// The pose after the arc and the turn of `moved`.
+    pub(crate) fn along(&self, pose: Pose2, moved: Twist) -> Pose2 {
+        match self.integration {
+            Integration::Arc => pose.along_arc(moved.v, moved.omega),
+            Integration::Euler => pose.along_euler(moved.v, moved.omega),
+        }
+    }
+}
+
+/// One tick: the motion since the tick before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Tick {
+    pub(crate) time: MissionTime,
+    pub(crate) seconds: f64,
+    /// Arc and turn by the counts, for wheels without errors: metres and radians.
+    pub(crate) arc: f64,
+    pub(crate) turn: f64,
+    /// How far each wheel may have rolled with its counts lost, metres.
+    pub(crate) lost_m: f64,
+    pub(crate) gyro: Option<GyroTurn>,
+}
+
+impl Tick {
+    pub(crate) const fn moved(&self) -> Twist {
+        Twist { v: self.arc, omega: self.turn }
+    }
+}
+
+/// A fix that was checked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Fix {
+    pub(crate) time: MissionTime,
+    pub(crate) position: DVec2,
+    pub(crate) heading: Option<f64>,
+    pub(crate) covariance: [f64; 6],
+}
+
+impl TryFrom<&FixSample> for Fix {
+    type Error = FixRefusal;
+
+    fn try_from(sample: &FixSample) -> Result<Self, FixRefusal> {
+        let FixSample { capture_ns, x_m, y_m, heading_rad, covariance, .. } = *sample;
+        let heading = (!heading_rad.is_nan()).then_some(heading_rad);
+        let [xx, xy, xt, yy, yt, tt] = covariance;
+        let numbers = [x_m, y_m, xx, xy, yy].into_iter();
+        if !numbers.chain(heading.into_iter().flat_map(|it| [it, xt, yt, tt])).all(f64::is_finite) {
+            return Err(FixRefusal::NotFinite);
+        }
+        let fix = Self {
+            time: MissionTime(capture_ns),
+            position: DVec2::new(x_m, y_m),
+            heading,
+            covariance: if heading.is_some() { covariance } else { [xx, xy, 0.0, yy, 0.0, 0.0] },
+        };
+        // A matrix is positive where less than its least eigenvalue can be taken from its diagonal.
+        let least = SVector::from([LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE]);
+        let spare = fix.noise() - SMatrix::from_diagonal(&(least * (1.0 - 1e-9)));
+        let positive = match heading {
+            Some(_) => spare.cholesky().is_some(),
+            None => spare.fixed_view::<2, 2>(0, 0).into_owned().cholesky().is_some(),
+        };
+        if positive { Ok(fix) } else { Err(FixRefusal::Covariance) }
+    }
+}
+
+impl Fix {
+    fn noise(&self) -> SMatrix<f64, 3, 3> {
+        let [xx, xy, xt, yy, yt, tt] = self.covariance;
+        SMatrix::from([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+    }
+
+    /// The mean of the variances of x and y, m^2.
+    pub(crate) fn variance(&self) -> f64 {
+        0.5 * (self.covariance[0] + self.covariance[3])
+    }
+}
+
+/// The difference of two headings, from -pi to pi.
+pub(crate) fn wrapped(turn: f64) -> f64 {
+    turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU
+}
+
+/// The estimate at one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Filter {
+    pub(crate) pose: Pose2,
+    /// The shares by which the ratio of the diameters, the track and the distance are off.
+    shares: [f64; 3],
+    /// Of the gyro, rad/s.
+    bias: f64,
+    pub(crate) covariance: Covariance,
+}
+
+impl Filter {
+    pub(crate) const fn new(pose: Pose2, covariance: Covariance) -> Self {
+        Self { pose, shares: [0.0; 3], bias: 0.0, covariance }
+    }
+
+    /// Arc and turn of `tick` with the errors of the wheels as they are known.
+    pub(crate) fn moved(&self, motions: &Motions, tick: &Tick) -> Twist {
+        motions.errors.corrected(tick.moved(), self.shares)
+    }
+
+    /// Go on by the motion of `tick`.
+    fn advance(&mut self, motions: &Motions, tick: &Tick) {
+        let moved = self.moved(motions, tick);
+        let Transition { carried, noise } =
+            motions.errors.transition(self.pose, moved, tick.seconds);
+        let noise = noise + motions.errors.lost(tick.lost_m);
+        let before = self.covariance.0;
+        self.pose = motions.along(self.pose, moved);
+        self.covariance = Covariance(carried * before * carried.transpose() + noise);
+        if let Some(gyro) = tick.gyro {
+            // The gyro measures the difference of two headings, so the earlier heading is one more part of the error for a moment.
+            let mut both = SMatrix::<f64, JOINT, PARTS>::zeros();
+            both.fixed_view_mut::<PARTS, PARTS>(0, 0).copy_from(&carried);
+            both[(PARTS, 2)] = 1.0;
+            let mut joint = both * before * both.transpose();
+            let mut own = joint.fixed_view_mut::<PARTS, PARTS>(0, 0);
+            own += noise;
+            let mut seen = SMatrix::<f64, 1, JOINT>::zeros();
+            (seen[2], seen[BIAS], seen[PARTS]) = (1.0, tick.seconds, -1.0);
+            let expected = moved.omega + self.bias * tick.seconds;
+            let scale = GYRO_SCALE * gyro.turn;
+            let variance = SMatrix::from([gyro.variance + scale * scale]);
+            let residual = SVector::from([gyro.turn - expected]);
+            if let Some((error, joint)) = update(&joint, &seen, residual, variance, f64::INFINITY) {
+                self.correct(&error.fixed_rows::<PARTS>(0).into_owned());
+                self.covariance = Covariance(joint.fixed_view::<PARTS, PARTS>(0, 0).into_owned());
+            }
+        }
+    }
+
+    /// The pose at the time of `fix`, which was measured in the time of `tick`, at which this estimate is, or soon after.
+    fn at(&self, motions: &Motions, tick: &Tick, fix: &Fix) -> Pose2 {
+        let ago = tick.time.0 as f64 - fix.time.0 as f64;
+        let share = if tick.seconds > 0.0 { ago * 1e-9 / tick.seconds } else { 0.0 };
+        let share = share.clamp(-1.0, 1.0);
+        let moved = self.moved(motions, tick);
+        self.pose.along_arc(-moved.v * share, -moved.omega * share)
+    }
+
+    /// Take `fix`, which was measured at the pose `there`. Returns whether it agrees with the estimate.
+    fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
+        let lever = self.pose.position - there.position;
+        let mut seen = SMatrix::<f64, 3, PARTS>::identity();
+        (seen[(0, 2)], seen[(1, 2)]) = (lever.y, -lever.x);
+        let [x, y] = (fix.position - there.position).to_array();
+        let (covariance, noise) = (&self.covariance.0, fix.noise());
+        let taken = match fix.heading {
+            Some(heading) => {
+                let residual = SVector::from([x, y, wrapped(heading - there.heading)]);
+                update(covariance, &seen, residual, noise, GATES[1])
+            }
+            None => {
+                let noise = noise.fixed_view::<2, 2>(0, 0).into_owned();
+                let seen = seen.fixed_rows::<2>(0).into_owned();
+                update(covariance, &seen, SVector::from([x, y]), noise, GATES[0])
+            }
+        };
+        if let Some((error, covariance)) = taken {
+            self.correct(&error);
+            self.covariance = Covariance(covariance);
+        }
+        taken.is_some()
+    }
+
+    fn correct(&mut self, error: &Error) {
+        self.pose.position += DVec2::new(error[0], error[1]);
+        self.pose.heading += error[2];
+        for (share, error) in self.shares.iter_mut().zip(&error.as_slice()[3..]) {
+            *share += error;
+        }
+        self.bias += error[BIAS];
+    }
+
+    /// The estimate at `pose`, whose position and heading have these variances, with the same errors of wheels and gyro.
+    pub(crate) fn moved_to(mut self, pose: Pose2, position: f64, heading: f64) -> Self {
+        let covariance = &mut self.covariance.0;
+        for (part, variance) in [position, position, heading].into_iter().enumerate() {
+            covariance.row_mut(part).fill(0.0);
+            covariance.column_mut(part).fill(0.0);
+            covariance[(part, part)] = variance;
+        }
+        Self { pose, ..self }
+    }
+}
+
+/// The update of a Kalman filter, in Joseph's form: the error by which the estimate is off, and the covariance afterwards. None if
+/// `residual`, of what is `seen` of the error with `noise`, is beyond `gate`.
+fn update<const N: usize, const M: usize>(
+    covariance: &SMatrix<f64, N, N>,
+    seen: &SMatrix<f64, M, N>,
+    residual: SVector<f64, M>,
+    noise: SMatrix<f64, M, M>,
+    gate: f64,
+) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>)>
+where
+    Const<M>: DimMin<Const<M>, Output = Const<M>>,
+{
+    let spread = seen * covariance * seen.transpose() + noise;
+    let inverse = spread.cholesky()?.inverse();
+    if (residual.transpose() * inverse * residual)[0] > gate {
+        return None;
+    }
+    let gain = covariance * seen.transpose() * inverse;
+    let rest = SMatrix::<f64, N, N>::identity() - gain * seen;
+    let after = rest * covariance * rest.transpose() + gain * noise * gain.transpose();
+    Some((gain * residual, (after + after.transpose()) * 0.5))
+}
+
+/// The estimate of the newest tick, and what it follows from.
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct History {
+    /// The estimate of the tick before those of `ticks`.
+    base: Filter,
+    ticks: VecDeque<Tick>,
+    /// The fixes that were used, each with the time of the tick at which it is taken, in the order of those.
+    fixes: VecDeque<(MissionTime, Fix)>,
+    newest: Filter,
+}
+
+impl fmt::Debug for History {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (ticks, fixes) = (self.ticks.len(), self.fixes.len());
+        let mut shown = f.debug_struct("History");
+        shown.field("pose", &self.newest.pose).field("ticks", &ticks).field("fixes", &fixes);
+        shown.finish_non_exhaustive()
+    }
+}
+
+impl History {
+    pub(crate) const fn new(start: Filter) -> Self {
+        Self { base: start, ticks: VecDeque::new(), fixes: VecDeque::new(), newest: start }
+    }
+
+    pub(crate) const fn newest(&self) -> &Filter {
+        &self.newest
+    }
+
+    /// Begin again from `estimate` at the newest tick.
+    pub(crate) fn restart(&mut self, estimate: Filter) {
+        let last = self.ticks.back().map(|tick| Tick { time: tick.time, ..Tick::default() });
+        *self = Self::new(estimate);
+        self.ticks.extend(last);
+    }
+
+    /// Go on by `tick`.
+    pub(crate) fn advance(&mut self, motions: &Motions, tick: Tick) {
+        self.ticks.push_back(tick);
+        self.newest.advance(motions, &tick);
+        let too_old = |oldest: &Tick| tick.time.since(oldest.time) > OLDEST;
+        while self.ticks.len() > MOST_TICKS || self.ticks.front().is_some_and(too_old) {
+            let Some(oldest) = self.ticks.pop_front() else { break };
+            self.base.advance(motions, &oldest);
+            while let Some((_, fix)) = self.fixes.pop_front_if(|(at, _)| *at <= oldest.time) {
+                let there = self.base.at(motions, &oldest, &fix);
+                self.base.take(&fix, there);
+            }
+        }
+    }
+
+    /// Take the increments of a gyro that came, after those in `gyro`.
+    pub(crate) fn turn(
+        &mut self,
+        motions: &Motions,
+        gyro: &mut Option<Gyro>,
+        increments: &[TurnSample],
+    ) {
+        let mut changed = false;
+        for increment in increments {
+            changed |= Gyro::take(gyro, increment, &mut self.ticks);
+        }
+        if changed {
+            self.newest = self.again(motions, |_, _, _| Ok(())).unwrap_or(self.newest);
+        }
+    }
+
+    /// The estimate of the newest tick, computed again from the oldest one. `at` sees each tick, by its place, and its estimate.
+    fn again(
+        &self,
+        motions: &Motions,
+        mut at: impl FnMut(usize, &Tick, &mut Filter) -> Result<(), Refused>,
+    ) -> Result<Filter, Refused> {
+        let mut estimate = self.base;
+        let mut fixes = self.fixes.iter().peekable();
+        for (place, tick) in self.ticks.iter().enumerate() {
+            estimate.advance(motions, tick);
+            while let Some((_, fix)) = fixes.next_if(|(at, _)| *at <= tick.time) {
+                let there = estimate.at(motions, tick, fix);
+                // A fix that was used and contradicts those that came later is left out.
+                estimate.take(fix, there);
+            }
+            at(place, tick, &mut estimate)?;
+        }
+        Ok(estimate)
+    }
+
+    /// Take `fix`. A fix that is too far off is refused, with the pose at its time.
+    pub(crate) fn take(&mut self, motions: &Motions, fix: Fix) -> Result<(), Refused> {
+        let not = |why| Err(Refused { why, there: None });
+        let (Some(first), Some(last)) = (self.ticks.front(), self.ticks.back()) else {
+            return not(FixRefusal::Late);
+        };
+        let first_s = first.time.seconds() - first.seconds;
+        if last.time.since(fix.time) > OLDEST || fix.time.seconds() < first_s {
+            return not(FixRefusal::Late);
+        }
+        if fix.time.seconds() > last.time.seconds() + last.seconds {
+            return not(FixRefusal::Future);
+        }
+        if self.fixes.len() >= MOST_FIXES {
+            return not(FixRefusal::TooMany);
+        }
+        let later = self.ticks.iter().position(|tick| tick.time >= fix.time);
+        let at = later.unwrap_or(self.ticks.len() - 1);
+        self.newest = self.again(motions, |place, tick, estimate| {
+            let there = estimate.at(motions, tick, &fix);
+            match place != at || estimate.take(&fix, there) {
+                true => Ok(()),
+                false => Err(Refused { why: FixRefusal::Far, there: Some(there) }),
+            }
+        })?;
+        let at = self.ticks[at].time;
+        let place = self.fixes.partition_point(|(used, _)| *used <= at);
+        self.fixes.insert(place, (at, fix));
+        Ok(())
+    }
+}
+
+/// A fix was refused; with the pose at its time, if it contradicts that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Refused {
+    pub(crate) why: FixRefusal,
+    pub(crate) there: Option<Pose2>,
+}

@@ -1,0 +1,76 @@
+//! The turns of ticks by a gyro, from increments that end at times of their own and may come late.
+
+use std::collections::VecDeque;
+
+use common::{clock::MissionTime, samples::TurnSample};
+use serde::{Deserialize, Serialize};
+
+use crate::filter::Tick;
+
+/// The share of a divided increment by which the division is taken to be off. What one tick lacks the next one has, so the errors do
+/// not add up.
+const UNEVEN: f64 = 0.1;
+
+/// The turn of a tick by a gyro.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct GyroTurn {
+    pub(crate) turn: f64,
+    pub(crate) variance: f64,
+}
+
+/// The increments that belong to no whole tick yet.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Gyro {
+    /// The number and the end of the newest increment.
+    sequence: u64,
+    end: MissionTime,
+    /// The time from which no increment is missing.
+    whole_since: MissionTime,
+    /// From the end of the last tick to the end of the newest increment, radians and rad^2.
+    turn: f64,
+    variance: f64,
+}
+
+impl Gyro {
+    /// Take an increment after those in `gyro`, and give the ticks that it completes their turns. Returns whether there are any.
+    /// An increment over the end of a tick is divided at that time as if the robot turned evenly.
+    pub(crate) fn take(
+        gyro: &mut Option<Self>,
+        increment: &TurnSample,
+        ticks: &mut VecDeque<Tick>,
+    ) -> bool {
+        let TurnSample { capture_ns, sequence, turn_rad, variance_rad2, .. } = *increment;
+        if !(turn_rad.is_finite() && variance_rad2.is_finite() && variance_rad2 >= 0.0) {
+            *gyro = None;
+            return false;
+        }
+        let end = MissionTime(capture_ns);
+        let follows =
+            |gyro: &Self| sequence.checked_sub(1) == Some(gyro.sequence) && gyro.end < end;
+        let Some(before) = gyro.filter(follows) else {
+            *gyro = Some(Self { sequence, end, whole_since: end, turn: 0.0, variance: 0.0 });
+            return false;
+        };
+        let seconds = |from: MissionTime, to: MissionTime| to.since(from).as_secs_f64();
+        let whole = seconds(before.end, end);
+        let mut rest = Self { sequence, end, ..before };
+        let (mut given, mut completed) = (0.0, false);
+        for tick in ticks.iter_mut().filter(|tick| tick.time > before.end && tick.time <= end) {
+            let share = seconds(before.end, tick.time) / whole;
+            let part = share - given;
+            let divided = UNEVEN * share * (1.0 - share) * turn_rad;
+            let turn = rest.turn + part * turn_rad;
+            let variance = rest.variance + part * variance_rad2 + divided * divided;
+            let begins_s = tick.time.seconds() - tick.seconds;
+            if tick.seconds > 0.0 && begins_s >= before.whole_since.seconds() - 1e-6 {
+                tick.gyro = Some(GyroTurn { turn, variance });
+                completed = true;
+            }
+            (rest.turn, rest.variance, given) = (0.0, divided * divided, share);
+        }
+        rest.turn += (1.0 - given) * turn_rad;
+        rest.variance += (1.0 - given) * variance_rad2;
+        *gyro = Some(rest);
+        completed
+    }
+}

@@ -1,0 +1,88 @@
+//! Fixes that contradict the pose and agree among themselves: the robot is elsewhere, for example because it was carried.
+
+use std::{collections::VecDeque, time::Duration};
+
+use common::{clock::MissionTime, kinematics::Pose2};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::filter::{Filter, Fix, GATES, wrapped};
+
+/// So many fixes have to agree.
+const AGREE: usize = 10;
+/// They are so far apart at least: all take 3 s.
+const APART: Duration = Duration::from_millis(334);
+/// The variance of the way between two of them by the wheels, m^2.
+const WHEELS: f64 = 4e-4;
+/// The heading follows from the way of the robot among the fixes if its deviation is below this, radians.
+const KNOWN_RAD: f64 = 0.2;
+/// The variance of the heading otherwise, rad^2.
+const UNKNOWN: f64 = 1.0;
+
+/// The fixes that were refused because they contradict the pose, since one was used: each with the pose at its time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Contradictions(VecDeque<(Pose2, Fix)>);
+
+impl Contradictions {
+    /// Add `fix`, measured where the pose was `there`. Returns the estimate elsewhere, in place of `estimate`, if the newest
+    /// fixes agree.
+    pub(crate) fn add(&mut self, there: Pose2, fix: &Fix, estimate: &Filter) -> Option<Filter> {
+        let time = |(_, fix): &(Pose2, Fix)| fix.time;
+        let last = self.0.back().map_or(MissionTime(0), time);
+        if !self.0.is_empty() && fix.time.since(last) < APART {
+            return None;
+        }
+        self.0.push_back((there, *fix));
+        if self.0.len() > AGREE {
+            self.0.pop_front();
+        }
+        let elsewhere = (self.0.len() == AGREE).then(|| self.agreed(estimate)).flatten()?;
+        self.0.clear();
+        Some(elsewhere)
+    }
+
+    /// The rigid motion that takes the poses to the fixes with the least squared distance, applied to `estimate`. None if a fix is
+    /// beyond its gate then.
+    fn agreed(&self, estimate: &Filter) -> Option<Filter> {
+        let share = 1.0 / self.0.len() as f64;
+        let mean = |of: fn(&Pose2, &Fix) -> DVec2| {
+            self.0.iter().map(|(pose, fix)| of(pose, fix)).sum::<DVec2>() * share
+        };
+        let (from, to) = (mean(|pose, _| pose.position), mean(|_, fix| fix.position));
+        let variance = self.0.iter().map(|(_, fix)| fix.variance()).sum::<f64>() * share + WHEELS;
+        let (turn, heading) = self.turned(from, to, variance);
+        let turned = DVec2::from_angle(turn);
+        let agrees = |(pose, fix): &(Pose2, Fix)| {
+            let way = to + turned.rotate(pose.position - from) - fix.position;
+            way.length_squared() <= GATES[0] * (fix.variance() + WHEELS)
+        };
+        if !self.0.iter().all(agrees) {
+            return None;
+        }
+        let lever = estimate.pose.position - from;
+        let pose =
+            Pose2 { position: to + turned.rotate(lever), heading: estimate.pose.heading + turn };
+        let position = variance + heading * lever.length_squared();
+        Some(estimate.moved_to(pose, position, heading))
+    }
+
+    /// The turn of that motion, and its variance.
+    fn turned(&self, from: DVec2, to: DVec2, variance: f64) -> (f64, f64) {
+        let turns = self.0.iter().filter_map(|(pose, fix)| {
+            Some((wrapped(fix.heading? - pose.heading), fix.covariance[5]))
+        });
+        if turns.clone().count() == self.0.len() {
+            let sum: DVec2 = turns.clone().map(|(turn, _)| DVec2::from_angle(turn)).sum();
+            let share = 1.0 / self.0.len() as f64;
+            return (sum.to_angle(), turns.map(|(_, variance)| variance).sum::<f64>() * share);
+        }
+        let arms = self.0.iter().map(|(pose, fix)| (pose.position - from, fix.position - to));
+        let spread: f64 = arms.clone().map(|(arm, _)| arm.length_squared()).sum();
+        if spread * KNOWN_RAD * KNOWN_RAD <= variance {
+            return (0.0, UNKNOWN);
+        }
+        let sum = |of: fn((DVec2, DVec2)) -> f64| arms.clone().map(of).sum::<f64>();
+        let (cosine, sine) = (sum(|(a, b)| a.dot(b)), sum(|(a, b)| a.perp_dot(b)));
+        (sine.atan2(cosine), variance / spread)
+    }
+}

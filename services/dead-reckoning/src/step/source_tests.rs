@@ -1,0 +1,312 @@
+//! Fixes and a gyro against a robot of known errors.
+
+use super::{
+    tests::{Take, reckoning_of},
+    *,
+};
+use crate::STATE_BYTES;
+use common::samples::Stamp;
+use glam::dvec2;
+
+const TICK_NS: u64 = 100_000_000;
+const FIVE_CM: [f64; 6] = [25e-4, 0.0, 0.0, 25e-4, 0.0, 4e-4];
+
+/// A robot whose right wheel is larger than its left one by a share, ten ticks a second.
+struct Robot {
+    truth: Pose2,
+    larger: f64,
+    counts: [f64; 2],
+    tick: u64,
+    seed: u64,
+}
+
+impl Robot {
+    fn new(larger: f64) -> Self {
+        Self { truth: Pose2::default(), larger, counts: [0.0; 2], tick: 0, seed: 7 }
+    }
+
+    /// The wheels after a tick of arc `arc` and turn `turn`.
+    fn drive(&mut self, arc: f64, turn: f64) -> WheelSample {
+        let (track, per_metre) = (0.26, 1200.0 / (std::f64::consts::TAU * 0.085));
+        self.truth = self.truth.along_arc(arc, turn);
+        for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
+            let way = arc + sign * turn * track / 2.0;
+            self.counts[side] += way / (1.0 + sign * self.larger / 2.0) * per_metre;
+        }
+        self.tick += 1;
+        let [left_counts, right_counts] =
+            self.counts.map(|counts| (counts.round() as i64).rem_euclid(32_768) as u16);
+        let stamp = Stamp { tick: self.tick, stamp_ns: self.tick * TICK_NS, ..Stamp::default() };
+        WheelSample { stamp, left_counts, right_counts, ..WheelSample::default() }
+    }
+
+    /// Along a curve that winds to either side.
+    fn wind(&mut self) -> WheelSample {
+        let turn = 0.06 * (self.tick as f64 / 15.0).sin();
+        self.drive(0.04, turn)
+    }
+
+    /// Normally distributed, nearly: the sum of twelve even ones.
+    fn noise(&mut self) -> f64 {
+        let mut even = || {
+            self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (self.seed >> 33) as f64 / f64::from(1u32 << 31)
+        };
+        (0..12).map(|_| even()).sum::<f64>() - 6.0
+    }
+
+    /// A fix of now, off by 5 cm.
+    fn fix(&mut self) -> FixSample {
+        let at = self.truth.position + dvec2(self.noise(), self.noise()) * 0.05;
+        FixSample {
+            capture_ns: self.tick * TICK_NS,
+            x_m: at.x,
+            y_m: at.y,
+            heading_rad: f64::NAN,
+            covariance: FIVE_CM,
+            ..FixSample::default()
+        }
+    }
+
+    fn error_m(&self, pose: &PoseSample) -> f64 {
+        self.truth.position.distance(pose.pose().position)
+    }
+}
+
+fn x80() -> DeadReckoning {
+    reckoning_of("target = [3, 0]")
+}
+
+/// The root mean square of the pose's error over `ticks` ticks, with the fixes of `source`.
+fn rms(
+    robot: &mut Robot,
+    reckoning: &mut DeadReckoning,
+    ticks: u64,
+    mut source: impl FnMut(&mut Robot) -> Vec<FixSample>,
+) -> f64 {
+    let mut sum = 0.0;
+    for _ in 0..ticks {
+        let wheels = robot.wind();
+        let fixes = source(robot);
+        let pose = reckoning.given(&wheels, &fixes, &[]).pose;
+        sum += robot.error_m(&pose).powi(2);
+    }
+    (sum / ticks as f64).sqrt()
+}
+
+fn each_second(robot: &mut Robot) -> Vec<FixSample> {
+    let fix = robot.fix();
+    if robot.tick.is_multiple_of(10) { vec![fix] } else { Vec::new() }
+}
+
+#[test]
+fn fixes_hold_the_pose_of_a_robot_with_unequal_wheels_and_teach_their_ratio() {
+    let none = |_: &mut Robot| Vec::new();
+    let off = rms(&mut Robot::new(0.005), &mut x80(), 600, none);
+    let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
+    let on = rms(&mut robot, &mut reckoning, 600, each_second);
+    assert!(on < 0.06 && off > 1.0, "{on} with fixes, {off} without");
+    // The wheels are known now.
+    let covariance = reckoning.sample().covariance;
+    let later = rms(&mut robot, &mut reckoning, 300, none);
+    assert!(later < 0.15, "{later} afterwards, {on} with fixes, {off} without");
+    let silent = reckoning.sample().covariance;
+    assert!(silent[0] > covariance[0] && silent[3] > covariance[3] && silent[5] > covariance[5]);
+}
+
+#[test]
+fn a_fix_that_comes_late_counts_as_if_it_had_come_at_once() {
+    let (mut robot, mut prompt, mut late) = (Robot::new(0.005), x80(), x80());
+    let mut waiting = Vec::new();
+    for tick in 0..200u64 {
+        let wheels = robot.wind();
+        let fix = robot.fix();
+        prompt.given(&wheels, if tick % 10 == 3 { std::slice::from_ref(&fix) } else { &[] }, &[]);
+        waiting.extend((tick % 10 == 3).then_some(fix));
+        let due = if tick % 10 == 9 { std::mem::take(&mut waiting) } else { Vec::new() };
+        let taken = late.given(&wheels, &due, &[]);
+        assert_eq!(taken.refused, None, "tick {tick}");
+        if tick % 10 == 9 {
+            assert_eq!(late.state().history, prompt.state().history, "tick {tick}");
+        }
+    }
+    assert_eq!(late.state().fixes, 20);
+}
+
+#[test]
+fn the_pose_follows_a_fix_without_tearing_the_map_and_odometry_does_not_jump() {
+    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    let mut before = reckoning.given(&robot.wind(), &[], &[]).pose;
+    let mut lost = robot.drive(0.0, 0.0);
+    // Its counts are lost in motion, so it may be a way off.
+    lost.restarts = 1;
+    robot.truth.position += dvec2(0.1, 0.08);
+    let odometry = |pose: &PoseSample| {
+        let [x, y, turn] = pose.map_from_odom;
+        DVec2::from_angle(-turn).rotate(pose.pose().position - dvec2(x, y))
+    };
+    before = {
+        reckoning.given(&lost, &[], &[]);
+        before
+    };
+    let mut reached = false;
+    for tick in 0..40 {
+        let mut wheels = robot.drive(0.03, 0.0);
+        wheels.restarts = 1;
+        let mut fix = robot.fix();
+        fix.heading_rad = robot.truth.heading;
+        let pose = reckoning.given(&wheels, &[fix], &[]).pose;
+        let moved = before.pose().position.distance(pose.pose().position);
+        let by_wheels = odometry(&pose).distance(odometry(&before));
+        let turned = (pose.heading_rad - before.heading_rad).abs().to_degrees();
+        assert!(moved < 0.051 && by_wheels < 0.031 && turned < 1.1, "{moved} {by_wheels} {turned}");
+        reached |= tick > 5 && robot.error_m(&pose) < 0.05;
+        before = pose;
+    }
+    assert!(reached, "{}", robot.error_m(&before));
+    assert!(before.map_from_odom != [0.0; 3]);
+}
+
+#[test]
+fn one_fix_in_twenty_that_is_off_by_a_metre_does_no_harm() {
+    let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
+    let mut count = 0;
+    let on = rms(&mut robot, &mut reckoning, 1000, |robot| {
+        let mut fixes = each_second(robot);
+        for fix in &mut fixes {
+            count += 1;
+            let off = DVec2::from_angle(f64::from(count)) * f64::from(u8::from(count % 20 == 0));
+            (fix.x_m, fix.y_m) = (fix.x_m + off.x, fix.y_m + off.y);
+        }
+        fixes
+    });
+    assert!(on < 0.07, "{on}");
+    assert_eq!((reckoning.state().fixes_refused, reckoning.state().relocations), (5, 0));
+}
+
+#[test]
+fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
+    use FixRefusal::{Covariance, Far, Future, Late, NotFinite};
+    let good = |robot: &mut Robot| FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
+    let rows: [(FixRefusal, fn(&mut FixSample)); 10] = [
+        (FixRefusal::None, |_| {}),
+        (FixRefusal::None, |fix| (fix.heading_rad, fix.covariance[5]) = (f64::NAN, f64::NAN)),
+        (Late, |fix| fix.capture_ns -= 21 * TICK_NS),
+        (Future, |fix| fix.capture_ns += 2 * TICK_NS),
+        (NotFinite, |fix| fix.x_m = f64::INFINITY),
+        (NotFinite, |fix| fix.covariance[5] = f64::NAN),
+        (Covariance, |fix| fix.covariance[0] = 24e-6),
+        (Covariance, |fix| fix.covariance[1] = 26e-4),
+        (Covariance, |fix| fix.covariance[5] = 0.0),
+        (Far, |fix| fix.y_m += 1.0),
+    ];
+    for (want, spoil) in rows {
+        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+        rms(&mut robot, &mut reckoning, 50, each_second);
+        let wheels = robot.wind();
+        let mut fix = good(&mut robot);
+        spoil(&mut fix);
+        let used = reckoning.state().fixes;
+        let reckoned = reckoning.given(&wheels, &[fix], &[]);
+        let refused = (want != FixRefusal::None).then_some(want);
+        assert_eq!(reckoned.refused, refused, "{fix:?}");
+        assert_eq!(reckoned.pose.refusal, u8::from(want));
+        assert_eq!(reckoned.pose.fixes - used, u64::from(refused.is_none()));
+    }
+}
+
+/// After 10 s the robot is carried, and seen from `source` for 20 s. The seconds after which it was relocated, and its error then.
+fn carried(source: impl Fn(&mut Robot, u64) -> FixSample) -> Vec<(u64, f64)> {
+    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    rms(&mut robot, &mut reckoning, 100, each_second);
+    robot.truth = Pose2 { position: dvec2(-2.0, 3.0), heading: robot.truth.heading + 1.9 };
+    let mut relocated = Vec::new();
+    for tick in 0..200 {
+        let wheels = robot.wind();
+        let fix = source(&mut robot, tick);
+        let Reckoned { pose, relocated: now, .. } = reckoning.given(&wheels, &[fix], &[]);
+        relocated.extend(now.then(|| (tick / 10, robot.error_m(&pose))));
+    }
+    relocated
+}
+
+#[test]
+fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
+    let seen = carried(|robot, _| robot.fix());
+    let headed = carried(|robot, _| FixSample { heading_rad: robot.truth.heading, ..robot.fix() });
+    for relocated in [seen, headed] {
+        let [(3, error)] = relocated[..] else { panic!("{relocated:?}") };
+        assert!(error < 0.15, "{error}");
+    }
+    let scattered = carried(|robot, tick| {
+        let off = DVec2::from_angle(tick as f64) * 2.0;
+        let fix = robot.fix();
+        FixSample { x_m: fix.x_m + off.x, y_m: fix.y_m + off.y, ..fix }
+    });
+    assert_eq!(scattered, []);
+}
+
+/// The robot stands for 20 s, and drives for 60 s. The error of its heading, with a gyro of this bias that says how often it is off.
+fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -> f64 {
+    let (mut robot, mut reckoning) = (Robot::new(0.01), x80());
+    let mut turned = 0.0;
+    let mut pose = PoseSample::default();
+    for tick in 0..800 {
+        let wheels = if tick < 200 { robot.drive(0.0, 0.0) } else { robot.wind() };
+        let increment = robot.truth.heading - turned + bias * 0.1;
+        turned = robot.truth.heading;
+        pose = reckoning.given(&wheels, &[], &gyro(robot.tick, increment)).pose;
+    }
+    pose.heading_rad - robot.truth.heading
+}
+
+#[test]
+fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
+    let turn = |tick: u64, turn_rad| TurnSample {
+        capture_ns: tick * TICK_NS,
+        sequence: tick,
+        turn_rad,
+        variance_rad2: 1e-8,
+        ..TurnSample::default()
+    };
+    let without = heading_error(0.0, |_, _| Vec::new());
+    let with = heading_error(0.01, |tick, increment| vec![turn(tick, increment)]);
+    assert!(without.abs() > 0.5 && with.abs() < 0.01, "{with} with a gyro, {without} without");
+    // Increments that come three ticks late, two at a time, and one in ten is lost.
+    let mut waiting = Vec::new();
+    let late = heading_error(0.01, |tick, increment| {
+        waiting.extend((tick % 10 != 5).then(|| turn(tick, increment)));
+        let due = if tick.is_multiple_of(2) { waiting.len().saturating_sub(3) } else { 0 };
+        waiting.drain(..due).collect()
+    });
+    assert!(late.abs() < 0.2 * without.abs(), "{late}");
+    // Increments that end between the ticks.
+    let mut before = 0.0;
+    let between = heading_error(0.01, |tick, increment| {
+        let half = 0.5 * (before + increment);
+        before = increment;
+        vec![TurnSample { capture_ns: tick * TICK_NS - TICK_NS / 2, ..turn(tick, half) }]
+    });
+    assert!(between.abs() < 0.03, "{between}");
+    let broken = heading_error(0.0, |tick, _| vec![turn(tick, f64::NAN)]);
+    assert_eq!(broken, without);
+}
+
+#[test]
+fn a_state_that_is_restored_between_fixes_goes_on_to_the_bit_and_fits_its_file() {
+    let (mut robot, mut whole, mut killed) = (Robot::new(0.01), x80(), x80());
+    let mut longest = 0;
+    for tick in 0..300u64 {
+        let wheels = robot.wind();
+        let fixes: Vec<_> = (0..4).map(|_| robot.fix()).collect();
+        let poses = [&mut whole, &mut killed].map(|one| one.given(&wheels, &fixes, &[]).pose);
+        assert_eq!(poses[0], poses[1]);
+        if tick % 7 == 0 {
+            let bytes = postcard::to_extend(killed.state(), Vec::new()).unwrap();
+            longest = longest.max(bytes.len());
+            killed = x80();
+            killed.restore(postcard::from_bytes(&bytes).unwrap()).unwrap();
+        }
+    }
+    assert!(longest > 5_000 && longest < STATE_BYTES, "{longest}");
+}
