@@ -16,6 +16,7 @@ mod experiments;
 mod failsafe;
 mod faults;
 mod field;
+mod fixes;
 mod foreign_payload;
 mod held_wheels;
 mod kills_and_freezes;

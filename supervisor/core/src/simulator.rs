@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{self, Read},
+    io::{self, Read, Write as _},
     net::SocketAddr,
     os::fd::{AsFd, BorrowedFd},
     path::Path,
@@ -21,6 +21,8 @@ use thiserror::Error;
 
 use crate::process::{Process, firsthand};
 
+/// The file in the run directory with the ground truth, one [`GroundTruthTick`] a line.
+pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 /// Time for the simulator to write its address.
 const STARTUP: Duration = Duration::from_secs(5);
 const STOP_GRACE: Duration = Duration::from_millis(300);
@@ -49,6 +51,8 @@ pub struct Simulator {
 
 struct GroundTruth {
     pipe: ChildStdout,
+    /// The lines of ticks as they came, for simulated sources of fixes; none once it cannot be written.
+    file: Option<File>,
     /// The beginning of an incomplete line.
     unfinished: Vec<u8>,
     listening: Option<SocketAddr>,
@@ -88,8 +92,14 @@ impl Simulator {
         let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
         fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
             .map_err(|errno| system("listen to")(errno.into()))?;
-        let mut truth =
-            GroundTruth { pipe, unfinished: Vec::new(), listening: None, ticks: Vec::new() };
+        let file = File::options().create(true).append(true).open(directory.join(GROUND_TRUTH));
+        let mut truth = GroundTruth {
+            pipe,
+            file: file.ok(),
+            unfinished: Vec::new(),
+            listening: None,
+            ticks: Vec::new(),
+        };
         let began = Instant::now();
         loop {
             truth.take()?;
@@ -154,6 +164,10 @@ impl GroundTruth {
             return Ok(());
         };
         let rest = self.unfinished.split_off(end + 1);
+        if self.listening.is_some() {
+            // It only reports, so the mission goes on without it.
+            self.file.take_if(|file| file.write_all(&self.unfinished).is_err());
+        }
         for line in self.unfinished.split(|&byte| byte == b'\n') {
             if self.listening.is_none() {
                 let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();

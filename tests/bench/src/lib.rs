@@ -3,11 +3,13 @@
 //! | module | holds |
 //! |---|---|
 //! | [`chaos`] | signals to random processes at random times; faults of the robot |
+//! | [`sources`] | simulated sources of fixes and turns |
 //! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
 //! | [`BenchError`] | why a bench ended early |
 
 pub mod chaos;
 mod error;
+pub mod sources;
 pub mod tick;
 
 pub use error::BenchError;

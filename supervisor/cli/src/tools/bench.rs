@@ -2,6 +2,7 @@
 
 mod chaos;
 mod consumer;
+mod sources;
 mod tick;
 
 use std::process::ExitCode;
@@ -11,7 +12,7 @@ use clap::{Args, Subcommand};
 use super::field;
 use crate::console::failure::Failure;
 
-/// Measure ticks and fields; send random signals to a robot's processes.
+/// Measure ticks and fields; send random signals to a robot's processes; publish fixes of a simulated robot.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -24,6 +25,7 @@ enum Command {
     Field(field::Arguments),
     Chaos(Box<chaos::Arguments>),
     Consumer(consumer::Arguments),
+    Sources(sources::Arguments),
 }
 
 pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -31,6 +33,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Command::Tick(arguments) => tick::main(arguments).map(|()| ExitCode::SUCCESS),
         Command::Field(arguments) => field::main(arguments).map(|()| ExitCode::SUCCESS),
         Command::Chaos(arguments) => chaos::main(arguments),
+        Command::Sources(arguments) => sources::main(arguments).map(|()| ExitCode::SUCCESS),
         Command::Consumer(arguments) => consumer::main(arguments),
     }
 }

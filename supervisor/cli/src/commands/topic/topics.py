@@ -22,6 +22,8 @@ class Follower:
         self.topics = {topic: TOPICS[topic] for topic in topics}
         self.name = name
         self.robot = robot
+        self.node = None
+        self.publishers = {}
 
     def __iter__(self):
         while True:
@@ -31,7 +33,7 @@ class Follower:
                 time.sleep(0.1)
                 continue
             yield "here", None
-            node, listener, subscribers = readers
+            self.node, listener, subscribers = readers
             quiet = 0
             while self._instance() == instance:
                 came = self._wait_for(listener)
@@ -44,8 +46,24 @@ class Follower:
                     yield "nothing", None
             # The last samples of a run that has ended.
             yield from self._take(subscribers)
-            del subscribers, listener, node, readers
+            self.publishers = {}
+            del subscribers, listener, readers
+            self.node = None
             yield "gone", None
+
+    def publish(self, topic, sample):
+        """Publish a struct on a topic that consumers may write: `fix`, `turn`. Only while the robot is here."""
+        iox2 = self.iox2
+        if topic not in self.publishers:
+            name = iox2.ServiceName.new(topic)
+            service = self.node.service_builder(name).publish_subscribe(TOPICS[topic][0]).open()
+            event = self.node.service_builder(name).event().open()
+            publisher = service.publisher_builder().create(), event.notifier_builder().create()
+            self.publishers[topic] = publisher
+        publisher, notifier = self.publishers[topic]
+        sample.stamp.generation = 1
+        publisher.loan_uninit().write_payload(sample).send()
+        notifier.notify()
 
     def _wait_for(self, listener):
         """Wait for samples, 0.2 s at most."""

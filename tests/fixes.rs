@@ -1,0 +1,80 @@
+//! Sources outside a robot publish where it is: by real processes on its bus.
+
+use std::process::{Child, Stdio};
+
+use common::topics;
+use recording::{
+    Recording,
+    replay::{Options, replay},
+};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::support::{Run, assert_nothing_left, firsthand};
+
+/// The right wheel is 1 % larger than the left one, so 6 m lead 0.7 m past the target.
+const UNEQUAL: [&str; 4] = ["--pace", "4", "--set", "simulation.wheels.diameter_ratio=1.01"];
+/// An arrival within that is in the right place.
+const SURE: [&str; 2] = ["--set", "sure_within_m=0.5"];
+
+/// Simulated sources for `run`.
+fn sources(run: &Run, arguments: &[&str]) -> Child {
+    let directory = run.directory();
+    let mut command = firsthand(&["bench", "sources", "--robot", &run.robot]);
+    command.arg(directory).args(arguments).stdout(Stdio::null()).spawn().unwrap()
+}
+
+/// A run with unequal wheels and `sources`. `meanwhile` sees it drive. Its summary, and the recording.
+fn driven(robot: &str, arguments: &[&str], meanwhile: impl FnOnce(&mut Run)) -> (Value, Recording) {
+    let mut run = Run::start(robot, "obstacle-course", &[&UNEQUAL[..], &SURE].concat());
+    run.wait_until_driving();
+    let mut sources = sources(&run, arguments);
+    meanwhile(&mut run);
+    let (_, summary, directory) = run.finish_in();
+    assert!(sources.wait().unwrap().success());
+    let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
+    assert_nothing_left(robot);
+    (summary, recording)
+}
+
+fn assert_there(summary: &Value) {
+    assert_eq!(summary["outcome"], "reached", "{summary}");
+    assert!(summary["true_distance_m"].as_f64() < Some(0.35), "{summary}");
+    assert!(summary["pose_error_m"].as_f64() < Some(0.2), "{summary}");
+}
+
+#[test]
+fn a_robot_with_unequal_wheels_arrives_with_fixes_and_not_without() {
+    let run = Run::start("fix-none", "obstacle-course", &[&UNEQUAL[..], &SURE].concat());
+    let (_, summary) = run.finish();
+    assert_eq!(summary["outcome"], "wrong_place", "{summary}");
+    // Some fixes are off by a metre.
+    let (summary, recording) = driven("fix-jumps", &["--jumps", "0.05", "--fixes", "2"], |_| {});
+    assert_there(&summary);
+    let poses = recording.samples(&topics::POSE).unwrap();
+    let last = poses.last().unwrap().unwrap().sample;
+    assert!(last.fixes > 10 && last.relocations == 0, "{last:?}");
+}
+
+#[test]
+fn a_gyro_keeps_the_heading_of_a_robot_with_unequal_wheels() {
+    let gyro = ["--fixes", "0", "--gyro", "0.015"];
+    let (summary, _) = driven("fix-gyro", &gyro, |_| {});
+    assert_there(&summary);
+}
+
+#[test]
+fn dead_reckoning_killed_between_fixes_goes_on_from_them_and_replays_to_the_bit() {
+    let (summary, recording) = driven("fix-killed", &["--gyro", "0.015"], |run| {
+        for under_way_s in [3.0, 6.0] {
+            run.wait_until_under_way(under_way_s);
+            run.kill_and_await_successor("dead-reckoning", Signal::KILL);
+        }
+    });
+    assert_there(&summary);
+    assert_eq!(summary["restarts"]["dead-reckoning"], 2, "{summary}");
+    let report = replay(&recording, &Options::default()).unwrap();
+    assert_eq!(report.difference, None, "{report}");
+    assert_eq!(report.not_replayed(), 0, "{report}");
+    assert!(report.stages["dead-reckoning"].compared > 50, "{report}");
+}
