@@ -10,6 +10,8 @@ use recording::{
 use rustix::process::Signal;
 use serde_json::Value;
 
+use tempfile::TempDir;
+
 use crate::support::{Run, assert_nothing_left, firsthand};
 
 /// The right wheel is 1 % larger than the left one, so 6 m lead 0.7 m past the target.
@@ -24,8 +26,12 @@ fn sources(run: &Run, arguments: &[&str]) -> Child {
     command.arg(directory).args(arguments).stdout(Stdio::null()).spawn().unwrap()
 }
 
-/// A run with unequal wheels and `sources`. `meanwhile` sees it drive. Its summary, and the recording.
-fn driven(robot: &str, arguments: &[&str], meanwhile: impl FnOnce(&mut Run)) -> (Value, Recording) {
+/// A run with unequal wheels and `sources`. `meanwhile` sees it drive. Its summary, and the recording in its directory.
+fn driven(
+    robot: &str,
+    arguments: &[&str],
+    meanwhile: impl FnOnce(&mut Run),
+) -> (Value, Recording, TempDir) {
     let mut run = Run::start(robot, "obstacle-course", &[&UNEQUAL[..], &SURE].concat());
     run.wait_until_driving();
     let mut sources = sources(&run, arguments);
@@ -34,7 +40,7 @@ fn driven(robot: &str, arguments: &[&str], meanwhile: impl FnOnce(&mut Run)) -> 
     assert!(sources.wait().unwrap().success());
     let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
     assert_nothing_left(robot);
-    (summary, recording)
+    (summary, recording, directory)
 }
 
 fn assert_there(summary: &Value) {
@@ -49,7 +55,8 @@ fn a_robot_with_unequal_wheels_arrives_with_fixes_and_not_without() {
     let (_, summary) = run.finish();
     assert_eq!(summary["outcome"], "wrong_place", "{summary}");
     // Some fixes are off by a metre.
-    let (summary, recording) = driven("fix-jumps", &["--jumps", "0.05", "--fixes", "2"], |_| {});
+    let (summary, recording, _directory) =
+        driven("fix-jumps", &["--jumps", "0.05", "--fixes", "2"], |_| {});
     assert_there(&summary);
     let poses = recording.samples(&topics::POSE).unwrap();
     let last = poses.last().unwrap().unwrap().sample;
@@ -59,13 +66,13 @@ fn a_robot_with_unequal_wheels_arrives_with_fixes_and_not_without() {
 #[test]
 fn a_gyro_keeps_the_heading_of_a_robot_with_unequal_wheels() {
     let gyro = ["--fixes", "0", "--gyro", "0.015"];
-    let (summary, _) = driven("fix-gyro", &gyro, |_| {});
+    let (summary, ..) = driven("fix-gyro", &gyro, |_| {});
     assert_there(&summary);
 }
 
 #[test]
 fn dead_reckoning_killed_between_fixes_goes_on_from_them_and_replays_to_the_bit() {
-    let (summary, recording) = driven("fix-killed", &["--gyro", "0.015"], |run| {
+    let (summary, recording, _directory) = driven("fix-killed", &["--gyro", "0.015"], |run| {
         for under_way_s in [3.0, 6.0] {
             run.wait_until_under_way(under_way_s);
             run.kill_and_await_successor("dead-reckoning", Signal::KILL);

@@ -188,7 +188,8 @@ fn one_fix_in_twenty_that_is_off_by_a_metre_does_no_harm() {
 fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
     use FixRefusal::{Covariance, Far, Future, Late, NotFinite};
     let good = |robot: &mut Robot| FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
-    let rows: [(FixRefusal, fn(&mut FixSample)); 10] = [
+    type Spoil = fn(&mut FixSample);
+    let rows: [(FixRefusal, Spoil); 10] = [
         (FixRefusal::None, |_| {}),
         (FixRefusal::None, |fix| (fix.heading_rad, fix.covariance[5]) = (f64::NAN, f64::NAN)),
         (Late, |fix| fix.capture_ns -= 21 * TICK_NS),

@@ -222,8 +222,9 @@ fn numbers(view: &View) -> Vec<Line<'static>> {
     let plain = Style::new();
     if let Some(pose) = view.pose {
         let heading = pose.heading_rad.to_degrees().rem_euclid(360.0);
-        line("pose", format!("{:.2}, {:.2} m, {heading:.0}°", pose.x_m, pose.y_m), plain);
-        line("known to", format!("{:.2} m; {} fixes", pose.position_within_m(), pose.fixes), plain);
+        let within_m = pose.position_within_m();
+        let place = format!("{:.2}, {:.2} ±{within_m:.2} m, {heading:.0}°", pose.x_m, pose.y_m);
+        line("pose", place, plain);
         line("speed", format!("{:.2} m/s, {:.2} rad/s", pose.v_m_s, pose.omega_rad_s), plain);
         if let Some(command) = view.command {
             let (left, driven) = (command.distance_m, pose.travelled_m);
