@@ -21,6 +21,7 @@ use crate::{
 };
 
 /// An input of the step. The belief follows from its inputs alone, so the journal holds the inputs.
+#[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Input {
     /// The pose of a tick with what the robot sensed.
