@@ -2,6 +2,7 @@
 //! fault injector here.
 
 use std::{
+    fs,
     sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
@@ -35,6 +36,8 @@ enum Fault {
     RollsOn,
     /// The front sonar says 0.
     NoSonar,
+    /// The front sonar says that nothing is in range.
+    DeafSonar,
     /// Velocity 0 does not reach the robot, nor does the time limit of commands.
     IgnoresZero,
 }
@@ -150,6 +153,9 @@ impl Shared {
                 Report::Standard(sensors) if self.fault == Fault::NoSonar => {
                     sensors.ultrasonic[1] = 0;
                 }
+                Report::Standard(sensors) if self.fault == Fault::DeafSonar => {
+                    sensors.ultrasonic[1] = 255;
+                }
                 _ => {}
             }
             report.encode(Addressing::default(), &mut bytes);
@@ -162,7 +168,7 @@ impl Shared {
         let frames = self.frames;
         let [left, right] = &mut sensors.encoders;
         match self.fault {
-            Fault::None | Fault::NoSonar | Fault::IgnoresZero => {}
+            Fault::None | Fault::NoSonar | Fault::DeafSonar | Fault::IgnoresZero => {}
             Fault::SameFrame => *sensors = MotorSensors::default(),
             Fault::DeadEncoder => right.position = 0,
             Fault::Reversed => {
@@ -274,7 +280,26 @@ fn without_its_front_sonar_the_robot_stands_and_goes_on_when_it_is_back() {
     let (_body, faults, mut run) = faulty("fi-sonar", Fault::None);
     run.wait_until_under_way(0.5);
     faults.set(Fault::NoSonar);
-    run.wait_until("it stands", cause_is("front sonar silent"));
+    run.wait_until("it stands", cause_is("ranging sensor silent"));
+    faults.set(Fault::None);
+    run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
+    run.stop();
+}
+
+#[test]
+fn before_a_wall_that_the_front_sonar_does_not_hear_the_robot_stands_until_it_hears_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("wall.toml");
+    // It turns so slowly that the wall stays square ahead for seconds.
+    let wall = "target = [-3, 0]\nworld.wall = [{ points = [[0.5, -1], [0.5, 1]] }]\n\
+        controller = { look_rad_s = 0.02, turn_rad_s = 0.02 }";
+    fs::write(&file, wall).unwrap();
+    let mission = file.to_str().unwrap();
+    let body = Robot::start(mission, "udp", "127.0.0.1:0");
+    let faults = FaultInjector::before(&body, Fault::DeafSonar);
+    let mut run = Run::start("fi-deaf", mission, &["--set", &faults.proxy.as_robot()]);
+    run.wait_until("it stands", cause_is("ranging sensor implausible"));
+    assert!(run.link_logged(&["front has heard nothing", "infrared-1 and infrared-2"]));
     faults.set(Fault::None);
     run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
     run.stop();

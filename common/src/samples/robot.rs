@@ -136,14 +136,14 @@ wire_enum! {
         FramesSilent = 15 "motor frames missing",
         /// Motor frames come less often than commands last.
         FramesSlow = 16 "motor frames too slow",
-        /// The front sonar of a mission that senses gives no readings.
-        RangeSilent = 17 "front sonar silent",
+        /// A ranging sensor that the mission uses gives no readings.
+        RangeSilent = 17 "ranging sensor silent",
         /// The robot's frames are old.
         RobotLate = 18 "robot late",
         /// Something holds a wheel that was told to turn.
         WheelsHeld = 19 "wheels held",
-        /// The front sonar's reading does not change although the robot moves.
-        RangeImplausible = 20 "front sonar implausible",
+        /// The reading of a ranging sensor does not change although the robot moves, or the front sonar hears nothing of what others see.
+        RangeImplausible = 20 "ranging sensor implausible",
     }
 }
 

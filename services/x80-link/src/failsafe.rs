@@ -15,6 +15,7 @@ pub mod restart;
 pub mod staleness;
 pub mod stop_monitor;
 pub mod streams;
+mod unheard_surface;
 
 use std::time::Duration;
 
@@ -178,14 +179,14 @@ pub const TABLE: &[Rule] = &[
     },
     Rule {
         cause: Cause::RangeSilent,
-        when: "a mission that senses has had no reading of it for three times `robot.command_limit_s`: none came, or 0; 255 is a reading",
+        when: "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`; `x80-link.log` names it. Nothing in range is a reading",
         action: Action::Stop,
         clears: Clears::WithCondition,
         monitor: |all| &all.streams,
     },
     Rule {
         cause: Cause::RangeImplausible,
-        when: "the front sonar says the same within 1 cm while the robot drives 0.4 m or turns by 90 degrees; 255 is not judged",
+        when: "the front sonar says the same within 1 cm while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; `x80-link.log` names the sensor",
         action: Action::Stop,
         clears: Clears::OnResume { or_after: Some(range::CHANGES) },
         monitor: |all| &all.range,

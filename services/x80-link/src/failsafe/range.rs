@@ -1,37 +1,46 @@
-//! The range monitor: whether the front sonar's reading changes as the motion says it must.
+//! The range monitor: whether the readings of the ranging sensors change as the motion says they must, and whether the front sonar hears
+//! what the infrared rangers see ([`super::unheard_surface`]).
 //!
 //! An echo of something that stands comes nearer as the robot drives, and another thing answers when it turns. A reading that stays
 //! the same to the centimetre meanwhile is stuck: at one value, or at the last one. In 240 recorded missions, 150 of them with
 //! measured realism, [`READINGS`] and more equal readings never came with more than 0.53 of the motion that is needed here.
 //!
-//! 255 means that nothing was heard. In the open, and before smooth walls that stand askew, it stays for long, so it is not judged.
+//! A sensor that looks aside gives the same reading for long as the robot drives along a wall. Of those only turns on the spot count.
+//!
+//! A reading of nothing stays for long in the open, and before smooth walls that stand askew, so it is not judged by motion.
 
-use std::time::Duration;
+use std::{ops::RangeInclusive, time::Duration};
 
 use common::{
-    mission::Mission,
-    samples::{Cause, RangeReading},
+    mission::{Mission, Sensor, SensorKind},
+    samples::{Cause, RangeReading, RangeStatus},
     wire::counts_between,
 };
 
-use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
+use super::{
+    monitor::{Condition, Counts, Moment, Monitor, Observation},
+    unheard_surface::UnheardSurface,
+};
 
-/// Readings are equal if they differ from the first by no more than this, centimetres.
-const EQUAL_CM: u16 = 1;
+/// Readings are equal if they differ from the first by no more than this, metres: a centimetre, and the rounding of the numbers.
+const EQUAL_M: f64 = 0.0101;
 /// The least number of equal readings, 1.1 s at 7 Hz: fewer may be alike by chance.
 const READINGS: u32 = 8;
 /// The way after which the reading must have changed, metres, or the turn, radians. Parts of both add up.
 const WAY_M: f64 = 0.4;
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
-/// The readings that are judged, centimetres. Those at the ends of the scale are limits, not distances.
-const JUDGED_CM: std::ops::RangeInclusive<u16> = 5..=249;
+/// The ranges that are judged, metres. Those at the ends of a sensor's scale are limits, not distances.
+const JUDGED_SONAR_M: RangeInclusive<f64> = 0.05..=2.49;
+const JUDGED_INFRARED_M: RangeInclusive<f64> = 0.10..=0.70;
+/// A robot turns on the spot if its wheels' mean way is less than this share of half their difference.
+const ON_THE_SPOT: f64 = 0.25;
 /// The cause clears after so long with readings that change.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
 
 /// Equal readings in a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Equal {
-    first_cm: u16,
+    first_m: f64,
     readings: u32,
     way_m: f64,
     turn_rad: f64,
@@ -43,32 +52,78 @@ impl Equal {
     }
 }
 
-/// The front sonar of one robot.
+/// The readings of one sensor.
 #[derive(Clone, Debug)]
-pub struct Range {
-    sensing: bool,
-    front: u8,
-    metres_per_count: f64,
-    /// None for a car, whose second encoder is that of the steering.
-    track_m: Option<f64>,
-    counts: Option<[u16; 2]>,
+struct Row {
+    row: u8,
+    name: String,
+    looks_ahead: bool,
+    judged_m: RangeInclusive<f64>,
     equal: Equal,
     implausible: Option<(Equal, Moment)>,
 }
 
-impl Range {
-    fn take(&mut self, cm: u16, now: Moment) {
-        let same = cm.abs_diff(self.equal.first_cm) <= EQUAL_CM;
-        if JUDGED_CM.contains(&cm) && same {
+impl Row {
+    fn of(row: usize, sensor: Sensor, front: usize) -> Self {
+        Self {
+            row: row as u8,
+            name: sensor.name,
+            looks_ahead: row == front,
+            judged_m: match sensor.kind {
+                SensorKind::Cone => JUDGED_SONAR_M,
+                SensorKind::Ray => JUDGED_INFRARED_M,
+            },
+            equal: Equal::default(),
+            implausible: None,
+        }
+    }
+
+    fn take(&mut self, reading: &RangeReading, now: Moment) {
+        let range_m = reading.range_m;
+        let is_same = (range_m - self.equal.first_m).abs() <= EQUAL_M;
+        let is_judged =
+            reading.status() == RangeStatus::Measured && self.judged_m.contains(&range_m);
+        if is_judged && is_same {
             self.equal.readings += 1;
         } else {
-            self.equal = Equal { first_cm: cm, readings: 1, ..Equal::default() };
+            self.equal = Equal { first_m: range_m, readings: 1, ..Equal::default() };
         }
         if self.equal.are_implausible() {
             self.implausible = Some((self.equal, now));
         }
     }
 
+    fn moved(&mut self, way_m: f64, turn_rad: f64, is_on_the_spot: bool) {
+        if self.looks_ahead {
+            self.equal.way_m += way_m;
+        }
+        if self.looks_ahead || is_on_the_spot {
+            self.equal.turn_rad += turn_rad;
+        }
+    }
+
+    fn condition(&self, now: Moment) -> Condition {
+        match self.implausible {
+            Some(_) if self.equal.are_implausible() => Condition::Holds,
+            Some((_, at)) => Condition::OverFor(now.time.since(at.time)),
+            None => false.into(),
+        }
+    }
+}
+
+/// The ranging sensors that a mission uses.
+#[derive(Clone, Debug)]
+pub struct Range {
+    sensing: bool,
+    metres_per_count: f64,
+    /// None for a car, whose second encoder is that of the steering.
+    track_m: Option<f64>,
+    counts: Option<[u16; 2]>,
+    rows: Vec<Row>,
+    unheard: Option<UnheardSurface>,
+}
+
+impl Range {
     fn turn(&mut self, counts: [u16; 2]) {
         let Some(before) = self.counts.replace(counts) else {
             return;
@@ -76,63 +131,90 @@ impl Range {
         let [left, right] = [0, 1].map(|wheel| {
             f64::from(counts_between(before[wheel], counts[wheel])) * self.metres_per_count
         });
-        match self.track_m {
-            Some(track_m) => {
-                self.equal.way_m += (left + right).abs() / 2.0;
-                self.equal.turn_rad += (right - left).abs() / track_m;
-            }
-            None => self.equal.way_m += left.abs(),
+        let (way_m, turn_m) = match self.track_m {
+            Some(_) => ((left + right).abs() / 2.0, (right - left).abs() / 2.0),
+            None => (left.abs(), 0.0),
+        };
+        let turn_rad = self.track_m.map_or(0.0, |track_m| 2.0 * turn_m / track_m);
+        for row in &mut self.rows {
+            row.moved(way_m, turn_rad, way_m < ON_THE_SPOT * turn_m);
         }
     }
 }
 
-/// The reading of the sensor of row `front`.
-pub(super) fn front(readings: &[RangeReading], front: u8) -> Option<&RangeReading> {
-    readings.iter().find(|reading| reading.sensor == front)
-}
-
 impl Monitor for Range {
     fn new(mission: &Mission) -> Self {
-        let body = mission.body();
+        let (body, front) = (mission.body(), mission.front_row());
+        let table = mission.sensor_table().into_iter().enumerate();
         Self {
             sensing: mission.sensing,
-            front: mission.front_row() as u8,
             metres_per_count: body.metres_per_count(),
             track_m: body.steering.is_none().then_some(body.track_m),
             counts: None,
-            equal: Equal::default(),
-            implausible: None,
+            rows: table
+                .filter(|(_, sensor)| sensor.used)
+                .map(|(row, sensor)| Row::of(row, sensor, front))
+                .collect(),
+            unheard: UnheardSurface::of(mission),
         }
     }
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
         match *what {
             Observation::Readings(readings) => {
-                if let Some(front) = front(readings, self.front) {
-                    self.take(front.raw, now);
+                for row in &mut self.rows {
+                    if let Some(reading) = readings.iter().find(|reading| reading.sensor == row.row)
+                    {
+                        row.take(reading, now);
+                    }
+                }
+                if let Some(unheard) = &mut self.unheard {
+                    unheard.take(readings);
                 }
             }
             Observation::Motor(counts, Counts::Follow) => self.turn(counts),
             Observation::Motor(..) => self.counts = None,
             Observation::Lost | Observation::Resumed => {
-                (self.counts, self.equal, self.implausible) = (None, Equal::default(), None);
+                self.counts = None;
+                for row in &mut self.rows {
+                    (row.equal, row.implausible) = (Equal::default(), None);
+                }
+                if let Some(unheard) = &mut self.unheard {
+                    unheard.reset();
+                }
             }
             _ => {}
         }
     }
 
     fn condition(&self, _: Cause, now: Moment) -> Condition {
-        match self.implausible {
-            Some(_) if self.sensing && self.equal.are_implausible() => Condition::Holds,
-            Some((_, at)) if self.sensing => Condition::OverFor(now.time.since(at.time)),
-            _ => false.into(),
+        if !self.sensing {
+            return false.into();
         }
+        if self.unheard.as_ref().is_some_and(UnheardSurface::is_implausible) {
+            return Condition::Holds;
+        }
+        let over_for = |row: &Row| match row.condition(now) {
+            Condition::Holds => None,
+            Condition::OverFor(over) => Some(over),
+        };
+        let least =
+            self.rows.iter().try_fold(Duration::MAX, |least, row| Some(least.min(over_for(row)?)));
+        least.map_or(Condition::Holds, Condition::OverFor)
     }
 
-    fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let (Equal { first_cm, readings, way_m, turn_rad }, _) = self.implausible?;
+    fn explain(&self, _: Cause, now: Moment) -> Option<String> {
+        if let Some(unheard) = self.unheard.as_ref().filter(|unheard| unheard.is_implausible()) {
+            let front = self.rows.iter().find(|row| row.looks_ahead)?;
+            return Some(unheard.explain(&front.name));
+        }
+        let newest = |row: &&Row| row.implausible.map(|(_, at)| now.time.since(at.time));
+        let implausible = self.rows.iter().filter(|row| row.implausible.is_some());
+        let row = implausible.min_by_key(newest)?;
+        let (Equal { first_m, readings, way_m, turn_rad }, _) = row.implausible?;
         Some(format!(
-            "the front sonar says {first_cm} cm in {readings} frames although the robot drove {way_m:.2} m and turned {:.0} degrees: check the sensor, then `firsthand stop` and `resume`",
+            "the sensor {} says {first_m:.2} m in {readings} frames although the robot drove {way_m:.2} m and turned {:.0} degrees: check it, then `firsthand stop` and `resume`",
+            row.name,
             turn_rad.to_degrees()
         ))
     }
@@ -148,6 +230,15 @@ mod tests {
 
     /// The first tick at which a sonar with these readings is implausible, on a robot whose wheels turn so many metres a tick.
     fn implausible_at(wheels_m: [f64; 2], reading: impl Fn(u32) -> u16) -> Option<u32> {
+        sensor_implausible_at(0, wheels_m, reading)
+    }
+
+    /// Likewise for the sensor of row `sensor`, which gives centimetres.
+    fn sensor_implausible_at(
+        sensor: u8,
+        wheels_m: [f64; 2],
+        reading: impl Fn(u32) -> u16,
+    ) -> Option<u32> {
         let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
         let mut monitor = Range::new(&mission);
         let per_count = mission.body().metres_per_count();
@@ -157,9 +248,17 @@ mod tests {
             let turned = wheels_m.map(|way| (way * f64::from(tick) / per_count).round() as i32);
             let counts = turned.map(|counts| counts.rem_euclid(32_768) as u16);
             monitor.observe(&Observation::Motor(counts, Counts::Follow), now);
-            let beside = RangeReading { sensor: 1, raw: 77, ..RangeReading::default() };
-            let front = RangeReading { raw: reading(tick), ..RangeReading::default() };
-            monitor.observe(&Observation::Readings(&[beside, front]), now);
+            let of = |sensor: u8, cm: u16| {
+                let status = if cm == 255 { RangeStatus::Nothing } else { RangeStatus::Measured };
+                RangeReading {
+                    range_m: f64::from(cm) / 100.0,
+                    raw: cm,
+                    sensor,
+                    status: status.into(),
+                }
+            };
+            let beside = of((sensor + 1) % 3, 20 + 3 * (tick % 2) as u16);
+            monitor.observe(&Observation::Readings(&[beside, of(sensor, reading(tick))]), now);
             monitor.condition(Cause::RangeImplausible, now) == Condition::Holds
         })
     }
@@ -182,5 +281,17 @@ mod tests {
         assert_eq!(implausible_at([0.05; 2], |_| 255), None);
         assert_eq!(implausible_at([0.05; 2], |_| 254), None);
         assert_eq!(implausible_at([0.05; 2], |tick| 90 - (tick / 8) as u16 * 2), None);
+    }
+
+    #[test]
+    fn a_sensor_that_looks_aside_is_stuck_if_its_reading_stays_while_the_robot_turns_on_the_spot() {
+        for sensor in [1, 2, 3, 9] {
+            assert_eq!(sensor_implausible_at(sensor, [-0.02, 0.02], |_| 50), Some(11), "{sensor}");
+            // It drives along a wall, or around a drum.
+            assert_eq!(sensor_implausible_at(sensor, [0.05; 2], |_| 50), None);
+            assert_eq!(sensor_implausible_at(sensor, [0.03, 0.05], |_| 50), None);
+        }
+        // An infrared ranger that sees nothing says so at any heading.
+        assert_eq!(sensor_implausible_at(3, [-0.02, 0.02], |_| 255), None);
     }
 }

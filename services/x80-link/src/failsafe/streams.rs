@@ -6,7 +6,7 @@ use std::{collections::VecDeque, time::Duration};
 use common::{
     clock::MissionTime,
     mission::Mission,
-    samples::{Cause, RangeStatus},
+    samples::{Cause, RangeReading, RangeStatus},
 };
 
 use super::{
@@ -36,16 +36,25 @@ pub enum Motor {
     Slow(f64),
 }
 
+/// The newest valid reading of a sensor.
+#[derive(Clone, Debug)]
+struct Newest {
+    row: u8,
+    name: String,
+    /// When it came by the machine's clock.
+    ns: u64,
+}
+
 /// The streams of one robot.
 #[derive(Clone, Debug)]
 pub struct Streams {
     limit: Duration,
     silence: Silence,
     sensing: bool,
-    front: u8,
+    /// The sensors that the mission uses.
+    sensors: Vec<Newest>,
     found_ns: u64,
     motor_ns: u64,
-    range_ns: u64,
     newest: Option<MissionTime>,
     intervals: VecDeque<Duration>,
     requests: Backoff,
@@ -78,14 +87,16 @@ impl Streams {
         }
     }
 
-    fn range_is_silent(&self, now_ns: u64) -> bool {
+    /// A sensor without a valid reading.
+    fn silent_sensor(&self, now_ns: u64) -> Option<&Newest> {
         // A robot that was just found must send a new reading first. Older readings do not show the obstacles that are ahead now.
-        self.sensing && self.silence.is_over(self.range_ns, now_ns)
+        let is_silent = |sensor: &&Newest| self.silence.is_over(sensor.ns, now_ns);
+        self.sensors.iter().filter(|_| self.sensing).find(is_silent)
     }
 
     /// Whether the next request for the streams is due. The pauses between requests grow.
     pub fn wants_request(&mut self, now_ns: u64) -> bool {
-        if self.motor_frames(now_ns) == Motor::Regular && !self.range_is_silent(now_ns) {
+        if self.motor_frames(now_ns) == Motor::Regular && self.silent_sensor(now_ns).is_none() {
             // A robot that sends frames only when it is asked is not asked more often.
             return false;
         }
@@ -99,14 +110,14 @@ impl Streams {
 
 impl Monitor for Streams {
     fn new(mission: &Mission) -> Self {
+        let used = (0..).zip(mission.sensor_table()).filter(|(_, sensor)| sensor.used);
         Self {
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             silence: Silence::new(mission),
             sensing: mission.sensing,
-            front: mission.front_row() as u8,
+            sensors: used.map(|(row, sensor)| Newest { row, name: sensor.name, ns: 0 }).collect(),
             found_ns: 0,
             motor_ns: 0,
-            range_ns: 0,
             newest: None,
             intervals: VecDeque::new(),
             requests: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
@@ -118,9 +129,13 @@ impl Monitor for Streams {
             Observation::Pace(pace) => self.silence.set_pace(pace),
             Observation::Motor(..) => self.motor(now.time, now.machine_ns),
             Observation::Readings(readings) => {
-                let front = super::range::front(readings, self.front);
-                if front.is_some_and(|reading| reading.status() != RangeStatus::Invalid) {
-                    self.range_ns = now.machine_ns;
+                for sensor in &mut self.sensors {
+                    let is_valid = |reading: &&RangeReading| {
+                        reading.sensor == sensor.row && reading.status() != RangeStatus::Invalid
+                    };
+                    if readings.iter().any(|reading| is_valid(&reading)) {
+                        sensor.ns = now.machine_ns;
+                    }
                 }
             }
             Observation::Found { .. } => {
@@ -136,7 +151,7 @@ impl Monitor for Streams {
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
         let holds = match cause {
-            Cause::RangeSilent => self.range_is_silent(now.machine_ns),
+            Cause::RangeSilent => self.silent_sensor(now.machine_ns).is_some(),
             Cause::FramesSilent => self.motor_frames(now.machine_ns) == Motor::Silent,
             _ => matches!(self.motor_frames(now.machine_ns), Motor::Slow(_)),
         };
@@ -145,7 +160,12 @@ impl Monitor for Streams {
 
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         match (cause, self.motor_frames(now.machine_ns)) {
-            (Cause::RangeSilent, _) => Some("the front sonar is missing or 0".to_owned()),
+            (Cause::RangeSilent, _) => self.silent_sensor(now.machine_ns).map(|sensor| {
+                format!(
+                    "the sensor {} gives no valid reading: check it, or leave it out of robot.sensor or of sensors",
+                    sensor.name
+                )
+            }),
             (Cause::FramesSilent, _) => {
                 Some("the robot answers and sends no motor frames; they are asked for".to_owned())
             }

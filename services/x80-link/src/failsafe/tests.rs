@@ -15,7 +15,8 @@ const SILENT_MS: u64 = 3 * LIMIT_MS;
 const MOMENT_NS: u64 = 1;
 
 fn mission() -> Mission {
-    Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap()
+    let text = "target = [3, 0]\nsensors = 'front'";
+    Mission::parse(text, Path::new("test.toml")).unwrap()
 }
 
 /// The moment `ns` nanoseconds before the tested one.
@@ -46,7 +47,8 @@ fn standard(volts: f64) -> StandardSensors {
 
 /// A reading of the front sonar.
 fn front(status: RangeStatus, raw: u16) -> [RangeReading; 1] {
-    [RangeReading { status: status.into(), raw, ..RangeReading::default() }]
+    let range_m = f64::from(raw) / 100.0;
+    [RangeReading { range_m, status: status.into(), raw, ..RangeReading::default() }]
 }
 
 /// A failsafe in which no cause applies, with all inputs as old as they may be.

@@ -12,7 +12,8 @@ const PERIOD_NS: u64 = 142_857_142;
 
 fn mission() -> Mission {
     // The X80 has 1200 counts a turn, its left wheel on channel 0, reversed, and its right wheel on channel 1.
-    Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap()
+    let text = "target = [3, 0]\nsensors = 'front'";
+    Mission::parse(text, Path::new("test.toml")).unwrap()
 }
 
 fn in_ticks() -> Link {

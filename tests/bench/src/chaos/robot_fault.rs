@@ -95,7 +95,7 @@ pub static TABLE: &[Row] = &[
     row(RobotFault::LinkKilled, "link-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the link under a frozen supervisor"),
     row(RobotFault::SupervisorKilled, "supervisor-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of the supervisor"),
     row(RobotFault::AllKilled, "all-killed", Promise::RestsAtOnce, "time limits are ignored; SIGKILL of all processes, then `firsthand stop`"),
-    row(RobotFault::SonarSilent, "sonar-silent", Promise::Nothing, "every ultrasonic byte is 255, nothing in range"),
+    row(RobotFault::SonarSilent, "sonar-silent", Promise::Unharmed, "every ultrasonic byte is 255, nothing in range"),
     row(RobotFault::SonarFrozen, "sonar-frozen", Promise::RestsLater, "the last ultrasonic bytes that are distances repeat for ever"),
     row(RobotFault::LateFromBoot, "late-from-boot", Promise::Unharmed, "from its start on, all frames come 0.5 s late"),
     row(RobotFault::HeldWheels, "held-wheels", Promise::EndsAtRest, "the wheels stand, and their motors draw the current of held ones"),

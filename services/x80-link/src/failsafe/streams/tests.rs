@@ -5,7 +5,7 @@ use std::path::Path;
 const MS: u64 = 1_000_000;
 
 fn streams(text: &str) -> Streams {
-    let text = format!("target = [3, 0]\n{text}");
+    let text = format!("target = [3, 0]\nsensors = 'front'\n{text}");
     let mut streams = Streams::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
     streams.observe(&Observation::Found { again: false }, Moment::default());
     streams
@@ -63,9 +63,30 @@ fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
     for (text, missed) in [("", true), ("sensing = false", false)] {
         let mut streams = streams(text);
         range(&mut streams, 100 * MS);
-        assert!(!streams.range_is_silent(849 * MS));
-        assert_eq!(streams.range_is_silent(850 * MS), missed);
+        assert!(streams.silent_sensor(849 * MS).is_none());
+        assert_eq!(streams.silent_sensor(850 * MS).is_some(), missed);
         range(&mut streams, 900 * MS);
-        assert!(!streams.range_is_silent(1000 * MS), "back");
+        assert!(streams.silent_sensor(1000 * MS).is_none(), "back");
+    }
+}
+
+#[test]
+fn each_sensor_that_the_mission_uses_must_give_valid_readings_and_the_one_that_does_not_is_named() {
+    let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+    for silent in 0..10 {
+        let mut streams = Streams::new(&mission);
+        let readings: Vec<_> = (0..10)
+            .map(|sensor| {
+                let is_silent = sensor == silent;
+                let status = if is_silent { RangeStatus::Invalid } else { RangeStatus::Nothing };
+                RangeReading { sensor, status: status.into(), ..RangeReading::default() }
+            })
+            .collect();
+        let now = Moment { time: MissionTime(900 * MS), machine_ns: 900 * MS };
+        streams.observe(&Observation::Readings(&readings), now);
+        let row = usize::from(silent);
+        let named = streams.silent_sensor(now.machine_ns).map(|sensor| sensor.name.clone());
+        assert_eq!(named, Some(mission.sensor_table().swap_remove(row).name));
+        assert_eq!(streams.condition(Cause::RangeSilent, now), Condition::Holds);
     }
 }

@@ -1,0 +1,184 @@
+//! Whether the front sonar hears what the infrared rangers beside it see.
+//!
+//! A sonar that is stuck at "nothing in range" looks like one before open ground. Where the two infrared rangers that look past it on
+//! either side both see a near surface, and the line through what they see is square to the sonar's axis, the sonar must hear it:
+//! even a smooth wall answers within 20 degrees of its normal.
+
+use common::{
+    kinematics::Pose2,
+    mission::{Mission, Sensor, SensorKind},
+    samples::{RangeReading, RangeStatus},
+    sonar::Mount,
+};
+use glam::DVec2;
+
+/// A surface must be nearer than this to both rangers, metres.
+const NEARER_M: f64 = 0.45;
+/// The greatest angle between the surface's normal and the sonar's axis, degrees.
+const SQUARE_DEG: f64 = 12.0;
+/// Rangers within this of the sonar's axis look at what is in its cone, degrees.
+const BESIDE_DEG: f64 = 15.0;
+/// As many readings without an echo may be chance: runs of four come with a healthy sonar.
+pub(super) const SILENCES: u32 = 4;
+
+/// The front sonar, and the two rangers beside it.
+#[derive(Clone, Debug)]
+pub(super) struct UnheardSurface {
+    front: u8,
+    axis: DVec2,
+    beside: [Ranger; 2],
+    silences: u32,
+}
+
+#[derive(Clone, Debug)]
+struct Ranger {
+    row: u8,
+    name: String,
+    mount: Mount,
+    range_m: Option<f64>,
+}
+
+impl UnheardSurface {
+    /// None for a robot that does not use a ranger on either side of the front sonar.
+    pub(super) fn of(mission: &Mission) -> Option<Self> {
+        let (table, front) = (mission.sensor_table(), mission.front_row());
+        let ahead = table.get(front)?.mount.bearing_rad;
+        let ranger = |side: f64| {
+            let beside = |sensor: &Sensor| (sensor.mount.bearing_rad - ahead) * side;
+            let looks = |(_, sensor): &(u8, &Sensor)| {
+                let is_ray = sensor.used && sensor.kind == SensorKind::Ray;
+                is_ray && (0.0..BESIDE_DEG.to_radians()).contains(&beside(sensor))
+            };
+            let nearest = (0..).zip(&table).filter(looks);
+            let nearest = nearest.min_by(|(_, a), (_, b)| beside(a).total_cmp(&beside(b)));
+            nearest.map(|(row, sensor)| Ranger {
+                row,
+                name: sensor.name.clone(),
+                mount: sensor.mount,
+                range_m: None,
+            })
+        };
+        let beside = [ranger(1.0)?, ranger(-1.0)?];
+        let is_one = beside[0].row == beside[1].row;
+        let axis = DVec2::from_angle(ahead);
+        (!is_one).then_some(Self { front: front as u8, axis, beside, silences: 0 })
+    }
+
+    /// Take the readings of the robot's newest frames.
+    pub(super) fn take(&mut self, readings: &[RangeReading]) {
+        for ranger in &mut self.beside {
+            if let Some(reading) = readings.iter().find(|reading| reading.sensor == ranger.row) {
+                let is_range = reading.status() == RangeStatus::Measured;
+                ranger.range_m = is_range.then_some(reading.range_m);
+            }
+        }
+        if self.surface_m().is_none() {
+            self.silences = 0;
+        } else if let Some(front) = readings.iter().find(|reading| reading.sensor == self.front) {
+            let is_silent = front.status() == RangeStatus::Nothing;
+            self.silences = if is_silent { self.silences.saturating_add(1) } else { 0 };
+        }
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.silences = 0;
+        for ranger in &mut self.beside {
+            ranger.range_m = None;
+        }
+    }
+
+    pub(super) const fn is_implausible(&self) -> bool {
+        self.silences > SILENCES
+    }
+
+    /// The mean range of a surface that both rangers see near and square ahead, metres.
+    fn surface_m(&self) -> Option<f64> {
+        let near = |ranger: &Ranger| ranger.range_m.filter(|range| *range < NEARER_M);
+        let seen = |ranger: &Ranger| Some(ranger.mount.hit(Pose2::default(), near(ranger)?));
+        let [left, right] = &self.beside;
+        let along = seen(left)? - seen(right)?;
+        let slant = along.dot(self.axis).atan2(along.perp_dot(self.axis).abs()).abs();
+        let mean = f64::midpoint(near(left)?, near(right)?);
+        (slant <= SQUARE_DEG.to_radians()).then_some(mean)
+    }
+
+    /// The observation in words.
+    pub(super) fn explain(&self, front: &str) -> String {
+        let [left, right] = &self.beside;
+        format!(
+            "{front} has heard nothing {} times, and {} and {} see a surface square ahead at {:.2} m: check the sensor",
+            self.silences,
+            left.name,
+            right.name,
+            self.surface_m().unwrap_or_default()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn watch(extra: &str) -> Option<UnheardSurface> {
+        let text = format!("target = [3, 0]\n{extra}");
+        UnheardSurface::of(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    }
+
+    /// The readings of the front sonar and of the rangers at 11.25 and -11.25 degrees; none for nothing.
+    fn readings(front: Option<f64>, left: Option<f64>, right: Option<f64>) -> [RangeReading; 3] {
+        [(0, front), (4, left), (5, right)].map(|(sensor, range)| {
+            let status = range.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
+            let range_m = range.unwrap_or_default();
+            RangeReading { range_m, sensor, status: status.into(), ..RangeReading::default() }
+        })
+    }
+
+    /// The number of readings after which the front sonar is implausible.
+    fn implausible_after(left: f64, right: f64) -> Option<usize> {
+        let mut watch = watch("").unwrap();
+        (1..50).find(|_| {
+            watch.take(&readings(None, Some(left), Some(right)));
+            watch.is_implausible()
+        })
+    }
+
+    #[test]
+    fn a_sonar_that_hears_nothing_of_a_near_surface_square_ahead_is_implausible_after_4_readings() {
+        assert_eq!(implausible_after(0.3, 0.3), Some(5));
+        assert_eq!(implausible_after(0.44, 0.44), Some(5));
+    }
+
+    #[test]
+    fn a_surface_that_is_far_aslant_or_not_before_both_rangers_proves_nothing() {
+        assert_eq!(implausible_after(0.46, 0.44), None);
+        // The two points are 0.19 m apart; 12 degrees are 4 cm of difference in depth.
+        assert_eq!(implausible_after(0.3, 0.33), Some(5));
+        assert_eq!(implausible_after(0.3, 0.36), None);
+        let mut watch = watch("").unwrap();
+        for _ in 0..50 {
+            watch.take(&readings(None, Some(0.3), None));
+        }
+        assert!(!watch.is_implausible());
+    }
+
+    #[test]
+    fn it_is_over_with_an_echo_or_without_the_surface() {
+        for over in [readings(Some(0.3), Some(0.3), Some(0.3)), readings(None, None, Some(0.3))] {
+            let mut watch = watch("").unwrap();
+            for _ in 0..6 {
+                watch.take(&readings(None, Some(0.3), Some(0.3)));
+            }
+            assert!(watch.is_implausible());
+            watch.take(&over);
+            assert!(!watch.is_implausible());
+        }
+    }
+
+    #[test]
+    fn a_robot_that_does_not_use_its_infrared_rangers_is_not_judged() {
+        assert!(watch("sensors = 'three-front'").is_none());
+        assert!(watch("method = 'paper'").is_none());
+    }
+}
