@@ -9,11 +9,9 @@
 //! planner that is restarted goes on with it. The only memory is the side to which a scan turns: wheels lag, so a side that is chosen
 //! anew with each tick may change with each tick.
 
-use std::f64::consts::{PI, TAU};
-
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
-    mission::{Mission, SensorKind},
+    mission::Mission,
     samples::GridHeader,
 };
 use glam::DVec2;
@@ -44,15 +42,15 @@ enum Side {
     Right,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
     speed: f64,
     turn: f64,
     /// The time in which the robot must be able to stop, seconds.
     stops_within_s: f64,
-    /// Bearings of the sonars that the mission uses, radians from the robot's axis.
-    sonars: Vec<f64>,
+    /// Unit vector from the robot's axis to the sonar's.
+    bearing: DVec2,
     /// The side to which the present scan turns; none while there is no scan.
     scan_side: Option<Side>,
 }
@@ -64,7 +62,7 @@ impl ActiveSensing {
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
             stops_within_s: mission.planner.stops_within_s,
-            sonars: sonars(mission),
+            bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
             scan_side: None,
         }
     }
@@ -91,15 +89,16 @@ impl ActiveSensing {
             undetected.normals(to, along)
         });
         let unseen = ground.chain(surfaces);
-        match scan(pose.axis(), &self.sonars, unseen, &mut self.scan_side) {
-            Some(there) => Advice::Look(there),
+        match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
+            // The robot turns until its sonar faces there.
+            Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
             None => Advice::Go(self.limit(view, &undetected, belief, pose, direction)),
         }
     }
 
     /// The most speed that the newest readings allow along the robot's axis, m/s: none towards an echo right before the body.
     pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
-        let clear_m = clear_ahead_m(belief, pose, self.radius, self.sonars.len());
+        let clear_m = clear_ahead_m(belief, pose, self.radius);
         if clear_m < STANDS_BEFORE_M {
             return 0.0;
         }
@@ -136,91 +135,64 @@ impl ActiveSensing {
     }
 }
 
-/// The bearings of the sonars that `mission` uses, radians from the robot's axis.
-fn sonars(mission: &Mission) -> Vec<f64> {
-    let table = mission.sensor_table().into_iter();
-    let used = table.filter(|sensor| sensor.used && sensor.kind == SensorKind::Cone);
-    used.map(|sensor| sensor.mount.bearing_rad).collect()
-}
-
-/// Where a robot that faces `axis` has to face for its `sonars` to scan all directions in `unseen`: it turns to the far end of a side
-/// without a stop, and each direction is left to the sonar that needs the least turn. A scan that began on a `side` turns there until
-/// nothing is unseen on it; a new one begins on the side where the first direction needs the lesser turn.
+/// Where to turn from `axis` to scan all directions in `unseen`: to the far end of a side without a stop. A scan that began on a `side`
+/// turns there until nothing is unseen on it; a new one begins on the side whose nearest direction is nearer.
 fn scan(
     axis: DVec2,
-    sonars: &[f64],
     unseen: impl Iterator<Item = DVec2>,
     side: &mut Option<Side>,
 ) -> Option<DVec2> {
-    // For the left and the right: the least and the greatest turn, radians.
-    let mut sides = [None::<(f64, f64)>; 2];
+    // For the left and the right: the least angle, the greatest one, and the direction of the greatest.
+    let mut sides = [None::<(f64, f64, DVec2)>; 2];
     for there in unseen {
         let angle = axis.angle_to(there);
-        let turns = sonars.iter().map(|bearing| wrapped(angle - bearing));
-        let Some(turn) = turns.min_by(|a, b| a.abs().total_cmp(&b.abs())) else {
-            continue;
-        };
-        let side = &mut sides[usize::from(turn < 0.0)];
-        let turn = turn.abs();
-        let (least, greatest) = side.unwrap_or((turn, turn));
-        *side = Some((least.min(turn), greatest.max(turn)));
+        let side = &mut sides[usize::from(angle < 0.0)];
+        let angle = angle.abs();
+        *side = Some(match *side {
+            None => (angle, angle, there),
+            Some((least, greatest, _)) if angle > greatest => (least.min(angle), angle, there),
+            Some((least, greatest, end)) => (least.min(angle), greatest, end),
+        });
     }
     let [left, right] = sides;
+    let nearer = |a: (f64, f64, DVec2), b: (f64, f64, DVec2)| a.0 <= b.0;
     *side = match (left, right, *side) {
         (None, None, _) => None,
         (Some(_), None, _) | (Some(_), Some(_), Some(Side::Left)) => Some(Side::Left),
         (None, Some(_), _) | (Some(_), Some(_), Some(Side::Right)) => Some(Side::Right),
-        (Some((left, _)), Some((right, _)), None) if left <= right => Some(Side::Left),
+        (Some(left), Some(right), None) if nearer(left, right) => Some(Side::Left),
         (Some(_), Some(_), None) => Some(Side::Right),
     };
-    let turn = match (*side)? {
-        Side::Left => left?.1,
-        Side::Right => -right?.1,
+    let (_, _, end) = match (*side)? {
+        Side::Left => left?,
+        Side::Right => right?,
     };
-    Some(DVec2::from_angle(turn).rotate(axis))
-}
-
-/// `angle` within half a turn of 0, radians.
-fn wrapped(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
+    Some(end)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Where a robot that faces x turns to scan these directions, degrees.
-    fn turn(sonars_deg: &[f64], unseen_deg: &[f64], side: &mut Option<Side>) -> Option<i32> {
-        let sonars: Vec<_> = sonars_deg.iter().map(|degrees| degrees.to_radians()).collect();
-        let unseen = unseen_deg.iter().map(|degrees| DVec2::from_angle(degrees.to_radians()));
-        let there = scan(DVec2::X, &sonars, unseen, side)?;
-        Some(there.to_angle().to_degrees().round() as i32)
-    }
-
     #[test]
     fn a_scan_turns_to_the_nearer_side_and_there_to_its_far_end() {
-        assert_eq!(turn(&[0.0], &[20.0, 50.0, 35.0, -30.0, -80.0], &mut None), Some(50));
-        assert_eq!(turn(&[10.0], &[20.0, 50.0, 35.0, -30.0, -80.0], &mut None), Some(40));
-        assert_eq!(turn(&[0.0], &[], &mut Some(Side::Left)), None);
-    }
-
-    #[test]
-    fn each_direction_is_left_to_the_sonar_that_needs_the_least_turn() {
-        let three = [0.0, 45.0, -45.0];
-        assert_eq!(turn(&three, &[60.0, 55.0, 40.0], &mut Some(Side::Left)), Some(15));
-        assert_eq!(turn(&three, &[30.0, -20.0], &mut None), Some(-15));
-        assert_eq!(turn(&three, &[179.0], &mut None), Some(134));
+        let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
+        let unseen = [at(20.0), at(50.0), at(35.0), at(-30.0), at(-80.0)];
+        let there = scan(DVec2::X, unseen.into_iter(), &mut None);
+        assert_eq!(there, Some(at(50.0)));
+        assert_eq!(scan(DVec2::X, std::iter::empty(), &mut Some(Side::Left)), None);
     }
 
     #[test]
     fn a_scan_keeps_its_side_until_nothing_is_unseen_there() {
+        let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
         let mut side = None;
-        let mut turn = |unseen: &[f64]| turn(&[0.0], unseen, &mut side);
-        assert_eq!(turn(&[-40.0, 30.0]), Some(30));
-        assert_eq!(turn(&[-10.0, 60.0]), Some(60), "the other side is nearer now");
-        assert_eq!(turn(&[-10.0, -20.0]), Some(-20), "nothing is left on this side");
-        assert_eq!(turn(&[-20.0, 10.0]), Some(-20));
+        let mut turn = |unseen: &[f64]| scan(DVec2::X, unseen.iter().copied().map(at), &mut side);
+        assert_eq!(turn(&[-40.0, 30.0]), Some(at(30.0)));
+        assert_eq!(turn(&[-10.0, 60.0]), Some(at(60.0)), "the other side is nearer now");
+        assert_eq!(turn(&[-10.0, -20.0]), Some(at(-20.0)), "nothing is left on this side");
+        assert_eq!(turn(&[-20.0, 10.0]), Some(at(-20.0)));
         assert_eq!(turn(&[]), None);
-        assert_eq!(turn(&[-20.0, 10.0]), Some(10), "a new scan begins on the nearer side");
+        assert_eq!(turn(&[-20.0, 10.0]), Some(at(10.0)), "a new scan begins on the nearer side");
     }
 }

@@ -29,7 +29,7 @@ pub use input::{Input, Job, Outcome, Snapshot, Solved, Work};
 const WAY_OUT_M_S: f64 = 0.08;
 
 /// How a direction of the field is checked before it is given.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 enum Advisor {
     /// The paper's method, and any without sensing: the robot goes where the field points.
     Follow,
