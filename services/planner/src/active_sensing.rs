@@ -11,7 +11,7 @@
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
-    mission::Mission,
+    mission::{Mission, SensorKind},
     samples::GridHeader,
 };
 use glam::DVec2;
@@ -49,8 +49,10 @@ pub(crate) struct ActiveSensing {
     turn: f64,
     /// The time in which the robot must be able to stop, seconds.
     stops_within_s: f64,
-    /// Unit vector from the robot's axis to the sonar's.
+    /// Unit vector from the robot's axis to the front sonar's, which is turned for a look.
     bearing: DVec2,
+    /// The number of sonars that the mission uses.
+    sonars: usize,
     /// The side to which the present scan turns; none while there is no scan.
     scan_side: Option<Side>,
 }
@@ -63,6 +65,7 @@ impl ActiveSensing {
             turn: mission.turn_rad_s(),
             stops_within_s: mission.planner.stops_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
+            sonars: sonars(mission),
             scan_side: None,
         }
     }
@@ -98,7 +101,7 @@ impl ActiveSensing {
 
     /// The most speed that the newest readings allow along the robot's axis, m/s: none towards an echo right before the body.
     pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
-        let clear_m = clear_ahead_m(belief, pose, self.radius);
+        let clear_m = clear_ahead_m(belief, pose, self.radius, self.sonars);
         if clear_m < STANDS_BEFORE_M {
             return 0.0;
         }
@@ -133,6 +136,12 @@ impl ActiveSensing {
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
         on_arc.max(least).min(self.limit_before_echoes(belief, pose))
     }
+}
+
+/// The number of sonars that `mission` uses.
+fn sonars(mission: &Mission) -> usize {
+    let table = mission.sensor_table().into_iter();
+    table.filter(|sensor| sensor.used && sensor.kind == SensorKind::Cone).count()
 }
 
 /// Where to turn from `axis` to scan all directions in `unseen`: to the far end of a side without a stop. A scan that began on a `side`

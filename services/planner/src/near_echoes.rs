@@ -6,7 +6,7 @@
 use common::{kinematics::Pose2, samples::GridHeader};
 use glam::DVec2;
 
-/// How many of the newest readings count: about a second of them. One false echo stops the robot no longer than that.
+/// How many of the newest readings of each sonar count: about a second of them. One false echo stops the robot no longer than that.
 const NEWEST: usize = 8;
 /// A reading taken within this angle of the robot's axis looked ahead: the cone, and a little more.
 const AHEAD_DEG: f64 = 20.0;
@@ -14,11 +14,16 @@ const AHEAD_DEG: f64 = 20.0;
 /// before its echo, so the echo is then 0.13 m away.
 pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
 
-/// Free ground ahead of a body of `radius` metres at `pose`, metres: the least of the newest readings in `belief`; infinite
-/// where none of them looked ahead.
-pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64) -> f64 {
+/// Free ground ahead of a body of `radius` metres at `pose`, metres: the least of the newest readings of the robot's `sonars` in
+/// `belief`; infinite where none of them looked ahead.
+pub(crate) fn clear_ahead_m(
+    belief: &GridHeader,
+    pose: &Pose2,
+    radius: f64,
+    sonars: usize,
+) -> f64 {
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
-    let newest = belief.clear_beams().iter().rev().take(NEWEST);
+    let newest = belief.clear_beams().iter().rev().take(NEWEST * sonars);
     newest
         .filter(|beam| DVec2::from_angle(beam.bearing_rad.into()).dot(axis) >= within)
         .map(|beam| {
@@ -52,7 +57,7 @@ mod tests {
 
     fn clear(readings: &[(f32, f32)], radius: f64, x: f64) -> f64 {
         let pose = Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
-        clear_ahead_m(&belief(readings), &pose, radius)
+        clear_ahead_m(&belief(readings), &pose, radius, 1)
     }
 
     #[test]
