@@ -230,16 +230,12 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
     let top = mission.body().top_speed_m_s;
     within("controller.speed_m_s", mission.speed_m_s(), 0.001..=top, "m/s")?;
     within("controller.turn_rad_s", mission.turn_rad_s(), 0.01..=20.0, "rad/s")?;
-    within("controller.look_rad_s", controller.look_rad_s, 0.01..=20.0, "rad/s")?;
-    within("controller.turns_beyond_deg", controller.turns_beyond_deg, 1.0..=90.0, "degrees")?;
-    let most = controller.turns_beyond_deg - 1.0;
-    within(
-        "controller.full_speed_within_deg",
-        controller.full_speed_within_deg,
-        0.0..=most,
-        "degrees",
-    )?;
-    within("planner.stops_within_s", mission.planner.stops_within_s, 0.05..=10.0, "s")?;
+    within("controller.look_rad_s", mission.hurry().look_rad_s, 0.01..=20.0, "rad/s")?;
+    let hurry = mission.hurry();
+    within("controller.turns_beyond_deg", hurry.turns_beyond_deg, 2.0..=90.0, "degrees")?;
+    let most = hurry.turns_beyond_deg - 1.0;
+    within("controller.full_speed_within_deg", hurry.full_speed_within_deg, 0.0..=most, "degrees")?;
+    within("planner.stops_within_s", hurry.stops_within_s, 0.05..=10.0, "s")?;
     within("controller.slow_radius_m", controller.slow_radius_m, 0.001..=1000.0, "m")?;
     within("controller.dead_zone", controller.dead_zone, 0.0..=0.9, "")?;
     within("mapper.map_within_m", mission.map_within_m(), 0.04..=2.54, "m")?;

@@ -197,12 +197,13 @@ pub struct Mapper {
 }
 
 /// The planner's executable, and the values of its field.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planner {
     /// The evidential method: the time in which the robot must be able to stop before it meets what it believes in or has not scanned,
-    /// seconds. The sonar's period, the radio's delay and the wheels' lag add up to 0.36 s.
-    pub stops_within_s: f64,
+    /// seconds; without it what [`Mission::hurry`] says. The sonar's period, the radio's delay and the wheels' lag add up to 0.36 s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stops_within_s: Option<f64>,
     /// Screening length, metres: lambda of laplacian u = u / lambda^2. Without
     /// it the paper's method has no screening, which is exactly (11), and the evidential one takes
     /// [`Planner::EVIDENTIAL_SCREENING_M`].
@@ -219,6 +220,19 @@ impl Planner {
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
+/// The values that decide how fast a robot of the evidential method may be, every one known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hurry {
+    /// See [`Controller::full_speed_within_deg`].
+    pub full_speed_within_deg: f64,
+    /// See [`Controller::turns_beyond_deg`].
+    pub turns_beyond_deg: f64,
+    /// See [`Controller::look_rad_s`].
+    pub look_rad_s: f64,
+    /// See [`Planner::stops_within_s`].
+    pub stops_within_s: f64,
+}
+
 /// The values of the controller, (14)-(17).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -229,14 +243,17 @@ pub struct Controller {
     /// wd: the most turn rate asked for, rad/s; without it what [`Mission::turn_rad_s`] says.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_rad_s: Option<f64>,
-    /// The evidential method drives at full speed while it faces its way within this angle, degrees.
-    pub full_speed_within_deg: f64,
+    /// The evidential method drives at full speed while it faces its way within this angle, degrees; without it what [`Mission::hurry`]
+    /// says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub full_speed_within_deg: Option<f64>,
     /// The evidential method turns on the spot while its way lies farther than this to a side, degrees. In between the speed falls with
-    /// the cosine.
-    pub turns_beyond_deg: f64,
-    /// The greatest turn rate on the spot of the evidential method, rad/s. At 2.0 a sonar of 7 Hz measures every 16 degrees, so its cone
-    /// of 15 degrees to either side covers each direction nearly twice.
-    pub look_rad_s: f64,
+    /// the cosine. Without it what [`Mission::hurry`] says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turns_beyond_deg: Option<f64>,
+    /// The greatest turn rate on the spot of the evidential method, rad/s; without it what [`Mission::hurry`] says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub look_rad_s: Option<f64>,
     /// Rc: where slowing down before the target begins, metres.
     pub slow_radius_m: f64,
     /// |eta_c| below which an antipodal robot keeps its turning side.
@@ -275,20 +292,14 @@ impl Default for Mapper {
     }
 }
 
-impl Default for Planner {
-    fn default() -> Self {
-        Self { stops_within_s: 0.4, screening_m: None, executable: None }
-    }
-}
-
 impl Default for Controller {
     fn default() -> Self {
         Self {
             speed_m_s: None,
             turn_rad_s: None,
-            full_speed_within_deg: 26.0,
-            turns_beyond_deg: 73.0,
-            look_rad_s: 2.0,
+            full_speed_within_deg: None,
+            turns_beyond_deg: None,
+            look_rad_s: None,
             slow_radius_m: 0.4,
             dead_zone: 0.05,
             modulated: true,
@@ -368,6 +379,28 @@ impl Mission {
     #[must_use]
     pub fn front_sonar(&self) -> Sensor {
         self.sensor_table().swap_remove(self.front_row())
+    }
+
+    /// How fast the evidential method may be, by its keys. A robot whose infrared rangers end at surfaces of any angle may hurry. One that
+    /// has sonars alone turns at 1.2 rad/s, so that a cone of 15 degrees to either side covers each direction three times at 7 Hz: with
+    /// 2.0 rad/s three times as many robots touched something, most of them the ends of loose walls.
+    #[must_use]
+    pub fn hurry(&self) -> Hurry {
+        let sees = self.looks_first()
+            && self
+                .sensor_table()
+                .iter()
+                .any(|sensor| sensor.used && sensor.kind == SensorKind::Ray);
+        let [full, turns, look, stops] =
+            if sees { [26.0, 73.0, 2.0, 0.4] } else { [1.0, 45.0, 1.2, 0.6] };
+        let Controller { full_speed_within_deg, turns_beyond_deg, look_rad_s, .. } =
+            self.controller;
+        Hurry {
+            full_speed_within_deg: full_speed_within_deg.unwrap_or(full),
+            turns_beyond_deg: turns_beyond_deg.unwrap_or(turns),
+            look_rad_s: look_rad_s.unwrap_or(look),
+            stops_within_s: self.planner.stops_within_s.unwrap_or(stops),
+        }
     }
 
     /// wd, rad/s: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.

@@ -78,16 +78,16 @@ impl Step for Controller {
 
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
-        let settings = &mission.controller;
+        let (settings, hurry) = (&mission.controller, mission.hurry());
         Self {
             drive: body.drive(),
             target: mission.target,
             tolerance: mission.arrival_tolerance_m,
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
-            look: settings.look_rad_s,
-            full_speed: settings.full_speed_within_deg.to_radians().cos(),
-            turns: settings.turns_beyond_deg.to_radians().cos(),
+            look: hurry.look_rad_s,
+            full_speed: hurry.full_speed_within_deg.to_radians().cos(),
+            turns: hurry.turns_beyond_deg.to_radians().cos(),
             slow_radius: settings.slow_radius_m,
             dead_zone: settings.dead_zone,
             modulated: settings.modulated,

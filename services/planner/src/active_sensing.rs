@@ -63,7 +63,7 @@ impl ActiveSensing {
             radius: mission.body().radius_m,
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
-            stops_within_s: mission.planner.stops_within_s,
+            stops_within_s: mission.hurry().stops_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
             sonars: sonars(mission),
             scan_side: None,

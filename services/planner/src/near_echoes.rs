@@ -16,12 +16,7 @@ pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
 
 /// Free ground ahead of a body of `radius` metres at `pose`, metres: the least of the newest readings of the robot's `sonars` in
 /// `belief`; infinite where none of them looked ahead.
-pub(crate) fn clear_ahead_m(
-    belief: &GridHeader,
-    pose: &Pose2,
-    radius: f64,
-    sonars: usize,
-) -> f64 {
+pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64, sonars: usize) -> f64 {
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
     let newest = belief.clear_beams().iter().rev().take(NEWEST * sonars);
     newest

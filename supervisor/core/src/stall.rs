@@ -149,8 +149,7 @@ struct Place {
 impl StallWatch {
     pub(crate) fn new(mission: &Mission) -> Self {
         let seconds = STALLED_AFTER.as_secs_f64();
-        let controller = &mission.controller;
-        let slowest_turn = TAU / mission.turn_rad_s().min(controller.look_rad_s);
+        let slowest_turn = TAU / mission.turn_rad_s().min(mission.hurry().look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         let car = mission.body().ackermann();
         // It turns on the spot, or as it drives.
@@ -167,7 +166,7 @@ impl StallWatch {
             },
             pinned_after: STALLED_AFTER + Duration::from_secs_f64(at_a_place),
             cut_off_after: if on_the_spot {
-                let turn = SCAN_TURNS * TAU / controller.look_rad_s;
+                let turn = SCAN_TURNS * TAU / mission.hurry().look_rad_s;
                 CUT_OFF_AFTER + Duration::from_secs_f64(2.0 * turn)
             } else {
                 CUT_OFF_AFTER

@@ -120,7 +120,7 @@ fn a_robot_cut_off_by_the_evidential_method_looks_around_before_its_belief_is_bl
     let mut watch = StallWatch::new(&mission);
     let cut_off = guidance(GuidanceStatus::Unreachable, 0);
     let turning = |second: f64| PoseSample { heading_rad: second, ..pose(second, 0.0) };
-    let turn = TAU / mission.controller.look_rad_s;
+    let turn = TAU / mission.hurry().look_rad_s;
     let first = (0..100)
         .map(f64::from)
         .find(|&second| watch.step(&turning(second), &cut_off, false, false).is_some());
