@@ -34,9 +34,10 @@ use serde::{Deserialize, Serialize};
 
 pub use error::MissionError;
 pub use odometry::{Calibration, Odometry, Provenance};
-pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, SonarConfig, Steering};
+pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, Steering};
 pub use sensor::{
     INFRARED_RANGERS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow, Sensors,
+    SonarConfig,
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, InfraredPhysics, Move, Physics, Radio, Ranger,
@@ -366,7 +367,12 @@ impl Mission {
     /// The robot's ranging sensors. A reading names its sensor by the row of this table.
     #[must_use]
     pub fn sensor_table(&self) -> Vec<Sensor> {
-        sensor::table(&self.robot, &self.sonar, self.sensor_set())
+        let RobotConfig { sensors, rate_hz, .. } = &self.robot;
+        let rows = match sensors.is_empty() {
+            true => sensor::x80(self.body().radius_m, &self.sonar),
+            false => sensors.clone(),
+        };
+        sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
     /// The row of the front sonar in [`Mission::sensor_table`].

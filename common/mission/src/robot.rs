@@ -282,21 +282,3 @@ impl RobotConfig {
         }
     }
 }
-
-/// The front ultrasonic sensor of a robot without `[[robot.sensor]]`: which one it is and how it is mounted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SonarConfig {
-    /// Its index among the six of the standard frame.
-    pub index: u8,
-    /// Its distance from the robot's centre along its bearing, metres (the paper writes W/2).
-    pub forward_m: f64,
-    /// delta of (19): its bearing from the robot's axis, degrees.
-    pub bearing_deg: f64,
-}
-
-impl Default for SonarConfig {
-    fn default() -> Self {
-        Self { index: 1, forward_m: 0.1915, bearing_deg: 0.0 }
-    }
-}

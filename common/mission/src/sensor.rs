@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{RobotConfig, SonarConfig, sonar::Mount};
+use crate::sonar::Mount;
 
 /// The greatest number of rows, and of the readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
@@ -121,6 +121,24 @@ pub struct SensorRow {
     pub model: Option<SensorModel>,
 }
 
+/// The front ultrasonic sensor of a robot without `[[robot.sensor]]`: which one it is and how it is mounted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SonarConfig {
+    /// Its index among the six of the standard frame.
+    pub index: u8,
+    /// Its distance from the robot's centre along its bearing, metres (the paper writes W/2).
+    pub forward_m: f64,
+    /// delta of (19): its bearing from the robot's axis, degrees.
+    pub bearing_deg: f64,
+}
+
+impl Default for SonarConfig {
+    fn default() -> Self {
+        Self { index: 1, forward_m: 0.1915, bearing_deg: 0.0 }
+    }
+}
+
 /// A sensor, every value known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
@@ -184,10 +202,14 @@ pub enum Sensors {
     All,
 }
 
-/// The rows of a robot, with those of `set` marked as used.
-pub(crate) fn table(robot: &RobotConfig, sonar: &SonarConfig, set: Sensors) -> Vec<Sensor> {
-    let rows = if robot.sensors.is_empty() { x80(robot, sonar) } else { robot.sensors.clone() };
-    let mut table: Vec<_> = rows.iter().map(|row| Sensor::of(row, robot.rate_hz)).collect();
+/// The sensors of `rows` on a robot whose frames come at `rate_hz`, with those of `set` marked as used.
+pub(crate) fn table(
+    rows: &[SensorRow],
+    rate_hz: f64,
+    sonar: &SonarConfig,
+    set: Sensors,
+) -> Vec<Sensor> {
+    let mut table: Vec<_> = rows.iter().map(|row| Sensor::of(row, rate_hz)).collect();
     let Some(front) = front(&table, sonar) else {
         return table;
     };
@@ -213,8 +235,8 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     cones.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// The rows of an X80. The car has its boards and sensors.
-fn x80(robot: &RobotConfig, sonar: &SonarConfig) -> Vec<SensorRow> {
+/// The rows of an X80 with a body of `radius_m` metres. The car has its boards and sensors.
+pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
     let row = |name: String, kind, channel, forward_m, bearing_deg| SensorRow {
         name,
         kind,
@@ -236,7 +258,6 @@ fn x80(robot: &RobotConfig, sonar: &SonarConfig) -> Vec<SensorRow> {
         cone("front-left", 5, SIDE_FORWARD_M, ahead + SIDE_BEARING_DEG),
         cone("front-right", 1, SIDE_FORWARD_M, ahead - SIDE_BEARING_DEG),
     ];
-    let radius_m = robot.body().radius_m;
     let rays = (0..).zip(RING).map(|(channel, (bearing_deg, share))| {
         let name = format!("infrared-{channel}");
         row(name, SensorKind::Ray, channel, share * radius_m, bearing_deg)
