@@ -24,7 +24,7 @@ pub struct Wiring {
     pub stage: &'static str,
     /// Topics it reads, whose writers start before it.
     pub inputs: Topics,
-    /// Topics it reads that close the loop: their writers start after it.
+    /// Topics it reads whose writers start after it: those that close the loop, and those that consumers write.
     pub feedback: Topics,
     /// Topics that start a turn of its work loop.
     pub wakes: Topics,
@@ -72,6 +72,12 @@ impl Wiring {
             outputs: &[],
             persists: Persists::Nothing,
         }
+    }
+
+    /// Whether a tick goes through the stage twice, because its feedback wakes it.
+    pub fn is_passed_twice(&self) -> bool {
+        let wakes = |name| self.wakes.iter().any(|topic| topic.spec().name == name);
+        self.feedback.iter().any(|topic| wakes(topic.spec().name))
     }
 
     /// The topic that answers a tick.

@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     covariance::{BIAS, Covariance, Error, ErrorModel, PARTS, Transition},
-    gyro::{Gyro, GyroTurn},
+    gyro::Gyro,
+    tick::Tick,
 };
 
 /// A fix that is older is refused.
@@ -53,25 +54,6 @@ impl Motions {
             Integration::Arc => pose.along_arc(moved.v, moved.omega),
             Integration::Euler => pose.along_euler(moved.v, moved.omega),
         }
-    }
-}
-
-/// One tick: the motion since the tick before.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Tick {
-    pub(crate) time: MissionTime,
-    pub(crate) seconds: f64,
-    /// Arc and turn by the counts, for wheels without errors: metres and radians.
-    pub(crate) arc: f64,
-    pub(crate) turn: f64,
-    /// How far each wheel may have rolled with its counts lost, metres.
-    pub(crate) lost_m: f64,
-    pub(crate) gyro: Option<GyroTurn>,
-}
-
-impl Tick {
-    pub(crate) const fn moved(&self) -> Twist {
-        Twist { v: self.arc, omega: self.turn }
     }
 }
 

@@ -5,18 +5,11 @@ use std::collections::VecDeque;
 use common::{clock::MissionTime, samples::TurnSample};
 use serde::{Deserialize, Serialize};
 
-use crate::filter::Tick;
+use crate::tick::{GyroTurn, Tick};
 
 /// The share of a divided increment by which the division is taken to be off. What one tick lacks the next one has, so the errors do
 /// not add up.
 const UNEVEN: f64 = 0.1;
-
-/// The turn of a tick by a gyro.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct GyroTurn {
-    pub(crate) turn: f64,
-    pub(crate) variance: f64,
-}
 
 /// The increments that belong to no whole tick yet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

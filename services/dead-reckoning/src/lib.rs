@@ -5,6 +5,7 @@
 //! | [`step`] | the pure step: a `wheels` sample, and the fixes and turns that came with it, to a `pose` |
 //! | `covariance` | how the covariance of the pose's error grows with the motion |
 //! | `filter` | the estimate, and the ticks and fixes of the last 2 s |
+//! | `tick` | the motion of one tick |
 //! | `gyro` | the turn of a tick from a gyro's increments |
 //! | `relocation` | whether fixes that contradict the pose agree among themselves |
 //!
@@ -20,6 +21,7 @@ mod filter;
 mod gyro;
 mod relocation;
 pub mod step;
+mod tick;
 
 use std::path::Path;
 

@@ -14,9 +14,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     covariance::ErrorModel,
-    filter::{Filter, Fix, History, Motions, Refused, Tick},
+    filter::{Filter, Fix, History, Motions, Refused},
     gyro::Gyro,
     relocation::Contradictions,
+    tick::Tick,
 };
 
 /// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
