@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::support::{PATIENCE, assert_nothing_left, firsthand, output, refused, status_of};
 
 /// A machine with other work may take its time.
-const SLOW: [&str; 2] = ["--set", "timeout_s=600"];
+const SLOW: [&str; 4] = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
 
 fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()

@@ -30,14 +30,14 @@ pub struct Run {
 }
 
 impl Run {
-    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Wheels that nobody calibrated do not make its
-    /// arrival unsure, unless an argument says so.
+    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Unless an argument says otherwise, wheels that nobody
+    /// calibrated do not make its arrival unsure, and the robot is slow, so that a test can act while it drives.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
-            .args(["--set", "sure_within_m=9"])
+            .args(["--set", "sure_within_m=9", "--set", "controller.speed_m_s=0.2"])
             .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -4,7 +4,7 @@ use std::{
     collections::BTreeSet,
     fs, io,
     path::{Path, PathBuf},
-    process::Stdio,
+    process::{Command, Stdio},
     sync::{Mutex, mpsc::channel},
     thread,
 };
@@ -37,6 +37,8 @@ pub struct Plan {
     pub pictured_seed: Option<u64>,
     /// Missions in parallel.
     pub jobs: usize,
+    /// Whether the robot of each mission is calibrated before, as its owner would do it. Where that fails the mission runs as it is.
+    pub calibrates: bool,
     /// Directory of worlds, rows and pictures of failures; it must exist.
     pub directory: PathBuf,
 }
@@ -205,13 +207,33 @@ fn mission(
     let Job { trial, setting, seed } = job;
     let own = std::process::id();
     let directory = plan.directory.join(format!("run-{worker}"));
+    let robot = format!("evaluate{own}-{worker}");
+    let with_keys = |command: &mut Command| {
+        command.arg(plan.mission_file(trial)).args([
+            "--robot",
+            &robot,
+            "--seed",
+            &seed.to_string(),
+        ]);
+        for assignment in &setting.set {
+            command.args(["--set", assignment]);
+        }
+    };
     let mut command = firsthand(&["run", "--json", "--no-record"]);
-    command.arg(plan.mission_file(trial));
-    command.args(["--robot", &format!("evaluate{own}-{worker}")]);
-    command.args(["--seed", &seed.to_string(), "--parent", &own.to_string()]);
+    with_keys(&mut command);
+    command.args(["--parent", &own.to_string()]);
     command.arg("--out").arg(&directory);
-    for assignment in &setting.set {
-        command.args(["--set", assignment]);
+    let calibration = plan.directory.join(format!("calibration-{worker}"));
+    if plan.calibrates {
+        let file = calibration.join("calibration.toml");
+        let mut calibrate = firsthand(&["calibrate", "--json"]);
+        with_keys(&mut calibrate);
+        calibrate.arg("--runs").arg(&calibration).arg("--out").arg(&file);
+        let calibrated = calibrate.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if calibrated.map_err(RunnerError::Start)?.success() {
+            let file = toml::Value::from(file.to_string_lossy().into_owned());
+            command.args(["--set", &format!("robot.calibration={file}")]);
+        }
     }
     let output = command
         .stdout(Stdio::piped())
@@ -235,6 +257,7 @@ fn mission(
         let _ = fs::rename(directory.join(PICTURE), plan.picture(&row));
     }
     let _ = fs::remove_dir_all(&directory);
+    let _ = fs::remove_dir_all(&calibration);
     Ok((row, latency))
 }
 

@@ -34,7 +34,7 @@ use crate::console::{
 /// Worlds and noise follow from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// rooms, doors, traps, corridors, straight-corridors, furnished; a mission file, a ROS map (.yaml), a BARN .world or
+    /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished; a mission file, a ROS map (.yaml), a BARN .world or
     /// cylinders.csv; a folder of such files.
     #[arg(long, default_value = "rooms")]
     worlds: Worlds,
@@ -67,6 +67,9 @@ pub(crate) struct Arguments {
     /// laboratory, measured or harsh.
     #[arg(long, default_value = "measured")]
     realism: String,
+    /// Calibrate the robot of each mission before it, by `firsthand calibrate`. Where that fails the mission runs as it is.
+    #[arg(long)]
+    calibrate: bool,
     /// The robot's model.
     #[arg(long, default_value = "x80")]
     robot: String,
@@ -112,6 +115,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         noise: NoiseSeeds::Derived(arguments.seed),
         jobs: jobs(arguments.jobs),
         pictured_seed: None,
+        calibrates: arguments.calibrate,
         directory,
     };
     write_stderr(&format!(
@@ -171,10 +175,11 @@ fn described(arguments: &Arguments, settings: &[Setting]) -> String {
         .map(|setting| format!("{}: {}", setting.name, setting.set.join(" ")))
         .collect();
     format!(
-        "firsthand evaluate --worlds {worlds}{ends}{count} --seed {} --repeats {} --robot {} [{}]",
+        "firsthand evaluate --worlds {worlds}{ends}{count} --seed {} --repeats {} --robot {}{} [{}]",
         arguments.seed,
         arguments.repeats,
         arguments.robot,
+        if arguments.calibrate { " --calibrate" } else { "" },
         settings.join("; ")
     )
 }

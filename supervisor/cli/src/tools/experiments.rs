@@ -62,6 +62,7 @@ pub(crate) fn main(arguments: &Arguments) -> Result<(), Failure> {
         let its = chosen.iter().filter(|it| it.is_run_by(method));
         let trials: Vec<Trial> = its.map(|it| it.trial()).collect::<Result<_, _>>()?;
         let plan = Plan {
+            calibrates: false,
             trials,
             settings: vec![method.setting(arguments.realism)],
             repeats: arguments.seeds,
