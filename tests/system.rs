@@ -8,6 +8,7 @@ mod support;
 
 mod bad_input;
 mod blocked_starts;
+mod calibration;
 mod chaos;
 mod console;
 mod consumers;

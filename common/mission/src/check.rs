@@ -1,5 +1,6 @@
 //! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
 
+mod calibration;
 mod objection;
 mod robot;
 mod sensor;
@@ -22,7 +23,7 @@ use crate::grid::{MAX_CELLS, MIN_CELLS};
 /// A mission is a page or two; a file without end is no mission.
 const MAX_BYTES: u64 = 8 << 20;
 
-pub(crate) fn read_bounded(path: &Path) -> io::Result<String> {
+fn read_bounded(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     // Opening a pipe would wait for its writer.
     if !fs::metadata(path)?.is_file() {
@@ -250,6 +251,11 @@ fn stages(mission: &Mission) -> Result<(), Objection> {
             "it is empty",
             "name an executable, or leave the key out",
         ));
+    }
+    if let Some(plan) = &mission.planner.calibration {
+        within("planner.calibration.ratio_sd", plan.ratio_sd, 0.0..=0.1, "")?;
+        within("planner.calibration.loops", f64::from(plan.loops), 6.0..=64.0, "loops")?;
+        within("planner.calibration.drive_m", plan.drive_m, 0.6..=10.0, "m")?;
     }
     if let Some(screening) = mission.planner.screening_m {
         // Shorter than that it would not be resolved by the grid.

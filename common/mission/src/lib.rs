@@ -33,7 +33,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use error::MissionError;
-pub use odometry::{Calibration, Odometry, Provenance};
+pub use odometry::{Calibration, CalibrationPlan, Odometry, Procedure, Provenance};
 pub use robot::{BatteryLimits, Body, Channel, Model, RobotConfig, Steering};
 pub use sensor::{
     INFRARED_RANGERS, MOST_SENSORS, SONARS, Sensor, SensorKind, SensorModel, SensorRow, Sensors,
@@ -214,6 +214,9 @@ pub struct Planner {
     /// `common::stage_command`. A run file has it absolute.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub executable: Option<PathBuf>,
+    /// The values of the planner `calibration`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationPlan>,
 }
 
 impl Planner {

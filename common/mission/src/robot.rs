@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crate::{
-    Odometry,
     kinematics::{Ackermann, DifferentialDrive, Drive},
+    odometry::Odometry,
     sensor::SensorRow,
 };
 use serde::{Deserialize, Serialize};

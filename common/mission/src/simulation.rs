@@ -278,8 +278,8 @@ section! {
         dead_band_counts in 0.0..=1000.0 => 0.0, 20.0, 20.0;
         /// Standard deviation of the speed of a turning wheel, counts per second.
         noise_counts in 0.0..=1000.0 => 0.0, 12.0, 12.0;
-        /// Share of the rolled way that slips away.
-        slip_share in 0.0..=0.5 => 0.0, 0.0, 0.005;
+        /// Share of the rolled way that slips away; below 0 it is won.
+        slip_share in -0.1..=0.5 => 0.0, 0.0, 0.005;
         /// Greatest amount by which that share is off, evenly drawn from the seed.
         slip_share_spread in 0.0..=0.1 => 0.0, 0.005, 0.0;
         /// Standard deviation of the way lost or won by slip, metres per square root of a metre. Measured: the upper end of the

@@ -27,7 +27,7 @@ payloads! {
         /// Length of the way so far, metres.
         travelled_m: f64,
         /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. It covers
-        /// the errors of the wheels, as `[dead_reckoning]` of the mission states them, and motions lost with their counts.
+        /// the errors of the wheels, as `[robot.odometry]` of the mission states them, and motions lost with their counts.
         covariance: [f64; 6],
         /// The encoder counts it was computed at.
         left_counts: u16,

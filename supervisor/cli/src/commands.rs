@@ -26,7 +26,9 @@ use std::{
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 #[cfg(feature = "tools")]
-use crate::tools::{bench, completions, evaluate, experiments, field, man, replay, report, top};
+use crate::tools::{
+    bench, calibrate, completions, evaluate, experiments, field, man, replay, report, top,
+};
 use crate::{console::failure::Failure, renamed};
 
 /// Declares the subcommands by groups: the name of each and the module that has its `Arguments` and its `main`, which takes in
@@ -106,7 +108,7 @@ commands! {
         Missions missions,
         Install install,
         Help help(command_line),
-        @tools { Completions completions, Man man(command_line), }
+        @tools { Calibrate calibrate, Completions completions, Man man(command_line), }
         @simulator { Sim sim }
     }
 }
@@ -161,6 +163,8 @@ impl Command {
     pub(crate) fn log_level(&self) -> Option<&'static str> {
         match self {
             Self::Run(_) => None,
+            #[cfg(feature = "tools")]
+            Self::Calibrate(_) => None,
             Self::Stage(arguments) if arguments.is_process() => Some("info"),
             #[cfg(feature = "simulator")]
             Self::Sim(_) => Some("info"),

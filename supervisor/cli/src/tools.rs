@@ -1,6 +1,7 @@
 //! The subcommands that a robot does without, and what only they need.
 
 pub(crate) mod bench;
+pub(crate) mod calibrate;
 pub(crate) mod completions;
 pub(crate) mod diff;
 pub(crate) mod error_code;

@@ -18,8 +18,9 @@ pub struct PlannerExecutableError {
     problem: ExecutableError,
 }
 
-/// The planners to compare with that this executable contains, as the stages `firsthand stage NAME`.
-const BASELINES: [&str; 2] = ["wavefront", "bug"];
+/// The other planners that this executable contains, as the stages `firsthand stage NAME`: two to compare with, and the one of
+/// `firsthand calibrate`.
+const BASELINES: [&str; 3] = ["wavefront", "bug", "calibration"];
 
 /// The baseline that is `named`, with the name of its former executable too.
 pub fn baseline(named: &Path) -> Option<&'static str> {

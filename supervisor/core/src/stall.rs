@@ -176,7 +176,8 @@ impl StallWatch {
             cut_off_since: None,
             waits_since: None,
             inside_hazard_since: None,
-            forgets: mission.method == Method::Evidential,
+            // A calibration drives to and fro.
+            forgets: mission.method == Method::Evidential && mission.planner.calibration.is_none(),
             wanders_at: None,
             replans_here: 0,
             replans: 0,

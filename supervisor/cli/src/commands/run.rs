@@ -1,6 +1,6 @@
 //! `firsthand run MISSION`: a mission from start to summary.
 
-mod recorder;
+pub(crate) mod recorder;
 mod summary_file;
 
 use std::{fs, path::PathBuf, process::ExitCode, time::Duration};

@@ -56,14 +56,28 @@ fn as_assigned(name: &str, assignments: &[String]) -> Result<Mission, LookupErro
             return Err(LookupError::Neither { name: name.to_owned() });
         }
     };
-    let as_written = Mission::parse(&text, Path::new(&origin));
+    as_parsed(&text, &origin, assignments)
+}
+
+/// The mission in `text`, called `origin`, with `KEY=VALUE` assignments on top.
+#[cfg(feature = "tools")]
+pub(crate) fn parsed(
+    text: &str,
+    origin: &str,
+    assignments: &[String],
+) -> Result<Mission, LookupError> {
+    Ok(as_parsed(text, origin, assignments)?.with_calibration()?)
+}
+
+fn as_parsed(text: &str, name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
+    let as_written = Mission::parse(text, Path::new(name));
     // Values are checked after all assignments, because one may correct what is refused without it.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
         return Ok(as_written?);
     };
     let assigned = assign(table, assignments)?;
-    Mission::parse(&assigned, Path::new(&origin)).map_err(|error| match as_written {
+    Mission::parse(&assigned, Path::new(name)).map_err(|error| match as_written {
         // The error of the file names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
         // The fault is in no line of the file.

@@ -53,6 +53,7 @@ fn baseline(name: &str) -> Option<RunStage> {
     match name {
         "wavefront" => Some(run_stage::<Shell<Wavefront>>),
         "bug" => Some(run_stage::<Shell<Bug>>),
+        calibration::PLANNER => Some(run_stage::<calibration::shell::Shell>),
         _ => None,
     }
 }

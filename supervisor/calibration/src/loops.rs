@@ -1,0 +1,375 @@
+//! Ratio, track and slip from loops that end before the wall they began at. Pure.
+//!
+//! Between two visits the robot really turned by whole turns, k. With the nominal ways l and r of the wheels, e = (rho - 1) / (rho + 1),
+//! the ratio rho of their diameters and the track W tau
+//!
+//! ```text
+//! (r - l + e (r + l)) / (W tau) = 2 pi k,   so   e (r + l) / W - 2 pi k tau = -(r - l) / W,
+//! ```
+//!
+//! which is linear in e and tau. The right side is off by slip, with variance q^2 times the way that both wheels rolled, over W^2, and by
+//! the two normals, each of which is shared with the next loop. Weighted least squares with a prior gives e and tau; q has the
+//! likelihood of the residuals, with a prior of its own.
+
+use std::f64::consts::TAU;
+
+use common::mission::Odometry;
+use glam::DVec2;
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The prior: standard deviations of the ratio and of the track, about 1.
+const PRIOR_RATIO: f64 = 0.01;
+const PRIOR_TRACK: f64 = 0.02;
+/// The prior of slip: its median, metres per square root of a metre, and the deviation of its logarithm.
+const PRIOR_SLIP: f64 = 0.002;
+const PRIOR_LN_SLIP: f64 = 1.2;
+/// The values of slip that are considered: from the least to the greatest by equal factors.
+const SLIPS: u32 = 60;
+const LEAST_SLIP: f64 = 0.0001;
+/// More slip than this is no floor to drive on.
+const MOST_SLIP: f64 = 0.01;
+/// The prior of a normal's standard deviation, radians, and the number of sweeps that it is worth.
+const PRIOR_NORMAL_RAD: f64 = 0.01;
+const PRIOR_NORMALS: f64 = 4.0;
+/// The loops that are held out to check the others.
+pub const HELD_OUT: usize = 2;
+/// The fewest loops of a calibration, those held out included.
+pub const FEWEST_LOOPS: usize = 6;
+/// Deviations within which the loops that are held out must lie.
+const AGREES: f64 = 3.0;
+/// A residual of more deviations is an accident; two are a fault of the floor or the robot.
+const ACCIDENT: f64 = 5.0;
+/// The most of chi^2 per degree of freedom.
+const MOST_CHI2: f64 = 4.0;
+
+/// A loop, from one visit to the wall to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Loop {
+    /// Its number among all loops; those next to each other share a normal.
+    pub number: u32,
+    /// Whole turns, counter-clockwise positive.
+    pub turns: f64,
+    /// Nominal ways of the wheels, forward less backward, metres.
+    pub left_m: f64,
+    pub right_m: f64,
+    /// The way of both wheels together, whichever way they rolled, metres.
+    pub rolled_m: f64,
+}
+
+/// The standard deviation of a normal, radians, from the differences between the two ways of each sweep.
+#[must_use]
+pub fn normal_sd(differences: &[f64]) -> f64 {
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n.max(1.0);
+    // The normal is the mean of both ways: a quarter of the variance of their difference.
+    let sum = differences.iter().map(|it| (it - mean).powi(2) / 4.0).sum::<f64>();
+    let freedom = (n - 1.0).max(0.0);
+    ((sum + PRIOR_NORMALS * PRIOR_NORMAL_RAD.powi(2)) / (freedom + PRIOR_NORMALS)).sqrt()
+}
+
+/// Wheels that are not nominal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wheels {
+    /// (rho - 1) / (rho + 1).
+    e: f64,
+    /// tau.
+    track: f64,
+}
+
+impl Wheels {
+    pub const NOMINAL: Self = Self { e: 0.0, track: 1.0 };
+
+    pub(crate) const fn of(e: f64, track: f64) -> Self {
+        Self { e, track }
+    }
+
+    /// The turn of a robot whose wheels went these nominal ways, radians.
+    #[must_use]
+    pub fn turned(self, left_m: f64, right_m: f64, track_m: f64) -> f64 {
+        (right_m - left_m + self.e * (right_m + left_m)) / (track_m * self.track)
+    }
+}
+
+/// Mean and standard deviation of slip, by the logarithm of its likelihood.
+pub(crate) fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
+    let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
+    let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
+    let posterior: Vec<(f64, f64)> = slips
+        .map(|slip| {
+            let ln_prior = -0.5 * ((slip / PRIOR_SLIP).ln() / PRIOR_LN_SLIP).powi(2);
+            (slip, ln_prior + ln_likelihood(slip))
+        })
+        .collect();
+    let most = posterior.iter().map(|(_, ln)| *ln).fold(f64::NEG_INFINITY, f64::max);
+    let weights: f64 = posterior.iter().map(|(_, ln)| (ln - most).exp()).sum();
+    let mean_of = |power: i32| {
+        let weighted = posterior.iter().map(|(slip, ln)| slip.powi(power) * (ln - most).exp());
+        weighted.sum::<f64>() / weights
+    };
+    let (mean, square) = (mean_of(1), mean_of(2));
+    (mean, (square - mean * mean).max(0.0).sqrt())
+}
+
+/// The wheels by some loops.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// (rho - 1) / (rho + 1) and tau.
+    values: Vector2<f64>,
+    covariance: Matrix2<f64>,
+    pub slip: f64,
+    pub slip_sd: f64,
+    /// Of each loop, in units of its standard deviation.
+    pub residuals: Vec<f64>,
+    pub chi2_per_dof: f64,
+}
+
+/// A calibration that is not written.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum Refusal {
+    #[error(
+        "{found} loops are too few, of {FEWEST_LOOPS} that are needed; let it finish, or clear the floor before the wall"
+    )]
+    TooFew { found: usize },
+    #[error("{found} squares are too few; drive at least three to the left and three to the right")]
+    TooFewSquares { found: usize },
+    #[error(
+        "the residuals of {loops} loops are over {ACCIDENT} deviations; look at floor and wheels, then repeat it"
+    )]
+    Accidents { loops: usize },
+    #[error(
+        "chi^2 is {chi2_per_dof:.1} per degree of freedom, over {MOST_CHI2}: the floor is too slippery; repeat it on another"
+    )]
+    Scattered { chi2_per_dof: f64 },
+    #[error(
+        "what was held out contradicts the others by {deviations:.1} deviations, over {AGREES}; repeat the calibration"
+    )]
+    Contradicted { deviations: f64 },
+    #[error("the loops cannot be fitted; repeat the calibration")]
+    Singular,
+}
+
+/// What is fitted: a row for each loop.
+struct Rows {
+    design: DMatrix<f64>,
+    values: DVector<f64>,
+    /// The variance by slip for q = 1, and the covariance by the normals.
+    by_slip: DMatrix<f64>,
+    by_normals: DMatrix<f64>,
+}
+
+impl Rows {
+    fn of(loops: &[Loop], normal_sd: f64, track_m: f64) -> Self {
+        let n = loops.len();
+        let turned = |it: &Loop| (it.right_m - it.left_m) / track_m;
+        let design = DMatrix::from_fn(n, 2, |row, column| match column {
+            0 => (loops[row].right_m + loops[row].left_m) / track_m,
+            _ => -TAU * loops[row].turns,
+        });
+        let variance = normal_sd * normal_sd;
+        let by_normals = DMatrix::from_fn(n, n, |row, column| {
+            match loops[row].number.abs_diff(loops[column].number) {
+                0 => 2.0 * variance,
+                1 => -variance,
+                _ => 0.0,
+            }
+        });
+        let by_slip = loops.iter().map(|it| it.rolled_m / (track_m * track_m));
+        Self {
+            design,
+            values: DVector::from_iterator(n, loops.iter().map(|it| -turned(it))),
+            by_slip: DMatrix::from_diagonal(&DVector::from_iterator(n, by_slip)),
+            by_normals,
+        }
+    }
+
+    fn noise(&self, slip: f64) -> DMatrix<f64> {
+        &self.by_slip * (slip * slip) + &self.by_normals
+    }
+}
+
+pub(crate) fn prior() -> (Vector2<f64>, Matrix2<f64>) {
+    // e is half of rho - 1.
+    let variances = Vector2::new((PRIOR_RATIO / 2.0).powi(2), PRIOR_TRACK.powi(2));
+    (Vector2::new(0.0, 1.0), Matrix2::from_diagonal(&variances))
+}
+
+impl Estimate {
+    /// The wheels by `loops`, of a robot with the nominal track `track_m`.
+    ///
+    /// # Errors
+    /// If the numbers are not finite.
+    pub fn of(loops: &[Loop], normal_sd: f64, track_m: f64) -> Result<Self, Refusal> {
+        let rows = Rows::of(loops, normal_sd, track_m);
+        let (mean, covariance) = prior();
+        let surprise = &rows.values - &rows.design * mean;
+        let by_prior = &rows.design * covariance * rows.design.transpose();
+        let factor =
+            |slip: f64| Cholesky::new(rows.noise(slip) + &by_prior).ok_or(Refusal::Singular);
+        let (slip, slip_sd) = posterior_of_slip(|slip| {
+            factor(slip).map_or(f64::NAN, |factor| {
+                -0.5 * factor.ln_determinant() - 0.5 * surprise.dot(&factor.solve(&surprise))
+            })
+        });
+        let used = slip.hypot(slip_sd);
+        let factor = factor(used)?;
+        let gain = covariance * rows.design.transpose();
+        let values = mean + &gain * factor.solve(&surprise);
+        let posterior = covariance - &gain * factor.solve(&gain.transpose());
+        let left = &rows.values - &rows.design * values;
+        let noise = rows.noise(used);
+        let residuals = (0..loops.len()).map(|row| left[row] / noise[(row, row)].sqrt()).collect();
+        let whitened = Cholesky::new(noise).ok_or(Refusal::Singular)?.solve(&left);
+        let freedom = (loops.len() as f64 - 2.0).max(1.0);
+        let chi2_per_dof = left.dot(&whitened) / freedom;
+        let found = Self::from_parts(values, posterior, [slip, slip_sd], residuals, chi2_per_dof);
+        found.is_finite().then_some(found).ok_or(Refusal::Singular)
+    }
+
+    pub(crate) const fn from_parts(
+        values: Vector2<f64>,
+        covariance: Matrix2<f64>,
+        [slip, slip_sd]: [f64; 2],
+        residuals: Vec<f64>,
+        chi2_per_dof: f64,
+    ) -> Self {
+        Self { values, covariance, slip, slip_sd, residuals, chi2_per_dof }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        let values = self.values.iter().chain(&self.covariance).chain([&self.slip, &self.slip_sd]);
+        values.copied().all(f64::is_finite)
+    }
+
+    /// How far an end by tape is from what these wheels predict, in standard deviations of a coordinate. `by` gives the end by wheels,
+    /// and its variance by slip of 1.
+    pub(crate) fn deviations_of_end(
+        &self,
+        by: impl Fn(Wheels) -> (DVec2, f64),
+        end: DVec2,
+        tape_m: f64,
+    ) -> f64 {
+        let (here, by_slip) = by(self.wheels());
+        let square = self.slip.powi(2) + self.slip_sd.powi(2);
+        // The values that are a deviation off, along the axes of their ellipse.
+        let axes = self.covariance.symmetric_eigen();
+        let by_values: f64 = (0..2)
+            .map(|axis| {
+                let off = axes.eigenvectors.column(axis) * axes.eigenvalues[axis].max(0.0).sqrt();
+                by(Wheels::of(self.values.x + off[0], self.values.y + off[1]))
+                    .0
+                    .distance_squared(here)
+            })
+            .sum();
+        let variance = square * by_slip + tape_m * tape_m + by_values / 2.0;
+        (end.distance_squared(here) / 2.0 / variance).sqrt()
+    }
+
+    /// rho: diameter of the right wheel over that of the left one.
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
+        (1.0 + self.values.x) / (1.0 - self.values.x)
+    }
+
+    #[must_use]
+    pub fn ratio_sd(&self) -> f64 {
+        2.0 * self.covariance[(0, 0)].max(0.0).sqrt() / (1.0 - self.values.x).powi(2)
+    }
+
+    /// tau: track on the ground over the nominal one.
+    #[must_use]
+    pub fn track(&self) -> f64 {
+        self.values.y
+    }
+
+    #[must_use]
+    pub fn track_sd(&self) -> f64 {
+        self.covariance[(1, 1)].max(0.0).sqrt()
+    }
+
+    #[must_use]
+    pub fn wheels(&self) -> Wheels {
+        Wheels { e: self.values.x, track: self.values.y }
+    }
+
+    /// How far `held_out` is from what this predicts, in standard deviations of the prediction.
+    fn deviations(&self, held_out: &Loop, normal_sd: f64, track_m: f64) -> f64 {
+        let rows = Rows::of(&[*held_out], normal_sd, track_m);
+        let square = self.slip * self.slip + self.slip_sd * self.slip_sd;
+        let off = (&rows.values - &rows.design * self.values)[0];
+        let by_values = (&rows.design * self.covariance * rows.design.transpose())[(0, 0)];
+        off / (rows.noise(square.sqrt())[(0, 0)] + by_values).sqrt()
+    }
+
+    /// The values for `[robot.odometry]`, without their provenance. The loops do not tell the distance, which stays as it was.
+    #[must_use]
+    pub fn odometry(&self, before: &Odometry) -> Odometry {
+        Odometry {
+            diameter_ratio: self.ratio(),
+            diameter_ratio_sd: self.ratio_sd(),
+            track_scale: self.track(),
+            track_scale_sd: self.track_sd(),
+            distance_scale: before.distance_scale,
+            distance_scale_sd: before.distance_scale_sd,
+            slip: self.slip,
+            slip_sd: self.slip_sd,
+            calibrated: None,
+        }
+    }
+}
+
+/// The wheels by `loops`, and those that were used, if they agree: at most one is an accident, which is left out, and two that are held
+/// out lie where the others say.
+///
+/// # Errors
+/// Why nothing may be written.
+pub fn checked(
+    loops: &[Loop],
+    normal_sd: f64,
+    track_m: f64,
+) -> Result<(Estimate, Vec<Loop>), Refusal> {
+    if loops.len() < FEWEST_LOOPS {
+        return Err(Refusal::TooFew { found: loops.len() });
+    }
+    let mut used = loops.to_vec();
+    let mut accidents = 0;
+    loop {
+        let mut worst = (0, 0.0);
+        for (index, held_out) in used.iter().enumerate() {
+            let others: Vec<Loop> =
+                used.iter().filter(|it| it.number != held_out.number).copied().collect();
+            let others = Estimate::of(&others, normal_sd, track_m)?;
+            let deviations = others.deviations(held_out, normal_sd, track_m).abs();
+            if deviations > worst.1 {
+                worst = (index, deviations);
+            }
+        }
+        if worst.1 <= ACCIDENT {
+            break;
+        }
+        accidents += 1;
+        if accidents > 1 {
+            return Err(Refusal::Accidents { loops: accidents });
+        }
+        used.remove(worst.0);
+    }
+    let (others, held_out) = used.split_at(used.len() - HELD_OUT);
+    let by_others = Estimate::of(others, normal_sd, track_m)?;
+    for held_out in held_out {
+        let deviations = by_others.deviations(held_out, normal_sd, track_m).abs();
+        // What is no number does not agree.
+        let agrees = deviations <= AGREES;
+        if !agrees {
+            return Err(Refusal::Contradicted { deviations });
+        }
+    }
+    let estimate = Estimate::of(&used, normal_sd, track_m)?;
+    if estimate.chi2_per_dof > MOST_CHI2 {
+        return Err(Refusal::Scattered { chi2_per_dof: estimate.chi2_per_dof });
+    }
+    Ok((estimate, used))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,151 @@
+//! The normal of a wall from the echoes of a sweep.
+
+use serde::{Deserialize, Serialize};
+
+/// An echo is of the wall if its range is within so much of the median, metres. A rough wall answers over the whole sweep; the next
+/// of these limits leaves its ends out.
+const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
+/// Readings at either end of a leg that must not be of the wall: the arc that answers is whole.
+const MARGIN: usize = 2;
+/// The fewest readings of a wall.
+const FEWEST: usize = 5;
+/// The most readings of one leg, of which more are dropped: three times those of the slowest sweep at 7 Hz.
+const MOST: usize = 200;
+/// The difference between the arcs of both legs at which one of them was cut short, by a run of silence or by a thing beside the wall,
+/// radians.
+const UNEQUAL_RAD: f64 = 0.12;
+
+/// The readings of a turn to one side, in the order of time: heading and range, metres, NaN without an echo.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Leg(Vec<(f64, f64)>);
+
+/// The headings at which the wall begins and ends to answer, radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Arc {
+    first: f64,
+    last: f64,
+    range_m: f64,
+}
+
+impl Leg {
+    pub(crate) fn push(&mut self, heading: f64, range_m: Option<f64>) {
+        if self.0.len() < MOST {
+            self.0.push((heading, range_m.unwrap_or(f64::NAN)));
+        }
+    }
+
+    fn arc(&self) -> Option<Arc> {
+        let mut ranges: Vec<f64> =
+            self.0.iter().map(|(_, range)| *range).filter(|range| range.is_finite()).collect();
+        if ranges.len() < FEWEST {
+            return None;
+        }
+        ranges.sort_by(f64::total_cmp);
+        let median = ranges[ranges.len() / 2];
+        let whole = |within: f64| {
+            let of_wall = |&(_, range): &(f64, f64)| (range - median).abs() <= within;
+            let first = self.0.iter().position(of_wall)?;
+            let last = self.0.iter().rposition(of_wall)?;
+            let answers = self.0[first..=last].iter().filter(|&reading| of_wall(reading)).count();
+            let inside = first >= MARGIN && last + MARGIN < self.0.len() && answers >= FEWEST;
+            // The edge lies between the last reading outside and the first inside.
+            let edge =
+                |outside: usize, inside: usize| f64::midpoint(self.0[outside].0, self.0[inside].0);
+            inside.then(|| Arc {
+                first: edge(first - 1, first),
+                last: edge(last + 1, last),
+                range_m: median,
+            })
+        };
+        WITHIN_M.into_iter().find_map(whole)
+    }
+}
+
+/// The normal by the turns to both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Normal {
+    /// The heading that faces the wall, radians.
+    pub(crate) heading: f64,
+    /// The middle of the first turn's arc less that of the second one. The age of the ranges makes it the same in each sweep; its scatter is
+    /// that of the normals.
+    pub(crate) difference: f64,
+    /// The distance of the wall from the sonar, metres.
+    pub(crate) range_m: f64,
+}
+
+/// A sweep that gives no normal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoNormal {
+    /// A leg has not seen both ends of the arc that answers.
+    Narrow,
+    /// The arcs of both legs are not alike.
+    Unequal,
+}
+
+/// The normal, if both legs saw the whole arc that answers.
+pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
+    let [Some(there), Some(back)] = [legs[0].arc(), legs[1].arc()] else {
+        return Err(NoNormal::Narrow);
+    };
+    let width = |arc: Arc| (arc.last - arc.first).abs();
+    let middle = |arc: Arc| f64::midpoint(arc.first, arc.last);
+    if (width(there) - width(back)).abs() > UNEQUAL_RAD {
+        return Err(NoNormal::Unequal);
+    }
+    Ok(Normal {
+        heading: f64::midpoint(middle(there), middle(back)),
+        difference: middle(there) - middle(back),
+        range_m: f64::midpoint(there.range_m, back.range_m),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A turn from `from` to `to`, in which a wall at heading `wall` answers within `half` to either side, `late` radians behind.
+    fn leg(from: f64, to: f64, wall: f64, half: f64, late: f64) -> Leg {
+        let mut leg = Leg::default();
+        for step in 0..=90 {
+            let heading = from + (to - from) * f64::from(step) / 90.0;
+            let seen = heading - late * (to - from).signum();
+            let echo = ((seen - wall).abs() <= half).then_some(0.42);
+            leg.push(heading, echo);
+        }
+        leg
+    }
+
+    #[test]
+    fn the_age_of_the_ranges_cancels_between_both_ways() {
+        let legs = [leg(-0.8, 0.8, 0.1, 0.38, 0.02), leg(0.8, -0.8, 0.1, 0.38, 0.02)];
+        let normal = normal(&legs).unwrap();
+        assert!((normal.heading - 0.1).abs() < 0.01, "{normal:?}");
+        assert!((normal.difference - 0.04).abs() < 0.02, "{normal:?}");
+    }
+
+    #[test]
+    fn an_arc_that_the_sweep_or_silence_cuts_short_gives_no_normal() {
+        let whole = leg(-0.8, 0.8, 0.1, 0.38, 0.0);
+        let cut = leg(-0.8, 0.8, 0.6, 0.38, 0.0);
+        assert_eq!(normal(&[whole.clone(), cut]), Err(NoNormal::Narrow));
+        let mut silent = leg(0.8, -0.8, 0.1, 0.38, 0.0);
+        silent.0.iter_mut().filter(|(heading, _)| *heading > 0.2).for_each(|it| it.1 = f64::NAN);
+        assert_eq!(normal(&[whole.clone(), silent]), Err(NoNormal::Unequal));
+        assert_eq!(normal(&[whole, Leg::default()]), Err(NoNormal::Narrow));
+    }
+
+    #[test]
+    fn a_rough_wall_that_answers_at_every_angle_is_found_by_its_nearest_part() {
+        let rough = |from: f64, to: f64| {
+            let mut leg = Leg::default();
+            for step in 0..=90 {
+                let heading = from + (to - from) * f64::from(step) / 90.0;
+                let beyond = ((heading - 0.05).abs() - 0.26).max(0.0);
+                leg.push(heading, Some(0.61 / beyond.cos() - 0.19 * beyond.cos()));
+            }
+            leg
+        };
+        let normal = normal(&[rough(-0.8, 0.8), rough(0.8, -0.8)]).unwrap();
+        assert!((normal.heading - 0.05).abs() < 0.03, "{normal:?}");
+    }
+}

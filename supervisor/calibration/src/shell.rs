@@ -1,0 +1,173 @@
+//! `pose` and `ranges` in, `guidance` out, in place of the planner. The state is saved before the guidance is published.
+
+use std::{collections::VecDeque, path::Path};
+
+use common::{
+    bus::{Reader, SliceReader, Writer},
+    checkpoint::{Checkpoint, CheckpointError},
+    kinematics::Pose2,
+    mission::{Body, CalibrationPlan, Procedure},
+    run,
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, RangeReading, RangesHeader},
+    saved::Saved,
+    shell::{Context, Process, Progress, StageError},
+    topics::{GUIDANCE, POSE, RANGES},
+    wiring::{Persists, Wiring},
+};
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    squares::Square,
+    wall::{Order, Wall, echo_m},
+};
+
+/// Room for the encoded state, bytes: two legs of 200 readings, and 64 loops.
+pub(crate) const STATE_BYTES: usize = 16 << 10;
+/// Poses that wait for the readings of their tick.
+const MOST_POSES: usize = 64;
+
+/// The procedure that is under way.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum Drive {
+    Wall(Box<Wall>),
+    Square(Square),
+}
+
+impl Drive {
+    /// The procedure of the run in `directory` at its end, as the stage saved it in its last tick. A recording may lack ticks, because no
+    /// stage waits for a recorder.
+    ///
+    /// # Errors
+    /// If the checkpoint cannot be read.
+    pub fn of_run(directory: &Path) -> Result<Option<Self>, CheckpointError> {
+        let file = run::checkpoint_file(directory, Shell::WIRING.stage);
+        Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
+    }
+
+    fn new(plan: CalibrationPlan) -> Self {
+        match plan.procedure {
+            Procedure::Wall => Self::Wall(Box::new(Wall::new(plan))),
+            Procedure::LeftSquare => Self::Square(Square::new(plan.drive_m, true)),
+            Procedure::RightSquare => Self::Square(Square::new(plan.drive_m, false)),
+        }
+    }
+
+    fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
+        match self {
+            Self::Wall(wall) => wall.step(counts, echo_m, body),
+            Self::Square(square) => square.step(counts, body),
+        }
+    }
+}
+
+pub struct Shell {
+    pose: Reader<PoseSample>,
+    ranges: SliceReader<RangesHeader, RangeReading>,
+    /// The row of the front sonar.
+    front: usize,
+    guidance: Writer<GuidanceSample>,
+    saved: Saved,
+    body: Body,
+    /// Where the robot faces the wall.
+    target: DVec2,
+    drive: Drive,
+    poses: VecDeque<PoseSample>,
+    /// The newest tick with readings, and the echo of the front sonar, metres.
+    newest: Option<(u64, Option<f64>)>,
+    answered: Option<GuidanceSample>,
+    progress: Progress,
+}
+
+impl Process for Shell {
+    const WIRING: &'static Wiring = &Wiring {
+        inputs: &[&POSE, &RANGES],
+        wakes: &[&POSE, &RANGES],
+        outputs: &[&GUIDANCE],
+        persists: Persists::State(STATE_BYTES),
+        ..Wiring::of("planner")
+    };
+
+    fn open(context: &mut Context) -> Result<Self, StageError> {
+        let mission = &context.run.mission;
+        let plan = mission.planner.calibration.clone().unwrap_or_default();
+        let (body, target, front) = (mission.body(), mission.target, mission.front_row());
+        let mut drive = Drive::new(plan);
+        if let Some(state) = context.saved_state()? {
+            drive = state;
+            tracing::info!("restored");
+        }
+        Ok(Self {
+            pose: context.reader(&POSE)?,
+            ranges: context.slice_reader(&RANGES)?,
+            front,
+            guidance: context.writer(&GUIDANCE)?,
+            saved: context.take_saved(),
+            body,
+            target,
+            drive,
+            poses: VecDeque::new(),
+            newest: None,
+            answered: None,
+            progress: Progress::default(),
+        })
+    }
+
+    fn turn(&mut self) -> Result<Progress, StageError> {
+        while let Some(pose) = self.pose.take()? {
+            self.progress = Progress::of(&pose.stamp);
+            self.poses.push_back(pose);
+            if self.poses.len() > MOST_POSES {
+                self.poses.pop_front();
+                // A tick that is given again gets its answer again.
+                if let Some(answered) = self.answered.filter(|it| it.pose_ns == pose.stamp.stamp_ns)
+                {
+                    self.guidance.publish(pose.stamp.tick, pose.stamp.time(), answered)?;
+                    continue;
+                }
+            }
+        }
+        while let Some(pose) = self.poses.front().copied() {
+            // Pose and readings of a tick come in any order.
+            while self.newest.is_none_or(|(tick, _)| tick < pose.stamp.tick) {
+                let Some(ranges) = self.ranges.take()? else {
+                    return Ok(self.progress);
+                };
+                let front = ranges.iter().find(|it| usize::from(it.sensor) == self.front);
+                self.newest = Some((ranges.header().stamp.tick, front.and_then(echo_m)));
+            }
+            self.poses.pop_front();
+            let readings = self.newest.filter(|(tick, _)| *tick == pose.stamp.tick);
+            self.answer(&pose, readings.and_then(|(_, echo_m)| echo_m))?;
+        }
+        Ok(self.progress)
+    }
+}
+
+impl Shell {
+    fn answer(&mut self, pose: &PoseSample, echo_m: Option<f64>) -> Result<(), StageError> {
+        let order = self.drive.step([pose.left_counts, pose.right_counts], echo_m, &self.body);
+        self.saved.save(&self.drive)?;
+        let heading_rad = order.heading_rad;
+        let at = Pose2 { position: DVec2::ZERO, heading: heading_rad + order.aside_rad };
+        let direction = match order.status {
+            GuidanceStatus::Along | GuidanceStatus::Look => at.axis(),
+            _ => DVec2::ZERO,
+        };
+        let guidance = GuidanceSample {
+            ex: direction.x,
+            ey: direction.y,
+            distance_m: self.target.distance(DVec2::new(order.x_m, 0.0)),
+            speed_limit_m_s: order.speed_limit_m_s,
+            status: order.status.into(),
+            // The place before the wall: dead reckoning with uncalibrated wheels would be metres off after some loops.
+            x_m: order.x_m,
+            y_m: 0.0,
+            heading_rad,
+            ..GuidanceSample::for_pose(pose, &GridHeader::default())
+        };
+        self.answered = Some(guidance);
+        self.guidance.publish(pose.stamp.tick, pose.stamp.time(), guidance)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,66 @@
+//! Promises of the squares.
+
+use super::*;
+
+const DT: f64 = 1.0 / 7.0;
+
+fn body() -> Body {
+    common::mission::Model::X80.body()
+}
+
+/// Drive a square with wheels of this ratio and track, which do not slip.
+fn drive(ratio: f64, track: f64, to_the_left: bool) -> Driven {
+    let wheels = Wheels::of((ratio - 1.0) / (ratio + 1.0), track);
+    let mut square = Square::new(2.0, to_the_left);
+    let mut pose = Pose2::default();
+    let (mut nominal, mut ways) = ([0.0, 0.0], Vec::new());
+    for _ in 0..2000 {
+        let counts = nominal.map(|way: f64| {
+            ((way / body().metres_per_count()).round() as i64).rem_euclid(32_768) as u16
+        });
+        let order = square.step(counts, &body());
+        let (v, omega) = match order.status {
+            GuidanceStatus::Look => {
+                (0.0, (3.0 * order.aside_rad.abs()).clamp(0.25, 1.5) * order.aside_rad.signum())
+            }
+            GuidanceStatus::Along => (order.speed_limit_m_s, 0.2 * order.aside_rad.sin()),
+            _ => break,
+        };
+        let half = omega * body().track_m / 2.0;
+        let step = [(v - half) * DT, (v + half) * DT];
+        nominal = [nominal[0] + step[0], nominal[1] + step[1]];
+        ways.push(step);
+        pose = pose.along_arc(v * DT, wheels.turned(step[0], step[1], body().track_m));
+    }
+    assert_eq!(square.state(), State::Finished);
+    Driven { ways, end: pose.position }
+}
+
+fn squares(ratio: f64, track: f64) -> Vec<Driven> {
+    (0..8).map(|index| drive(ratio, track, index % 2 == 0)).collect()
+}
+
+#[test]
+fn nominal_wheels_come_back_to_their_mark() {
+    for to_the_left in [true, false] {
+        assert!(drive(1.0, 1.0, to_the_left).end.length() < 0.15);
+    }
+}
+
+#[test]
+fn ratio_and_track_are_found_from_the_ends_of_squares() {
+    for (ratio, track) in [(1.006, 1.02), (0.994, 0.98)] {
+        let estimate = checked(&squares(ratio, track), body().track_m).unwrap();
+        assert!((estimate.ratio() - ratio).abs() < 0.0005, "{ratio}: {estimate:?}");
+        assert!((estimate.track() - track).abs() < 0.002, "{track}: {estimate:?}");
+    }
+}
+
+#[test]
+fn an_end_that_was_typed_wrongly_is_refused() {
+    let mut squares = squares(1.002, 1.0);
+    squares[7].end += DVec2::new(1.0, 0.0);
+    let refusal = checked(&squares, body().track_m);
+    assert!(matches!(refusal, Err(Refusal::Contradicted { .. })), "{refusal:?}");
+    assert_eq!(checked(&squares[..4], body().track_m), Err(Refusal::TooFewSquares { found: 4 }));
+}

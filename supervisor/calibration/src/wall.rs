@@ -1,0 +1,392 @@
+//! The procedure before a wall: sweep, turn, drive away, turn, come back, sweep again. A step for each tick, pure.
+//!
+//! Headings are measured from the last normal, with the wheels as the loops so far have them. The first two loops have a single turn,
+//! because nothing is known of the track yet; later ones have as many as the robot can make and still find the wall.
+
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
+
+use common::{
+    mission::{Body, CalibrationPlan},
+    samples::{GuidanceStatus, RangeReading, RangeStatus},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    loops::{Estimate, FEWEST_LOOPS, Loop, Wheels, normal_sd},
+    normal::{Leg, NoNormal, normal},
+    ways::Ways,
+};
+
+/// The range at which a drive to the wall ends, metres, and that at which it goes slowly.
+const STOP_M: f64 = 0.42;
+const NEAR_M: f64 = 0.7;
+/// A drive away from the wall ends when something is so near ahead, metres.
+const AHEAD_M: f64 = 0.5;
+/// The longest first drive to the wall, metres, and the readings without an echo at which it ends before.
+const APPROACH_M: f64 = 2.0;
+const SILENT: u32 = 7;
+/// A single near echo may be false: so many in a row are none.
+const NEAR: u32 = 2;
+/// The shortest drive away of which a loop learns something, metres.
+const SHORTEST_M: f64 = 0.5;
+/// A drive back that comes so much nearer to the wall than it may has missed the wall's echo, metres.
+const BEYOND_M: f64 = 0.15;
+/// Half the angle of a sweep. One that was too narrow, because the robot had turned by less or more than it took itself to, is followed
+/// by one that is wider by a third, up to the greatest share.
+const SWEEP_RAD: f64 = FRAC_PI_4;
+const WIDER: f64 = 1.0 / 3.0;
+const MOST_WIDER: u32 = 2;
+/// Sweeps of one visit.
+const SWEEPS: u32 = 5;
+/// Whole turns of a loop before the half one: the first number of them after which the heading is known this well, radians.
+const TURNS: [f64; 2] = [3.0, 1.0];
+const HEADING_SD_RAD: f64 = 0.13;
+/// The controller turns on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s: so much ahead of the robot
+/// is the direction that it is ordered to, radians, in a sweep and at most in another turn.
+const SLOW_RAD: f64 = 0.08;
+const FAST_RAD: f64 = 0.5;
+/// A turn is over when so much is left, radians.
+const TURNED_RAD: f64 = 0.04;
+/// Speeds, m/s.
+const SPEED_M_S: f64 = 0.35;
+const NEAR_M_S: f64 = 0.12;
+/// The deviation of the track that is good enough, over that of the ratio.
+const TRACK_OVER_RATIO: f64 = 3.0;
+
+/// The state of a calibration before a wall.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wall {
+    plan: CalibrationPlan,
+    ways: Ways,
+    /// The wheels by the loops so far.
+    wheels: Wheels,
+    /// The ways when the robot faced the wall.
+    visit: Ways,
+    /// Whether that is a normal that was measured: the first one is where the robot started.
+    is_measured: bool,
+    /// The heading of the wall that is expected next, radians.
+    facing: f64,
+    phase: Phase,
+    /// The way of the middle between the wheels at the start of this phase, metres.
+    phase_from_m: f64,
+    /// The way of the middle at the start of the drive away, the length of that drive with its end, and the range at which the
+    /// robot swept before it, metres.
+    away_from_m: f64,
+    away_m: f64,
+    swept_m: f64,
+    /// Readings in a row that are at the limit of this phase, and readings without an echo.
+    near: u32,
+    silent: u32,
+    sweeps: u32,
+    /// How often the sweep was made wider.
+    wider: u32,
+    legs: [Leg; 2],
+    /// Differences between the two ways of each sweep, radians.
+    differences: Vec<f64>,
+    loops: Vec<Loop>,
+    /// Visits so far.
+    visits: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+enum Phase {
+    /// To the wall.
+    Approach,
+    /// To the beginning of the sweep.
+    Aside,
+    /// The sweep: the first leg, then the second.
+    Sweep(usize),
+    /// Turns, and away from the wall.
+    Turn(f64),
+    Away(f64),
+    /// The half turn back to the wall.
+    Back,
+    Finished,
+    Failed(Fault),
+}
+
+/// A procedure that cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+pub enum Fault {
+    #[error(
+        "no flat wall was found ahead; put the robot 0.5 to 2 m before one, facing it, with 1 m of it free to either side"
+    )]
+    NoWall,
+    #[error("something stands less than half a metre behind; clear the floor before the wall")]
+    NoRoom,
+}
+
+/// The order of one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Order {
+    pub status: GuidanceStatus,
+    /// The angle from the robot's axis to the direction, counter-clockwise, radians.
+    pub aside_rad: f64,
+    pub speed_limit_m_s: f64,
+    /// The robot's place and heading before the wall: the origin is where it faces the wall, and the wall is ahead on the x-axis.
+    pub x_m: f64,
+    pub heading_rad: f64,
+}
+
+/// The end of a procedure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum State {
+    Running,
+    Finished,
+    Failed(Fault),
+}
+
+/// The distance that a reading of the front sonar gives, metres.
+pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
+    match reading.status() {
+        RangeStatus::Measured => Some(reading.range_m),
+        RangeStatus::AtContact => Some(0.0),
+        RangeStatus::Nothing | RangeStatus::Absent | RangeStatus::Invalid => None,
+    }
+}
+
+impl Wall {
+    #[must_use]
+    pub fn new(plan: CalibrationPlan) -> Self {
+        Self {
+            plan,
+            ways: Ways::default(),
+            wheels: Wheels::NOMINAL,
+            visit: Ways::default(),
+            is_measured: false,
+            facing: 0.0,
+            phase: Phase::Approach,
+            phase_from_m: 0.0,
+            away_from_m: 0.0,
+            away_m: 0.0,
+            swept_m: STOP_M,
+            near: 0,
+            silent: 0,
+            sweeps: 0,
+            wider: 0,
+            legs: Default::default(),
+            differences: Vec::new(),
+            loops: Vec::new(),
+            visits: 0,
+        }
+    }
+
+    #[must_use]
+    pub fn loops(&self) -> &[Loop] {
+        &self.loops
+    }
+
+    /// The standard deviation of a normal, radians.
+    #[must_use]
+    pub fn normal_sd(&self) -> f64 {
+        normal_sd(&self.differences)
+    }
+
+    /// The mean way of a wheel so far, metres.
+    #[must_use]
+    pub fn metres(&self) -> f64 {
+        self.ways.rolled_m / 2.0
+    }
+
+    #[must_use]
+    pub const fn state(&self) -> State {
+        match self.phase {
+            Phase::Finished => State::Finished,
+            Phase::Failed(fault) => State::Failed(fault),
+            _ => State::Running,
+        }
+    }
+
+    /// The order for a tick with these counts and this echo.
+    pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
+        self.ways.step(counts, body);
+        let heading = self.heading(body);
+        self.advance(heading, echo_m, body);
+        self.order(self.heading(body), echo_m)
+    }
+
+    /// The turn since the wall was faced, radians.
+    fn heading(&self, body: &Body) -> f64 {
+        let left = self.ways.left_m - self.visit.left_m;
+        let right = self.ways.right_m - self.visit.right_m;
+        self.wheels.turned(left, right, body.track_m)
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.phase_from_m = self.ways.arc_m();
+        (self.near, self.silent) = (0, 0);
+    }
+
+    fn advance(&mut self, heading: f64, echo_m: Option<f64>, body: &Body) {
+        let driven = (self.ways.arc_m() - self.phase_from_m).abs();
+        let limit = if matches!(self.phase, Phase::Away(_)) { AHEAD_M } else { STOP_M };
+        self.near = if echo_m.is_some_and(|echo| echo <= limit) { self.near + 1 } else { 0 };
+        self.silent = if echo_m.is_none() { self.silent + 1 } else { 0 };
+        let is_near = self.near >= NEAR;
+        match self.phase {
+            Phase::Approach => {
+                let (longest, is_lost) = if self.visits == 0 {
+                    (APPROACH_M, self.silent >= SILENT)
+                } else {
+                    (self.away_m + self.swept_m - STOP_M + BEYOND_M, false)
+                };
+                if is_near || is_lost || driven >= longest {
+                    (self.sweeps, self.wider) = (0, 0);
+                    self.enter(Phase::Aside);
+                }
+            }
+            Phase::Aside => {
+                if heading <= self.facing - self.half_rad() {
+                    self.legs = Default::default();
+                    self.enter(Phase::Sweep(0));
+                }
+            }
+            Phase::Sweep(leg) => {
+                let nominal = (self.ways.right_m - self.ways.left_m) / body.track_m;
+                self.legs[leg.min(1)].push(nominal, echo_m);
+                if leg == 0 && heading >= self.facing + self.half_rad() {
+                    self.enter(Phase::Sweep(1));
+                } else if leg == 1 && heading <= self.facing - self.half_rad() {
+                    self.end_sweep(nominal, body);
+                }
+            }
+            Phase::Turn(target) => {
+                if (target - heading) * target.signum() <= TURNED_RAD {
+                    self.away_from_m = self.ways.arc_m();
+                    self.enter(Phase::Away(target));
+                }
+            }
+            Phase::Away(target) => {
+                if driven >= self.plan.drive_m || is_near {
+                    self.away_m = driven;
+                    self.facing = target + PI * target.signum();
+                    let fault = driven < SHORTEST_M;
+                    self.enter(if fault { Phase::Failed(Fault::NoRoom) } else { Phase::Back });
+                }
+            }
+            Phase::Back => {
+                if (self.facing - heading) * self.facing.signum() <= TURNED_RAD {
+                    // The robot rolled on for a while when the drive was over.
+                    self.away_m = (self.ways.arc_m() - self.away_from_m).abs();
+                    self.enter(Phase::Approach);
+                }
+            }
+            Phase::Finished | Phase::Failed(_) => {}
+        }
+    }
+
+    /// The sweep is over, at the `nominal` heading: the loop is complete if the wall was found.
+    fn end_sweep(&mut self, nominal: f64, body: &Body) {
+        self.sweeps += 1;
+        let normal = match normal(&self.legs) {
+            Ok(normal) => normal,
+            Err(problem) => {
+                if problem == NoNormal::Narrow {
+                    self.wider = (self.wider + 1).min(MOST_WIDER);
+                }
+                let again = self.sweeps < SWEEPS;
+                self.enter(if again { Phase::Aside } else { Phase::Failed(Fault::NoWall) });
+                return;
+            }
+        };
+        // The wheels stood there if the robot had turned on the spot from here to the normal.
+        let aside_m = (normal.heading - nominal) * body.track_m / 2.0;
+        let mut faced = self.ways;
+        faced.left_m -= aside_m;
+        faced.right_m += aside_m;
+        self.differences.push(normal.difference);
+        self.swept_m = normal.range_m;
+        if self.is_measured {
+            self.loops.push(Loop {
+                number: self.visits,
+                turns: (self.facing / TAU).round(),
+                left_m: faced.left_m - self.visit.left_m,
+                right_m: faced.right_m - self.visit.right_m,
+                rolled_m: faced.rolled_m - self.visit.rolled_m,
+            });
+        }
+        self.visits += 1;
+        (self.visit, self.is_measured, self.facing) = (faced, true, 0.0);
+        let estimate = Estimate::of(&self.loops, self.normal_sd(), body.track_m).ok();
+        self.wheels = estimate.as_ref().map_or(self.wheels, Estimate::wheels);
+        if self.is_enough(estimate.as_ref()) {
+            self.enter(Phase::Finished);
+            return;
+        }
+        let done = self.loops.len();
+        let side = if done.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let turns = self.turns(estimate.as_ref(), body);
+        self.enter(Phase::Turn(side * (TAU * turns + PI)));
+    }
+
+    /// Half the angle of this sweep.
+    fn half_rad(&self) -> f64 {
+        SWEEP_RAD * (1.0 + WIDER * f64::from(self.wider))
+    }
+
+    /// The whole turns of the next loop: none before both sides were tried once.
+    fn turns(&self, estimate: Option<&Estimate>, body: &Body) -> f64 {
+        let Some(estimate) = estimate.filter(|_| self.loops.len() >= 2) else {
+            return 0.0;
+        };
+        let is_known = |turns: &f64| {
+            let turned = TAU * (turns + 1.0);
+            let rolled_m = 4.0 * self.plan.drive_m + turned * body.track_m;
+            let by_slip = estimate.slip * rolled_m.sqrt() / body.track_m;
+            (turned * estimate.track_sd()).hypot(by_slip) <= HEADING_SD_RAD
+        };
+        TURNS.into_iter().find(is_known).unwrap_or(0.0)
+    }
+
+    fn is_enough(&self, estimate: Option<&Estimate>) -> bool {
+        let done = self.loops.len();
+        if done < FEWEST_LOOPS {
+            return false;
+        }
+        let asked = self.plan.ratio_sd;
+        done >= usize::try_from(self.plan.loops).unwrap_or(usize::MAX)
+            || estimate.is_some_and(|estimate| {
+                estimate.ratio_sd() <= asked && estimate.track_sd() <= TRACK_OVER_RATIO * asked
+            })
+    }
+
+    fn order(&self, heading: f64, echo_m: Option<f64>) -> Order {
+        let turn = |target: f64, fast: bool| {
+            let left = target - heading;
+            let most = if fast { FAST_RAD } else { SLOW_RAD };
+            let aside = left.abs().clamp(SLOW_RAD, most) * left.signum();
+            (GuidanceStatus::Look, aside, 0.0)
+        };
+        let along = |target: f64, limit: f64| {
+            let aside = (target - heading).clamp(-PI / 6.0, PI / 6.0);
+            (GuidanceStatus::Along, aside, limit)
+        };
+        let is_near = echo_m.is_some_and(|echo| echo <= NEAR_M);
+        let speed = if is_near { NEAR_M_S } else { SPEED_M_S };
+        // Beyond the end of a leg, so that the robot is still turning there.
+        let beyond = self.half_rad() + SLOW_RAD;
+        let (status, aside_rad, speed_limit_m_s) = match self.phase {
+            Phase::Approach => along(self.facing, speed),
+            Phase::Aside => turn(self.facing - beyond, true),
+            Phase::Sweep(0) => turn(self.facing + beyond, false),
+            Phase::Sweep(_) => turn(self.facing - beyond, false),
+            Phase::Turn(target) => turn(target, true),
+            Phase::Away(target) => along(target, SPEED_M_S),
+            Phase::Back => turn(self.facing, true),
+            // Either way the run is over.
+            Phase::Finished | Phase::Failed(_) => (GuidanceStatus::AtTarget, 0.0, 0.0),
+        };
+        let driven = (self.ways.arc_m() - self.phase_from_m).abs();
+        let x_m = match self.phase {
+            Phase::Away(_) => -driven,
+            Phase::Back => -self.away_m,
+            Phase::Approach if self.visits > 0 => (driven - self.away_m).min(0.0),
+            _ => 0.0,
+        };
+        Order { status, aside_rad, speed_limit_m_s, x_m, heading_rad: heading }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+//! Promises of the procedure, on a robot whose wheels and world are a few lines.
+
+use common::checkpoint::Checkpoint;
+
+use super::*;
+
+const DT: f64 = 1.0 / 7.0;
+const WALL_M: f64 = 1.0;
+
+fn body() -> Body {
+    common::mission::Model::X80.body()
+}
+
+/// A robot that does as it is ordered, before a wall that answers within 22 degrees of its normal.
+struct Robot {
+    x: f64,
+    y: f64,
+    heading: f64,
+    ratio: f64,
+    track: f64,
+    /// Nominal ways, metres.
+    left: f64,
+    right: f64,
+    wall: bool,
+}
+
+impl Robot {
+    fn new(ratio: f64, track: f64) -> Self {
+        let (x, y, heading) = (0.0, 0.0, 0.1);
+        Self { x, y, heading, ratio, track, left: 0.0, right: 0.0, wall: true }
+    }
+
+    fn counts(&self) -> [u16; 2] {
+        [self.left, self.right]
+            .map(|way| ((way / body().metres_per_count()).round() as i64).rem_euclid(32_768) as u16)
+    }
+
+    fn echo(&self) -> Option<f64> {
+        let aside = (self.heading + PI).rem_euclid(TAU) - PI;
+        let range = WALL_M - self.x - 0.19 * aside.cos();
+        (self.wall && aside.abs() < 0.384 && range < 2.55)
+            .then_some((range * 100.0).round() / 100.0)
+    }
+
+    fn obey(&mut self, order: &Order) {
+        let (v, omega) = match order.status {
+            GuidanceStatus::Look => {
+                (0.0, (3.0 * order.aside_rad.abs()).clamp(0.25, 1.5) * order.aside_rad.signum())
+            }
+            GuidanceStatus::Along => (order.speed_limit_m_s.min(0.35), 0.2 * order.aside_rad.sin()),
+            _ => (0.0, 0.0),
+        };
+        let track_m = body().track_m;
+        let (left, right) = ((v - omega * track_m / 2.0) * DT, (v + omega * track_m / 2.0) * DT);
+        self.left += left;
+        self.right += right;
+        let both = 2.0 / (1.0 + self.ratio);
+        let (left, right) = (left * both, right * both * self.ratio);
+        self.heading += (right - left) / (track_m * self.track);
+        self.x += f64::midpoint(left, right) * self.heading.cos();
+        self.y += f64::midpoint(left, right) * self.heading.sin();
+    }
+}
+
+fn run(robot: &mut Robot, plan: CalibrationPlan) -> Wall {
+    let mut wall = Wall::new(plan);
+    for _ in 0..20_000 {
+        let order = wall.step(robot.counts(), robot.echo(), &body());
+        robot.obey(&order);
+        assert!(robot.x < WALL_M - 0.25, "it came too near the wall: {:?}", wall.phase);
+        if wall.state() != State::Running {
+            break;
+        }
+    }
+    wall
+}
+
+#[test]
+fn a_robot_that_does_not_slip_is_calibrated_to_a_thousandth_and_stands_where_it_began() {
+    for (ratio, track) in [(1.008, 1.025), (0.992, 0.975), (1.0, 1.0)] {
+        let mut robot = Robot::new(ratio, track);
+        let wall = run(&mut robot, CalibrationPlan::default());
+        assert_eq!(wall.state(), State::Finished);
+        assert!(wall.loops().len() >= FEWEST_LOOPS);
+        let (estimate, _) =
+            crate::loops::checked(wall.loops(), wall.normal_sd(), body().track_m).unwrap();
+        assert!((estimate.ratio() - ratio).abs() < 0.001, "{ratio}: {}", estimate.ratio());
+        assert!((estimate.track() - track).abs() < 0.002, "{track}: {}", estimate.track());
+        assert!(robot.y.abs() < 1.0, "it drifted along the wall: {}", robot.y);
+    }
+}
+
+#[test]
+fn loops_go_to_the_left_and_to_the_right_in_turn() {
+    let wall = run(&mut Robot::new(1.0, 1.0), CalibrationPlan::default());
+    let turns: Vec<f64> = wall.loops().iter().map(|it| it.turns).collect();
+    assert_eq!(turns[..4], [1.0, -1.0, 4.0, -4.0]);
+}
+
+#[test]
+fn it_stops_after_the_most_loops_if_the_values_are_not_good_enough() {
+    let plan = CalibrationPlan { ratio_sd: 0.0, loops: 7, ..CalibrationPlan::default() };
+    let wall = run(&mut Robot::new(1.0, 1.0), plan);
+    assert_eq!((wall.state(), wall.loops().len()), (State::Finished, 7));
+}
+
+#[test]
+fn without_a_wall_it_fails_and_the_run_ends() {
+    let mut robot = Robot::new(1.0, 1.0);
+    robot.wall = false;
+    // Nothing is in the way of a robot without a wall.
+    robot.x = -4.0;
+    let wall = run(&mut robot, CalibrationPlan::default());
+    assert_eq!(wall.state(), State::Failed(Fault::NoWall));
+    assert_eq!(wall.order(0.0, None).status, GuidanceStatus::AtTarget, "the run ends");
+}
+
+#[test]
+fn the_state_of_a_whole_calibration_fits_into_its_checkpoint_and_comes_back() {
+    let plan = CalibrationPlan { ratio_sd: 0.0, loops: 40, ..CalibrationPlan::default() };
+    let mut wall = run(&mut Robot::new(1.004, 1.01), plan);
+    // The longest sweep is under way.
+    for _ in 0..1000 {
+        wall.legs.iter_mut().for_each(|leg| leg.push(1.0, Some(0.42)));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("planner.checkpoint");
+    let open = || Checkpoint::open::<Wall>(&file, crate::shell::STATE_BYTES).unwrap();
+    open().0.save(&wall).unwrap();
+    // Ranges without an echo are no number, which equals nothing.
+    assert_eq!(format!("{:?}", open().1), format!("{:?}", Some(wall)));
+}

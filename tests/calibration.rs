@@ -1,0 +1,66 @@
+//! Calibrations through real processes.
+
+use std::path::Path;
+
+use common::mission::{Calibration, Odometry};
+use serde_json::Value;
+
+use crate::support::{assert_nothing_left, directory_of, printed, refused};
+
+/// Wheels that nobody but the simulator knows: a larger right wheel on a narrower track, on a floor as measured.
+const UNKNOWN: [&str; 8] = [
+    "--set",
+    "simulation.wheels.diameter_ratio=1.006",
+    "--set",
+    "simulation.wheels.diameter_spread=0",
+    "--set",
+    "simulation.wheels.track_scale=0.985",
+    "--set",
+    "simulation.wheels.track_spread=0",
+];
+const NO_BIAS: [&str; 2] = ["--set", "simulation.wheels.slip_share_spread=0"];
+
+fn words<'a>(robot: &'a str, folder: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let own = ["calibrate", "--robot", robot, "--runs", folder, "--out", out, "--json"];
+    [&own, &UNKNOWN[..], &NO_BIAS, more].concat()
+}
+
+fn read(file: &Path) -> Odometry {
+    Calibration::parse(&std::fs::read_to_string(file).unwrap()).unwrap()
+}
+
+#[test]
+fn unknown_wheels_are_found_within_three_deviations_and_written() {
+    let folder = directory_of("calibrated");
+    let out = folder.path().join("calibration.toml");
+    let (folder_name, out_name) = (folder.path().to_str().unwrap(), out.to_str().unwrap());
+    let said = printed(&words("calibrated", folder_name, out_name, &["--seed", "3"]));
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let found = read(&out);
+    let is_near = |value: f64, sd: f64, truth: f64, most_sd: f64| {
+        assert!((value - truth).abs() <= 3.0 * sd, "{value} +- {sd}, not {truth}: {said}");
+        assert!(sd > 0.0 && sd <= most_sd, "{sd}: {said}");
+    };
+    is_near(found.diameter_ratio, found.diameter_ratio_sd, 1.006, 0.001);
+    is_near(found.track_scale, found.track_scale_sd, 0.985, 0.003);
+    is_near(found.slip, found.slip_sd, 0.001, 0.001);
+    let provenance = found.calibrated.unwrap();
+    assert_eq!((&*provenance.method, &*provenance.robot), ("wall", "calibrated"));
+    assert!(provenance.metres > 20.0 && provenance.chi2_per_dof < 4.0, "{provenance:?}");
+    let picture = std::fs::read_to_string(said["picture"].as_str().unwrap()).unwrap();
+    assert!(picture.starts_with("<svg"), "{picture:.20}");
+    assert_nothing_left("calibrated");
+}
+
+#[test]
+fn without_a_wall_nothing_is_written() {
+    let folder = directory_of("no-wall");
+    let out = folder.path().join("calibration.toml");
+    let (folder_name, out_name) = (folder.path().to_str().unwrap(), out.to_str().unwrap());
+    // No wall answers this sonar.
+    let deaf =
+        ["--set", "simulation.sonar.wall_limit_deg=0", "--set", "simulation.sonar.edge_share=0"];
+    refused(&words("no-wall", folder_name, out_name, &deaf), "not-calibrated", &["wall"]);
+    assert!(!out.exists());
+    assert_nothing_left("no-wall");
+}
