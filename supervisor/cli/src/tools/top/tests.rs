@@ -72,6 +72,7 @@ fn view() -> View {
             y_m: f64::from(y) * 0.1,
             heading_rad: FRAC_PI_2,
             travelled_m: 123.45,
+            covariance: [0.0036, 0.0, 0.0, 0.0009, 0.0, 0.0],
             ..PoseSample::default()
         });
     }
@@ -145,7 +146,7 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
         }
         let whole = lines.join("\n");
         for text in [
-            "0.00, -0.10 m, 90°",
+            "0.00, -0.10 ±0.12 m, 90°",
             "4.10 m; driven 123.45 m",
             "no way to the target, at most 0.50 m/s",
             "1000 full",
