@@ -105,9 +105,13 @@ pub(super) fn stages() -> String {
             Persists::State(bytes) => format!("its state, {bytes} bytes"),
             Persists::Journal => "its inputs since a snapshot".to_owned(),
         };
+        let more = match stage.per_million_cells.as_millis() {
+            0 => String::new(),
+            more => format!(", {more} ms more for a million cells"),
+        };
         item(&format!(
             "`{}` reads {}; is woken by {}; writes {}; persists {persists}; ready within {} ms, beats within {} ms, \
-             answers within {} ms, {} ms more for a million cells; while it is down: {}",
+             answers within {} ms{more}; while it is down: {}",
             stage.name,
             list(&[wiring.inputs, wiring.feedback]),
             list(&[wiring.wakes]),
@@ -115,7 +119,6 @@ pub(super) fn stages() -> String {
             stage.deadlines.startup.as_millis(),
             stage.deadlines.heartbeat.as_millis(),
             stage.deadlines.answers.as_millis(),
-            stage.per_million_cells.as_millis(),
             stage.while_down
         ))
     };
