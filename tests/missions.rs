@@ -156,8 +156,9 @@ fn a_turn_of_a_quarter_at_the_start_costs_little() {
 fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
     let known = "known.drum=[{at=[1.7,0.2],radius_m=0.35},{at=[3.7,-0.7],radius_m=0.4},\
                  {at=[2.3,-1.7],radius_m=0.3},{at=[3.9,1.2],radius_m=0.3}]";
-    let (_, sensing) = run("sensing", "obstacle-course", &PAPER);
-    let knows = [&PAPER[..], &["--set", known]].concat();
+    let laboratory = [&PAPER[..], &["--set", "simulation.realism='laboratory'"]].concat();
+    let (_, sensing) = run("sensing", "obstacle-course", &laboratory);
+    let knows = [&laboratory[..], &["--set", known]].concat();
     let (_, knowing) = run("knowing", "obstacle-course", &knows);
     assert_eq!(knowing["outcome"], "reached", "{knowing}");
     let time = |summary: &Value| summary["mission_time_s"].as_f64().unwrap();
