@@ -25,8 +25,9 @@ type Matrix = SMatrix<f64, PARTS, PARTS>;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Covariance(pub(crate) Matrix);
 
-/// Standard deviation of an unknown gyro's bias, rad/s.
-const BIAS_RAD_S: f64 = 0.02;
+/// Standard deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees a second. A source that is off by more removes
+/// it itself. With a greater one a robot that never rests takes unequal wheels for bias.
+const BIAS_RAD_S: f64 = 0.002;
 /// Growth of the bias's deviation, rad/s per square root of a second.
 const BIAS_WALK: f64 = 2e-5;
 

@@ -121,7 +121,7 @@ pub(crate) fn attack(
         collisions: summary.collisions.unwrap_or_default(),
         pose_excess_m: summary.pose_error_m.unwrap_or_default() - undisturbed_error_m,
         stopping_time_s: summary.stopping_time_s.unwrap_or_default(),
-        pose_allowance_m: pose_allowance_m(&options.loaded, kills),
+        pose_allowance_m: pose_allowance_m(&options.loaded, kills, &summary),
         kills,
         healthy_aborted: attack.healthy_aborted(&deaths(&directory)),
     };
@@ -159,11 +159,13 @@ fn deaths(directory: &Path) -> Vec<Value> {
 ///
 /// Each signal may cost one wheel count of travel. Besides, a run that was hit takes another path, so its wheels are read at
 /// other fractions of a count: one count between the wheels turns the heading by `count / track`, which displaces the robot by
-/// that fraction of the distance to the target.
-fn pose_allowance_m(mission: &Mission, kills: u32) -> f64 {
+/// that fraction of the distance to the target. Wheels that slip do so otherwise in each run: by what the robot says of its pose.
+fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     let body = mission.body();
     let target = mission.start_pose().position.distance(mission.target);
-    body.metres_per_count() * (f64::from(kills) + target / body.track_m)
+    let slips = mission.simulation.physics().wheels.slip_noise > 0.0;
+    let slip_m = if slips { summary.pose_within_m.unwrap_or_default() } else { 0.0 };
+    body.metres_per_count() * (f64::from(kills) + target / body.track_m) + slip_m
 }
 
 /// Start a robot that does not end with its supervisor.

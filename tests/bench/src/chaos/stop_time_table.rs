@@ -159,7 +159,7 @@ mod tests {
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
             (Entry { outcome: "wrong_place".to_owned(), ..entry(CountsReset) }, false),
-            (Entry { collisions: 1, ..entry(SonarSilent) }, true),
+            (Entry { collisions: 1, ..entry(SonarSilent) }, false),
             (Entry { fault_began: false, ..entry(SonarSilent) }, false),
         ];
         for (entry, kept) in rows {
