@@ -347,14 +347,17 @@ impl Mission {
     /// paper's 0.25.
     #[must_use]
     pub fn speed_m_s(&self) -> f64 {
-        self.controller.speed_m_s.unwrap_or_else(|| {
-            let ray = |sensor: &Sensor| sensor.used && sensor.kind == SensorKind::Ray;
-            match self.looks_first() {
-                false => 0.25,
-                true if self.sensor_table().iter().any(ray) => 0.7,
-                true => 0.5,
-            }
+        self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
+            false => 0.25,
+            true if self.used(SensorKind::Ray) > 0 => 0.7,
+            true => 0.5,
         })
+    }
+
+    /// The number of sensors of that kind that the mission uses.
+    #[must_use]
+    pub fn used(&self, kind: SensorKind) -> usize {
+        self.sensor_table().iter().filter(|sensor| sensor.used && sensor.kind == kind).count()
     }
 
     /// The set of sensors that the mapper uses: `sensors`, or by default all that the robot has with the evidential method, and the front
@@ -395,11 +398,7 @@ impl Mission {
     /// 2.0 rad/s three times as many robots touched something, most of them the ends of loose walls.
     #[must_use]
     pub fn hurry(&self) -> Hurry {
-        let sees = self.looks_first()
-            && self
-                .sensor_table()
-                .iter()
-                .any(|sensor| sensor.used && sensor.kind == SensorKind::Ray);
+        let sees = self.looks_first() && self.used(SensorKind::Ray) > 0;
         let [full, turns, look, stops] =
             if sees { [26.0, 73.0, 2.0, 0.4] } else { [1.0, 45.0, 1.2, 0.6] };
         let Controller { full_speed_within_deg, turns_beyond_deg, look_rad_s, .. } =

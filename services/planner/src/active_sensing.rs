@@ -65,7 +65,7 @@ impl ActiveSensing {
             turn: mission.turn_rad_s(),
             stops_within_s: mission.hurry().stops_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().mount.bearing_rad),
-            sonars: sonars(mission),
+            sonars: mission.used(SensorKind::Cone),
             scan_side: None,
         }
     }
@@ -136,12 +136,6 @@ impl ActiveSensing {
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
         on_arc.max(least).min(self.limit_before_echoes(belief, pose))
     }
-}
-
-/// The number of sonars that `mission` uses.
-fn sonars(mission: &Mission) -> usize {
-    let table = mission.sensor_table().into_iter();
-    table.filter(|sensor| sensor.used && sensor.kind == SensorKind::Cone).count()
 }
 
 /// Where to turn from `axis` to scan all directions in `unseen`: to the far end of a side without a stop. A scan that began on a `side`

@@ -15,7 +15,7 @@ pub mod restart;
 pub mod staleness;
 pub mod stop_monitor;
 pub mod streams;
-mod unheard_surface;
+mod undetected_surface;
 
 use std::time::Duration;
 

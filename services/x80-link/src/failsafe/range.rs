@@ -1,5 +1,5 @@
 //! The range monitor: whether the readings of the ranging sensors change as the motion says they must, and whether the front sonar hears
-//! what the infrared rangers see ([`super::unheard_surface`]).
+//! what the infrared rangers see ([`super::undetected_surface`]).
 //!
 //! An echo of something that stands comes nearer as the robot drives, and another thing answers when it turns. A reading that stays
 //! the same to the centimetre meanwhile is stuck: at one value, or at the last one. In 240 recorded missions, 150 of them with
@@ -19,7 +19,7 @@ use common::{
 
 use super::{
     monitor::{Condition, Counts, Moment, Monitor, Observation},
-    unheard_surface::UnheardSurface,
+    undetected_surface::UndetectedSurface,
 };
 
 /// Readings are equal if they differ from the first by no more than this, metres: a centimetre, and the rounding of the numbers.
@@ -120,7 +120,7 @@ pub struct Range {
     track_m: Option<f64>,
     counts: Option<[u16; 2]>,
     rows: Vec<Row>,
-    unheard: Option<UnheardSurface>,
+    undetected: Option<UndetectedSurface>,
 }
 
 impl Range {
@@ -155,7 +155,7 @@ impl Monitor for Range {
                 .filter(|(_, sensor)| sensor.used)
                 .map(|(row, sensor)| Row::of(row, sensor, front))
                 .collect(),
-            unheard: UnheardSurface::of(mission),
+            undetected: UndetectedSurface::of(mission),
         }
     }
 
@@ -168,8 +168,8 @@ impl Monitor for Range {
                         row.take(reading, now);
                     }
                 }
-                if let Some(unheard) = &mut self.unheard {
-                    unheard.take(readings);
+                if let Some(undetected) = &mut self.undetected {
+                    undetected.take(readings);
                 }
             }
             Observation::Motor(counts, Counts::Follow) => self.turn(counts),
@@ -179,8 +179,8 @@ impl Monitor for Range {
                 for row in &mut self.rows {
                     (row.equal, row.implausible) = (Equal::default(), None);
                 }
-                if let Some(unheard) = &mut self.unheard {
-                    unheard.reset();
+                if let Some(undetected) = &mut self.undetected {
+                    undetected.reset();
                 }
             }
             _ => {}
@@ -191,7 +191,7 @@ impl Monitor for Range {
         if !self.sensing {
             return false.into();
         }
-        if self.unheard.as_ref().is_some_and(UnheardSurface::is_implausible) {
+        if self.undetected.as_ref().is_some_and(UndetectedSurface::is_implausible) {
             return Condition::Holds;
         }
         let over_for = |row: &Row| match row.condition(now) {
@@ -204,9 +204,11 @@ impl Monitor for Range {
     }
 
     fn explain(&self, _: Cause, now: Moment) -> Option<String> {
-        if let Some(unheard) = self.unheard.as_ref().filter(|unheard| unheard.is_implausible()) {
+        if let Some(undetected) =
+            self.undetected.as_ref().filter(|undetected| undetected.is_implausible())
+        {
             let front = self.rows.iter().find(|row| row.looks_ahead)?;
-            return Some(unheard.explain(&front.name));
+            return Some(undetected.explain(&front.name));
         }
         let newest = |row: &&Row| row.implausible.map(|(_, at)| now.time.since(at.time));
         let implausible = self.rows.iter().filter(|row| row.implausible.is_some());

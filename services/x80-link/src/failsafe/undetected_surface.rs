@@ -23,7 +23,7 @@ pub(super) const SILENCES: u32 = 4;
 
 /// The front sonar, and the two rangers beside it.
 #[derive(Clone, Debug)]
-pub(super) struct UnheardSurface {
+pub(super) struct UndetectedSurface {
     front: u8,
     axis: DVec2,
     beside: [Ranger; 2],
@@ -38,7 +38,7 @@ struct Ranger {
     range_m: Option<f64>,
 }
 
-impl UnheardSurface {
+impl UndetectedSurface {
     /// None for a robot that does not use a ranger on either side of the front sonar.
     pub(super) fn of(mission: &Mission) -> Option<Self> {
         let (table, front) = (mission.sensor_table(), mission.front_row());
@@ -121,9 +121,9 @@ mod tests {
 
     use super::*;
 
-    fn watch(extra: &str) -> Option<UnheardSurface> {
+    fn watch(extra: &str) -> Option<UndetectedSurface> {
         let text = format!("target = [3, 0]\n{extra}");
-        UnheardSurface::of(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+        UndetectedSurface::of(&Mission::parse(&text, Path::new("test.toml")).unwrap())
     }
 
     /// The readings of the front sonar and of the rangers at 11.25 and -11.25 degrees; none for nothing.
