@@ -48,9 +48,9 @@ pub struct Simulation {
 #[serde(rename_all = "lowercase")]
 pub enum Realism {
     /// A good day in the laboratory.
-    #[default]
     Laboratory,
     /// The errors were measured on real robots. The radio is perfect unless the mission says otherwise.
+    #[default]
     Measured,
     /// Wheels slip more than those of any log that was found, each robot's in the same direction.
     Harsh,

@@ -145,7 +145,9 @@ mod tests {
     use crate::robot::Robot;
 
     fn car(extra: &str) -> Robot {
-        let text = format!("target = [3, 0]\nrobot.model = 'car'\n{extra}");
+        let text = format!(
+            "target = [3, 0]\nrobot.model = 'car'\nsimulation.realism = 'laboratory'\n{extra}"
+        );
         Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
     }
 

@@ -50,7 +50,7 @@ mod tests {
     fn wheels_in_the_laboratory_are_exactly_the_nominal_ones() {
         let diameter = Wheels { left: 1.0, right: 1.0 };
         let exact = WheelErrors { diameter, track: 1.0, slip_share: 0.0 };
-        assert_eq!(errors("seed = 7"), exact);
+        assert_eq!(errors("seed = 7\nsimulation.realism = 'laboratory'"), exact);
     }
 
     #[test]

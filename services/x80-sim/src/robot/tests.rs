@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use common::mission::Realism;
 use common::wire::{
     COUNT_CYCLE, Decoder, Gains, Parameter, Quantity, Request, Stream, Targets, counts_between,
 };
@@ -12,9 +13,14 @@ use super::*;
 
 mod realism;
 
+/// A mission with ideal sensors and wheels, unless `text` names a realism.
 fn mission(text: &str) -> Mission {
-    let text = format!("target = [3, 0]\n{text}");
-    Mission::parse(&text, Path::new("m.toml")).unwrap()
+    let mut mission =
+        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml")).unwrap();
+    if !text.contains("realism") {
+        mission.simulation.realism = Realism::Laboratory;
+    }
+    mission
 }
 
 fn robot(text: &str) -> Robot {

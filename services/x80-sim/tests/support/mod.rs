@@ -21,16 +21,21 @@ use std::{
 use common::{
     clock::Pace,
     ground_truth::{GroundTruthHeader, GroundTruthTick},
-    mission::Mission,
+    mission::{Mission, Realism},
 };
 use x80_sim::{SimError, SimOptions, Transport, run};
 
 /// Longer than anything here takes: a test that waits this long has failed.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
+/// A mission with ideal sensors and wheels, unless `text` names a realism.
 pub(crate) fn mission(text: &str) -> Mission {
-    let text = format!("target = [3, 0]\n{text}");
-    Mission::parse(&text, Path::new("test.toml")).unwrap()
+    let mut mission =
+        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("test.toml")).unwrap();
+    if !text.contains("realism") {
+        mission.simulation.realism = Realism::Laboratory;
+    }
+    mission
 }
 
 /// A running simulated robot; dropping it stops it.
