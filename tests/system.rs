@@ -19,6 +19,7 @@ mod faults;
 mod field;
 mod fixes;
 mod foreign_payload;
+mod goto;
 mod held_wheels;
 mod kills_and_freezes;
 mod live_replay;

@@ -24,6 +24,7 @@
 //! | [`wiring`] | what a stage's process opens and persists, declared |
 //! | [`stop_socket`] | the operator's stop without middleware |
 //! | [`shell`] | the process shell every stage runs in |
+//! | [`target`] | the target, as a stage follows it |
 //! | [`step`] | what a stage computes: the trait of every stage's pure step |
 //! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
 //! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
@@ -53,6 +54,7 @@ pub mod stage_command;
 pub mod start;
 pub mod step;
 pub mod stop_socket;
+pub mod target;
 pub mod topics;
 pub mod wiring;
 

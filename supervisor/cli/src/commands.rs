@@ -1,6 +1,8 @@
 //! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
 
 pub(crate) mod check;
+pub(crate) mod go_back;
+pub(crate) mod goto;
 pub(crate) mod help;
 pub(crate) mod install;
 pub(crate) mod logs;
@@ -82,6 +84,8 @@ commands! {
     "Operate a robot" {
         Run run,
         Status status,
+        Goto goto,
+        Return go_back,
         Stop stop,
         Resume resume,
         @tools { Top top, }

@@ -29,6 +29,7 @@ fn view() -> View {
         reason: 1,
         simulated: 1,
         last_request: 0,
+        answer: 0,
     };
     let entries = STAGES.map(|stage| RosterEntry {
         stage: name(stage),
